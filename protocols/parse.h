@@ -1,0 +1,36 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+
+namespace palpate {
+
+/// One thing wrong with an input file.
+struct Fault {
+  std::string file;
+  std::string place;     ///< JSON pointer, or "line L, column C" where the text is no JSON
+  std::string expected;  ///< what was expected there, and what was found
+};
+
+/// Every fault that was found in a file; what() lists them all, a line each: "file: place: expected".
+class InputError : public std::runtime_error {
+ public:
+  explicit InputError(std::vector<Fault> faults);
+  const std::vector<Fault>& faults() const { return faults_; }
+
+ private:
+  std::vector<Fault> faults_;
+};
+
+/// Reads and checks a protocol, also that its schedule can be built. \throws InputError with every fault.
+Protocol parse_protocol(const std::string& path);
+Protocol parse_protocol_text(const std::string& text, const std::string& file_name);
+
+/// Reads and checks a scene file: {"objects": [...]}. Mesh files are resolved relative to it.
+/// \throws InputError with every fault.
+std::vector<ObjectSpec> parse_scene(const std::string& path);
+
+}  // namespace palpate

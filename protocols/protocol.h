@@ -1,0 +1,84 @@
+#pragma once
+// An experiment's design as plain values; what each key means and its default: contracts, "Protocol".
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stimuli/object_spec.h"
+
+namespace palpate {
+
+enum class RendererKind { point, ray };
+const char* to_string(RendererKind kind);  ///< "point", "ray"
+
+enum class RendererOrder { fixed, counterbalanced, interleaved };
+enum class OrderKind { random, sequential };
+enum class OrientationKind { uniform, fixed, listed };
+
+struct StimulusSpec {
+  std::string name;   ///< unique within the protocol
+  ObjectSpec object;  ///< material already resolved against the protocol's default
+};
+
+struct Protocol {
+  int version = 1;
+  std::string name, title, description;
+  std::vector<RendererKind> renderers;
+  RendererOrder renderer_order = RendererOrder::counterbalanced;
+  std::vector<StimulusSpec> stimuli;
+  int repetitions = 1;  ///< of each stimulus, for each renderer
+  struct Order {
+    OrderKind kind = OrderKind::random;
+    std::optional<int> max_run;       ///< at most so many equal stimuli in a row within a block
+    std::optional<int> min_distance;  ///< equal stimuli at least so many trials apart (1: adjacent is allowed)
+  } order;
+  int blocks_per_renderer = 1;
+  OrientationKind orientation = OrientationKind::uniform;
+  std::vector<Quat> orientations;  ///< when listed
+  struct Practice {
+    int repetitions = 0;
+    std::optional<double> criterion;  ///< share correct to go on
+    int max_rounds = 1;
+  } practice;
+  struct Sessions {
+    int count = 1;
+    std::optional<double> max_minutes;
+    int warm_up_trials = 0;
+  } sessions;
+  struct Breaks {
+    std::optional<int> every_trials;
+    double min_seconds = 0;
+  } breaks;
+  struct Response {
+    std::map<std::string, std::string> keys;  ///< key -> stimulus name
+    double time_out = 60;                     ///< s
+    bool feedback = false;
+  } response;
+  struct Stylus {
+    double length = 0.12;  ///< m
+    double grip = 0.06;    ///< m, from the tip
+  } stylus;
+  struct Workspace {
+    Vec3 centre{0, 0, 0};  ///< m, in the device's frame: where the stimuli's origin stands
+    double scale = 1;      ///< virtual metres per device metre
+  } workspace;
+  Material material;
+  double servo_rate = 1000;  ///< Hz
+  struct Home {
+    double rest = 0.5;     ///< s
+    double margin = 0.01;  ///< m outside the bounding spheres
+  } home;
+  struct Texts {
+    std::string instructions, practice, break_text, end;
+  } texts;
+  bool samples = false;
+  std::uint64_t seed = 0;
+
+  std::string source_text;  ///< the file as it was read, byte for byte
+  std::string sha256;       ///< of source_text, lower-case hexadecimal
+};
+
+}  // namespace palpate

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+/// The virtual probe as the device reports it: a segment from tip to tail. World frame, m.
+struct LineProbe {
+  Vec3 tip, tail;
+};
+
+}  // namespace palpate

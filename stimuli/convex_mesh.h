@@ -1,0 +1,87 @@
+#pragma once
+// A closed convex polyhedron, prepared for local search: merged coplanar facets, edges with their
+// two facets, the fan of edges around every vertex.
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+/// What a mesh is made from: corners and faces as index loops, counter-clockwise seen from outside.
+struct PolygonSoup {
+  std::vector<Vec3> vertices;                      ///< m
+  std::vector<std::vector<std::uint32_t>> faces;   ///< three or more corners each
+};
+
+/// Why a polygon soup is no convex mesh: one message for each fault found (the first few of a kind).
+class MeshError : public std::runtime_error {
+ public:
+  explicit MeshError(std::vector<std::string> faults);
+  const std::vector<std::string>& faults() const { return faults_; }
+
+ private:
+  std::vector<std::string> faults_;
+};
+
+/// One side of a facet's polygon, in counter-clockwise order seen from outside.
+struct Side {
+  Vec3 inward;          ///< unit, in the facet's plane, pointing into the polygon
+  double offset;        ///< m; a point p of the plane is on the inner side when dot(inward, p) >= offset
+  std::uint32_t edge;   ///< index into edges
+  std::uint32_t across; ///< the facet beyond this side
+};
+
+/// A maximal planar polygon of the surface.
+struct Facet {
+  Vec3 normal;               ///< unit, outward
+  double offset;             ///< m; the plane is dot(normal, p) == offset
+  std::uint32_t first_side;  ///< its sides are sides[first_side .. first_side + side_count)
+  std::uint32_t side_count;
+};
+
+/// An edge between two facets that are not coplanar. Seen from outside, with v0 below and v1 above,
+/// `left` and `right` are the facets on those hands: v0 -> v1 is counter-clockwise in `left`.
+struct Edge {
+  std::uint32_t v0, v1;
+  std::uint32_t left, right;
+};
+
+/// Immutable after construction. Facets, edges and vertices that are near each other in space are
+/// near each other in memory. Every vertex is a corner of at least three facets (vertices inside a
+/// merged facet or along a straight edge are dropped).
+class ConvexMesh {
+ public:
+  /// Merges duplicate vertices and coplanar neighbours, checks that the result is closed, convex
+  /// and consistently outward. Tolerances are relative to the size of the object.
+  /// \throws MeshError naming every kind of fault.
+  explicit ConvexMesh(const PolygonSoup& soup);
+
+  const std::vector<Vec3>& vertices() const { return vertices_; }
+  const std::vector<Facet>& facets() const { return facets_; }
+  const std::vector<Side>& sides() const { return sides_; }
+  const std::vector<Edge>& edges() const { return edges_; }
+
+  /// Edges around vertex v, counter-clockwise seen from outside:
+  /// fan_edges()[fan_first()[v] .. fan_first()[v + 1]).
+  const std::vector<std::uint32_t>& fan_first() const { return fan_first_; }
+  const std::vector<std::uint32_t>& fan_edges() const { return fan_edges_; }
+
+  Vec3 centre() const { return centre_; }   ///< of the bounding sphere, m
+  double radius() const { return radius_; } ///< of the bounding sphere, m
+  double size() const { return 2 * radius_; }  ///< m; the length that tolerances are relative to
+
+ private:
+  std::vector<Vec3> vertices_;
+  std::vector<Facet> facets_;
+  std::vector<Side> sides_;
+  std::vector<Edge> edges_;
+  std::vector<std::uint32_t> fan_first_, fan_edges_;
+  Vec3 centre_;
+  double radius_ = 0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "stimuli/convex_mesh.h"
+
+namespace palpate {
+
+/// Reads a Wavefront .obj (v, f; other statements ignored; negative and v/vt/vn indices) or an .stl
+/// (ASCII or binary). Units are metres as they stand. Convexity is checked by ConvexMesh, not here.
+/// \throws MeshError with file, line (text formats) or byte (binary) and what was expected.
+PolygonSoup read_mesh_file(const std::string& path);
+
+}  // namespace palpate
