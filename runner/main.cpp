@@ -1,0 +1,84 @@
+// palpate: show a shape to a hand, time the answer, know what may be concluded.
+// From here to a force: session.cpp > servo.cpp > rendering/ray_renderer.cpp > rendering/facet_walk.cpp
+
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "protocols/parse.h"
+#include "runner/commands/command.h"
+#include "stimuli/convex_mesh.h"
+
+namespace {
+
+struct Command {
+  const char* name;
+  const char* summary;
+  int (*run)(const std::vector<std::string>&);
+};
+
+constexpr Command kCommands[] = {
+    {"analyze", "per-shape speed-ups with inference, from a database or a CSV file", palpate::analyze_command},
+    {"export", "the trials of a database as files for others", palpate::export_command},
+    {"render", "forces along a recorded path, offline", palpate::render_command},
+    {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
+    {"simulate", "the whole study with simulated participants", palpate::simulate_command},
+    {"validate", "check a protocol and list all its faults", palpate::validate_command},
+};
+
+void print_help(std::ostream& out) {
+  out << "palpate " PALPATE_VERSION ": a psychophysics experiment runner for touch\n\n"
+         "Usage: palpate COMMAND [OPTIONS]\n\nCommands:\n";
+  for (const auto& command : kCommands) {
+    std::string name = command.name;
+    name.resize(12, ' ');
+    out << "  " << name << command.summary << "\n";
+  }
+  out << "\n'palpate COMMAND --help' shows a command's options with examples; 'palpate --version' the "
+         "version.\nExit status: 0 done, 1 failed while running, 2 wrong usage or bad input.\n";
+}
+
+int run(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.empty()) {
+    print_help(std::cerr);
+    return 2;
+  }
+  if (words[0] == "--version") {
+    std::cout << "palpate " PALPATE_VERSION "\n";
+    return 0;
+  }
+  if (words[0] == "--help" || words[0] == "-h" || words[0] == "help") {
+    print_help(std::cout);
+    return 0;
+  }
+  for (const auto& command : kCommands) {
+    if (words[0] == command.name) return command.run({words.begin() + 1, words.end()});
+  }
+  throw palpate::UsageError("no command '" + words[0] + "'; 'palpate --help' lists them");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const int status = run(argc, argv);
+    std::cout.flush();
+    if (!std::cout) throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
+    return status;
+  } catch (const palpate::UsageError& error) {
+    std::cerr << "palpate: " << error.what() << "\n";
+    return 2;
+  } catch (const palpate::InputError& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const palpate::MeshError& error) {
+    std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "palpate: " << error.what() << "\n";
+    return 1;
+  }
+}
