@@ -19,11 +19,13 @@ struct ReferenceDepth {
 };
 ReferenceDepth reference_depth(const ConvexMesh& mesh, const LineProbe& probe);
 
-/// Exact distance between the segment and the solid: positive outside, 0 when they touch or overlap.
+/// Exact distance between the segment and the solid: positive outside, 0 when they touch or
+/// overlap.
 double reference_gap(const ConvexMesh& mesh, const LineProbe& probe);
 
 /// First time in [0, 1] at which the probe, its ends moving linearly from `before` to `after`,
-/// penetrates; found by stepping `steps` times and then bisecting. Empty when it never does.
+/// penetrates by more than 1e-12 of the mesh's size (touching is not penetrating); found by
+/// stepping `steps` times and then bisecting to rounding. Empty when no step ends inside.
 std::optional<double> reference_first_contact(const ConvexMesh& mesh, const LineProbe& before,
                                               const LineProbe& after, int steps);
 
