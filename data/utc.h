@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "data/record.h"
+
+namespace palpate {
+
+/// "2024-05-01T09:30:00.123456Z": ISO 8601 in UTC, cut (not rounded) to microseconds.
+/// \param unix_ns since 1970-01-01T00:00:00Z; any value, also before.
+std::string format_utc(std::int64_t unix_ns);
+
+/// Where `monotonic_ns` of a session clock lies on the calendar, ns since 1970.
+inline std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns) {
+  return clock.utc_ns + (monotonic_ns - clock.monotonic_ns);
+}
+
+}  // namespace palpate
