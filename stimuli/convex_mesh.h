@@ -13,11 +13,15 @@ namespace palpate {
 
 /// What a mesh is made from: corners and faces as index loops, counter-clockwise seen from outside.
 struct PolygonSoup {
-  std::vector<Vec3> vertices;                      ///< m
-  std::vector<std::vector<std::uint32_t>> faces;   ///< three or more corners each
+  std::vector<Vec3> vertices;                     ///< m
+  std::vector<std::vector<std::uint32_t>> faces;  ///< three or more corners each
+  /// m; how far each coordinate may be from where it was meant (digits of a text file, single
+  /// precision). 0: double precision. Tolerances never go below it.
+  double coordinate_error = 0;
 };
 
-/// Why a polygon soup is no convex mesh: one message for each fault found (the first few of a kind).
+/// Why a polygon soup is no convex mesh: one message for each fault found (the first few of a
+/// kind).
 class MeshError : public std::runtime_error {
  public:
   explicit MeshError(std::vector<std::string> faults);
@@ -29,10 +33,10 @@ class MeshError : public std::runtime_error {
 
 /// One side of a facet's polygon, in counter-clockwise order seen from outside.
 struct Side {
-  Vec3 inward;          ///< unit, in the facet's plane, pointing into the polygon
-  double offset;        ///< m; a point p of the plane is on the inner side when dot(inward, p) >= offset
-  std::uint32_t edge;   ///< index into edges
-  std::uint32_t across; ///< the facet beyond this side
+  Vec3 inward;    ///< unit, in the facet's plane, pointing into the polygon
+  double offset;  ///< m; a point p of the plane is on the inner side when dot(inward, p) >= offset
+  std::uint32_t edge;    ///< index into edges
+  std::uint32_t across;  ///< the facet beyond this side
 };
 
 /// A maximal planar polygon of the surface.
@@ -70,8 +74,8 @@ class ConvexMesh {
   const std::vector<std::uint32_t>& fan_first() const { return fan_first_; }
   const std::vector<std::uint32_t>& fan_edges() const { return fan_edges_; }
 
-  Vec3 centre() const { return centre_; }   ///< of the bounding sphere, m
-  double radius() const { return radius_; } ///< of the bounding sphere, m
+  Vec3 centre() const { return centre_; }      ///< of the bounding sphere, m
+  double radius() const { return radius_; }    ///< of the bounding sphere, m
   double size() const { return 2 * radius_; }  ///< m; the length that tolerances are relative to
 
  private:

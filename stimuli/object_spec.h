@@ -21,12 +21,12 @@ struct Material {
 /// +height/2, base at -height/2.
 struct ObjectSpec {
   ShapeKind shape = ShapeKind::sphere;
-  double radius = 0.03;   ///< m; sphere, cone, cylinder
-  double height = 0.06;   ///< m; cone, cylinder
-  double edge = 0.06;     ///< m; cube
-  int subdivisions = 4;   ///< sphere: an icosphere of 20 * 4^subdivisions triangles
-  int segments = 64;      ///< cone, cylinder: corners of the rim
-  std::string file;       ///< mesh: resolved path of an .obj or .stl file
+  double radius = 0.03;           ///< m; sphere, cone, cylinder
+  double height = 0.06;           ///< m; cone, cylinder
+  double edge = 0.06;             ///< m; cube
+  int subdivisions = 4;           ///< sphere: an icosphere of 20 * 4^subdivisions triangles
+  int segments = 64;              ///< cone, cylinder: corners of the rim
+  std::string file;               ///< mesh: resolved path of an .obj or .stl file
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
   Pose pose;
   Material material;

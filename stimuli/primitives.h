@@ -7,13 +7,14 @@
 
 namespace palpate {
 
-PolygonSoup icosphere(double radius, int subdivisions);              ///< 20 * 4^subdivisions triangles
-PolygonSoup cone(double radius, double height, int segments);        ///< axis +z, apex at +height/2
-PolygonSoup cylinder(double radius, double height, int segments);    ///< axis +z, centred
-PolygonSoup cube(double edge);                                       ///< centred
+PolygonSoup icosphere(double radius, int subdivisions);        ///< 20 * 4^subdivisions triangles
+PolygonSoup cone(double radius, double height, int segments);  ///< axis +z, apex at +height/2
+PolygonSoup cylinder(double radius, double height, int segments);  ///< axis +z, centred
+PolygonSoup cube(double edge);                                     ///< centred
 
 /// The polygons of a primitive or mesh file in its local frame (pose and parts are not applied).
-/// \throws MeshError, std::runtime_error for an unreadable file; std::invalid_argument for a compound.
+/// \throws MeshError, std::runtime_error for an unreadable file; std::invalid_argument for a
+/// compound.
 PolygonSoup polygons_of(const ObjectSpec& spec);
 
 }  // namespace palpate
