@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+struct Box {
+  Vec3 low, high;  ///< m
+};
+
+/// A binary tree of axis-aligned boxes over primitives (polygons or edges), split at the median of
+/// the longest side. Gottschalk, Lin & Manocha 1996; the paper's section 4(a).
+class BoundingTree {
+ public:
+  struct Node {
+    Box box;
+    std::uint32_t
+        first;  ///< leaf: first primitive in order(); inner: right child (left is the next node)
+    std::uint32_t count;  ///< leaf: number of primitives; inner: 0
+  };
+
+  BoundingTree() = default;
+  explicit BoundingTree(std::span<const Box> boxes);
+
+  const std::vector<Node>& nodes() const {
+    return nodes_;
+  }  ///< root first; empty without primitives
+  const std::vector<std::uint32_t>& order() const { return order_; }
+
+ private:
+  void build(std::span<const Box> boxes, std::uint32_t begin, std::uint32_t end);
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> order_;
+};
+
+}  // namespace palpate

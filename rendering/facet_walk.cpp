@@ -1,0 +1,238 @@
+#include "rendering/facet_walk.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+// Ho, Basdogan & Srinivasan 2000, 4(b). Departs: the paper's rules are steps between adjacent
+// facets of the Minkowski sum M of the object and the mirrored probe, so one loop covers them all.
+//
+// A step over a violated side strictly lowers the depth as long as the depth is not negative, so
+// the loop ends; a negative depth is a plane between probe and object: the probe has left.
+
+using Kind = MinkowskiFacet::Kind;
+
+constexpr std::uint32_t kNoSide = ~0u;
+constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by halving
+constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below this: no contact edge
+constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is rounding, not a step
+
+std::uint32_t corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
+  const Edge& edge = mesh.edges()[side.edge];
+  return edge.left == facet ? edge.v0 : edge.v1;
+}
+
+bool outside(const Side& side, const Vec3& p) { return glm::dot(side.inward, p) < side.offset; }
+
+/// The side of a polygon with many sides that p lies beyond: halving over the fan of triangles at
+/// corner 0, so that a cap of a thousand sides costs ten comparisons.
+std::uint32_t violated_side_of_many(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+  const Facet& facet = mesh.facets()[index];
+  const Side* sides = &mesh.sides()[facet.first_side];
+  const std::uint32_t count = facet.side_count;
+  if (outside(sides[0], p)) return facet.first_side;
+  if (outside(sides[count - 1], p)) return facet.first_side + count - 1;
+  const Vec3 apex = mesh.vertices()[corner(mesh, index, sides[0])];
+  const Vec3 turn = glm::cross(facet.normal, p - apex);  // in-plane, a quarter turn ahead of p
+  std::uint32_t low = 1, high = count - 1;  // p lies between the rays to corner low and corner high
+  while (high - low > 1) {
+    const std::uint32_t middle = (low + high) / 2;
+    const Vec3 ray = mesh.vertices()[corner(mesh, index, sides[middle])] - apex;
+    (glm::dot(ray, turn) <= 0 ? low : high) = middle;
+  }
+  return outside(sides[low], p) ? facet.first_side + low : kNoSide;
+}
+
+/// The side that p, a point of the facet's plane, lies farthest beyond; kNoSide when p is inside.
+std::uint32_t violated_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+  const Facet& facet = mesh.facets()[index];
+  if (facet.side_count > kScanSides) return violated_side_of_many(mesh, index, p);
+  std::uint32_t worst = kNoSide;
+  double worst_margin = 0;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const Side& side = mesh.sides()[i];
+    const double margin = glm::dot(side.inward, p) - side.offset;
+    if (margin < worst_margin) {
+      worst_margin = margin;
+      worst = i;
+    }
+  }
+  return worst;
+}
+
+/// One facet of M measured against the probe.
+struct Measured {
+  MinkowskiFacet facet;
+  Vec3 normal;
+  double depth = 0;
+  double place = 0;       ///< along the probe, 0 tip to 1 tail
+  double along_edge = 0;  ///< edge only: 0 at v0 to 1 at v1
+};
+
+template <bool kSegment>
+Measured measure_face(const ConvexMesh& mesh, std::uint32_t index, const Vec3& tip, const Vec3& d) {
+  const Facet& facet = mesh.facets()[index];
+  Measured m;
+  m.facet = {Kind::face, false, index};
+  m.normal = facet.normal;
+  const double height = facet.offset - glm::dot(facet.normal, tip);
+  if constexpr (kSegment) {
+    const double slope = glm::dot(facet.normal, d);
+    m.place = slope >= 0 ? 0.0 : 1.0;
+    m.depth = slope >= 0 ? height : height - slope;
+  } else {
+    m.depth = height;
+  }
+  return m;
+}
+
+struct Slopes {
+  double left, right;  ///< dot(normal, d) of the edge's two faces
+  bool silhouette() const { return (left >= 0) != (right >= 0); }
+};
+
+Slopes slopes_at(const ConvexMesh& mesh, const Edge& edge, const Vec3& d) {
+  return {glm::dot(mesh.facets()[edge.left].normal, d),
+          glm::dot(mesh.facets()[edge.right].normal, d)};
+}
+
+/// False where the edge and the probe are parallel: then it is no contact edge.
+bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, const Vec3& tip,
+                  const Vec3& d, Measured& m) {
+  const Edge& edge = mesh.edges()[index];
+  const Vec3& v0 = mesh.vertices()[edge.v0];
+  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3 c = glm::cross(e, d);
+  const double c2 = glm::dot(c, c);
+  if (c2 <= kParallel * kParallel * glm::dot(e, e) * glm::dot(d, d)) return false;
+  const double inverse = 1 / c2;
+  const double scale = (left_ahead ? 1 : -1) * std::sqrt(inverse);
+  const Vec3 w = tip - v0;
+  m.facet = {Kind::edge, left_ahead, index};
+  m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
+  m.depth = -glm::dot(m.normal, w);
+  // w + depth n + place d = along_edge e, crossed with e and with d
+  m.place = glm::dot(glm::cross(w, e), c) * inverse;
+  m.along_edge = glm::dot(glm::cross(w, d), c) * inverse;
+  return true;
+}
+
+/// The silhouette edge at `vertex` other than `from`; the fan around a vertex crosses the
+/// silhouette exactly twice. Returns `from` when rounding hides the second one.
+std::uint32_t other_silhouette_edge(const ConvexMesh& mesh, std::uint32_t vertex,
+                                    std::uint32_t from, const Vec3& d, bool& left_ahead) {
+  for (std::uint32_t i = mesh.fan_first()[vertex]; i < mesh.fan_first()[vertex + 1]; ++i) {
+    const std::uint32_t candidate = mesh.fan_edges()[i];
+    if (candidate == from) continue;
+    const Slopes slopes = slopes_at(mesh, mesh.edges()[candidate], d);
+    if (slopes.silhouette()) {
+      left_ahead = slopes.left >= 0;
+      return candidate;
+    }
+  }
+  return from;
+}
+
+/// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
+/// face.
+template <bool kSegment>
+Measured step_from_face(const ConvexMesh& mesh, const Side& side, const Vec3& tip, const Vec3& d) {
+  if constexpr (kSegment) {
+    const Slopes slopes = slopes_at(mesh, mesh.edges()[side.edge], d);
+    Measured next;
+    if (slopes.silhouette() && measure_edge(mesh, side.edge, slopes.left >= 0, tip, d, next))
+      return next;
+  }
+  return measure_face<kSegment>(mesh, side.across, tip, d);
+}
+
+/// From an edge past an end of the probe (to the face ahead or behind) or past an end of the edge
+/// (to the next silhouette edge). False when the probe is within both.
+bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d,
+                    Measured& next) {
+  const Edge& edge = mesh.edges()[at.facet.index];
+  if (at.place < 0 || at.place > 1) {
+    const bool to_left = (at.place < 0) == at.facet.left_ahead;
+    next = measure_face<true>(mesh, to_left ? edge.left : edge.right, tip, d);
+    return true;
+  }
+  if (at.along_edge < 0 || at.along_edge > 1) {
+    const std::uint32_t vertex = at.along_edge < 0 ? edge.v0 : edge.v1;
+    bool left_ahead = false;
+    const std::uint32_t index = other_silhouette_edge(mesh, vertex, at.facet.index, d, left_ahead);
+    if (index == at.facet.index) return false;
+    if (measure_edge(mesh, index, left_ahead, tip, d, next)) return true;
+    // Parallel to the probe: its two faces meet there with the same depth.
+    next = measure_face<true>(mesh, mesh.edges()[index].left, tip, d);
+    return true;
+  }
+  return false;
+}
+
+/// The facet that the last tick ended on, measured against where the probe is now.
+template <bool kSegment>
+Measured resume(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
+  if constexpr (kSegment) {
+    if (start.kind == Kind::edge) {
+      const Edge& edge = mesh.edges()[start.index];
+      const Slopes slopes = slopes_at(mesh, edge, d);
+      Measured m;
+      if (slopes.silhouette() && measure_edge(mesh, start.index, slopes.left >= 0, tip, d, m))
+        return m;
+      // The probe has turned past one of the two faces: there the edge's normal had become that
+      // face's normal, so taking that face keeps the force continuous.
+      const bool both_ahead = slopes.left >= 0 && slopes.right >= 0;
+      const bool left_turned = start.left_ahead != both_ahead;
+      return measure_face<true>(mesh, left_turned ? edge.left : edge.right, tip, d);
+    }
+  }
+  return measure_face<kSegment>(mesh, start.index, tip, d);
+}
+
+template <bool kSegment>
+WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
+  const double gain = kDepthRounding * mesh.size();
+  Measured at = resume<kSegment>(mesh, start, tip, d);
+  bool capped = false;
+  int steps = 0;
+  while (at.depth >= 0) {
+    Measured next;
+    if (kSegment && at.facet.kind == Kind::edge) {
+      if (!step_from_edge(mesh, at, tip, d, next)) break;
+    } else {
+      const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
+      const std::uint32_t side = violated_side(mesh, at.facet.index, end + at.depth * at.normal);
+      if (side == kNoSide) break;
+      next = step_from_face<kSegment>(mesh, mesh.sides()[side], tip, d);
+    }
+    if (!(next.depth < at.depth - gain)) break;
+    at = next;
+    // A path straight across the object visits some sqrt(facets) of them.
+    if (++steps > 16 && steps > 16 + 4 * std::sqrt(static_cast<double>(mesh.facets().size()))) {
+      capped = true;
+      break;
+    }
+  }
+  WalkResult result;
+  result.normal = at.normal;
+  result.depth = at.depth;
+  result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
+  result.capped = capped;
+  if (at.depth >= 0) result.facet = at.facet;
+  return result;
+}
+
+}  // namespace
+
+WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                        const Vec3& d) {
+  return walk<true>(mesh, start, tip, d);
+}
+
+WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
+  return walk<false>(mesh, start, tip, Vec3(0));
+}
+
+}  // namespace palpate

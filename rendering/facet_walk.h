@@ -1,0 +1,40 @@
+#pragma once
+// Neighbourhood watch: the next contact is looked for among the neighbours of the last one, so a
+// tick costs the same whatever the number of polygons.
+
+#include <cstdint>
+
+#include "stimuli/convex_mesh.h"
+
+namespace palpate {
+
+/// A facet of M, the Minkowski sum of the object and the mirrored probe: a facet of the object with
+/// the deeper end of the probe, or a silhouette edge of the object with the probe's direction.
+struct MinkowskiFacet {
+  enum class Kind : std::uint8_t { none, face, edge };
+  Kind kind = Kind::none;
+  /// Edge only: which of its two faces turned towards the tail (dot(normal, d) >= 0) at the last
+  /// tick.
+  bool left_ahead = false;
+  std::uint32_t index = 0;  ///< of the facet or edge in the mesh
+};
+
+/// Where a walk ended. Mesh frame.
+struct WalkResult {
+  MinkowskiFacet facet;  ///< kind none: the probe has left the object
+  Vec3 normal;           ///< unit, outward, of `facet`; when left: of the plane that separates
+  double depth = 0;      ///< m, along normal; negative when left
+  double place = 0;      ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  bool capped = false;  ///< the limit of steps was met; the facet is valid but perhaps not the last
+};
+
+/// Walks from `start` to the facet of M that the probe is held by. Mesh frame.
+/// \param tip   the virtual probe's tip, m
+/// \param d     tail - tip, m; zero for a point
+WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                        const Vec3& d);
+
+/// The same walk with the probe shrunk to its tip: faces only.
+WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+
+}  // namespace palpate

@@ -1,0 +1,191 @@
+#include "rendering/first_contact.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+// Ho, Basdogan & Srinivasan 2000, 4(a), appendix 7 and 8. Departs: appendix 8 holds for small
+// motions only; here the time of crossing is the root of a quadratic, so a fast hand is caught as
+// well.
+
+using Kind = MinkowskiFacet::Kind;
+
+constexpr std::size_t kScan = 64;  // primitives; fewer are scanned faster than any tree is climbed
+
+/// Whether the segment a -> a + d comes into the box enlarged by low_margin and high_margin.
+bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3& high) {
+  double enter = 0, leave = 1;
+  for (int k = 0; k < 3; ++k) {
+    if (d[k] == 0) {
+      if (a[k] < low[k] || a[k] > high[k]) return false;
+      continue;
+    }
+    const double inverse = 1 / d[k];
+    double t0 = (low[k] - a[k]) * inverse, t1 = (high[k] - a[k]) * inverse;
+    if (t0 > t1) std::swap(t0, t1);
+    enter = std::max(enter, t0);
+    leave = std::min(leave, t1);
+    if (enter > leave) return false;
+  }
+  return true;
+}
+
+/// Calls visit(primitive) for all primitives whose box the segment a -> a + d can touch while it is
+/// shifted by anything between `low_margin` and `high_margin`.
+template <class Visit>
+void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a, const Vec3& d,
+                const Vec3& low_margin, const Vec3& high_margin, Visit visit) {
+  if (!tree) {
+    for (std::uint32_t i = 0; i < primitives; ++i) visit(i);
+    return;
+  }
+  std::array<std::uint32_t, 64> stack;  // depth of a median-split tree: at most 32
+  std::size_t top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const std::uint32_t index = stack[--top];
+    const BoundingTree::Node& node = tree->nodes()[index];
+    if (!segment_meets_box(a, d, node.box.low - high_margin, node.box.high - low_margin)) continue;
+    if (node.count > 0) {
+      for (std::uint32_t i = 0; i < node.count; ++i) visit(tree->order()[node.first + i]);
+    } else {
+      stack[top++] = node.first;
+      stack[top++] = index + 1;
+    }
+  }
+}
+
+/// An end point moving from a to b against one polygon (appendix 7).
+void meet_polygon(const ConvexMesh& mesh, std::uint32_t index, const Vec3& a, const Vec3& b,
+                  double tolerance, FirstContact& first) {
+  const Facet& facet = mesh.facets()[index];
+  const double before = glm::dot(facet.normal, a) - facet.offset;
+  const double after = glm::dot(facet.normal, b) - facet.offset;
+  if (!(after < 0) || before < -tolerance || !(after < before)) return;
+  const double time = std::max(0.0, before / (before - after));
+  if (time >= first.time) return;
+  const Vec3 p = a + time * (b - a);
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    if (glm::dot(mesh.sides()[i].inward, p) < mesh.sides()[i].offset - tolerance) return;
+  }
+  first = {{Kind::face, false, index}, time};
+}
+
+/// The moving segment, read as functions of the time t in [0, 1].
+struct MovingSegment {
+  Vec3 tip, tip_motion, d, d_motion;
+};
+
+/// The moving segment against one edge (appendix 8, made exact).
+void meet_edge(const ConvexMesh& mesh, std::uint32_t index, const MovingSegment& probe,
+               double tolerance, FirstContact& first) {
+  const Edge& edge = mesh.edges()[index];
+  const Vec3& v0 = mesh.vertices()[edge.v0];
+  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3 w = probe.tip - v0;
+  // (w(t) x d(t)) . e = 0: probe and edge in one plane
+  const double c0 = glm::dot(glm::cross(w, probe.d), e);
+  const double c1 =
+      glm::dot(glm::cross(probe.tip_motion, probe.d) + glm::cross(w, probe.d_motion), e);
+  const double c2 = glm::dot(glm::cross(probe.tip_motion, probe.d_motion), e);
+  std::array<double, 2> roots;
+  int count = 0;
+  const double discriminant = c1 * c1 - 4 * c2 * c0;
+  if (!(discriminant >= 0)) return;
+  const double q = -0.5 * (c1 + std::copysign(std::sqrt(discriminant), c1));
+  if (c2 != 0) roots[count++] = q / c2;
+  if (q != 0) roots[count++] = c0 / q;
+  for (int k = 0; k < count; ++k) {
+    constexpr double kEarly = 1e-9;  // a probe that left by rounding alone is still at the surface
+    if (!(roots[k] >= -kEarly && roots[k] <= 1)) continue;
+    const double time = std::max(0.0, roots[k]);
+    if (time >= first.time) continue;
+    const Vec3 d = probe.d + time * probe.d_motion;
+    const Vec3 at = w + time * probe.tip_motion;
+    const double left = glm::dot(mesh.facets()[edge.left].normal, d);
+    const double right = glm::dot(mesh.facets()[edge.right].normal, d);
+    if ((left >= 0) == (right >= 0)) continue;
+    const bool left_ahead = left >= 0;
+    // Height over the edge is -(w x d).e / |e x d| for left_ahead, else its negative: going in.
+    const double rate = c1 + 2 * c2 * time;
+    if (!(left_ahead ? rate > 0 : rate < 0)) continue;
+    const Vec3 c = glm::cross(e, d);
+    const double n2 = glm::dot(c, c);
+    const double e2 = glm::dot(e, e), d2 = glm::dot(d, d);
+    if (n2 <= 1e-18 * e2 * d2) continue;
+    const double along_probe = glm::dot(glm::cross(at, e), c) / n2;
+    const double along_edge = glm::dot(glm::cross(at, d), c) / n2;
+    const double slack_probe = tolerance / std::sqrt(d2), slack_edge = tolerance / std::sqrt(e2);
+    if (along_probe < -slack_probe || along_probe > 1 + slack_probe) continue;
+    if (along_edge < -slack_edge || along_edge > 1 + slack_edge) continue;
+    first = {{Kind::edge, left_ahead, index}, time};
+  }
+}
+
+void meet_polygons(const ConvexMesh& mesh, const ContactTrees& trees, const Vec3& a, const Vec3& b,
+                   double tolerance, FirstContact& first) {
+  visit_near(trees.polygons(), mesh.facets().size(), a, b - a, Vec3(-tolerance), Vec3(tolerance),
+             [&](std::uint32_t i) { meet_polygon(mesh, i, a, b, tolerance, first); });
+}
+
+}  // namespace
+
+ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges) {
+  if (mesh.facets().size() > kScan) {
+    std::vector<Box> boxes;
+    boxes.reserve(mesh.facets().size());
+    for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+      const Facet& facet = mesh.facets()[f];
+      Box box{Vec3(HUGE_VAL), Vec3(-HUGE_VAL)};
+      for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+        const Edge& edge = mesh.edges()[mesh.sides()[i].edge];
+        for (const std::uint32_t v : {edge.v0, edge.v1}) {
+          box.low = glm::min(box.low, mesh.vertices()[v]);
+          box.high = glm::max(box.high, mesh.vertices()[v]);
+        }
+      }
+      boxes.push_back(box);
+    }
+    polygons_ = BoundingTree(boxes);
+  }
+  if (with_edges && mesh.edges().size() > kScan) {
+    std::vector<Box> boxes;
+    boxes.reserve(mesh.edges().size());
+    for (const Edge& edge : mesh.edges()) {
+      const Vec3 &a = mesh.vertices()[edge.v0], &b = mesh.vertices()[edge.v1];
+      boxes.push_back({glm::min(a, b), glm::max(a, b)});
+    }
+    edges_ = BoundingTree(boxes);
+  }
+}
+
+FirstContact first_contact_segment(const ConvexMesh& mesh, const ContactTrees& trees,
+                                   const LineProbe& before, const LineProbe& after,
+                                   double tolerance) {
+  FirstContact first;
+  meet_polygons(mesh, trees, before.tip, after.tip, tolerance, first);
+  meet_polygons(mesh, trees, before.tail, after.tail, tolerance, first);
+  const Vec3 tip_motion = after.tip - before.tip, tail_motion = after.tail - before.tail;
+  const MovingSegment probe{before.tip, tip_motion, before.tail - before.tip,
+                            tail_motion - tip_motion};
+  const Vec3 zero(0);
+  const Vec3 low = glm::min(glm::min(tip_motion, tail_motion), zero) - tolerance;
+  const Vec3 high = glm::max(glm::max(tip_motion, tail_motion), zero) + tolerance;
+  visit_near(trees.edges(), mesh.edges().size(), probe.tip, probe.d, low, high,
+             [&](std::uint32_t i) { meet_edge(mesh, i, probe, tolerance, first); });
+  return first;
+}
+
+FirstContact first_contact_point(const ConvexMesh& mesh, const ContactTrees& trees,
+                                 const Vec3& before, const Vec3& after, double tolerance) {
+  FirstContact first;
+  meet_polygons(mesh, trees, before, after, tolerance, first);
+  return first;
+}
+
+}  // namespace palpate

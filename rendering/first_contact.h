@@ -1,0 +1,44 @@
+#pragma once
+// Continuous detection of the first contact: the facet of M by which the probe came in.
+
+#include <memory>
+
+#include "rendering/bounding_tree.h"
+#include "rendering/facet_walk.h"
+#include "rendering/probe.h"
+#include "stimuli/convex_mesh.h"
+
+namespace palpate {
+
+/// The two hierarchies of the paper's section 4(a). A mesh that is small enough to scan has none,
+/// and where only points are shown there is no tree of edges.
+class ContactTrees {
+ public:
+  ContactTrees(const ConvexMesh& mesh, bool with_edges);
+
+  const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
+  const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
+
+ private:
+  BoundingTree polygons_, edges_;
+};
+
+/// Where and when the probe came in.
+struct FirstContact {
+  MinkowskiFacet facet;  ///< kind none: it did not
+  double time = 2;       ///< fraction of the tick, 0 to 1
+};
+
+/// The earliest entry while both ends move linearly from `before` to `after`. Mesh frame.
+/// Exact for any length of motion and any rotation within the tick: an end point meets a facet's
+/// plane at the root of a linear equation, the segment meets an edge at a root of a quadratic one.
+/// \param tolerance  m; how far outside of a polygon's or edge's rim still counts, against rounding
+FirstContact first_contact_segment(const ConvexMesh& mesh, const ContactTrees& trees,
+                                   const LineProbe& before, const LineProbe& after,
+                                   double tolerance);
+
+/// The same for the tip alone.
+FirstContact first_contact_point(const ConvexMesh& mesh, const ContactTrees& trees,
+                                 const Vec3& before, const Vec3& after, double tolerance);
+
+}  // namespace palpate

@@ -1,0 +1,59 @@
+#include "rendering/force.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+/// The shortest translation x with dot(n_i, x) >= depth_i for all contacts, as x = sum of share_i
+/// n_i with share_i >= 0. Hildreth 1957: one contact at a time is satisfied, until none moves.
+void share_depths(std::span<LoadedContact> contacts) {
+  constexpr int kRounds = 60;
+  Vec3 x(0);
+  for (int round = 0; round < kRounds; ++round) {
+    double moved = 0;
+    for (auto& c : contacts) {
+      const double step = std::max(c.contact.depth - glm::dot(c.contact.normal, x), -c.share);
+      c.share += step;
+      x += step * c.contact.normal;
+      moved = std::max(moved, std::abs(step));
+    }
+    if (moved == 0) break;
+  }
+}
+
+}  // namespace
+
+void load(std::span<LoadedContact> contacts) {
+  for (std::size_t begin = 0; begin < contacts.size();) {
+    std::size_t end = begin + 1;
+    while (end < contacts.size() && contacts[end].object == contacts[begin].object) ++end;
+    if (end - begin == 1) {
+      contacts[begin].share = contacts[begin].contact.depth;
+    } else {
+      share_depths(contacts.subspan(begin, end - begin));
+    }
+    begin = end;
+  }
+  for (auto& c : contacts) {
+    c.force = c.stiffness * c.share;
+    if (c.damping > 0 && c.share > 0)
+      c.force = std::max(0.0, c.force + c.damping * c.closing_speed);
+  }
+}
+
+Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe, double length) {
+  Loads loads;
+  for (const auto& c : contacts) {
+    const Vec3 force = c.force * c.contact.normal;
+    loads.force += force;
+    loads.torque += glm::cross(c.contact.point - probe.tip, force);
+    if (length > 0) loads.device2 += (c.contact.along / length) * force;
+  }
+  loads.device1 = loads.force - loads.device2;
+  return loads;
+}
+
+}  // namespace palpate

@@ -1,0 +1,41 @@
+#pragma once
+// From contacts to what the hand and the devices get. Pure functions.
+
+#include <cstdint>
+#include <span>
+
+#include "rendering/contact.h"
+
+namespace palpate {
+
+/// A contact in the world frame with what decides its force.
+struct LoadedContact {
+  Contact contact;
+  double stiffness = 0;      ///< N/m
+  double damping = 0;        ///< N s/m
+  double closing_speed = 0;  ///< m/s, of the probe at the contact, against the normal
+  double share = 0;          ///< m, of the ideal probe's translation along the normal (set by load)
+  double force = 0;          ///< N, along the normal, on the hand; never negative (set by load)
+  int object = -1;           ///< parts of one compound share it
+};
+
+/// Sets the share and the force of each contact: k share + b closing_speed, never pulling. A
+/// contact that is alone has its whole depth; contacts with parts of one compound share the
+/// shortest translation that satisfies them all, so that a seam between two parts neither doubles
+/// the force nor lets it drop. Contacts of one object stand side by side.
+void load(std::span<LoadedContact> contacts);
+
+/// Force and moment of contacts, and their split on two devices at the ends of the stylus.
+struct Loads {
+  Vec3 force;    ///< N, on the hand
+  Vec3 torque;   ///< N m, about the virtual tip: sum of (contact - tip) x force
+  Vec3 device1;  ///< N, at the tip
+  Vec3 device2;  ///< N, at the tail
+};
+
+/// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
+/// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F. A probe of zero length: device 1 takes all.
+/// \param length  m, of the probe
+Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe, double length);
+
+}  // namespace palpate

@@ -1,0 +1,41 @@
+#include "rendering/renderer.h"
+#include "rendering/tick.h"
+
+namespace palpate {
+namespace {
+
+/// The probe shrunk to its tip.
+struct PointProbe {
+  static constexpr bool kSegment = false;
+
+  static FirstContact first_contact(const ConvexMesh& mesh, const ContactTrees& trees,
+                                    const LineProbe& before, const LineProbe& after,
+                                    double tolerance) {
+    return first_contact_point(mesh, trees, before.tip, after.tip, tolerance);
+  }
+
+  static void describe(const ConvexMesh&, const WalkResult&, const Vec3&, const Vec3&, double,
+                       Contact& contact) {
+    contact.type = ContactType::point_polygon;
+    contact.along = 0;
+  }
+};
+
+class PointRenderer final : public Renderer {
+ public:
+  const char* name() const override { return "point"; }
+  bool side_contact() const override { return false; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    return tick::render<PointProbe>(scene, state, probe, dt);
+  }
+};
+
+}  // namespace
+
+const Renderer& point_renderer() {
+  static const PointRenderer renderer;
+  return renderer;
+}
+
+}  // namespace palpate

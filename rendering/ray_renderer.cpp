@@ -1,0 +1,92 @@
+#include <algorithm>
+#include <numbers>
+
+#include "rendering/renderer.h"
+#include "rendering/tick.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kEpsilon =
+    std::numbers::pi / 180;  // 1 degree: the paper's choice for segment-face
+const double kSinEpsilon = std::sin(kEpsilon);
+
+/// Where a probe that lies on a face enters and leaves its polygon, as fractions of the probe.
+/// False when rounding leaves nothing of it on the polygon.
+bool touching_portion(const ConvexMesh& mesh, std::uint32_t index, const Vec3& ideal_tip,
+                      const Vec3& d, double& enter, double& leave) {
+  const Facet& facet = mesh.facets()[index];
+  enter = 0;
+  leave = 1;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const Side& side = mesh.sides()[i];
+    const double height = glm::dot(side.inward, ideal_tip) - side.offset;  // inside: >= 0
+    const double slope = glm::dot(side.inward, d);
+    if (slope > 0) {
+      enter = std::max(enter, -height / slope);
+    } else if (slope < 0) {
+      leave = std::min(leave, height / -slope);
+    } else if (height < 0) {
+      return false;
+    }
+  }
+  return enter <= leave;
+}
+
+/// The whole segment.
+struct SegmentProbe {
+  static constexpr bool kSegment = true;
+
+  static FirstContact first_contact(const ConvexMesh& mesh, const ContactTrees& trees,
+                                    const LineProbe& before, const LineProbe& after,
+                                    double tolerance) {
+    return first_contact_segment(mesh, trees, before, after, tolerance);
+  }
+
+  /// Type of the contact and its place along the probe, m from the tip. Frame of the mesh.
+  static void describe(const ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
+                       const Vec3& d, double length, Contact& contact) {
+    const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
+    contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
+    contact.along = hit.place * length;
+    // Of an edge's two faces the one that the probe is nearer to parallel with.
+    std::uint32_t face = hit.facet.index;
+    if (edge) {
+      const Edge& e = mesh.edges()[hit.facet.index];
+      const double left = std::abs(glm::dot(mesh.facets()[e.left].normal, d));
+      const double right = std::abs(glm::dot(mesh.facets()[e.right].normal, d));
+      face = left <= right ? e.left : e.right;
+    }
+    const double rise = glm::dot(mesh.facets()[face].normal, d);
+    if (std::abs(rise) > kSinEpsilon * length || length == 0) return;
+    // Equation (2): the contact point glides from one end of the touching portion to the other
+    // while the probe turns through the face, instead of jumping. Depth and normal stay those of
+    // the facet.
+    double enter = 0, leave = 1;
+    if (!touching_portion(mesh, face, tip + hit.depth * hit.normal, d, enter, leave)) return;
+    const double theta = std::asin(rise / length);
+    const double middle = 0.5 * (enter + leave);
+    contact.along =
+        std::clamp(middle + theta / kEpsilon * 0.5 * (enter - leave), enter, leave) * length;
+    contact.type = ContactType::segment_face;
+  }
+};
+
+class RayRenderer final : public Renderer {
+ public:
+  const char* name() const override { return "ray"; }
+  bool side_contact() const override { return true; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    return tick::render<SegmentProbe>(scene, state, probe, dt);
+  }
+};
+
+}  // namespace
+
+const Renderer& ray_renderer() {
+  static const RayRenderer renderer;
+  return renderer;
+}
+
+}  // namespace palpate

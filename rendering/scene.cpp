@@ -1,0 +1,73 @@
+#include "rendering/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <stdexcept>
+
+namespace palpate {
+namespace {
+
+double distance_to_segment(const Vec3& p, const LineProbe& probe) {
+  const Vec3 d = probe.tail - probe.tip;
+  const double d2 = glm::dot(d, d);
+  const double t = d2 > 0 ? std::clamp(glm::dot(p - probe.tip, d) / d2, 0.0, 1.0) : 0;
+  return glm::length(p - (probe.tip + t * d));
+}
+
+}  // namespace
+
+Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
+  parts_.reserve(objects.size());
+  for (auto& object : objects) {
+    if (!object.mesh) throw std::invalid_argument("a scene's object has no mesh");
+    ScenePart part;
+    part.mesh = std::move(object.mesh);
+    part.trees = object.trees ? std::move(object.trees)
+                              : std::make_shared<const ContactTrees>(*part.mesh, side_contact);
+    part.to_world = glm::mat3_cast(object.pose.orientation);
+    part.position = object.pose.position;
+    part.sphere_centre = part.world_vector(part.mesh->centre()) + part.position;
+    part.sphere_radius = part.mesh->radius();
+    part.tolerance = 1e-12 * part.mesh->size() +
+                     8 * std::numeric_limits<double>::epsilon() * glm::length(part.sphere_centre);
+    part.material = object.material;
+    part.object = object.object;
+    parts_.push_back(std::move(part));
+  }
+}
+
+RenderState Scene::initial_state() const {
+  RenderState state;
+  state.parts.resize(parts_.size());
+  state.near_parts.reserve(parts_.size());
+  return state;
+}
+
+void survey(const Scene& scene, RenderState& state, const LineProbe& probe) {
+  const double moved = std::max(glm::length(probe.tip - state.surveyed.tip),
+                                glm::length(probe.tail - state.surveyed.tail));
+  if (moved < state.clearance) return;
+  // How far the probe came in this tick: what it may have passed on the way counts as near.
+  const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
+                                                glm::length(probe.tail - state.last.tail))
+                                     : 0;
+  state.near_parts.clear();
+  state.surveyed = probe;
+  state.clearance = std::numeric_limits<double>::infinity();
+  for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
+    const ScenePart& part = scene.parts()[i];
+    const double gap = distance_to_segment(part.sphere_centre, probe) - part.sphere_radius;
+    // A quarter of the radius of room to move before the list must be drawn up again. A part that
+    // is held stays: through a thin plate the probe may be far from it and yet in contact.
+    const bool held = state.parts[i].facet.kind != MinkowskiFacet::Kind::none;
+    if (held || gap - step <= 0.25 * part.sphere_radius) {
+      state.near_parts.push_back(i);
+    } else {
+      state.clearance = std::min(state.clearance, gap);
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,79 @@
+#pragma once
+// What stands in the world, compiled once per trial into the least work that shows it.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rendering/facet_walk.h"
+#include "rendering/first_contact.h"
+#include "rendering/probe.h"
+#include "rendering/separation.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate {
+
+/// One convex part to be placed in a scene.
+struct SceneObject {
+  std::shared_ptr<const ConvexMesh> mesh;
+  Pose pose;
+  Material material;
+  int object =
+      0;  ///< index of the object in the scene; the parts of a compound share it, side by side
+  std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
+};
+
+/// One convex part as the tick sees it. World frame unless said otherwise.
+struct ScenePart {
+  std::shared_ptr<const ConvexMesh> mesh;
+  std::shared_ptr<const ContactTrees> trees;
+  Mat3 to_world;             ///< rotation from the mesh frame
+  Vec3 position;             ///< m, of the mesh frame's origin
+  Vec3 sphere_centre;        ///< m
+  double sphere_radius = 0;  ///< m
+  double tolerance = 0;      ///< m; below it a length is rounding, for this size and distance
+  Material material;
+  int object = 0;
+
+  Vec3 local_point(const Vec3& world) const { return (world - position) * to_world; }
+  Vec3 world_vector(const Vec3& local) const { return to_world * local; }
+};
+
+/// What is remembered of one part from tick to tick.
+struct PartState {
+  MinkowskiFacet facet;       ///< kind none: not in contact
+  SeparatingPlane plane;      ///< mesh frame; where valid, the last pose was beyond it
+  std::uint32_t support = 0;  ///< vertex that the last search for a plane ended on
+  bool blocked = false;       ///< the trial began inside: no force until it has been left once
+  Vec3 share;    ///< m; its part of the ideal probe's translation, where parts share one
+  Vec3 yielded;  ///< m; the translation that its siblings' shares gave it at the last tick
+};
+
+/// A renderer's whole memory. Copy it to replay from here.
+struct RenderState {
+  std::vector<PartState> parts;
+  std::vector<std::uint32_t> near_parts;  ///< in order; the others are out of reach for now
+  LineProbe surveyed;                     ///< where the probe was when near_parts was drawn up
+  double clearance = -1;  ///< m; that far from `surveyed` the other parts are out of reach
+  LineProbe last;         ///< last good pose
+  bool has_last = false;
+};
+
+/// Immutable; shared by the servo and the display.
+class Scene {
+ public:
+  /// \param side_contact  false leaves out what only a segment needs (the tree of edges)
+  explicit Scene(std::vector<SceneObject> objects, bool side_contact = true);
+
+  const std::vector<ScenePart>& parts() const { return parts_; }
+  RenderState initial_state() const;
+
+ private:
+  std::vector<ScenePart> parts_;
+};
+
+/// Lists the parts that the probe can reach soon, unless the last list still holds. No allocation.
+void survey(const Scene& scene, RenderState& state, const LineProbe& probe);
+
+}  // namespace palpate

@@ -1,0 +1,34 @@
+#pragma once
+// Planes between probe and object: while one holds, nothing else need be computed for that object.
+
+#include <cstdint>
+#include <glm/geometric.hpp>
+
+#include "stimuli/convex_mesh.h"
+
+namespace palpate {
+
+/// The object lies within dot(normal, p) <= offset; mesh frame.
+struct SeparatingPlane {
+  Vec3 normal;        ///< unit, from the object to the probe
+  double offset = 0;  ///< m
+  bool valid = false;
+
+  /// Both ends, hence the whole probe, beyond the plane (and all poses between two such poses).
+  bool separates(const Vec3& tip, const Vec3& tail) const {
+    return valid && glm::dot(normal, tip) > offset && glm::dot(normal, tail) > offset;
+  }
+};
+
+/// The vertex farthest along `direction`, climbed to from `start`. Exact on a convex mesh.
+std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std::uint32_t start);
+
+/// Looks for a plane between the mesh and the segment, starting from `plane.normal` (any direction
+/// where there is none) and the vertex `support`; both are updated. Gilbert, Johnson & Keerthi
+/// 1988, stopped at the first direction that shows at least half of the distance. plane.valid says
+/// whether one was found; where the two are nearer than rounding, none may be found although one
+/// exists.
+void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
+                           SeparatingPlane& plane, std::uint32_t& support);
+
+}  // namespace palpate
