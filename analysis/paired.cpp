@@ -1,0 +1,147 @@
+#include "analysis/paired.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <boost/math/special_functions/gamma.hpp>
+#include <cmath>
+#include <numeric>
+
+#include "stimuli/random.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr const char* kOnePair = "one pair: nothing to tell chance from effect";
+constexpr const char* kNoPairs = "no participant has times for both renderers";
+constexpr const char* kNoVariance = "no variance: all differences are alike";
+
+/// Why differences do not allow inference; empty where they do.
+std::string no_inference(const std::vector<double>& differences) {
+  if (differences.empty()) return kNoPairs;
+  if (differences.size() == 1) return kOnePair;
+  return {};
+}
+
+bool no_variance(double sd, double centre) {
+  return sd <= 1e-10 * std::max(1.0, std::fabs(centre));
+}
+
+}  // namespace
+
+double percent_reduction(double log_ratio) { return -100 * std::expm1(log_ratio); }
+
+Interval percent_reduction(const Interval& log_ratio) {
+  return {percent_reduction(log_ratio.high), percent_reduction(log_ratio.low)};
+}
+
+TTest t_test(const std::vector<double>& differences) {
+  TTest test;
+  test.undefined = no_inference(differences);
+  if (!test.undefined.empty()) return test;
+  const double n = static_cast<double>(differences.size()), m = mean(differences);
+  test.sd = *standard_deviation(differences);
+  test.se = *test.sd / std::sqrt(n);
+  test.df = n - 1;
+  if (no_variance(*test.sd, m)) {
+    test.undefined = kNoVariance;
+    return test;
+  }
+  const boost::math::students_t distribution(n - 1);
+  test.t = m / *test.se;
+  test.p = std::min(1.0, 2 * cdf(complement(distribution, std::fabs(*test.t))));
+  const double half = quantile(distribution, 0.975) * *test.se;
+  test.log_ratio_ci95 = Interval{m - half, m + half};
+  return test;
+}
+
+EffectSize effect_size(const std::vector<double>& differences) {
+  EffectSize effect;
+  effect.undefined = no_inference(differences);
+  if (!effect.undefined.empty()) return effect;
+  const double sd = *standard_deviation(differences), m = mean(differences);
+  if (no_variance(sd, m)) {
+    effect.undefined = kNoVariance;
+    return effect;
+  }
+  effect.dz = m / sd;
+  const double df = static_cast<double>(differences.size()) - 1;
+  if (df < 2) {
+    effect.undefined = "two pairs: Hedges' correction J is 0";
+    return effect;
+  }
+  const double j =
+      std::exp(boost::math::lgamma(df / 2) - boost::math::lgamma((df - 1) / 2)) / std::sqrt(df / 2);
+  effect.hedges_gz = j * *effect.dz;
+  return effect;
+}
+
+std::vector<std::optional<double>> holm(const std::vector<std::optional<double>>& p) {
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    if (p[i]) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return *p[a] < *p[b]; });
+  std::vector<std::optional<double>> adjusted(p.size());
+  double largest = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    largest = std::max(largest, static_cast<double>(order.size() - i) * *p[order[i]]);
+    adjusted[order[i]] = std::min(1.0, largest);
+  }
+  return adjusted;
+}
+
+std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Description& description,
+                                          std::uint64_t seed) {
+  std::vector<PairedShape> all(table.shapes.size());
+  const auto place = [&](const char* renderer) {
+    return static_cast<std::size_t>(
+        std::find(table.renderers.begin(), table.renderers.end(), renderer) -
+        table.renderers.begin());
+  };
+  const std::size_t point = place("point"), ray = place("ray"), none = table.renderers.size();
+  for (std::size_t s = 0; s < all.size(); ++s) {
+    PairedShape& shape = all[s];
+    std::vector<double> points, rays;
+    for (std::size_t p = 0; p < table.participants.size(); ++p) {
+      const ParticipantCell nothing;
+      const auto& a = point == none ? nothing : description.people[point][s][p];
+      const auto& b = ray == none ? nothing : description.people[ray][s][p];
+      if (a.n_used > 0 && b.n_used > 0) {
+        shape.differences.push_back(b.mean_log - a.mean_log);
+        points.push_back(a.mean);
+        rays.push_back(b.mean);
+      } else if (a.n_trials + b.n_trials > 0) {
+        Dropped dropped{p, {}};
+        if (a.n_used == 0) dropped.renderers.emplace_back("point");
+        if (b.n_used == 0) dropped.renderers.emplace_back("ray");
+        shape.dropped.push_back(std::move(dropped));
+      }
+    }
+    shape.n_pairs = shape.differences.size();
+    if (shape.n_pairs == 0) {
+      shape.undefined = point == none || ray == none
+                            ? "only one renderer in the data: nothing to compare"
+                            : kNoPairs;
+    } else {
+      shape.percent_reduction_arithmetic = 100 * (mean(points) - mean(rays)) / mean(points);
+      shape.mean_log_ratio = mean(shape.differences);
+      shape.percent_reduction_geometric = percent_reduction(*shape.mean_log_ratio);
+    }
+    shape.t_test = t_test(shape.differences);
+    shape.effect_size = effect_size(shape.differences);
+    shape.wilcoxon = wilcoxon(shape.differences);
+    Random random(seed, {s});
+    shape.bootstrap = bootstrap_mean(shape.differences, random);
+    shape.bootstrap.seed = seed;
+  }
+
+  std::vector<std::optional<double>> p;
+  for (const PairedShape& shape : all) p.push_back(shape.t_test.p);
+  const auto adjusted = holm(p);
+  for (std::size_t s = 0; s < all.size(); ++s) all[s].t_test.p_holm = adjusted[s];
+  return all;
+}
+
+}  // namespace palpate

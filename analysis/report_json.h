@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "analysis/analysis.h"
+
+namespace palpate {
+
+/// The analysis as JSON (contracts: "Analysis"): numbers read back exactly; an undefined one is
+/// null, beside "status": "undefined" and a "reason".
+std::string report_json(const Analysis& analysis);
+
+}  // namespace palpate

@@ -1,0 +1,135 @@
+#include "analysis/trial_table_builder.h"
+
+#include <algorithm>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::array<std::string_view, 4> kShapes{"sphere", "cone", "cylinder", "cube"};
+
+/// The place of a name among the levels: the paper's first, then the protocol's.
+std::size_t rank(const std::string& name, const std::vector<std::string>& listed) {
+  const auto known = std::find(kShapes.begin(), kShapes.end(), name);
+  if (known != kShapes.end()) return static_cast<std::size_t>(known - kShapes.begin());
+  const auto found = std::find(listed.begin(), listed.end(), name);
+  return kShapes.size() + static_cast<std::size_t>(found - listed.begin());
+}
+
+std::string plural(std::size_t n, const char* one, const char* many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+}  // namespace
+
+std::uint32_t Interner::number(std::string_view name) {
+  if (!names_.empty() && names_[last_] == name) return last_;
+  const auto found = numbers_.find(name);
+  if (found != numbers_.end()) return last_ = found->second;
+  last_ = static_cast<std::uint32_t>(names_.size());
+  numbers_.emplace(names_.emplace_back(name), last_);
+  return last_;
+}
+
+void TrialTableBuilder::add(const RawTrial& raw) {
+  if (raw.practice) {
+    ++n_practice_;
+    return;
+  }
+  TrialRow row;
+  row.participant = participants_.number(raw.participant);
+  row.renderer = static_cast<std::uint16_t>(renderers_.number(raw.renderer));
+  row.shape = static_cast<std::uint16_t>(stimuli_.number(raw.shape));
+  if (!raw.response.empty()) row.answer = static_cast<std::int32_t>(stimuli_.number(raw.response));
+  row.timed_out = raw.timed_out;
+  row.correct = raw.correct && !raw.timed_out;
+  row.response_time = raw.response_time;
+  shown_.resize(stimuli_.names().size());
+  shown_[row.shape] = true;
+  n_simulated_ += raw.simulated;
+  n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
+  n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
+  places_.push_back({row.participant, raw.session, raw.block, raw.trial,
+                     static_cast<std::uint32_t>(rows_.size())});
+  rows_.push_back(row);
+}
+
+void TrialTableBuilder::check_places(TrialTable& table) {
+  std::sort(places_.begin(), places_.end());
+  std::size_t repeated = 0, doubled = 0;
+  for (std::size_t i = 1; i < places_.size(); ++i) {
+    const Place &a = places_[i - 1], &b = places_[i];
+    if (a.participant != b.participant || a.session != b.session || a.block != b.block ||
+        a.trial != b.trial) {
+      continue;
+    }
+    ++repeated;
+    const TrialRow &x = rows_[a.row], &y = rows_[b.row];
+    doubled += x.renderer == y.renderer && x.shape == y.shape && x.answer == y.answer &&
+               x.response_time == y.response_time;
+  }
+  if (doubled > 0) {
+    throw std::runtime_error(
+        plural(doubled, "row stands", "rows stand") +
+        " twice (same participant, session, block, trial and the same answer after the same "
+        "time): expected each trial once");
+  }
+  if (repeated > 0) {
+    table.warnings.push_back(plural(repeated, "row repeats", "rows repeat") +
+                             " the participant, session, block and trial of another row.");
+  }
+}
+
+TrialTable TrialTableBuilder::finish(Provenance provenance,
+                                     const std::vector<std::string>& listed) {
+  if (rows_.empty()) throw std::runtime_error("expected at least one trial that is not practice");
+  TrialTable table;
+  check_places(table);
+  table.provenance = std::move(provenance);
+  table.participants.assign(participants_.names().begin(), participants_.names().end());
+  table.n_practice = n_practice_;
+  table.simulated = n_simulated_ == 0              ? Simulated::no
+                    : n_simulated_ == rows_.size() ? Simulated::yes
+                                                   : Simulated::mixed;
+
+  // Levels into their order; order[new] = old, place[old] = new.
+  const auto& names = stimuli_.names();
+  std::vector<std::uint32_t> order(names.size()), place(names.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    if (shown_[a] != shown_[b]) return static_cast<bool>(shown_[a]);
+    return rank(names[a], listed) < rank(names[b], listed);
+  });
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    place[order[i]] = i;
+    table.answers.push_back(names[order[i]]);
+    if (shown_[order[i]]) table.shapes.push_back(names[order[i]]);
+  }
+  table.renderers.assign(renderers_.names().begin(), renderers_.names().end());
+  std::sort(table.renderers.begin(), table.renderers.end());  // point before ray
+  const bool swapped = !table.renderers.empty() && table.renderers[0] != renderers_.names()[0];
+  for (TrialRow& row : rows_) {
+    row.shape = static_cast<std::uint16_t>(place[row.shape]);
+    if (row.answer >= 0) {
+      row.answer = static_cast<std::int32_t>(place[static_cast<std::size_t>(row.answer)]);
+    }
+    if (swapped) row.renderer = static_cast<std::uint16_t>(1 - row.renderer);
+  }
+  table.rows = std::move(rows_);
+
+  if (n_contradicting_ > 0) {
+    table.warnings.push_back(
+        "In " + plural(n_contradicting_, "row", "rows") +
+        " `correct` does not follow from shape and response; `correct` was taken as it stands.");
+  }
+  if (n_late_answers_ > 0) {
+    table.warnings.push_back(plural(n_late_answers_, "time-out carries", "time-outs carry") +
+                             " an answer or counts as correct; time-outs were taken as wrong.");
+  }
+  return table;
+}
+
+}  // namespace palpate

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "analysis/trials.h"
+
+namespace palpate {
+
+/// Keeps each distinct name once and numbers them in order of first appearance.
+class Interner {
+ public:
+  std::uint32_t number(std::string_view name);
+  /// Whether the name is known already.
+  bool holds(std::string_view name) const { return numbers_.contains(name); }
+  const std::deque<std::string>& names() const { return names_; }
+
+ private:
+  std::deque<std::string> names_;  // a deque: the views in numbers_ stay good
+  std::unordered_map<std::string_view, std::uint32_t> numbers_;
+  std::uint32_t last_ = 0;
+};
+
+/// A row as a source has it.
+struct RawTrial {
+  std::string_view participant, renderer, shape, response;
+  int session = 1, block = 1, trial = 1;
+  bool correct = false, practice = false, timed_out = false, simulated = false;
+  double response_time = 0;  ///< s
+};
+
+/// Turns rows into a TrialTable: leaves practice out, numbers names, orders levels, and warns of
+/// what contradicts itself.
+class TrialTableBuilder {
+ public:
+  void add(const RawTrial& raw);
+  /// `listed`: the stimuli in the protocol's order, where it is known.
+  /// \throws std::runtime_error where nothing but practice is there, or rows stand twice.
+  TrialTable finish(Provenance provenance, const std::vector<std::string>& listed = {});
+
+ private:
+  struct Place {
+    std::uint32_t participant;
+    std::int32_t session, block, trial;
+    std::uint32_t row;
+    auto operator<=>(const Place&) const = default;
+  };
+  void check_places(TrialTable& table);
+
+  Interner participants_, renderers_, stimuli_;
+  std::vector<bool> shown_;  ///< by number of stimulus
+  std::vector<TrialRow> rows_;
+  std::vector<Place> places_;
+  std::size_t n_practice_ = 0, n_simulated_ = 0, n_contradicting_ = 0, n_late_answers_ = 0;
+};
+
+}  // namespace palpate
