@@ -101,7 +101,7 @@ class Store {
 
   // --- writing -------------------------------------------------------------------------------
 
-  /// Finds `code` in this protocol or adds it, with `wanted_number` or the next unused number.
+  /// Finds `code` in this protocol or adds it, with `wanted_number` or the smallest unused number.
   /// Protocols are told apart by SHA-256. \throws StoreRefused: a code that is not 1 to 32 letters
   /// and digits, a number below 1 or another code's, a code with another number, a code that is
   /// simulated here and real there, or with another seed.
@@ -152,7 +152,7 @@ class Store {
   StoreCounts counts();
 
   /// Completed trials by protocol, participant number, session and trial, one at a time: they need
-  /// not fit into memory.
+  /// not fit into memory. `visit` must not write to this store.
   void for_each_trial(const std::function<void(const StoredTrial&)>& visit,
                       bool with_samples = false);
   /// Attempts that were cut off, same order, then by attempt.

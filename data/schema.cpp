@@ -1,0 +1,137 @@
+#include "data/schema.h"
+
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "data/sqlite_errors.h"
+#include "data/store.h"
+
+namespace palpate {
+namespace {
+
+void set_version(SQLite::Database& db, int version) {
+  db.exec("PRAGMA user_version = " + std::to_string(version));
+}
+
+/// False when there is such a file already.
+bool make_private_file(const std::string& file) {
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (descriptor < 0) {
+    if (errno == EEXIST) return false;
+    throw StoreError(file + ": cannot be created: " + std::generic_category().message(errno) +
+                     "; check that the folder exists and that you may write there");
+  }
+  ::close(descriptor);
+  return true;
+}
+
+void sync_folder_of(const std::string& file) {
+  const auto folder = std::filesystem::path(file).parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) return;  // not every folder that may be written may be read
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+void remove_database(const std::string& file) {
+  for (const char* end : {"", "-journal", "-wal", "-shm"}) ::unlink((file + end).c_str());
+}
+
+}  // namespace
+
+std::span<const Migration> migrations() { return {}; }
+
+void create_database(const std::string& path) {
+  const std::string draft = path + ".palpate-new";
+  remove_database(draft);  // of a process that died right here
+  make_private_file(draft);
+  try {
+    guarded(path, [&] {
+      SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+      db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+      SQLite::Transaction transaction(db);
+      db.exec(schema_sql());
+      db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
+      set_version(db, kSchemaVersion);
+      transaction.commit();
+    });
+    if (std::rename(draft.c_str(), path.c_str()) != 0) {
+      throw StoreError(path + ": cannot be created: " + std::generic_category().message(errno));
+    }
+  } catch (...) {
+    remove_database(draft);
+    throw;
+  }
+  sync_folder_of(path);
+}
+
+void require_application_id(SQLite::Database& db, const std::string& path) {
+  if (db.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return;
+  throw StoreRefused(path + ": is not a palpate database but another program's; name another file");
+}
+
+int checked_version(SQLite::Database& db, const std::string& path, int newest) {
+  return guarded(path, [&] {
+    require_application_id(db, path);
+    const int version = db.execAndGet("PRAGMA user_version").getInt();
+    if (version > newest || version < 1) {
+      throw StoreRefused(path + ": has schema version " + std::to_string(version) +
+                         ", this palpate knows 1 to " + std::to_string(newest) +
+                         "; use the palpate that wrote it or a newer one");
+    }
+    return version;
+  });
+}
+
+std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
+                    std::span<const Migration> steps) {
+  const std::string stem = path + ".v" + std::to_string(from);
+  std::string copy = stem + ".backup";
+  for (int i = 2; !make_private_file(copy); ++i) copy = stem + "-" + std::to_string(i) + ".backup";
+  try {
+    guarded(copy, [&] {
+      SQLite::Database target(copy, SQLite::OPEN_READWRITE);
+      if (SQLite::Backup(target, db).executeStep() != 101 /* SQLITE_DONE */) {
+        throw StoreError(path + ": cannot be copied to " + copy +
+                         " before it is migrated: another program keeps it locked");
+      }
+    });
+  } catch (...) {
+    remove_database(copy);
+    throw;
+  }
+  sync_folder_of(copy);
+  guarded(path, [&] {
+    // A step may rebuild tables that others refer to: references are checked once, at the end.
+    db.exec("PRAGMA foreign_keys = OFF");
+    SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
+    int version = from;
+    for (const auto& step : steps) {
+      if (step.from != version || version >= to) continue;
+      db.exec(step.sql);
+      ++version;
+    }
+    if (version != to) {
+      throw StoreError(path + ": no way from schema version " + std::to_string(version) + " to " +
+                       std::to_string(to));
+    }
+    if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
+      throw StoreError(path +
+                       ": rows would be left without what they refer to; it stays at version " +
+                       std::to_string(from) + ", see the copy " + copy);
+    }
+    set_version(db, version);
+    transaction.commit();
+  });
+  return copy;
+}
+
+}  // namespace palpate

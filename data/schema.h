@@ -1,0 +1,43 @@
+#pragma once
+// Internal to data/: which files are ours, how one is made and how an older one becomes a current
+// one.
+
+#include <SQLiteCpp/Database.h>
+
+#include <span>
+#include <string>
+
+namespace palpate {
+
+inline constexpr int kSchemaVersion = 1;
+inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", in every file of ours
+
+/// schema.sql as it was when the program was built.
+const char* schema_sql();
+
+/// Turns version `from` into `from + 1`.
+struct Migration {
+  int from;
+  const char* sql;
+};
+
+/// The migrations to kSchemaVersion, in order. Version 1 is the first: none so far.
+std::span<const Migration> migrations();
+
+/// Makes the database whole or not at all: built as `path`.new, synced, renamed. 0600.
+/// The caller holds the writer's lock and has seen that there is no file. \throws StoreError.
+void create_database(const std::string& path);
+
+/// \throws StoreRefused: it is not ours; SQLite::Exception: it is no database at all.
+void require_application_id(SQLite::Database& db, const std::string& path);
+
+/// The version of an open database. \throws StoreRefused: it is not ours, or newer than `newest`.
+int checked_version(SQLite::Database& db, const std::string& path, int newest = kSchemaVersion);
+
+/// Brings a database of version `from` to `to`: copies it to a new `path`.v<from>.backup (0600),
+/// then runs every step in one transaction. \return the path of the copy. \throws StoreError; the
+/// database is then as it was.
+std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
+                    std::span<const Migration> steps);
+
+}  // namespace palpate

@@ -1,0 +1,135 @@
+#pragma once
+// Internal to data/: what store.cpp (opening, writing) and store_read.cpp share.
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <sys/types.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "data/sqlite_errors.h"
+#include "data/store.h"
+#include "data/store_lock.h"
+
+namespace palpate {
+
+/// Which file a path leads to; {0, 0}: none.
+struct FileIdentity {
+  dev_t device = 0;
+  ino_t inode = 0;
+  bool operator==(const FileIdentity&) const = default;
+};
+FileIdentity identity_of(const std::string& path);
+
+struct Store::Impl {
+  std::string path;  ///< as given; for messages
+  std::string file;  ///< links followed
+  Mode mode = Mode::read_only;
+  std::optional<WriterLock> lock;  // before db: given up after the database is closed
+  std::optional<SQLite::Database> db;
+  FileIdentity identity, wal_identity;
+
+  /// Runs `work` in a transaction that is on disk when this returns. A file that has been moved
+  /// away or deleted meanwhile takes writes without a complaint: that is seen here.
+  template <class Work>
+  auto commit(Work&& work) {
+    require_writer();
+    return guarded(path, [&] {
+      SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
+      auto result = work();
+      transaction.commit();
+      require_still_there();
+      return result;
+    });
+  }
+
+  /// Of attempts in this state, in the order of the header.
+  void for_each_attempt(const char* state, bool with_samples,
+                        const std::function<void(const StoredTrial&)>& visit);
+
+  void require_writer() const;
+  void require_running(const Run& run);
+  void require_still_there();
+  [[noreturn]] void refuse(const std::string& why) const;
+};
+
+/// Binds values one after the other, whatever their types.
+class Binder {
+ public:
+  explicit Binder(SQLite::Statement& statement) : statement_(statement) {}
+  Binder& operator<<(const std::string& value) { return bind(value); }
+  Binder& operator<<(const char* value) { return bind(value); }
+  Binder& operator<<(double value) { return bind(value); }
+  Binder& operator<<(int value) { return bind(value); }
+  Binder& operator<<(std::uint32_t value) { return bind(static_cast<std::int64_t>(value)); }
+  Binder& operator<<(std::int64_t value) { return bind(value); }
+  Binder& operator<<(std::uint64_t value) { return bind(static_cast<std::int64_t>(value)); }
+  Binder& operator<<(bool value) { return bind(value ? 1 : 0); }
+  template <class T>
+  Binder& operator<<(const std::optional<T>& value) {
+    if (value) return *this << *value;
+    statement_.bind(++index_);
+    return *this;
+  }
+
+ private:
+  template <class T>
+  Binder& bind(const T& value) {
+    statement_.bind(++index_, value);
+    return *this;
+  }
+  SQLite::Statement& statement_;
+  int index_ = 0;
+};
+
+/// Reads the columns of a row one after the other, whatever their types.
+class Row {
+ public:
+  explicit Row(SQLite::Statement& statement, int first = 0)
+      : statement_(statement), index_(first) {}
+  Row& operator>>(std::string& value) {
+    value = statement_.getColumn(index_++).getString();
+    return *this;
+  }
+  Row& operator>>(double& value) {
+    value = statement_.getColumn(index_++).getDouble();
+    return *this;
+  }
+  Row& operator>>(int& value) { return integer(value); }
+  Row& operator>>(std::uint32_t& value) { return integer(value); }
+  Row& operator>>(std::int64_t& value) { return integer(value); }
+  Row& operator>>(std::uint64_t& value) { return integer(value); }
+  Row& operator>>(bool& value) {
+    value = statement_.getColumn(index_++).getInt64() != 0;
+    return *this;
+  }
+  template <class T>
+  Row& operator>>(std::optional<T>& value) {
+    if (statement_.getColumn(index_).isNull()) {
+      value.reset();
+      ++index_;
+      return *this;
+    }
+    return *this >> value.emplace();
+  }
+
+ private:
+  template <class T>
+  Row& integer(T& value) {
+    value = static_cast<T>(statement_.getColumn(index_++).getInt64());
+    return *this;
+  }
+  SQLite::Statement& statement_;
+  int index_;
+};
+
+RunEnd run_end_of(const std::string& text);
+
+/// Within a transaction; no effect where none is open.
+void cut_off_open_attempt(SQLite::Database& db, const Run& run, const std::string& reason);
+
+}  // namespace palpate

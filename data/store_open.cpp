@@ -1,0 +1,190 @@
+// Opening a store: which files are taken, by whom, and what a dead process left behind.
+
+#include <SQLiteCpp/Transaction.h>
+#include <sqlite3.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <utility>
+
+#include "data/schema.h"
+#include "data/sqlite_errors.h"
+#include "data/store_impl.h"
+
+namespace palpate {
+namespace {
+
+constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";
+
+constexpr int kBusyTimeoutMs = 5000;
+
+/// The one writer is us: whatever else is still running in the file is dead.
+void mark_dead_runs(SQLite::Database& db) {
+  SQLite::Statement find(db, "SELECT 1 FROM runs WHERE end_reason = 'running' LIMIT 1");
+  if (!find.executeStep()) return;
+  find.reset();
+  SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
+  SQLite::Statement update(
+      db, "UPDATE attempts SET state = 'cut_off', cut_off_reason = ? WHERE state = 'running'");
+  Binder(update) << kInterrupted;
+  update.exec();
+  db.exec("UPDATE runs SET end_reason = 'interrupted' WHERE end_reason = 'running'");
+  transaction.commit();
+}
+
+/// Cheap damage is found before a participant sits down. Not the samples: they may be gigabytes,
+/// and carry their own checksums.
+void quick_check(SQLite::Database& db, const std::string& path) {
+  for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts"}) {
+    SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
+    if (!check.executeStep()) continue;
+    const std::string found = check.getColumn(0).getString();
+    if (found != "ok") throw SQLite::Exception(table + (": " + found), SQLITE_CORRUPT);
+  }
+  if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
+    throw StoreRefused(path + ": is damaged: rows refer to others that are gone; restore a backup");
+  }
+}
+
+/// SQLite's name for a file that nobody writes to: no locks, no log.
+std::string immutable_uri(const std::string& file) {
+  std::string uri = "file:";
+  for (const char c : file) {
+    if (c == '?' || c == '#' || c == '%') {
+      constexpr const char* kDigits = "0123456789ABCDEF";
+      uri += {'%', kDigits[c >> 4], kDigits[c & 15]};
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?immutable=1";
+}
+
+/// Another program's file is left alone: this look takes no locks and writes nothing, where an
+/// ordinary one could roll back or checkpoint it.
+void require_ours(const std::string& file, const std::string& path) {
+  SQLite::Database probe(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  try {
+    require_application_id(probe, path);
+  } catch (const SQLite::Exception& error) {
+    // Beside a writer the size in the header may run ahead of the file: a proper look will tell.
+    if (error.getErrorCode() != SQLITE_CORRUPT) throw;
+  }
+}
+
+bool may_write(const std::string& file) {
+  return ::access(file.c_str(), W_OK) == 0 &&
+         ::access(std::filesystem::path(file).parent_path().c_str(), W_OK) == 0;
+}
+
+/// A reader that may write opens the file so as to leave nothing behind: the last one to close a
+/// write-ahead log removes it. On a read-only disk a file without a log is taken as it is.
+void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file) {
+  if (may_write(file)) {
+    db.emplace(file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+    db->exec("PRAGMA query_only = ON");
+  } else if (std::filesystem::exists(file + "-wal")) {
+    db.emplace(file, SQLite::OPEN_READONLY, kBusyTimeoutMs);
+  } else {
+    db.emplace(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeoutMs);
+  }
+}
+
+}  // namespace
+
+FileIdentity identity_of(const std::string& path) {
+  struct stat found {};
+  if (::stat(path.c_str(), &found) != 0) return {};
+  return {found.st_dev, found.st_ino};
+}
+
+void Store::Impl::refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
+
+void Store::Impl::require_writer() const {
+  if (mode == Mode::read_only) refuse("was opened for reading only");
+}
+
+void Store::Impl::require_running(const Run& run) {
+  SQLite::Statement find(
+      *db, "SELECT 1 FROM runs WHERE id = ? AND session_id = ? AND end_reason = 'running'");
+  Binder(find) << run.id << run.session_id;
+  if (!find.executeStep())
+    refuse("this run of session " + std::to_string(run.session) + " is over");
+}
+
+void Store::Impl::require_still_there() {
+  const FileIdentity wal = identity_of(file + "-wal");
+  if (wal_identity == FileIdentity{}) wal_identity = wal;  // made by the first write
+  if (identity_of(file) != identity || wal != wal_identity || wal == FileIdentity{}) {
+    throw StoreError(path +
+                     ": the file or its -wal was moved, replaced or deleted while in use; this "
+                     "step is not safely stored. Put both back where they were before going on, or "
+                     "restore a backup");
+  }
+}
+
+Store::Store(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Store::Store(Store&&) noexcept = default;
+Store& Store::operator=(Store&&) noexcept = default;
+Store::~Store() = default;
+
+const std::string& Store::path() const { return impl_->path; }
+
+Store Store::open(const std::string& path, Mode mode) {
+  namespace fs = std::filesystem;
+  auto impl = std::make_unique<Impl>();
+  impl->path = path;
+  impl->mode = mode;
+  std::error_code error;
+  impl->file = fs::weakly_canonical(fs::absolute(path, error), error).string();
+  if (path.empty() || error) throw StoreRefused("'" + path + "' is no path of a database");
+  const bool writes = mode == Mode::write_or_create;
+  const fs::file_status status = fs::status(impl->file, error);
+  if (fs::exists(status) && !fs::is_regular_file(status))
+    impl->refuse("is not a file; name a file");
+  if (!writes && !fs::exists(status))
+    impl->refuse("there is no such file (or its folder may not be read)");
+  if (writes) {
+    impl->lock.emplace(impl->file);
+    if (!fs::exists(impl->file)) create_database(impl->file);
+  }
+  if (fs::file_size(impl->file, error) == 0 && !error) {
+    impl->refuse(
+        "is empty, which a palpate database never is; restore a backup, or remove it to begin a "
+        "new one");
+  }
+  guarded(path, [&] {
+    require_ours(impl->file, path);
+    if (writes) {
+      impl->db.emplace(impl->file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+    } else {
+      open_for_reading(impl->db, impl->file);
+    }
+    SQLite::Database& db = *impl->db;
+    db.exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
+    if (!writes) db.exec("BEGIN");
+    const int version = checked_version(db, path);
+    if (writes) {
+      if (sqlite3_db_readonly(db.getHandle(), "main") == 1) {
+        throw StoreError(path + ": may not be written; check its permissions");
+      }
+      if (version < kSchemaVersion) migrate(db, impl->file, version, kSchemaVersion, migrations());
+      if (db.execAndGet("PRAGMA journal_mode = WAL").getString() != "wal") {
+        throw StoreError(
+            path +
+            ": this disk does not allow a write-ahead log; keep the database on a local disk");
+      }
+      db.exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
+    } else if (version < kSchemaVersion) {
+      impl->refuse("was written by an older palpate (schema version " + std::to_string(version) +
+                   "); open it for writing once (palpate run or simulate) to bring it up to date");
+    }
+    quick_check(db, path);
+    if (writes) mark_dead_runs(db);
+  });
+  impl->identity = identity_of(impl->file);
+  return Store(std::move(impl));
+}
+
+}  // namespace palpate

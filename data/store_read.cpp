@@ -1,0 +1,269 @@
+// Reading: what a session holds, and everything for exports and analysis.
+
+#include <sqlite3.h>
+
+#include <algorithm>
+
+#include "data/samples_codec.h"
+#include "data/store_impl.h"
+#include "data/utc.h"
+
+namespace palpate {
+namespace {
+
+// The columns that the readers below take in this order.
+constexpr const char* kPerson = "pa.id, pa.code, pa.number, pa.simulated, pa.seed";
+constexpr const char* kRun =
+    "s.number, r.started_utc_ns, r.started_ns, r.program_version, r.build, r.device, "
+    "r.device_calibration, r.response_device, r.response_latency, s.observer_sha256, "
+    "r.consent_version, r.consent_utc_ns, r.hand";
+constexpr const char* kPlan =
+    "a.id, s.number, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
+    "a.orientation_w, "
+    "a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
+constexpr const char* kOutcome =
+    "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, a.onset_ns, "
+    "a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, a.start_tail_x, a.start_tail_y, "
+    "a.start_tail_z, a.ticks, a.missed_ticks, a.longest_period_ns, a.faults, a.started_inside, "
+    "a.max_force";
+// CROSS JOIN keeps SQLite to this nesting; with the indexes each level comes in order, so nothing
+// is sorted in memory or in a temporary file, however many trials there are.
+constexpr const char* kFromProtocolDown =
+    " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
+    "ON "
+    "s.participant_id = pa.id ";
+
+Row& operator>>(Row& row, Participant& person) {
+  std::optional<std::string> seed;
+  row >> person.id >> person.code >> person.number >> person.simulated >> seed;
+  person.seed = seed ? std::optional(std::stoull(*seed)) : std::nullopt;
+  return row;
+}
+
+Row& operator>>(Row& row, RunInfo& info) {
+  return row >> info.session >> info.clock.utc_ns >> info.clock.monotonic_ns >>
+         info.program_version >> info.build >> info.device >> info.device_calibration >>
+         info.response_device >> info.response_latency >> info.observer_sha256 >>
+         info.consent_version >> info.consent_utc_ns >> info.hand;
+}
+
+/// kPlan; the onset is when the attempt was begun, until read_outcome knows better.
+std::int64_t read_plan(Row& row, TrialRecord& record) {
+  std::int64_t id = 0;
+  row >> id >> record.session >> record.block >> record.trial >> record.attempt >>
+      record.renderer >> record.shape >> record.practice;
+  for (double& q : record.orientation_wxyz) row >> q;
+  row >> record.onset_ns;
+  return id;
+}
+
+void read_outcome(Row& row, TrialRecord& record) {
+  row >> record.response >> record.correct >> record.timed_out >> record.response_time >>
+      record.first_contact_time >> record.onset_ns >> record.response_ns;
+  for (double& x : record.start_tip) row >> x;
+  for (double& x : record.start_tail) row >> x;
+  row >> record.ticks >> record.missed_ticks >> record.longest_period_ns >> record.faults >>
+      record.started_inside >> record.max_force;
+}
+
+std::vector<SampleRecord> read_samples(SQLite::Statement& find, std::int64_t attempt,
+                                       const std::string& path) {
+  find.reset();
+  find.bind(1, attempt);
+  if (!find.executeStep()) return {};
+  if (find.getColumn(0).getInt() != kSamplesPacking) {
+    throw StoreRefused(
+        path + ": holds samples in a packing that this palpate does not know; use a newer one");
+  }
+  const SQLite::Column data = find.getColumn(2);
+  try {
+    return unpack_samples(data.getBlob(), static_cast<std::size_t>(data.getBytes()),
+                          find.getColumn(1).getInt64());
+  } catch (const StoreError& error) {
+    throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
+  }
+}
+
+}  // namespace
+
+SessionProgress Store::progress(const Participant& participant, int session) {
+  return guarded(impl_->path, [&] {
+    SQLite::Database& db = *impl_->db;
+    SessionProgress progress;
+    SQLite::Statement runs(
+        db,
+        "SELECT r.end_reason, r.started_utc_ns, r.started_ns FROM sessions s JOIN "
+        "runs r ON r.session_id = s.id WHERE s.participant_id = ? AND s.number = ? "
+        "ORDER BY r.id");
+    Binder(runs) << participant.id << session;
+    while (runs.executeStep()) {
+      ClockStamp clock;
+      std::string end;
+      Row(runs) >> end >> clock.utc_ns >> clock.monotonic_ns;
+      if (!progress.last_end) progress.clock = clock;
+      progress.last_end = run_end_of(end);
+    }
+    SQLite::Statement trials(
+        db, std::string("SELECT a.state, r.started_utc_ns, r.started_ns, ") + kPlan + ", " +
+                kOutcome +
+                " FROM sessions s JOIN attempts a ON a.session_id = s.id JOIN runs r ON r.id = "
+                "a.run_id "
+                "WHERE s.participant_id = ? AND s.number = ? ORDER BY a.trial, a.attempt");
+    Binder(trials) << participant.id << session;
+    while (trials.executeStep()) {
+      Row row(trials);
+      std::string state;
+      ClockStamp clock;
+      row >> state >> clock.utc_ns >> clock.monotonic_ns;
+      if (state == "cut_off") ++progress.cut_off;
+      if (state != "completed") continue;
+      TrialRecord& record = progress.completed.emplace_back();
+      read_plan(row, record);
+      read_outcome(row, record);
+      record.onset_utc = format_utc(to_unix_ns(clock, record.onset_ns));
+      progress.latest_ns = std::max(progress.latest_ns, record.response_ns);
+    }
+    return progress;
+  });
+}
+
+std::vector<ProtocolInfo> Store::protocols() {
+  return guarded(impl_->path, [&] {
+    std::vector<ProtocolInfo> all;
+    SQLite::Statement find(*impl_->db, "SELECT name, text, sha256 FROM protocols ORDER BY id");
+    while (find.executeStep()) {
+      ProtocolInfo& protocol = all.emplace_back();
+      Row(find) >> protocol.name >> protocol.text >> protocol.sha256;
+    }
+    return all;
+  });
+}
+
+std::vector<Participant> Store::participants(const std::string& protocol_sha256) {
+  return guarded(impl_->path, [&] {
+    std::vector<Participant> all;
+    SQLite::Statement find(*impl_->db, std::string("SELECT ") + kPerson +
+                                           " FROM participants pa JOIN protocols pr ON pr.id = "
+                                           "pa.protocol_id WHERE pr.sha256 = ? ORDER BY pa.number");
+    Binder(find) << protocol_sha256;
+    while (find.executeStep()) {
+      Row row(find);
+      row >> all.emplace_back();
+    }
+    return all;
+  });
+}
+
+std::vector<StoredRun> Store::runs() {
+  return guarded(impl_->path, [&] {
+    std::vector<StoredRun> all;
+    SQLite::Statement find(*impl_->db, std::string("SELECT pr.sha256, r.end_reason, ") + kPerson +
+                                           ", " + kRun + kFromProtocolDown +
+                                           "JOIN runs r ON r.session_id = s.id ORDER BY pr.id, "
+                                           "pa.number, s.number, r.id");
+    while (find.executeStep()) {
+      StoredRun& run = all.emplace_back();
+      std::string end;
+      Row row(find);
+      row >> run.protocol_sha256 >> end >> run.participant >> run.info;
+      run.end = run_end_of(end);
+    }
+    return all;
+  });
+}
+
+std::vector<StoredNote> Store::notes() {
+  return guarded(impl_->path, [&] {
+    std::vector<StoredNote> all;
+    SQLite::Statement find(*impl_->db,
+                           std::string("SELECT ") + kPerson +
+                               ", s.number, n.text, n.at_ns, r.started_utc_ns, r.started_ns" +
+                               kFromProtocolDown +
+                               "JOIN runs r ON r.session_id = s.id JOIN notes n ON n.run_id = "
+                               "r.id ORDER BY pr.id, pa.number, s.number, r.id, n.id");
+    while (find.executeStep()) {
+      StoredNote& note = all.emplace_back();
+      std::int64_t at_ns = 0;
+      ClockStamp clock;
+      Row row(find);
+      row >> note.participant >> note.session >> note.text >> at_ns >> clock.utc_ns >>
+          clock.monotonic_ns;
+      note.utc = format_utc(to_unix_ns(clock, at_ns));
+    }
+    return all;
+  });
+}
+
+StoreCounts Store::counts() {
+  return guarded(impl_->path, [&] {
+    SQLite::Statement count(
+        *impl_->db,
+        "SELECT (SELECT count(*) FROM protocols), (SELECT count(*) FROM participants), (SELECT "
+        "count(*) "
+        "FROM sessions), (SELECT count(*) FROM runs), (SELECT count(*) FROM attempts WHERE state = "
+        "'completed'), (SELECT count(*) FROM attempts WHERE state = 'cut_off'), (SELECT count(*) "
+        "FROM "
+        "runs WHERE end_reason = 'interrupted')");
+    count.executeStep();
+    StoreCounts counts;
+    Row(count) >> counts.protocols >> counts.participants >> counts.sessions >> counts.runs >>
+        counts.completed >> counts.cut_off >> counts.interrupted_runs;
+    return counts;
+  });
+}
+
+void Store::Impl::for_each_attempt(const char* state, bool with_samples,
+                                   const std::function<void(const StoredTrial&)>& visit) {
+  guarded(path, [&] {
+    SQLite::Statement find(
+        *db, std::string("SELECT ") + kPlan + ", a.cut_off_reason, " + kOutcome +
+                 ", a.run_id, pr.name, pr.sha256" + kFromProtocolDown +
+                 "CROSS JOIN attempts a ON a.session_id = s.id WHERE a.state = ? ORDER "
+                 "BY pr.id, pa.number, s.number, a.trial, a.attempt");
+    SQLite::Statement find_run(*db,
+                               std::string("SELECT ") + kPerson + ", " + kRun +
+                                   " FROM runs r JOIN sessions s ON s.id = r.session_id JOIN "
+                                   "participants pa ON pa.id = s.participant_id WHERE r.id = ?");
+    SQLite::Statement samples(*db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?");
+    Binder(find) << state;
+    StoredTrial trial;
+    std::int64_t known_run = 0;
+    while (find.executeStep()) {
+      TrialRecord& record = trial.record;
+      record = {};
+      std::optional<std::string> reason;
+      Row row(find);
+      const std::int64_t id = read_plan(row, record);
+      const std::int64_t began_ns = record.onset_ns;
+      row >> reason;
+      read_outcome(row, record);  // NULL reads as 0 or ""
+      trial.cut_off_reason = reason.value_or("");
+      if (reason) record.onset_ns = began_ns;
+      std::int64_t run = 0;
+      row >> run >> trial.protocol_name >> trial.protocol_sha256;
+      if (run != known_run) {
+        find_run.reset();
+        find_run.bind(1, run);
+        if (!find_run.executeStep())
+          throw SQLite::Exception("an attempt without a run", SQLITE_CORRUPT);
+        Row columns(find_run);
+        columns >> trial.participant >> trial.run;
+        known_run = run;
+      }
+      record.onset_utc = format_utc(to_unix_ns(trial.run.clock, record.onset_ns));
+      if (with_samples) record.samples = read_samples(samples, id, path);
+      visit(trial);
+    }
+  });
+}
+
+void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
+                           bool with_samples) {
+  impl_->for_each_attempt("completed", with_samples, visit);
+}
+
+void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visit) {
+  impl_->for_each_attempt("cut_off", false, visit);
+}
+
+}  // namespace palpate

@@ -1,0 +1,196 @@
+// Who takes part and which process runs which session.
+
+#include <sqlite3.h>
+
+#include <array>
+
+#include "data/checks.h"
+#include "data/store_impl.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::array<const char*, 6> kRunEnds = {"running", "done",      "paused",
+                                                 "aborted", "withdrawn", "interrupted"};
+
+}  // namespace
+
+const char* to_string(RunEnd end) { return kRunEnds.at(static_cast<std::size_t>(end)); }
+
+RunEnd run_end_of(const std::string& text) {
+  for (std::size_t i = 0; i < kRunEnds.size(); ++i) {
+    if (text == kRunEnds[i]) return static_cast<RunEnd>(i);
+  }
+  throw SQLite::Exception("a run ends with '" + text + "'", SQLITE_CORRUPT);
+}
+
+void cut_off_open_attempt(SQLite::Database& db, const Run& run, const std::string& reason) {
+  SQLite::Statement update(
+      db,
+      "UPDATE attempts SET state = 'cut_off', cut_off_reason = ? WHERE run_id = ? "
+      "AND state = 'running'");
+  Binder(update) << reason << run.id;
+  update.exec();
+}
+
+Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
+                         std::optional<int> wanted_number, bool simulated,
+                         std::optional<std::uint64_t> seed) {
+  Checks checks;
+  checks.expect(
+      is_participant_code(code),
+      "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
+  if (wanted_number) checks.positive("the participant's number", *wanted_number);
+  checks.expect(simulated || !seed, "only a simulated participant has a seed");
+  checks.present("protocol's name", protocol.name);
+  checks.present("protocol's text", protocol.text);
+  checks.expect(protocol.sha256.size() == 64 &&
+                    protocol.sha256.find_first_not_of("0123456789abcdef") == std::string::npos,
+                "protocol's SHA-256 must be 64 lower-case hexadecimal digits");
+  checks.raise(impl_->path + ": participant");
+  return impl_->commit([&] {
+    SQLite::Database& db = *impl_->db;
+    SQLite::Statement add_protocol(
+        db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?) ON CONFLICT DO NOTHING");
+    Binder(add_protocol) << protocol.sha256 << protocol.name << protocol.text;
+    add_protocol.exec();
+    SQLite::Statement find_protocol(db, "SELECT id, text FROM protocols WHERE sha256 = ?");
+    Binder(find_protocol) << protocol.sha256;
+    find_protocol.executeStep();
+    const std::int64_t protocol_id = find_protocol.getColumn(0).getInt64();
+    if (find_protocol.getColumn(1).getString() != protocol.text) {
+      impl_->refuse("holds another protocol text under the same SHA-256 " + protocol.sha256);
+    }
+
+    Participant person{.code = code, .simulated = simulated, .seed = seed};
+    SQLite::Statement find(
+        db,
+        "SELECT id, number, simulated, seed FROM participants WHERE protocol_id = ? AND code = ?");
+    Binder(find) << protocol_id << code;
+    if (find.executeStep()) {
+      bool was_simulated = false;
+      std::optional<std::string> was_seed;
+      Row(find) >> person.id >> person.number >> was_simulated >> was_seed;
+      if (wanted_number && *wanted_number != person.number) {
+        impl_->refuse("participant " + code + " has number " + std::to_string(person.number) +
+                      ", not " + std::to_string(*wanted_number) +
+                      "; leave the number out to go on");
+      }
+      if (was_simulated != simulated) {
+        impl_->refuse("participant " + code + " is " + (was_simulated ? "simulated" : "real") +
+                      " in this database; use another code or another database");
+      }
+      const auto text = seed ? std::optional(std::to_string(*seed)) : std::nullopt;
+      if (was_seed != text) {
+        impl_->refuse("participant " + code + " was simulated with seed " +
+                      was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
+                      "; use that seed or another database");
+      }
+      return person;
+    }
+
+    SQLite::Statement numbers(
+        db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
+    Binder(numbers) << protocol_id;
+    int next = 1;  // the smallest unused: the counterbalancing has no gaps
+    while (numbers.executeStep()) {
+      const int number = numbers.getColumn(0).getInt();
+      if (wanted_number == number) {
+        impl_->refuse("number " + std::to_string(number) + " is taken by participant " +
+                      numbers.getColumn(1).getString() +
+                      "; leave the number out for the next unused one");
+      }
+      if (number == next) ++next;
+    }
+    person.number = wanted_number.value_or(next);
+    SQLite::Statement add(db,
+                          "INSERT INTO participants (protocol_id, code, number, simulated, seed) "
+                          "VALUES (?, ?, ?, ?, ?)");
+    Binder(add) << protocol_id << code << person.number << simulated
+                << (seed ? std::optional(std::to_string(*seed)) : std::nullopt);
+    add.exec();
+    person.id = db.getLastInsertRowid();
+    return person;
+  });
+}
+
+Run Store::begin_run(const Participant& participant, const RunInfo& info) {
+  Checks checks;
+  check(checks, info, participant.simulated);
+  checks.raise(impl_->path + ": session of participant " + participant.code);
+  return impl_->commit([&] {
+    SQLite::Database& db = *impl_->db;
+    const std::string name =
+        "session " + std::to_string(info.session) + " of participant " + participant.code;
+    Run run{.session = info.session};
+    SQLite::Statement find(
+        db, "SELECT id, observer_sha256 FROM sessions WHERE participant_id = ? AND number = ?");
+    Binder(find) << participant.id << info.session;
+    if (find.executeStep()) {
+      std::string observer;
+      Row(find) >> run.session_id >> observer;
+      if (observer != info.observer_sha256) {
+        impl_->refuse(name +
+                      " was begun with other settings of the simulated participant; use those or "
+                      "another database");
+      }
+      SQLite::Statement last(
+          db, "SELECT end_reason FROM runs WHERE session_id = ? ORDER BY id DESC LIMIT 1");
+      Binder(last) << run.session_id;
+      const RunEnd end =
+          last.executeStep() ? run_end_of(last.getColumn(0).getString()) : RunEnd::paused;
+      if (end == RunEnd::done || end == RunEnd::withdrawn || end == RunEnd::running) {
+        impl_->refuse(name + " is " + to_string(end) + " and cannot be begun again");
+      }
+    } else {
+      SQLite::Statement add(
+          db, "INSERT INTO sessions (participant_id, number, observer_sha256) VALUES (?, ?, ?)");
+      Binder(add) << participant.id << info.session << info.observer_sha256;
+      add.exec();
+      run.session_id = db.getLastInsertRowid();
+    }
+    SQLite::Statement add(
+        db,
+        "INSERT INTO runs (session_id, started_utc_ns, started_ns, program_version, build, device, "
+        "device_calibration, response_device, response_latency, consent_version, consent_utc_ns, "
+        "hand, "
+        "end_reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'running')");
+    Binder(add) << run.session_id << info.clock.utc_ns << info.clock.monotonic_ns
+                << info.program_version << info.build << info.device << info.device_calibration
+                << info.response_device << info.response_latency << info.consent_version
+                << info.consent_utc_ns << info.hand;
+    add.exec();
+    run.id = db.getLastInsertRowid();
+    return run;
+  });
+}
+
+void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text) {
+  Checks checks;
+  checks.present("note", text);
+  checks.raise(impl_->path + ": note");
+  impl_->commit([&] {
+    SQLite::Statement add(*impl_->db, "INSERT INTO notes (run_id, at_ns, text) VALUES (?, ?, ?)");
+    Binder(add) << run.id << at_ns << text;
+    add.exec();
+    return true;
+  });
+}
+
+void Store::end_run(const Run& run, RunEnd reason, std::int64_t ended_ns) {
+  if (reason == RunEnd::running || reason == RunEnd::interrupted) {
+    impl_->refuse(std::string("a run is not ended as ") + to_string(reason));
+  }
+  impl_->commit([&] {
+    impl_->require_running(run);
+    cut_off_open_attempt(*impl_->db, run,
+                         std::string("the session was ended: ") + to_string(reason));
+    SQLite::Statement update(*impl_->db,
+                             "UPDATE runs SET end_reason = ?, ended_ns = ? WHERE id = ?");
+    Binder(update) << to_string(reason) << ended_ns << run.id;
+    update.exec();
+    return true;
+  });
+}
+
+}  // namespace palpate
