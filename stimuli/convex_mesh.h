@@ -79,6 +79,8 @@ class ConvexMesh {
   double size() const { return 2 * radius_; }  ///< m; the length that tolerances are relative to
 
  private:
+  class Builder;
+
   std::vector<Vec3> vertices_;
   std::vector<Facet> facets_;
   std::vector<Side> sides_;

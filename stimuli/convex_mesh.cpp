@@ -1,0 +1,245 @@
+#include "stimuli/convex_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "stimuli/convexity.h"
+#include "stimuli/coplanar.h"
+#include "stimuli/facet_outlines.h"
+#include "stimuli/half_edges.h"
+
+namespace palpate {
+namespace {
+
+using Index = std::uint32_t;
+constexpr Index kNone = HalfEdges::kNone;
+
+// Folds, thickness and orientation, face by face, before anything is merged.
+void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, MeshFaults& faults) {
+  check_flatness(mesh, shapes, faults);
+  double volume = 0, area = 0;
+  for (const FaceShape& shape : shapes) {
+    volume += glm::dot(shape.middle - mesh.points[0], shape.area) / 3;
+    area += glm::length(shape.area);
+  }
+  const bool closed = std::find(mesh.twin.begin(), mesh.twin.end(), kNone) == mesh.twin.end();
+  if (closed && !(std::abs(volume) > 2 * mesh.error * area)) {
+    faults.add("flat", [] { return "expected a solid, found no volume"; });
+    return;
+  }
+  if (closed && volume < 0) {
+    faults.add("inside out", [] {
+      return "all faces are clockwise seen from outside; expected counter-clockwise";
+    });
+  }
+  const double outward = volume < 0 ? -1 : 1;
+  for (Index h = 0; h < mesh.count(); ++h) {
+    const Index twin = mesh.twin[h];
+    if (twin == kNone || twin < h) continue;
+    if (shapes[mesh.face[h]].thin || shapes[mesh.face[twin]].thin) continue;
+    if (outward * fold(mesh, shapes, h) >= -kCoplanar) continue;
+    faults.add("not convex", [&] {
+      return mesh.name_edge(h) + " is a dent against " + mesh.name_face(mesh.face[twin]) +
+             "; expected convex edges only";
+    });
+  }
+}
+
+// Interleaves the bits of a place within the bounding box: what is near in this order is near in
+// space (Morton 1966).
+std::uint64_t morton(const Vec3& place, const Vec3& low, double extent) {
+  const auto spread = [](double share) {
+    auto bits = static_cast<std::uint64_t>(std::clamp(share, 0.0, 1.0) * 0x1fffff);
+    bits = (bits | bits << 32U) & 0x001f00000000ffffU;
+    bits = (bits | bits << 16U) & 0x001f0000ff0000ffU;
+    bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
+    bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
+    return (bits | bits << 2U) & 0x1249249249249249U;
+  };
+  const Vec3 share = (place - low) / extent;
+  return spread(share.x) | spread(share.y) << 1U | spread(share.z) << 2U;
+}
+
+std::vector<Index> order_in_space(const HalfEdges& mesh, const FacetOutlines& outlines) {
+  Vec3 low = mesh.points[0];
+  for (const Vec3& point : mesh.points) low = glm::min(low, point);
+  std::vector<std::pair<std::uint64_t, Index>> keys;
+  keys.reserve(outlines.region_count());
+  for (Index r = 0; r < outlines.region_count(); ++r) {
+    Vec3 middle;
+    for (Index s = outlines.first[r]; s < outlines.first[r + 1]; ++s) {
+      middle += mesh.from(outlines.start[s]) - low;
+    }
+    middle /= static_cast<double>(outlines.first[r + 1] - outlines.first[r]);
+    keys.emplace_back(morton(low + middle, low, mesh.size), r);
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<Index> order;
+  order.reserve(keys.size());
+  for (const auto& [key, region] : keys) order.push_back(region);
+  return order;
+}
+
+// The plane through a polygon: Newell's normal, and midway between the corners that stand out most
+// and least.
+Facet plane_of(const std::vector<Vec3>& corners) {
+  Vec3 middle, area;
+  for (const Vec3& corner : corners) middle += corner - corners[0];
+  middle = corners[0] + middle / static_cast<double>(corners.size());
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    area += glm::cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle);
+  }
+  Facet facet{glm::normalize(area), 0, 0, static_cast<Index>(corners.size())};
+  double low = std::numeric_limits<double>::max(), high = -low;
+  for (const Vec3& corner : corners) {
+    low = std::min(low, glm::dot(facet.normal, corner));
+    high = std::max(high, glm::dot(facet.normal, corner));
+  }
+  facet.offset = (low + high) / 2;
+  return facet;
+}
+
+}  // namespace
+
+/// Numbers and fills the arrays of a ConvexMesh from the outlines of its facets.
+class ConvexMesh::Builder {
+ public:
+  Builder(ConvexMesh& out, const HalfEdges& mesh, const FacetOutlines& outlines)
+      : out_(out),
+        mesh_(mesh),
+        outlines_(outlines),
+        facet_of_(outlines.region_count()),
+        side_of_(outlines.side_count()),
+        edge_of_(outlines.side_count(), kNone),
+        vertex_of_(mesh.points.size(), kNone) {}
+
+  void build() {
+    const std::vector<Index> order = order_in_space(mesh_, outlines_);
+    for (Index f = 0; f < order.size(); ++f) facet_of_[order[f]] = f;
+    out_.facets_.reserve(order.size());
+    out_.sides_.reserve(outlines_.side_count());
+    out_.edges_.reserve(outlines_.side_count() / 2);
+    start_.reserve(outlines_.side_count());
+    for (const Index region : order) add_facet(region);
+    add_fans();
+    add_sphere();
+  }
+
+  const std::vector<Index>& soup_vertex() const { return soup_vertex_; }
+
+ private:
+  Index vertex(Index outline_side) {
+    const Index point = mesh_.origin[outlines_.start[outline_side]];
+    if (vertex_of_[point] == kNone) {
+      vertex_of_[point] = static_cast<Index>(out_.vertices_.size());
+      out_.vertices_.push_back(mesh_.points[point]);
+      soup_vertex_.push_back(mesh_.soup_vertex[point]);
+    }
+    return vertex_of_[point];
+  }
+
+  void add_facet(Index region) {
+    const Index first = outlines_.first[region], end = outlines_.first[region + 1];
+    corners_.clear();
+    for (Index s = first; s < end; ++s) corners_.push_back(mesh_.from(outlines_.start[s]));
+    Facet facet = plane_of(corners_);
+    facet.first_side = static_cast<Index>(out_.sides_.size());
+    out_.facets_.push_back(facet);
+    for (Index s = first; s < end; ++s) {
+      add_side(s, s + 1 == end ? first : s + 1, corners_[s - first],
+               corners_[s + 1 == end ? 0 : s + 1 - first]);
+    }
+  }
+
+  void add_side(Index s, Index next, const Vec3& from, const Vec3& to) {
+    const Index opposite = outlines_.opposite[s];
+    const Index across = facet_of_[outlines_.region[opposite]];
+    const Index v0 = vertex(s), v1 = vertex(next);
+    if (edge_of_[opposite] == kNone) {
+      edge_of_[s] = static_cast<Index>(out_.edges_.size());
+      out_.edges_.push_back({v0, v1, static_cast<Index>(out_.facets_.size() - 1), across});
+    } else {
+      edge_of_[s] = edge_of_[opposite];
+    }
+    side_of_[s] = static_cast<Index>(out_.sides_.size());
+    start_.push_back(v0);
+    const Vec3 inward =
+        glm::normalize(glm::cross(out_.facets_.back().normal, glm::normalize(to - from)));
+    const double offset = (glm::dot(inward, from) + glm::dot(inward, to)) / 2;
+    out_.sides_.push_back({inward, offset, edge_of_[s], across});
+  }
+
+  // Counter-clockwise round a vertex: from the side that leaves it, over the facet on the left, to
+  // the side that arrives at it, which leaves it on the other side of that edge.
+  void add_fans() {
+    std::vector<Index> opposite(out_.sides_.size()), leaving(out_.vertices_.size(), kNone);
+    for (Index s = 0; s < outlines_.side_count(); ++s) {
+      opposite[side_of_[s]] = side_of_[outlines_.opposite[s]];
+    }
+    for (Index s = 0; s < start_.size(); ++s) leaving[start_[s]] = s;
+    out_.fan_first_.reserve(out_.vertices_.size() + 1);
+    out_.fan_edges_.reserve(out_.sides_.size());
+    for (const Index begin : leaving) {
+      out_.fan_first_.push_back(static_cast<Index>(out_.fan_edges_.size()));
+      Index side = begin;
+      do {
+        out_.fan_edges_.push_back(out_.sides_[side].edge);
+        const Edge& edge = out_.edges_[out_.sides_[side].edge];
+        const Facet& facet = out_.facets_[edge.v0 == start_[side] ? edge.left : edge.right];
+        const bool is_first = side == facet.first_side;
+        side = opposite[is_first ? side + facet.side_count - 1 : side - 1];
+      } while (side != begin);
+    }
+    out_.fan_first_.push_back(static_cast<Index>(out_.fan_edges_.size()));
+  }
+
+  // Round the middle of the bounding box: at most 1.74 times the smallest sphere, and the smallest
+  // for anything with a centre of symmetry.
+  void add_sphere() {
+    Vec3 low = out_.vertices_[0], high = low;
+    for (const Vec3& vertex : out_.vertices_) {
+      low = glm::min(low, vertex);
+      high = glm::max(high, vertex);
+    }
+    out_.centre_ = low + (high - low) / 2.0;
+    for (const Vec3& vertex : out_.vertices_) {
+      out_.radius_ = std::max(out_.radius_, glm::distance(vertex, out_.centre_));
+    }
+  }
+
+  ConvexMesh& out_;
+  const HalfEdges& mesh_;
+  const FacetOutlines& outlines_;
+  std::vector<Index> facet_of_;           // of each region
+  std::vector<Index> side_of_, edge_of_;  // of each side of the outlines
+  std::vector<Index> vertex_of_;          // of each welded point
+  std::vector<Index> soup_vertex_;        // of each vertex
+  std::vector<Index> start_;              // of each side, its first vertex
+  std::vector<Vec3> corners_;
+};
+
+ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
+  MeshFaults faults;
+  const HalfEdges mesh = link_half_edges(soup, faults);
+  const std::vector<FaceShape> shapes = shapes_of(mesh);
+  check_solid(mesh, shapes, faults);
+  faults.throw_if_any();
+  Index region_count = 0;
+  const std::vector<Index> region_of = coplanar_regions(mesh, shapes, region_count);
+  if (region_count == 0) {
+    faults.add("flat", [] { return "expected a solid, found lines only"; });
+    faults.throw_if_any();
+  }
+  const FacetOutlines outlines = facet_outlines(mesh, region_of, region_count, faults);
+  faults.throw_if_any();
+  Builder builder(*this, mesh, outlines);
+  builder.build();
+  check_convexity(*this, builder.soup_vertex(), 16 * kCoplanar * mesh.error, faults);
+  faults.throw_if_any();
+}
+
+}  // namespace palpate

@@ -1,0 +1,218 @@
+#include "stimuli/coplanar.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+namespace palpate {
+namespace {
+
+using Index = HalfEdges::Index;
+constexpr Index kNone = HalfEdges::kNone;
+
+// How a face lies against one of its sides.
+struct Reach {
+  double across = 0;    // m, how far it extends from the line of the side
+  double overhang = 0;  // m, how far it extends past the ends of the side
+};
+
+Reach reach_of(const HalfEdges& mesh, Index h, const Vec3& along, double length) {
+  const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
+  // Some corners tell enough of a polygon with many: trying all would cost their number squared.
+  const Index stride = std::max<Index>(1, corners / 16);
+  Reach reach;
+  for (Index k = 0; k < corners; k += stride) {
+    const Index corner = mesh.first[face] + (h - mesh.first[face] + 2 + k) % corners;
+    const Vec3 arm = mesh.from(corner) - mesh.from(h);
+    const double t = glm::dot(arm, along);
+    reach.across = std::max(reach.across, glm::length(arm - t * along));
+    reach.overhang = std::max({reach.overhang, -t, t - length});
+  }
+  return reach;
+}
+
+// A planar region while it grows.
+class Region {
+ public:
+  Region(const HalfEdges& mesh, const FaceShape& seed, Index face)
+      : mesh_(mesh), low_(seed.middle), high_(seed.middle) {
+    add(seed, face);
+  }
+
+  void add(const FaceShape& shape, Index face) {
+    const double weight = glm::length(shape.area);
+    area_ += shape.area;
+    weight_ += weight;
+    moment_ += weight * (shape.middle - mesh_.points[0]);
+    for (Index h = mesh_.first[face]; h < mesh_.first[face + 1]; ++h) {
+      low_ = glm::min(low_, mesh_.from(h));
+      high_ = glm::max(high_, mesh_.from(h));
+    }
+  }
+
+  // Does the face beyond half-edge h lie in the plane? The plane is known to the error over the
+  // region's width, and the face reaches past it: allow for that.
+  bool holds(Index h) const {
+    const Vec3 normal = glm::normalize(area_);
+    const Vec3 middle = mesh_.points[0] + moment_ / weight_;
+    const Vec3 side = mesh_.to(h) - mesh_.from(h);
+    const double length = glm::length(side), width = weight_ / glm::distance(low_, high_);
+    const Index beyond = mesh_.twin[h], face = mesh_.face[beyond];
+    const Reach reach = reach_of(mesh_, beyond, -side / length, length);
+    const double allowed = 2 * kCoplanar * mesh_.error * (1 + reach.across / width);
+    for (Index k = mesh_.first[face]; k < mesh_.first[face + 1]; ++k) {
+      if (std::abs(glm::dot(normal, mesh_.from(k) - middle)) > allowed) return false;
+    }
+    return true;
+  }
+
+ private:
+  const HalfEdges& mesh_;
+  Vec3 area_, moment_, low_, high_;
+  double weight_ = 0;
+};
+
+void grow(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index seed, Index number,
+          std::vector<Index>& region_of) {
+  Region region(mesh, shapes[seed], seed);
+  region_of[seed] = number;
+  std::deque<Index> border{seed};
+  while (!border.empty()) {
+    const Index face = border.front();
+    border.pop_front();
+    for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
+      const Index beyond = mesh.face[mesh.twin[h]];
+      if (region_of[beyond] != kNone || shapes[beyond].thin) continue;
+      if (std::abs(fold(mesh, shapes, h)) > kCoplanar || !region.holds(h)) continue;
+      region.add(shapes[beyond], beyond);
+      region_of[beyond] = number;
+      border.push_back(beyond);
+    }
+  }
+}
+
+Index longest_side(const HalfEdges& mesh, Index face) {
+  Index longest = mesh.first[face];
+  for (Index h = longest; h < mesh.first[face + 1]; ++h) {
+    if (glm::distance(mesh.from(h), mesh.to(h)) >
+        glm::distance(mesh.from(longest), mesh.to(longest))) {
+      longest = h;
+    }
+  }
+  return longest;
+}
+
+// A face that is as good as a line joins the region beyond its longest side; where that is such a
+// face as well, any region that it touches.
+void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
+                      std::vector<Index>& region_of) {
+  bool only_longest = true;
+  while (!thin.empty()) {
+    const std::size_t before = thin.size();
+    std::erase_if(thin, [&](Index face) {
+      const Index longest = longest_side(mesh, face);
+      for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
+        if (only_longest && h != longest) continue;
+        const Index beyond = region_of[mesh.face[mesh.twin[h]]];
+        if (beyond == kNone) continue;
+        region_of[face] = beyond;
+        return true;
+      }
+      return false;
+    });
+    if (thin.size() < before) {
+      only_longest = true;
+    } else if (only_longest) {
+      only_longest = false;
+    } else {
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
+  std::vector<FaceShape> shapes(mesh.face_count());
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    FaceShape& shape = shapes[f];
+    const Index first = mesh.first[f], end = mesh.first[f + 1];
+    const Vec3 base = mesh.from(first);
+    double longest = 0;
+    for (Index h = first; h < end; ++h) {
+      const Vec3 arm = mesh.from(h) - base;
+      shape.area += 0.5 * glm::cross(arm, mesh.to(h) - base);
+      shape.middle += arm;
+      longest = std::max(longest, glm::distance(mesh.from(h), mesh.to(h)));
+    }
+    shape.middle = base + shape.middle / static_cast<double>(end - first);
+    const double area = glm::length(shape.area);
+    shape.height = 2 * area / longest;
+    shape.thin = !(shape.height > 4 * mesh.error);
+    if (area > 0) shape.normal = shape.area / area;
+  }
+  return shapes;
+}
+
+void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                    MeshFaults& faults) {
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (mesh.first[f + 1] - mesh.first[f] == 3 || shapes[f].thin) continue;
+    double off = 0;
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) {
+      off = std::max(off, std::abs(glm::dot(shapes[f].normal, mesh.from(h) - shapes[f].middle)));
+    }
+    if (off <= 2 * kCoplanar * mesh.error) continue;
+    faults.add("bent face", [&] {
+      return mesh.name_face(f) + ": expected corners in one plane, found them up to " +
+             std::to_string(off / mesh.size) + " of the object's size off it";
+    });
+  }
+}
+
+double fold(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
+  const Index twin = mesh.twin[h];
+  const Vec3& ours = shapes[mesh.face[h]].normal;
+  const Vec3& theirs = shapes[mesh.face[twin]].normal;
+  const Vec3 side = mesh.to(h) - mesh.from(h);
+  const double length = glm::length(side);
+  const Vec3 along = side / length;
+  double sine = glm::dot(glm::cross(ours, theirs), along);
+  // Past a right angle the sine falls again, the fold does not. At more than 60 degrees faces are
+  // not one plane however little is known of them: that keeps the sides of needles apart.
+  const bool sharp = glm::dot(ours, theirs) < 0.5;
+  if (sharp) sine = sine < 0 ? -1 : 1;
+  const Reach near = reach_of(mesh, h, along, length);
+  const Reach far = reach_of(mesh, twin, -along, length);
+  const double lever = 1 + std::max(near.overhang, far.overhang) / length;
+  const double moved = sine * near.across * far.across / (near.across + far.across);
+  const double folded = moved / (mesh.error * lever);
+  return sharp ? std::copysign(std::max(std::abs(folded), 2 * kCoplanar), folded) : folded;
+}
+
+std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                                    Index& count) {
+  // From the largest faces on: their planes are the best known.
+  std::vector<std::pair<double, Index>> seeds;
+  std::vector<Index> thin;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (shapes[f].thin) {
+      thin.push_back(f);
+    } else {
+      seeds.emplace_back(-glm::dot(shapes[f].area, shapes[f].area), f);
+    }
+  }
+  std::sort(seeds.begin(), seeds.end());
+  std::vector<Index> region_of(mesh.face_count(), kNone);
+  count = 0;
+  for (const auto& [area, face] : seeds) {
+    if (region_of[face] == kNone) grow(mesh, shapes, face, count++, region_of);
+  }
+  place_thin_faces(mesh, std::move(thin), region_of);
+  return region_of;
+}
+
+}  // namespace palpate

@@ -1,0 +1,38 @@
+#pragma once
+// Which faces of a linked surface lie in one plane. The second stage of building a ConvexMesh.
+
+#include <cstdint>
+#include <vector>
+
+#include "stimuli/half_edges.h"
+#include "stimuli/mesh_faults.h"
+
+namespace palpate {
+
+/// What the merging needs to know of a face.
+struct FaceShape {
+  Vec3 area;          ///< m^2, along the outward normal, as long as the face is large
+  Vec3 normal;        ///< unit; of no use when thin
+  Vec3 middle;        ///< m, mean of the corners
+  double height = 0;  ///< m, area over the longest side: how far it is from being a line
+  bool thin = false;  ///< no wider than the error of its corners: it has no plane of its own
+};
+std::vector<FaceShape> shapes_of(const HalfEdges& mesh);
+
+/// Reports polygons whose corners are not in one plane.
+void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                    MeshFaults& faults);
+
+/// How far two faces that share an edge are from being one plane, as the distance by which corners
+/// would have to be moved, over the error of the corners: below kCoplanar they are one plane within
+/// what is known of them, positive when the edge is convex.
+double fold(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, HalfEdges::Index h);
+inline constexpr double kCoplanar = 4;
+
+/// For each face the number of the maximal planar region that it belongs to; regions are numbered
+/// from 0. \param[out] count the number of regions.
+std::vector<HalfEdges::Index> coplanar_regions(const HalfEdges& mesh,
+                                               const std::vector<FaceShape>& shapes,
+                                               HalfEdges::Index& count);
+
+}  // namespace palpate

@@ -1,0 +1,235 @@
+#include "stimuli/half_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+
+#include "stimuli/pair_map.h"
+#include "stimuli/weld.h"
+
+namespace palpate {
+namespace {
+
+using Index = HalfEdges::Index;
+constexpr Index kNone = HalfEdges::kNone;
+
+std::string corner_list(const std::vector<Index>& corners) {
+  constexpr std::size_t kShown = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(corners.size(), kShown); ++i) {
+    text += (i == 0 ? "" : " ") + std::to_string(corners[i]);
+  }
+  if (corners.size() > kShown) text += " ...";
+  return text;
+}
+
+bool finite(const Vec3& v) {
+  // Far larger numbers overflow when they are multiplied, and no object is that far away.
+  constexpr double kLargest = 1e30;
+  return std::abs(v.x) <= kLargest && std::abs(v.y) <= kLargest && std::abs(v.z) <= kLargest;
+}
+
+void check_numbers(const PolygonSoup& soup) {
+  MeshFaults faults;
+  if (soup.faces.empty()) faults.add("empty", [] { return "expected faces, found none"; });
+  for (Index v = 0; v < soup.vertices.size(); ++v) {
+    if (finite(soup.vertices[v])) continue;
+    faults.add("not a place", [&] {
+      return "vertex " + std::to_string(v) + ": expected three finite coordinates (up to 1e30 m)";
+    });
+  }
+  std::size_t corners = 0;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const std::vector<Index>& face = soup.faces[f];
+    corners += face.size();
+    const auto name = [&] {
+      return "face " + std::to_string(f) + " (vertices " + corner_list(face) + ")";
+    };
+    if (face.size() < 3) {
+      faults.add("too few corners", [&] { return name() + ": expected at least 3"; });
+    }
+    for (const Index v : face) {
+      if (v < soup.vertices.size()) continue;
+      faults.add("no such vertex", [&] {
+        return name() + ": expected vertex numbers below " + std::to_string(soup.vertices.size()) +
+               ", found " + std::to_string(v);
+      });
+      break;
+    }
+  }
+  if (corners >= kNone / 2 || soup.vertices.size() >= kNone / 2) {
+    faults.add("too large", [] { return "expected fewer than 2^31 corners"; });
+  }
+  faults.throw_if_any();
+}
+
+// Corners that no face uses are left out: they must not make the object seem larger than it is.
+void take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& point_of) {
+  std::vector<char> used(soup.vertices.size(), 0);
+  for (const auto& face : soup.faces) {
+    for (const Index v : face) used[v] = 1;
+  }
+  std::vector<Vec3> points;
+  std::vector<Index> soup_vertex;
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (Index v = 0; v < soup.vertices.size(); ++v) {
+    if (used[v] == 0) continue;
+    points.push_back(soup.vertices[v]);
+    soup_vertex.push_back(v);
+    low = glm::min(low, soup.vertices[v]);
+    high = glm::max(high, soup.vertices[v]);
+  }
+  mesh.size = glm::length(high - low);
+  const Vec3 far = glm::max(glm::abs(low), glm::abs(high));
+  // How far corners may be off. A modest 1e-11 of the size allows for the arithmetic of whoever
+  // made the object and still is 1e-5 of the width of a needle a million times longer than wide;
+  // far from the origin the spacing of the coordinates themselves is coarser.
+  mesh.error =
+      std::max({soup.coordinate_error, 1e-11 * mesh.size,
+                8 * std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
+  const std::vector<Index> kept = weld(points, 4 * mesh.error);
+  point_of.assign(soup.vertices.size(), kNone);
+  for (Index i = 0; i < kept.size(); ++i) {
+    if (kept[i] == i) {
+      point_of[soup_vertex[i]] = static_cast<Index>(mesh.points.size());
+      mesh.points.push_back(points[i]);
+      mesh.soup_vertex.push_back(soup_vertex[i]);
+    } else {
+      point_of[soup_vertex[i]] = point_of[soup_vertex[kept[i]]];
+    }
+  }
+}
+
+void take_faces(const PolygonSoup& soup, const std::vector<Index>& point_of, HalfEdges& mesh,
+                MeshFaults& faults) {
+  std::vector<Index> corners, sorted;
+  for (Index f = 0; f < soup.faces.size(); ++f) {
+    corners.clear();
+    for (const Index v : soup.faces[f]) {
+      if (corners.empty() || corners.back() != point_of[v]) corners.push_back(point_of[v]);
+    }
+    while (corners.size() > 1 && corners.back() == corners.front()) corners.pop_back();
+    if (corners.size() < 3) continue;
+    sorted = corners;
+    std::sort(sorted.begin(), sorted.end());
+    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
+      faults.add("crossed face", [&] {
+        return "face " + std::to_string(f) + " (vertices " + corner_list(soup.faces[f]) +
+               "): expected every corner once, found one visited twice";
+      });
+      continue;
+    }
+    mesh.first.push_back(mesh.count());
+    mesh.soup_face.push_back(f);
+    mesh.origin.insert(mesh.origin.end(), corners.begin(), corners.end());
+    mesh.face.resize(mesh.origin.size(), mesh.face_count() - 1);
+  }
+  mesh.first.push_back(mesh.count());
+}
+
+Index root_of(std::vector<Index>& parent, Index i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+void report_pieces(const HalfEdges& mesh, std::vector<Index>& parent, MeshFaults& faults) {
+  for (Index f = 1; f < mesh.face_count(); ++f) {
+    if (root_of(parent, f) != f) continue;
+    faults.add("separate pieces", [&] {
+      return mesh.name_face(f) + " is not connected with " + mesh.name_face(0) +
+             "; expected one piece";
+    });
+  }
+}
+
+void link_twins(HalfEdges& mesh, MeshFaults& faults) {
+  mesh.twin.assign(mesh.count(), kNone);
+  std::vector<Index> parent(mesh.face_count());
+  std::iota(parent.begin(), parent.end(), Index{0});
+  std::vector<char> matched(mesh.count(), 0);
+  PairMap first_of(mesh.count() / 2);
+  for (Index h = 0; h < mesh.count(); ++h) {
+    Index& other = first_of(mesh.origin[h], mesh.origin[mesh.next(h)]);
+    if (other == kNone) {
+      other = h;
+      continue;
+    }
+    const Index a = root_of(parent, mesh.face[h]), b = root_of(parent, mesh.face[other]);
+    parent[std::max(a, b)] = std::min(a, b);
+    if (matched[other] != 0) {
+      faults.add("shared edge", [&] {
+        return mesh.name_edge(h) + " belongs to three or more faces; expected exactly two";
+      });
+    } else if (mesh.origin[h] == mesh.origin[other]) {
+      faults.add("turned face", [&] {
+        return mesh.name_edge(h) + " runs the same way in " + mesh.name_face(mesh.face[other]) +
+               "; expected opposite ways (all faces counter-clockwise seen from outside)";
+      });
+    } else {
+      mesh.twin[h] = other;
+      mesh.twin[other] = h;
+    }
+    matched[h] = matched[other] = 1;
+  }
+  for (Index h = 0; h < mesh.count(); ++h) {
+    if (matched[h] != 0) continue;
+    faults.add("open", [&] {
+      return mesh.name_edge(h) + " has no face on its other side; expected a closed surface";
+    });
+  }
+  report_pieces(mesh, parent, faults);
+}
+
+// Two bodies that touch in one corner share the vertex but not the fan of faces round it.
+void check_fans(const HalfEdges& mesh, MeshFaults& faults) {
+  std::vector<Index> degree(mesh.points.size(), 0), some(mesh.points.size(), kNone);
+  for (Index h = 0; h < mesh.count(); ++h) {
+    ++degree[mesh.origin[h]];
+    some[mesh.origin[h]] = h;
+  }
+  for (Index v = 0; v < mesh.points.size(); ++v) {
+    if (some[v] == kNone) continue;
+    Index turned = 0, h = some[v];
+    do {
+      h = mesh.twin[mesh.previous(h)];
+      ++turned;
+    } while (h != some[v]);
+    if (turned == degree[v]) continue;
+    faults.add("shared vertex", [&] {
+      return mesh.name_vertex(v) + ": expected one ring of faces round it, found several";
+    });
+  }
+}
+
+}  // namespace
+
+std::string HalfEdges::name_face(Index f) const {
+  std::vector<Index> corners;
+  for (Index h = first[f]; h < first[f + 1]; ++h) corners.push_back(soup_vertex[origin[h]]);
+  return "face " + std::to_string(soup_face[f]) + " (vertices " + corner_list(corners) + ")";
+}
+
+std::string HalfEdges::name_vertex(Index v) const {
+  return "vertex " + std::to_string(soup_vertex[v]);
+}
+
+std::string HalfEdges::name_edge(Index h) const {
+  return "edge " + std::to_string(soup_vertex[origin[h]]) + "-" +
+         std::to_string(soup_vertex[origin[next(h)]]) + " of " + name_face(face[h]);
+}
+
+HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults) {
+  check_numbers(soup);
+  HalfEdges mesh;
+  std::vector<Index> point_of;
+  take_points(soup, mesh, point_of);
+  take_faces(soup, point_of, mesh, faults);
+  link_twins(mesh, faults);
+  if (faults.empty()) check_fans(mesh, faults);
+  return mesh;
+}
+
+}  // namespace palpate
