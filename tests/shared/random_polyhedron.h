@@ -1,0 +1,109 @@
+#pragma once
+// Convex polyhedra as polygon soups for property tests. SI units; centred at the origin.
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "stimuli/convex_mesh.h"
+#include "stimuli/orientation.h"
+#include "stimuli/random.h"
+
+namespace palpate::testing {
+
+/// The hull of points no four of which are coplanar, as outward triangles: starts with a
+/// tetrahedron and adds point by point, replacing the faces that it sees. O(n^2), independent of
+/// ConvexMesh on purpose.
+inline PolygonSoup hull_of(const std::vector<Vec3>& points) {
+  using Triangle = std::array<std::uint32_t, 3>;
+  const auto above = [&](const Triangle& t, std::uint32_t p) {
+    return glm::dot(glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]),
+                    points[p] - points[t[0]]);
+  };
+  if (points.size() < 4) throw std::invalid_argument("hull_of: at least four points");
+  std::vector<Triangle> faces;
+  if (above({0, 1, 2}, 3) < 0) {
+    faces = {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}};
+  } else {
+    faces = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  }
+  for (std::uint32_t p = 4; p < points.size(); ++p) {
+    std::set<std::pair<std::uint32_t, std::uint32_t>> seen;  // sides of faces that p sees
+    std::erase_if(faces, [&](const Triangle& t) {
+      if (above(t, p) <= 0) return false;
+      for (std::size_t k = 0; k < 3; ++k) seen.emplace(t[k], t[(k + 1) % 3]);
+      return true;
+    });
+    for (const auto& [a, b] : seen) {
+      if (!seen.contains({b, a})) faces.push_back({a, b, p});
+    }
+  }
+  PolygonSoup soup;
+  soup.vertices = points;
+  for (const Triangle& t : faces) soup.faces.push_back({t[0], t[1], t[2]});
+  return soup;
+}
+
+/// The hull of `points` random points on an ellipsoid (every point is a corner).
+inline PolygonSoup random_polyhedron(Random& random, int points, const Vec3& semi_axes) {
+  std::vector<Vec3> corners;
+  for (int i = 0; i < points; ++i) {
+    corners.push_back(semi_axes * (uniform_rotation(random) * Vec3(0, 0, 1)));
+  }
+  return hull_of(corners);
+}
+
+/// A regular prism about the z axis; side faces are quadrilaterals.
+inline PolygonSoup prism(int sides, double radius, double height) {
+  PolygonSoup soup;
+  const auto n = static_cast<std::uint32_t>(sides);
+  std::vector<std::uint32_t> bottom, top;
+  for (std::uint32_t k = 0; k < n; ++k) {
+    const double angle = 2 * std::numbers::pi * k / sides;
+    const double x = radius * std::cos(angle), y = radius * std::sin(angle);
+    soup.vertices.emplace_back(x, y, -height / 2);
+    soup.vertices.emplace_back(x, y, height / 2);
+    bottom.push_back(2 * (n - 1 - k));
+    top.push_back(2 * k + 1);
+    const std::uint32_t next = (k + 1) % n;
+    soup.faces.push_back({2 * k, 2 * next, 2 * next + 1, 2 * k + 1});
+  }
+  soup.faces.push_back(bottom);
+  soup.faces.push_back(top);
+  return soup;
+}
+
+/// A bar of square section along z: `length` long, `width` from corner to opposite corner.
+inline PolygonSoup needle(double length, double width) { return prism(4, width / 2, length); }
+
+/// A square plate across z.
+inline PolygonSoup plate(double edge, double thickness) {
+  return prism(4, edge / std::numbers::sqrt2, thickness);
+}
+
+/// Every polygon cut into triangles from its first corner.
+inline PolygonSoup triangulated(const PolygonSoup& soup) {
+  PolygonSoup out;
+  out.vertices = soup.vertices;
+  out.coordinate_error = soup.coordinate_error;
+  for (const auto& face : soup.faces) {
+    for (std::size_t k = 1; k + 1 < face.size(); ++k) {
+      out.faces.push_back({face[0], face[k], face[k + 1]});
+    }
+  }
+  return out;
+}
+
+/// Turned, scaled by `scale` and then moved.
+inline PolygonSoup placed(PolygonSoup soup, const Quat& turn, double scale, const Vec3& to) {
+  for (Vec3& vertex : soup.vertices) vertex = scale * (turn * vertex) + to;
+  return soup;
+}
+
+}  // namespace palpate::testing
