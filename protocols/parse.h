@@ -13,9 +13,11 @@ struct Fault {
   std::string file;
   std::string place;     ///< JSON pointer, or "line L, column C" where the text is no JSON
   std::string expected;  ///< what was expected there, and what was found
+  int line = 0;          ///< of the text, from 1; 0: unknown
 };
 
-/// Every fault that was found in a file; what() lists them all, a line each: "file: place: expected".
+/// Every fault that was found in a file; what() lists them all, a line each:
+/// "file:line: place: expected" (without ":line" where it is unknown or the place says it).
 class InputError : public std::runtime_error {
  public:
   explicit InputError(std::vector<Fault> faults);
@@ -25,7 +27,8 @@ class InputError : public std::runtime_error {
   std::vector<Fault> faults_;
 };
 
-/// Reads and checks a protocol, also that its schedule can be built. \throws InputError with every fault.
+/// Reads and checks a protocol, also that its schedule can be built. \throws InputError with every
+/// fault.
 Protocol parse_protocol(const std::string& path);
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name);
 

@@ -1,5 +1,6 @@
 #pragma once
-// An experiment's design as plain values; what each key means and its default: contracts, "Protocol".
+// An experiment's design as plain values; what each key means and its default: contracts,
+// "Protocol".
 
 #include <cstdint>
 #include <map>
@@ -32,8 +33,9 @@ struct Protocol {
   int repetitions = 1;  ///< of each stimulus, for each renderer
   struct Order {
     OrderKind kind = OrderKind::random;
-    std::optional<int> max_run;       ///< at most so many equal stimuli in a row within a block
-    std::optional<int> min_distance;  ///< equal stimuli at least so many trials apart (1: adjacent is allowed)
+    std::optional<int> max_run;  ///< at most so many equal stimuli in a row within a block
+    std::optional<int>
+        min_distance;  ///< equal stimuli at least so many trials apart (1: adjacent is allowed)
   } order;
   int blocks_per_renderer = 1;
   OrientationKind orientation = OrientationKind::uniform;

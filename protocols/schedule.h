@@ -1,4 +1,15 @@
 #pragma once
+// Which trials a participant gets, in which order. Everything follows from the protocol's seed and
+// the participant number alone, on every machine and compiler.
+//
+// Numbering. Sessions count from 1, trials from 1 within their session. Blocks count from 1 through
+// all sessions of the participant, and everything that is shown in a row is a block of its own: the
+// practice before a renderer's first block, the warm-up at the start of the second and later
+// sessions, every block of trials; a block that a session's end cuts in two goes on under a new
+// number. So session and block never decrease, and (session, trial) is unique.
+//
+// The limits max_run and min_distance hold within each block and each round of practice, not across
+// their borders, where there are breaks or instructions.
 
 #include <stdexcept>
 #include <vector>
@@ -13,7 +24,7 @@ struct Trial {
   RendererKind renderer = RendererKind::point;
   int stimulus = 0;  ///< index into Protocol::stimuli
   Quat orientation{1, 0, 0, 0};
-  bool practice = false;
+  bool practice = false;  ///< practice or warm-up: not analysed
 };
 
 /// The constraint on the order of trials cannot be met; what() says why and what would help.
@@ -22,7 +33,22 @@ class ScheduleError : public std::runtime_error {
 };
 
 /// The trials of participant number 1, 2, ... in order. Depends on the protocol's seed and the
-/// number alone. \throws ScheduleError where the constraints have no solution.
+/// number alone. Practice appears once, as its first round.
+/// \throws ScheduleError where the constraints have no solution, std::invalid_argument for a
+/// participant number below 1.
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number);
+
+/// Round 1, 2, ... of practice with a renderer; round 1 is the one in schedule(). For an
+/// interleaved protocol, a round mixes all renderers and `renderer` does not matter. Trials count
+/// from 1 within the round, session and block are left at 1: the session that shows a further round
+/// numbers it. \throws as schedule().
+std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
+                                  RendererKind renderer, int round);
+
+/// After how many successive participant numbers the orders of renderers repeat.
+int renderer_orders(const Protocol& protocol);
+
+/// Trials that count, without practice and warm-up, in all sessions of a participant.
+long long main_trials(const Protocol& protocol);
 
 }  // namespace palpate

@@ -1,0 +1,127 @@
+#include "protocols/parse_object.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+// Generous: a wrong unit (30 for 30 mm) is caught by the devices' workspace, not here.
+constexpr Interval kLength{0, 1000, "m", true};
+constexpr Interval kPosition{-1000, 1000, "m"};
+// Stiffer than the stiffest haptic devices by an order of magnitude: a slipped decimal point.
+constexpr Interval kStiffness{0, 1e5, "N/m", true};
+constexpr Interval kDamping{0, 1000, "N s/m"};
+constexpr Interval kSubdivisions{0, 8};  // 8: 1.3 million triangles
+constexpr Interval kSegments{3, 4096};
+constexpr int kMaxCompounds = 8;  // within each other
+constexpr std::size_t kMaxParts = 1000;
+
+ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
+                       const std::string& folder, int compounds);
+
+void read_file(ObjectReader& reader, const std::string& folder, ObjectSpec& spec) {
+  std::string name;
+  reader.text("file", name);
+  const json* const value = reader.member("file", Need::required);
+  if (value == nullptr || !value->is_string()) return;
+  const std::filesystem::path path = std::filesystem::path(folder) / name;
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::error_code error;
+  if (extension != ".obj" && extension != ".stl") {
+    reader.faults().add(reader.pointer("file"), "expected a file .obj or .stl" + found(*value));
+  } else if (!std::filesystem::is_regular_file(path, error)) {
+    reader.faults().add(reader.pointer("file"),
+                        "expected an existing file; there is no " + path.string());
+  }
+  spec.file = path.string();
+}
+
+void read_parts(ObjectReader& reader, const std::string& folder, int compounds, ObjectSpec& spec) {
+  const json* const parts = reader.array("parts", 1, kMaxParts, Need::required);
+  if (parts == nullptr) return;
+  if (compounds == kMaxCompounds) {
+    reader.faults().add(
+        reader.pointer("parts"),
+        "expected compounds at most " + std::to_string(kMaxCompounds) + " deep within each other");
+    return;
+  }
+  for (std::size_t i = 0; i < parts->size(); ++i) {
+    ObjectReader part((*parts)[i], child_pointer(reader.pointer("parts"), i), reader.faults());
+    spec.parts.push_back(read_nested(part, spec.material, folder, compounds + 1));
+    part.refuse_unknown_keys();
+  }
+}
+
+ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
+                       const std::string& folder, int compounds) {
+  ObjectSpec spec;
+  spec.material = default_material;
+  reader.vector("position_m", spec.pose.position, kPosition);
+  reader.quaternion("orientation_wxyz", spec.pose.orientation);
+  read_material(reader, spec.material);
+
+  std::optional<ShapeKind> shape;
+  reader.choice<std::optional<ShapeKind>>("shape", shape,
+                                          {{"sphere", ShapeKind::sphere},
+                                           {"cone", ShapeKind::cone},
+                                           {"cylinder", ShapeKind::cylinder},
+                                           {"cube", ShapeKind::cube},
+                                           {"mesh", ShapeKind::mesh},
+                                           {"compound", ShapeKind::compound}},
+                                          Need::required);
+  if (!shape) {
+    // Which keys belong here cannot be told: none of the shapes' is called unknown.
+    for (const char* key :
+         {"radius_m", "height_m", "edge_m", "subdivisions", "segments", "file", "parts"}) {
+      reader.member(key);
+    }
+    return spec;
+  }
+  spec.shape = *shape;
+  switch (spec.shape) {
+    case ShapeKind::sphere:
+      reader.number("radius_m", spec.radius, kLength, Need::required);
+      reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
+      break;
+    case ShapeKind::cone:
+    case ShapeKind::cylinder:
+      reader.number("radius_m", spec.radius, kLength, Need::required);
+      reader.number("height_m", spec.height, kLength, Need::required);
+      reader.integer("segments", spec.segments, kSegments);
+      break;
+    case ShapeKind::cube:
+      reader.number("edge_m", spec.edge, kLength, Need::required);
+      break;
+    case ShapeKind::mesh:
+      read_file(reader, folder, spec);
+      break;
+    case ShapeKind::compound:
+      read_parts(reader, folder, compounds, spec);
+      break;
+  }
+  return spec;
+}
+
+}  // namespace
+
+void read_material(ObjectReader& reader, Material& material) {
+  reader.number("stiffness_n_per_m", material.stiffness, kStiffness);
+  reader.number("damping_ns_per_m", material.damping, kDamping);
+}
+
+ObjectSpec read_object(ObjectReader& reader, const Material& default_material,
+                       const std::string& folder) {
+  return read_nested(reader, default_material, folder, 0);
+}
+
+std::string folder_of(const std::string& file) {
+  return std::filesystem::path(file).parent_path().string();
+}
+
+}  // namespace palpate

@@ -1,0 +1,274 @@
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "protocols/json_document.h"
+#include "protocols/parse.h"
+#include "protocols/parse_object.h"
+#include "protocols/schedule.h"
+#include "protocols/sha256.h"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+// What a laboratory may need, with room to spare; beyond it a value is a slip.
+constexpr std::size_t kMaxStimuli = 100;
+constexpr std::size_t kMaxOrientations = 10000;
+constexpr std::size_t kMaxKey = 32;  // bytes of a response key's name
+constexpr long long kMaxTrials = 1000000;
+constexpr Interval kRepetitions{1, 1e6};
+constexpr Interval kCount{1, 1e6};
+constexpr Interval kFewFromZero{0, 10000};
+constexpr Interval kFew{1, 10000};
+constexpr int kRoundsWithCriterion = 5;  // of practice, unless max_rounds says otherwise
+
+void read_renderers(ObjectReader& reader, Protocol& protocol) {
+  const json* const list = reader.array("renderers", 1, 2, Need::required);
+  if (list == nullptr) return;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string place = child_pointer(reader.pointer("renderers"), i);
+    RendererKind kind{};
+    if (!read_choice((*list)[i], place, kind,
+                     {{to_string(RendererKind::point), RendererKind::point},
+                      {to_string(RendererKind::ray), RendererKind::ray}},
+                     reader.faults())) {
+      continue;
+    }
+    const auto& renderers = protocol.renderers;
+    if (std::find(renderers.begin(), renderers.end(), kind) != renderers.end()) {
+      reader.faults().add(place, "expected each renderer once" + found((*list)[i]) + " again");
+    }
+    protocol.renderers.push_back(kind);
+  }
+}
+
+StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol,
+                           const std::string& folder) {
+  StimulusSpec stimulus;
+  reader.name("name", stimulus.name);
+  Material material = protocol.material;
+  reader.section("material", [&](ObjectReader& section) {
+    read_material(section, material);
+    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m"}) {
+      if (section.has(key) && reader.has(key)) {
+        reader.faults().add(reader.pointer(key), "expected in 'material' or here, found in both");
+      }
+    }
+  });
+  stimulus.object = read_object(reader, material, folder);
+  reader.refuse_unknown_keys();
+  return stimulus;
+}
+
+void read_stimuli(ObjectReader& reader, Protocol& protocol, const std::string& folder) {
+  const json* const list = reader.array("stimuli", 1, kMaxStimuli, Need::required);
+  if (list == nullptr) return;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string place = child_pointer(reader.pointer("stimuli"), i);
+    ObjectReader item((*list)[i], place, reader.faults());
+    protocol.stimuli.push_back(read_stimulus(item, protocol, folder));
+    const std::string& name = protocol.stimuli.back().name;
+    if (!name.empty() && !names.insert(name).second) {
+      reader.faults().add(item.pointer("name"),
+                          "expected a name of its own, found '" + name + "' again");
+    }
+  }
+}
+
+void read_orientation(ObjectReader& reader, Protocol& protocol) {
+  const json* const value = reader.member("orientation");
+  if (value == nullptr) return;
+  if (!value->is_array()) {
+    if (value->is_string()) {
+      read_choice(*value, reader.pointer("orientation"), protocol.orientation,
+                  {{"uniform", OrientationKind::uniform}, {"fixed", OrientationKind::fixed}},
+                  reader.faults());
+    } else {
+      reader.faults().add(reader.pointer("orientation"),
+                          "expected 'uniform', 'fixed' or an array of quaternions" + found(*value));
+    }
+    return;
+  }
+  protocol.orientation = OrientationKind::listed;
+  if (reader.array("orientation", 1, kMaxOrientations) == nullptr) return;
+  for (std::size_t i = 0; i < value->size(); ++i) {
+    const std::string place = child_pointer(reader.pointer("orientation"), i);
+    if (const auto rotation = read_quaternion((*value)[i], place, reader.faults())) {
+      protocol.orientations.push_back(*rotation);
+    }
+  }
+}
+
+void read_keys(ObjectReader& response, Protocol& protocol) {
+  const json* const keys = response.member("keys", Need::required);
+  if (keys == nullptr) return;
+  FaultList& faults = response.faults();
+  const std::string place = response.pointer("keys");
+  if (!keys->is_object()) {
+    faults.add(place, "expected an object of a stimulus for each key" + found(*keys));
+    return;
+  }
+  std::map<std::string, std::string> key_of;  // by stimulus
+  for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
+  for (const auto& [key, value] : keys->items()) {
+    const std::string here = child_pointer(place, key);
+    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
+    if (key.empty() || key.size() > kMaxKey || !std::all_of(key.begin(), key.end(), printable)) {
+      faults.add(here, "expected a key's name of 1 to " + std::to_string(kMaxKey) +
+                           " bytes without control characters");
+    }
+    const auto stimulus = value.is_string() ? key_of.find(value.get<std::string>()) : key_of.end();
+    if (stimulus == key_of.end()) {
+      faults.add(here, "expected the name of a stimulus" + found(value));
+      continue;
+    }
+    if (!stimulus->second.empty()) {
+      faults.add(here, "expected one key for each stimulus; '" + stimulus->first +
+                           "' has the key '" + stimulus->second + "' already");
+    }
+    stimulus->second = key;
+    protocol.response.keys[key] = stimulus->first;
+  }
+  for (const auto& [name, key] : key_of) {
+    if (key.empty() && !name.empty()) faults.add(place, "no key for the stimulus '" + name + "'");
+  }
+}
+
+void read_session_settings(ObjectReader& reader, Protocol& protocol) {
+  reader.section("practice", [&](ObjectReader& section) {
+    auto& practice = protocol.practice;
+    section.integer("repetitions", practice.repetitions, kFewFromZero);
+    section.number("criterion", practice.criterion, {0, 1, "", true});
+    if (practice.criterion) practice.max_rounds = kRoundsWithCriterion;
+    section.integer("max_rounds", practice.max_rounds, kFew);
+    if (practice.criterion && practice.repetitions == 0) {
+      section.faults().add(section.pointer("criterion"), "a criterion needs repetitions above 0");
+    }
+  });
+  reader.section("sessions", [&](ObjectReader& section) {
+    section.integer("count", protocol.sessions.count, {1, 1000});
+    section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
+    section.integer("warm_up_trials", protocol.sessions.warm_up_trials, kFewFromZero);
+  });
+  reader.section("breaks", [&](ObjectReader& section) {
+    section.integer("every_trials", protocol.breaks.every_trials, kCount);
+    section.number("min_seconds", protocol.breaks.min_seconds, {0, 3600, "s"});
+  });
+  reader.section(
+      "response",
+      [&](ObjectReader& section) {
+        read_keys(section, protocol);
+        section.number("time_out_s", protocol.response.time_out, {0, 3600, "s", true});
+        section.boolean("feedback", protocol.response.feedback);
+      },
+      Need::required);
+  reader.section("texts", [&](ObjectReader& section) {
+    section.text("instructions", protocol.texts.instructions);
+    section.text("practice", protocol.texts.practice);
+    section.text("break", protocol.texts.break_text);
+    section.text("end", protocol.texts.end);
+  });
+}
+
+void read_apparatus(ObjectReader& reader, Protocol& protocol) {
+  reader.section("stylus", [&](ObjectReader& section) {
+    section.number("length_m", protocol.stylus.length, {0, 10, "m", true});
+    section.number("grip_m", protocol.stylus.grip, {0, 10, "m"});
+    if (protocol.stylus.grip > protocol.stylus.length) {
+      section.faults().add(section.pointer("grip_m"),
+                           "expected a grip on the stylus, at most at "
+                           "its length_m from the tip");
+    }
+  });
+  reader.section("workspace", [&](ObjectReader& section) {
+    section.vector("centre_m", protocol.workspace.centre, {-10, 10, "m"});
+    section.number("scale", protocol.workspace.scale, {0.001, 1000});
+  });
+  reader.section("servo", [&](ObjectReader& section) {
+    section.number("rate_hz", protocol.servo_rate, {100, 10000, "Hz"});
+  });
+  reader.section("home", [&](ObjectReader& section) {
+    section.number("rest_s", protocol.home.rest, {0, 60, "s"});
+    section.number("margin_m", protocol.home.margin, {0, 1, "m"});
+  });
+}
+
+void read_version(ObjectReader& reader, Protocol& protocol) {
+  reader.integer("version", protocol.version, {1, 1}, Need::required);
+}
+
+/// What only the whole can tell: whether there is a schedule.
+void check_schedule(const Protocol& protocol, FaultList& faults) {
+  const long long trials = main_trials(protocol);
+  if (trials > kMaxTrials) {
+    faults.add("/repetitions", "expected at most " + std::to_string(kMaxTrials) +
+                                   " trials for each participant, found " + std::to_string(trials));
+  }
+  if (protocol.blocks_per_renderer > protocol.repetitions) {
+    faults.add("/blocks_per_renderer", "expected at most as many blocks as repetitions (" +
+                                           std::to_string(protocol.repetitions) + "), found " +
+                                           std::to_string(protocol.blocks_per_renderer));
+  }
+  if (protocol.sessions.count > trials) {
+    faults.add("/sessions/count", "expected at most as many sessions as trials (" +
+                                      std::to_string(trials) + "), found " +
+                                      std::to_string(protocol.sessions.count));
+  }
+  faults.throw_if_any();
+  try {
+    for (int n = 1; n <= renderer_orders(protocol); ++n) schedule(protocol, n);
+  } catch (const ScheduleError& error) {
+    faults.add("/order", error.what());
+  }
+}
+
+}  // namespace
+
+Protocol parse_protocol(const std::string& path) {
+  return parse_protocol_text(read_text_file(path), path);
+}
+
+Protocol parse_protocol_text(const std::string& text, const std::string& file_name) {
+  FaultList faults(file_name);
+  const json root = read_json(text, faults);
+  Protocol protocol;
+  ObjectReader reader(root, "", faults);
+  reader.member("$schema");
+  read_version(reader, protocol);
+  reader.name("name", protocol.name);
+  reader.text("title", protocol.title);
+  reader.text("description", protocol.description);
+  read_renderers(reader, protocol);
+  reader.choice("renderer_order", protocol.renderer_order,
+                {{"fixed", RendererOrder::fixed},
+                 {"counterbalanced", RendererOrder::counterbalanced},
+                 {"interleaved", RendererOrder::interleaved}});
+  reader.section("material",
+                 [&](ObjectReader& section) { read_material(section, protocol.material); });
+  read_stimuli(reader, protocol, folder_of(file_name));
+  reader.integer("repetitions", protocol.repetitions, kRepetitions, Need::required);
+  reader.section("order", [&](ObjectReader& section) {
+    section.choice("kind", protocol.order.kind,
+                   {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});
+    section.integer("max_run", protocol.order.max_run, kCount);
+    section.integer("min_distance", protocol.order.min_distance, kCount);
+  });
+  reader.integer("blocks_per_renderer", protocol.blocks_per_renderer, kCount);
+  read_orientation(reader, protocol);
+  read_session_settings(reader, protocol);
+  read_apparatus(reader, protocol);
+  reader.boolean("samples", protocol.samples);
+  reader.seed("seed", protocol.seed);
+  reader.refuse_unknown_keys();
+  if (faults.empty()) check_schedule(protocol, faults);
+  faults.throw_if_any();
+
+  protocol.source_text = text;
+  protocol.sha256 = sha256_hex(text);
+  return protocol;
+}
+
+}  // namespace palpate

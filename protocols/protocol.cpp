@@ -1,0 +1,7 @@
+#include "protocols/protocol.h"
+
+namespace palpate {
+
+const char* to_string(RendererKind kind) { return kind == RendererKind::point ? "point" : "ray"; }
+
+}  // namespace palpate

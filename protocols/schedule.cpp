@@ -1,0 +1,278 @@
+#include "protocols/schedule.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <numeric>
+
+#include "protocols/latin_square.h"
+#include "protocols/order.h"
+#include "stimuli/orientation.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+// One stream of random numbers for each use, so that a change to one part of a protocol leaves the
+// draws of the others alone. The values are part of what a seed means: never renumber them.
+enum Stream : std::uint64_t { kOrder = 1, kOrientation = 2, kPractice = 3, kWarmUp = 4 };
+
+/// Renderers whose trials are shown together: one of them, or all when interleaved.
+using Group = std::vector<RendererKind>;
+
+/// Trials shown in a row.
+struct Block {
+  int session = 1;
+  int group = 0;  ///< index into the groups
+  std::vector<Trial> trials;
+};
+
+/// Size of part `index` when `total` is spread over `parts` as evenly as it goes, larger parts
+/// first.
+int share(long long total, int parts, int index) {
+  return static_cast<int>(total / parts + (index < total % parts ? 1 : 0));
+}
+
+std::uint64_t code(RendererKind renderer) { return renderer == RendererKind::point ? 0 : 1; }
+
+/// Separates the streams of groups; the interleaved group has a code of its own.
+std::uint64_t code(const Group& group) { return group.size() == 1 ? code(group.front()) : 2; }
+
+std::vector<std::string> names_of(const Protocol& protocol) {
+  std::vector<std::string> names;
+  for (const StimulusSpec& stimulus : protocol.stimuli) names.push_back(stimulus.name);
+  return names;
+}
+
+std::vector<Group> groups_in_order(const Protocol& protocol, int participant_number) {
+  if (protocol.renderer_order == RendererOrder::interleaved) return {protocol.renderers};
+  std::vector<int> row(protocol.renderers.size());
+  std::iota(row.begin(), row.end(), 0);
+  if (protocol.renderer_order == RendererOrder::counterbalanced) {
+    row = latin_square_row(static_cast<int>(row.size()), participant_number);
+  }
+  std::vector<Group> groups;
+  for (const int index : row) {
+    groups.push_back({protocol.renderers[static_cast<std::size_t>(index)]});
+  }
+  return groups;
+}
+
+/// Gives every trial its renderer: each stimulus meets each renderer of the group equally often.
+/// Together with a uniform order of the stimuli this makes every mixed order equally likely.
+void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Trial>& trials,
+                   Random& random) {
+  for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
+    std::vector<Trial*> shown;
+    for (Trial& trial : trials) {
+      if (trial.stimulus == stimulus) shown.push_back(&trial);
+    }
+    std::vector<RendererKind> renderers;
+    // A sequential order shows all stimuli with one renderer, then with the next; random: any.
+    for (std::size_t i = 0; i < shown.size(); ++i) renderers.push_back(group[i % group.size()]);
+    if (protocol.order.kind == OrderKind::random && group.size() > 1) random.shuffle(renderers);
+    for (std::size_t i = 0; i < shown.size(); ++i) shown[i]->renderer = renderers[i];
+  }
+}
+
+/// A block without orientations: counts[i] trials of stimulus i.
+std::vector<Trial> ordered_trials(const Protocol& protocol, const Group& group,
+                                  const std::vector<int>& counts, Random& random) {
+  std::vector<Trial> trials;
+  for (const int stimulus : order_block(counts, protocol.order, names_of(protocol), random)) {
+    Trial trial;
+    trial.stimulus = stimulus;
+    trials.push_back(trial);
+  }
+  mix_renderers(protocol, group, trials, random);
+  return trials;
+}
+
+std::vector<int> equal_counts(const Protocol& protocol, const Group& group, int repetitions) {
+  return std::vector<int>(protocol.stimuli.size(), repetitions * static_cast<int>(group.size()));
+}
+
+/// Listed orientations: for each stimulus and renderer the list as evenly as it goes, shuffled.
+void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
+  if (protocol.orientations.empty()) throw ScheduleError("the list of orientations is empty");
+  for (const RendererKind renderer : protocol.renderers) {
+    for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
+      std::vector<Trial*> shown;
+      std::copy_if(trials.begin(), trials.end(), std::back_inserter(shown), [&](const Trial* t) {
+        return t->renderer == renderer && t->stimulus == stimulus;
+      });
+      std::vector<Quat> turns;
+      while (turns.size() < shown.size()) {
+        std::vector<Quat> round = protocol.orientations;
+        random.shuffle(round);  // which ones fill the last, incomplete round is a matter of chance
+        turns.insert(turns.end(), round.begin(), round.end());
+      }
+      turns.resize(shown.size(), Quat(1, 0, 0, 0));
+      random.shuffle(turns);
+      for (std::size_t i = 0; i < shown.size(); ++i) shown[i]->orientation = turns[i];
+    }
+  }
+}
+
+void orient(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
+  switch (protocol.orientation) {
+    case OrientationKind::uniform:
+      for (Trial* trial : trials) trial->orientation = uniform_rotation(random);
+      break;
+    case OrientationKind::fixed:
+      for (Trial* trial : trials) trial->orientation = Quat(1, 0, 0, 0);
+      break;
+    case OrientationKind::listed:
+      orient_from_list(protocol, trials, random);
+      break;
+  }
+}
+
+void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, Random random) {
+  std::vector<Trial*> all;
+  int number = 0;
+  for (Trial& trial : trials) {
+    trial.practice = true;
+    trial.trial = ++number;
+    all.push_back(&trial);
+  }
+  orient(protocol, all, random);
+}
+
+std::vector<Trial> practice_trials(const Protocol& protocol, int participant_number,
+                                   const Group& group, int round) {
+  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
+  const std::uint64_t number = static_cast<std::uint64_t>(round);
+  Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
+  std::vector<Trial> trials = ordered_trials(
+      protocol, group, equal_counts(protocol, group, protocol.practice.repetitions), random);
+  finish_practice(
+      protocol, trials,
+      Random(protocol.seed, {participant, kPractice, kOrientation, code(group), number}));
+  return trials;
+}
+
+std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_number,
+                                  const Group& group, int session) {
+  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
+  const std::uint64_t number = static_cast<std::uint64_t>(session);
+  Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
+  const int stimuli = static_cast<int>(protocol.stimuli.size());
+  std::vector<int> counts;
+  for (int i = 0; i < stimuli; ++i) {
+    counts.push_back(share(protocol.sessions.warm_up_trials, stimuli, i));
+  }
+  if (protocol.order.kind == OrderKind::random) random.shuffle(counts);
+  std::vector<Trial> trials = ordered_trials(protocol, group, counts, random);
+  finish_practice(protocol, trials,
+                  Random(protocol.seed, {participant, kWarmUp, kOrientation, number}));
+  return trials;
+}
+
+std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
+                               const std::vector<Group>& groups) {
+  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
+  std::vector<Block> blocks;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    for (int b = 0; b < protocol.blocks_per_renderer; ++b) {
+      Random random(protocol.seed,
+                    {participant, kOrder, code(groups[g]), static_cast<std::uint64_t>(b)});
+      const int repetitions = share(protocol.repetitions, protocol.blocks_per_renderer, b);
+      blocks.push_back({1, static_cast<int>(g),
+                        ordered_trials(protocol, groups[g],
+                                       equal_counts(protocol, groups[g], repetitions), random)});
+    }
+  }
+  std::vector<Trial*> all;
+  for (Block& block : blocks) {
+    for (Trial& trial : block.trials) all.push_back(&trial);
+  }
+  Random random(protocol.seed, {participant, kOrientation});
+  orient(protocol, all, random);
+  return blocks;
+}
+
+/// Whole blocks for each session where there are enough of them; else the trials are cut evenly.
+std::vector<Block> into_sessions(const Protocol& protocol, std::vector<Block> blocks) {
+  const int sessions = protocol.sessions.count;
+  const int count = static_cast<int>(blocks.size());
+  if (sessions <= count) {
+    std::size_t next = 0;
+    for (int s = 0; s < sessions; ++s) {
+      for (int i = share(count, sessions, s); i > 0; --i) blocks[next++].session = s + 1;
+    }
+    return blocks;
+  }
+  std::vector<Block> parts;
+  int session = 1;
+  int room = share(main_trials(protocol), sessions, 0);
+  for (const Block& block : blocks) {
+    Block part{session, block.group, {}};
+    for (const Trial& trial : block.trials) {
+      if (room == 0) {
+        if (!part.trials.empty()) parts.push_back(part);
+        room = share(main_trials(protocol), sessions, session);
+        part = {++session, block.group, {}};
+      }
+      part.trials.push_back(trial);
+      --room;
+    }
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+}  // namespace
+
+int renderer_orders(const Protocol& protocol) {
+  if (protocol.renderer_order != RendererOrder::counterbalanced) return 1;
+  return latin_square_rows(static_cast<int>(protocol.renderers.size()));
+}
+
+long long main_trials(const Protocol& protocol) {
+  return static_cast<long long>(protocol.renderers.size()) *
+         static_cast<long long>(protocol.stimuli.size()) * protocol.repetitions;
+}
+
+std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
+                                  RendererKind renderer, int round) {
+  if (participant_number < 1) throw std::invalid_argument("participants are numbered from 1");
+  if (round < 1) throw std::invalid_argument("rounds of practice are numbered from 1");
+  const bool mixed = protocol.renderer_order == RendererOrder::interleaved;
+  return practice_trials(protocol, participant_number, mixed ? protocol.renderers : Group{renderer},
+                         round);
+}
+
+std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
+  if (participant_number < 1) throw std::invalid_argument("participants are numbered from 1");
+  const std::vector<Group> groups = groups_in_order(protocol, participant_number);
+  std::vector<Trial> trials;
+  int session = 0, block = 0, trial = 0, practised = 0;
+  const auto append = [&](std::vector<Trial> shown) {
+    if (shown.empty()) return;
+    ++block;
+    for (Trial& next : shown) {
+      next.session = session;
+      next.block = block;
+      next.trial = ++trial;
+      trials.push_back(next);
+    }
+  };
+  for (const Block& next :
+       into_sessions(protocol, main_blocks(protocol, participant_number, groups))) {
+    const Group& group = groups[static_cast<std::size_t>(next.group)];
+    if (next.session != session) {
+      session = next.session;
+      trial = 0;
+      if (session > 1) append(warm_up_trials(protocol, participant_number, group, session));
+    }
+    if (next.group == practised) {
+      ++practised;
+      append(practice_trials(protocol, participant_number, group, 1));
+    }
+    append(next.trials);
+  }
+  return trials;
+}
+
+}  // namespace palpate
