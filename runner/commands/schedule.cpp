@@ -1,0 +1,120 @@
+#include "protocols/schedule.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdio>
+#include <iomanip>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "protocols/parse.h"
+#include "runner/commands/command.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+std::string exact(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.17g", value);
+  return text.data();
+}
+
+const std::string& shape_of(const Protocol& protocol, const Trial& trial) {
+  return protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
+}
+
+// Names are letters, digits and '-', so that no field needs quotes.
+void print_csv(const Protocol& protocol, const std::vector<Trial>& trials, int participant) {
+  std::cout << "participant_id,session,block,trial,renderer,shape,orientation_w,orientation_x,"
+               "orientation_y,orientation_z,practice,protocol_sha256,program_version\r\n";
+  for (const Trial& trial : trials) {
+    const Quat& q = trial.orientation;
+    std::cout << participant << ',' << trial.session << ',' << trial.block << ',' << trial.trial
+              << ',' << to_string(trial.renderer) << ',' << shape_of(protocol, trial) << ','
+              << exact(q.w) << ',' << exact(q.x) << ',' << exact(q.y) << ',' << exact(q.z) << ','
+              << (trial.practice ? 1 : 0) << ',' << protocol.sha256 << ',' << PALPATE_VERSION
+              << "\r\n";
+  }
+}
+
+void print_json(const Protocol& protocol, const std::vector<Trial>& trials, int participant) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const Trial& trial : trials) {
+    const Quat& q = trial.orientation;
+    rows.push_back({{"session", trial.session},
+                    {"block", trial.block},
+                    {"trial", trial.trial},
+                    {"renderer", to_string(trial.renderer)},
+                    {"shape", shape_of(protocol, trial)},
+                    {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
+                    {"practice", trial.practice}});
+  }
+  const nlohmann::ordered_json document = {{"protocol", protocol.name},
+                                           {"protocol_sha256", protocol.sha256},
+                                           {"program_version", PALPATE_VERSION},
+                                           {"participant_number", participant},
+                                           {"trials", rows}};
+  std::cout << document.dump(1) << "\n";
+}
+
+void print_table(const Protocol& protocol, const std::vector<Trial>& trials) {
+  std::size_t width = 5;
+  for (const StimulusSpec& stimulus : protocol.stimuli) {
+    width = std::max(width, stimulus.name.size());
+  }
+  const auto shape_width = static_cast<int>(width);
+  std::cout << "session  block  trial  renderer  " << std::left << std::setw(shape_width) << "shape"
+            << "  orientation (w x y z)\n";
+  std::cout << std::fixed << std::setprecision(3);
+  for (const Trial& trial : trials) {
+    const Quat& q = trial.orientation;
+    std::cout << std::right << std::setw(7) << trial.session << std::setw(7) << trial.block
+              << std::setw(7) << trial.trial << "  " << std::left << std::setw(8)
+              << to_string(trial.renderer) << "  " << std::setw(shape_width)
+              << shape_of(protocol, trial) << std::right;
+    for (const double part : {q.w, q.x, q.y, q.z}) std::cout << std::setw(8) << part;
+    std::cout << (trial.practice ? "  practice\n" : "\n");
+  }
+}
+
+}  // namespace
+
+int schedule_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate schedule PROTOCOL.json --participant N [--format table|csv|json]";
+  line.summary = "Prints the trials that a participant will get, in order, without running them.";
+  line.example =
+      "  palpate schedule protocols/ho2000.json --participant 1\n"
+      "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv";
+  line.positional_names = {"PROTOCOL.json"};
+  line.options.add_options()("participant", po::value<int>()->required()->value_name("N"),
+                             "participant number: 1, 2, ...")(
+      "format", po::value<std::string>()->default_value("table")->value_name("FORMAT"),
+      "table, csv or json");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const int participant = (*values)["participant"].as<int>();
+  const auto format = (*values)["format"].as<std::string>();
+  if (participant < 1) {
+    throw UsageError("--participant: expected 1 or more, found " + std::to_string(participant));
+  }
+  if (format != "table" && format != "csv" && format != "json") {
+    throw UsageError("--format: expected table, csv or json, found '" + format + "'");
+  }
+
+  const Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  const std::vector<Trial> trials = schedule(protocol, participant);
+  if (format == "csv") {
+    print_csv(protocol, trials, participant);
+  } else if (format == "json") {
+    print_json(protocol, trials, participant);
+  } else {
+    print_table(protocol, trials);
+  }
+  return 0;
+}
+
+}  // namespace palpate

@@ -1,0 +1,101 @@
+#include <cstddef>
+#include <iomanip>
+#include <iostream>
+#include <sstream>
+
+#include "protocols/parse.h"
+#include "protocols/schedule.h"
+#include "runner/commands/command.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kTypicalTrial = 10;  // s; about what the paper's participants took, and a bit
+
+/// Builds every mesh of an object, as a session would, and adds what is wrong with them.
+void check_meshes(const ObjectSpec& object, const std::string& place, const std::string& file,
+                  std::vector<Fault>& faults) {
+  if (object.shape == ShapeKind::compound) {
+    for (std::size_t i = 0; i < object.parts.size(); ++i) {
+      check_meshes(object.parts[i], place + "/parts/" + std::to_string(i), file, faults);
+    }
+    return;
+  }
+  const std::string where = object.shape == ShapeKind::mesh ? place + "/file" : place;
+  try {
+    const ConvexMesh mesh(polygons_of(object));
+  } catch (const MeshError& error) {
+    for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
+  } catch (const std::runtime_error& error) {
+    faults.push_back({file, where, error.what()});
+  }
+}
+
+std::string list(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::string minutes(double seconds) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(0);
+  if (seconds < 5400) {
+    out << seconds / 60 << " min";
+  } else {
+    out << std::setprecision(1) << seconds / 3600 << " h";
+  }
+  return out.str();
+}
+
+void print_summary(const Protocol& protocol, std::ostream& out) {
+  const std::vector<Trial> trials = schedule(protocol, 1);
+  const long long counted = main_trials(protocol);
+  const int sessions = protocol.sessions.count;
+  std::vector<std::string> renderers, stimuli;
+  for (const RendererKind kind : protocol.renderers) renderers.emplace_back(to_string(kind));
+  for (const StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
+  const char* const orders[] = {"in this order", "counterbalanced", "interleaved"};
+  const double rest = protocol.home.rest;
+  const auto n = static_cast<double>(trials.size());
+
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + protocol.title) << "\n"
+      << "  renderers   " << list(renderers) << " ("
+      << orders[static_cast<int>(protocol.renderer_order)] << ")\n"
+      << "  stimuli     " << list(stimuli) << "\n"
+      << "  trials      " << counted << " for each participant ("
+      << counted / static_cast<long long>(protocol.renderers.size()) << " with each renderer), "
+      << trials.size() - static_cast<std::size_t>(counted) << " of practice and warm-up besides\n"
+      << "  blocks      " << trials.back().block << ", in " << sessions
+      << (sessions == 1 ? " session\n" : " sessions\n") << "  duration    about "
+      << minutes(n * (kTypicalTrial + rest)) << " at " << kTypicalTrial << " s a trial, at most "
+      << minutes(n * (protocol.response.time_out + rest)) << "; breaks besides\n"
+      << "  seed        " << protocol.seed << "\n"
+      << "  sha256      " << protocol.sha256 << "\n";
+}
+
+}  // namespace
+
+int validate_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate validate PROTOCOL.json";
+  line.summary = "Checks a protocol with its meshes and its schedule, and lists all faults.";
+  line.example = "  palpate validate protocols/ho2000.json";
+  line.positional_names = {"PROTOCOL.json"};
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const auto file = (*values)["PROTOCOL.json"].as<std::string>();
+
+  const Protocol protocol = parse_protocol(file);
+  std::vector<Fault> faults;
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, faults);
+  }
+  if (!faults.empty()) throw InputError(faults);
+  print_summary(protocol, std::cout);
+  return 0;
+}
+
+}  // namespace palpate
