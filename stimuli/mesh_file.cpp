@@ -1,0 +1,57 @@
+#include "stimuli/mesh_file.h"
+
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "stimuli/mesh_text.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 31U;
+
+std::string lower_extension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c + 32 : c);
+  return extension;
+}
+
+std::string contents(const std::string& path, FileFaults& faults) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    faults.add("", "a file", error ? error.message() : "something else");
+    return {};
+  }
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || size > kLargestFile) {
+    faults.add("", "a file of at most 2 GiB", error ? error.message() : std::to_string(size));
+    return {};
+  }
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(size))) {
+    faults.add("", "a file that can be read", "one that cannot");
+  }
+  return bytes;
+}
+
+}  // namespace
+
+PolygonSoup read_mesh_file(const std::string& path) {
+  FileFaults faults(path);
+  const std::string extension = lower_extension(path);
+  const bool is_obj = extension == ".obj";
+  if (!is_obj && extension != ".stl") {
+    faults.add("", "a name that ends in .obj or .stl", in_quotes(extension));
+  }
+  faults.throw_if_any();
+  const std::string bytes = contents(path, faults);
+  faults.throw_if_any();
+  PolygonSoup soup = is_obj ? read_obj(bytes, faults) : read_stl(bytes, faults);
+  faults.throw_if_any();
+  return soup;
+}
+
+}  // namespace palpate

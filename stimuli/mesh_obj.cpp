@@ -1,0 +1,123 @@
+// Wavefront .obj, as far as a solid needs it: v and f statements.
+
+#include <charconv>
+#include <cstdint>
+
+#include "stimuli/mesh_text.h"
+
+namespace palpate {
+namespace {
+
+using Index = std::uint32_t;
+
+class ObjReader {
+ public:
+  ObjReader(std::string_view text, FileFaults& faults) : text_(text), faults_(faults) {}
+
+  PolygonSoup read() {
+    while (next_line()) {
+      const std::vector<std::string_view> words = words_of(line_.substr(0, line_.find('#')));
+      if (words.empty()) continue;
+      if (words[0] == "v") {
+        add_vertex(words);
+      } else if (words[0] == "f") {
+        add_face(words);
+      }
+    }
+    for (std::size_t f = 0; f < soup_.faces.size(); ++f) {
+      for (const Index v : soup_.faces[f]) check_known(v, face_lines_[f]);
+    }
+    if (soup_.faces.empty()) faults_.add("", "at least one f statement", "none");
+    soup_.coordinate_error = precision_.coordinate_error();
+    return std::move(soup_);
+  }
+
+ private:
+  // A backslash at the end of a line continues it on the next.
+  bool next_line() {
+    line_number_ += lines_taken_;
+    lines_taken_ = 0;
+    bool continued = true;
+    joined_.clear();
+    while (continued && at_ < text_.size()) {
+      std::size_t end = text_.find('\n', at_);
+      if (end == std::string_view::npos) end = text_.size();
+      line_ = text_.substr(at_, end - at_);
+      at_ = end + 1;
+      ++lines_taken_;
+      if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
+      continued = !line_.empty() && line_.back() == '\\';
+      if (continued) line_.remove_suffix(1);
+      if (continued || !joined_.empty()) joined_.append(line_).append(" ");
+    }
+    if (!joined_.empty()) line_ = joined_;
+    return lines_taken_ > 0;
+  }
+
+  void add_vertex(const std::vector<std::string_view>& words) {
+    Vec3 place;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::string_view word = i + 1 < words.size() ? words[i + 1] : std::string_view();
+      double value = 0;
+      if (!parse_number(word, value)) {
+        faults_.add_line(line_number_, "three finite coordinates after v", word);
+        break;
+      }
+      place[static_cast<int>(i)] = value;
+      precision_.see(word, value);
+    }
+    // Also after a fault, so that the numbers of the following vertices stay right.
+    soup_.vertices.push_back(place);
+  }
+
+  void add_face(const std::vector<std::string_view>& words) {
+    if (words.size() < 4) {
+      faults_.add_line(line_number_, "three or more corners after f", "");
+      return;
+    }
+    std::vector<Index> face;
+    for (std::size_t i = 1; i < words.size(); ++i) {
+      const std::string_view word = words[i].substr(0, words[i].find('/'));
+      std::int64_t number = 0;
+      const char* end = word.data() + word.size();
+      const auto [stop, error] = std::from_chars(word.data(), end, number);
+      if (error != std::errc() || stop != end || number == 0 || number > kMostVertices) {
+        faults_.add_line(line_number_, "vertex numbers from 1, or -1 for the latest", words[i]);
+        return;
+      }
+      if (number < 0) number += static_cast<std::int64_t>(soup_.vertices.size()) + 1;
+      if (number < 1) {
+        faults_.add_line(line_number_,
+                         "vertex numbers from -" + std::to_string(soup_.vertices.size()), words[i]);
+        return;
+      }
+      face.push_back(static_cast<Index>(number - 1));
+    }
+    soup_.faces.push_back(std::move(face));
+    face_lines_.push_back(line_number_);
+  }
+
+  void check_known(Index vertex, std::size_t line) {
+    if (vertex < soup_.vertices.size()) return;
+    faults_.add_line(line, "vertex numbers up to " + std::to_string(soup_.vertices.size()),
+                     std::to_string(std::uint64_t{vertex} + 1));
+  }
+
+  static constexpr std::int64_t kMostVertices = 0x7fffffff;
+
+  std::string_view text_, line_;
+  FileFaults& faults_;
+  std::string joined_;
+  std::size_t at_ = 0, line_number_ = 1, lines_taken_ = 0;
+  PolygonSoup soup_;
+  std::vector<std::size_t> face_lines_;
+  NumberPrecision precision_;
+};
+
+}  // namespace
+
+PolygonSoup read_obj(std::string_view text, FileFaults& faults) {
+  return ObjReader(text, faults).read();
+}
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+#pragma once
+// What the readers of mesh files share: faults with their places, words, numbers and how exact the
+// numbers are.
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stimuli/convex_mesh.h"
+
+namespace palpate {
+
+/// Faults of one file, each "file: place: expected ..., found ...".
+class FileFaults {
+ public:
+  explicit FileFaults(std::string file) : file_(std::move(file)) {}
+
+  void add(const std::string& place, const std::string& expected, const std::string& found);
+  void add_line(std::size_t line, const std::string& expected, std::string_view found);
+  void throw_if_any() const;  ///< \throws MeshError: the first 20 faults and how many more
+
+ private:
+  std::string file_;
+  std::vector<std::string> messages_;
+  std::size_t count_ = 0;
+};
+
+/// A word as it can be shown in a message: quoted, cut short, without control characters.
+std::string in_quotes(std::string_view word);
+
+/// The words of a line, parted by blanks.
+std::vector<std::string_view> words_of(std::string_view line);
+
+/// A finite decimal number, whatever the locale; what is too small for a double is 0.
+/// False when the word is anything else.
+bool parse_number(std::string_view word, double& value);
+
+/// Watches the numbers of a file go by and tells how exact they are.
+class NumberPrecision {
+ public:
+  void see(std::string_view word, double value);
+
+  /// m, how far a coordinate may be from where it was meant. Numbers that all end at the same place
+  /// (printf's %f) are known to half of that place; otherwise (%g, or written by hand) as many
+  /// digits count as the longest number has, but at least six. Up to nine digits, or nothing but
+  /// single-precision numbers: no better than single precision.
+  double coordinate_error() const;
+
+ private:
+  int most_digits_ = 0;
+  int last_place_ = 0;  // power of ten of the last digit, where it is the same for all
+  bool any_ = false, same_place_ = true, all_single_ = true;
+  double largest_ = 0;
+};
+
+PolygonSoup read_obj(std::string_view text, FileFaults& faults);
+PolygonSoup read_stl(std::string_view bytes, FileFaults& faults);
+
+}  // namespace palpate
