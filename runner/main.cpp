@@ -1,5 +1,6 @@
 // palpate: show a shape to a hand, time the answer, know what may be concluded.
-// From here to a force: session.cpp > servo.cpp > rendering/ray_renderer.cpp > rendering/facet_walk.cpp
+// From here to a force: session.cpp > servo.cpp > rendering/ray_renderer.cpp >
+// rendering/facet_walk.cpp
 
 #include <cstdio>
 #include <exception>
@@ -20,7 +21,8 @@ struct Command {
 };
 
 constexpr Command kCommands[] = {
-    {"analyze", "per-shape speed-ups with inference, from a database or a CSV file", palpate::analyze_command},
+    {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
+     palpate::analyze_command},
     {"export", "the trials of a database as files for others", palpate::export_command},
     {"render", "forces along a recorded path, offline", palpate::render_command},
     {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
@@ -29,14 +31,16 @@ constexpr Command kCommands[] = {
 };
 
 void print_help(std::ostream& out) {
-  out << "palpate " PALPATE_VERSION ": a psychophysics experiment runner for touch\n\n"
+  out << "palpate " PALPATE_VERSION
+         ": a psychophysics experiment runner for touch\n\n"
          "Usage: palpate COMMAND [OPTIONS]\n\nCommands:\n";
   for (const auto& command : kCommands) {
     std::string name = command.name;
     name.resize(12, ' ');
     out << "  " << name << command.summary << "\n";
   }
-  out << "\n'palpate COMMAND --help' shows a command's options with examples; 'palpate --version' the "
+  out << "\n'palpate COMMAND --help' shows a command's options with examples; 'palpate --version' "
+         "the "
          "version.\nExit status: 0 done, 1 failed while running, 2 wrong usage or bad input.\n";
 }
 
@@ -66,7 +70,8 @@ int main(int argc, char** argv) {
   try {
     const int status = run(argc, argv);
     std::cout.flush();
-    if (!std::cout) throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
+    if (!std::cout)
+      throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
   } catch (const palpate::UsageError& error) {
     std::cerr << "palpate: " << error.what() << "\n";

@@ -1,0 +1,166 @@
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "protocols/parse.h"
+#include "runner/commands/command.h"
+#include "runner/scene_builder.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+struct TrajectoryRow {
+  double t = 0;
+  LineProbe probe;
+};
+
+constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
+constexpr const char* kForceHeader =
+    "t,force_x,force_y,force_z,torque_x,torque_y,torque_z,ideal_tip_x,ideal_tip_y,ideal_tip_z,"
+    "ideal_tail_x,ideal_tail_y,ideal_tail_z,contact_x,contact_y,contact_z,device1_x,device1_y,"
+    "device1_z,"
+    "device2_x,device2_y,device2_z,depth,contacts,contact_type,object";
+
+/// The seven numbers of a line. Empty where it holds anything else.
+std::optional<std::array<double, 7>> seven_numbers(const std::string& line) {
+  std::array<double, 7> out{};
+  const char* at = line.data();
+  const char* const end = at + line.size();
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (i > 0 && (at == end || *at++ != ',')) return std::nullopt;
+    const auto [next, error] = std::from_chars(at, end, out[i]);
+    if (error != std::errc{}) return std::nullopt;
+    at = next;
+  }
+  if (at != end) return std::nullopt;
+  return out;
+}
+
+std::vector<TrajectoryRow> read_trajectory(const std::string& path) {
+  constexpr std::size_t kFaultsShown = 20;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw InputError({{path, "", "a readable file was expected"}});
+  std::vector<TrajectoryRow> rows;
+  std::vector<Fault> faults;
+  std::string line;
+  for (std::size_t number = 1; std::getline(in, line) && faults.size() < kFaultsShown; ++number) {
+    const std::string place = "line " + std::to_string(number);
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (number == 1) {
+      if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
+      if (line != kTrajectoryHeader) {
+        throw InputError(
+            {{path, place, std::string("the header ") + kTrajectoryHeader + " was expected"}});
+      }
+      continue;
+    }
+    if (line.empty()) continue;
+    const auto values = seven_numbers(line);
+    if (!values) {
+      faults.push_back({path, place, "seven numbers were expected"});
+    } else if (!std::isfinite((*values)[0])) {
+      faults.push_back({path, place, "a finite time was expected"});
+    } else if (!rows.empty() && (*values)[0] <= rows.back().t) {
+      faults.push_back({path, place, "a time later than the line before was expected"});
+    } else {
+      const auto& v = *values;
+      rows.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}});
+    }
+  }
+  if (faults.size() == kFaultsShown)
+    faults.push_back({path, "", "and perhaps more; the first are shown"});
+  if (!faults.empty()) throw InputError(std::move(faults));
+  if (rows.empty()) throw InputError({{path, "", "at least one row was expected"}});
+  return rows;
+}
+
+void append(std::string& out, double value) {
+  char text[40];
+  out.append(text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.17g", value)));
+}
+
+void append(std::string& out, const Vec3& v) {
+  for (int k = 0; k < 3; ++k) {
+    out += ',';
+    append(out, v[k]);
+  }
+}
+
+void append_row(std::string& out, double t, const Rendering& r) {
+  append(out, t);
+  for (const Vec3& v :
+       {r.force, r.torque, r.ideal.tip, r.ideal.tail, r.deepest.point, r.device1, r.device2}) {
+    append(out, v);
+  }
+  out += ',';
+  append(out, r.deepest.depth);
+  out += ',' + std::to_string(r.contacts) + ',' + to_string(r.deepest.type) + ',' +
+         std::to_string(r.object) + '\n';
+}
+
+/// Beside the target first, then renamed: the target is whole or untouched.
+void write_whole(const std::string& path, const std::string& text) {
+  const std::string draft = path + ".part";
+  std::ofstream out(draft, std::ios::binary);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  std::error_code error;
+  if (out) std::filesystem::rename(draft, path, error);
+  if (!out || error) {
+    std::filesystem::remove(draft, error);
+    throw std::runtime_error(path +
+                             ": cannot be written; check the folder, its permissions and the disk");
+  }
+}
+
+}  // namespace
+
+int render_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv";
+  line.summary =
+      "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
+      "in.";
+  line.example =
+      "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n";
+  line.options.add_options()                                                                  //
+      ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
+      ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
+      ("trajectory", po::value<std::string>()->required()->value_name("FILE"),
+       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader + " (s, m)")
+           .c_str())  //
+      ("out", po::value<std::string>()->required()->value_name("FILE"), "forces, CSV; overwritten");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const std::string name = (*values)["renderer"].as<std::string>();
+  if (name != "point" && name != "ray") {
+    throw UsageError("--renderer: point or ray was expected, not '" + name + "'");
+  }
+  const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
+  const std::string scene_path = (*values)["scene"].as<std::string>();
+  const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+  const std::vector<TrajectoryRow> rows =
+      read_trajectory((*values)["trajectory"].as<std::string>());
+  SceneBuilder builder;
+  const Scene scene = builder.build(objects, renderer.side_contact());
+  RenderState state = scene.initial_state();
+  std::string out = std::string(kForceHeader) + '\n';
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double dt = i > 0 ? rows[i].t - rows[i - 1].t : 0;
+    const Rendering rendering = renderer.tick(scene, state, rows[i].probe, dt);
+    append_row(out, rows[i].t, rendering);
+  }
+  write_whole((*values)["out"].as<std::string>(), out);
+  return 0;
+}
+
+}  // namespace palpate

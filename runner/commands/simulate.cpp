@@ -1,0 +1,135 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <thread>
+
+#include "protocols/parse.h"
+#include "runner/commands/command.h"
+#include "runner/simulated_study.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
+
+void ask_to_stop(int) { stop_asked = true; }
+
+/// Ctrl-C ends the study cleanly; a second one ends the program as usual.
+void watch_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = SA_RESETHAND;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// One line on a terminal, rewritten in place.
+class ProgressLine {
+ public:
+  ProgressLine() : on_terminal_(isatty(STDERR_FILENO) == 1) {}
+  void show(const StudyProgress& p) {
+    if (!on_terminal_) return;
+    const double elapsed = seconds_since(start_);
+    const auto left = static_cast<double>(p.expected - p.recorded);
+    std::fprintf(stderr, "\r%lld of %lld trials, %.0f simulated s per s, ",
+                 static_cast<long long>(p.recorded), static_cast<long long>(p.expected),
+                 p.simulated_seconds / elapsed);
+    if (p.this_run > 0) {
+      std::fprintf(stderr, "%.0f s left \x1b[K", left * elapsed / static_cast<double>(p.this_run));
+    } else {
+      std::fprintf(stderr, "starting \x1b[K");
+    }
+  }
+  void clear() const {
+    if (on_terminal_) std::fprintf(stderr, "\r\x1b[K");
+  }
+
+ private:
+  bool on_terminal_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+int simulate_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate simulate PROTOCOL.json --db FILE [--participants N] [--seed S] [--jobs J]";
+  line.summary =
+      "Runs the whole study with simulated participants through the renderers, device layer, "
+      "session and\n"
+      "store that live participants use. Their data is labelled simulated. Run again, it goes on "
+      "where it\n"
+      "stopped; the same seed gives the same data, whatever the jobs and interruptions.";
+  line.example =
+      "  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try\n"
+      "  palpate simulate protocols/ho2000.json --db study.db                    the paper's "
+      "study\n"
+      "  palpate simulate protocols/ho2000.json --db study.db --participants 20  more of the "
+      "same\n";
+  int participants = 7;
+  std::uint64_t seed = 1;
+  int jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::string settings_patch;
+  line.options.add_options()  //
+      ("db", po::value<std::string>()->required()->value_name("FILE"),
+       "database; created, or gone on with")  //
+      ("participants", po::value(&participants)->default_value(participants)->value_name("N"),
+       "simulated participants, numbered from 1")  //
+      ("seed", po::value(&seed)->default_value(seed)->value_name("S"),
+       "of the participants; the order of trials follows the protocol's own seed")  //
+      ("jobs", po::value(&jobs)->default_value(jobs)->value_name("J"),
+       "sessions simulated at a time")  //
+      ("settings", po::value(&settings_patch)->value_name("FILE"),
+       "JSON merge patch on the frozen settings of the simulated participant, for ablations");
+  line.positional_names = {"PROTOCOL.json"};
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  if (participants < 1 || participants > 100000)
+    throw UsageError("--participants: 1 to 100000 was expected");
+  if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: 1 to 1024 was expected");
+
+  const Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  const SimulatedSettings settings = load_simulated_settings(settings_patch);
+  Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
+  watch_signals();
+  const auto start = std::chrono::steady_clock::now();
+  ProgressLine progress_line;
+  StudyProgress progress;
+  try {
+    progress = simulate_study(protocol, store, settings, {participants, seed, jobs}, stop_asked,
+                              [&](const StudyProgress& p) { progress_line.show(p); });
+  } catch (const std::invalid_argument& error) {
+    progress_line.clear();
+    throw UsageError(std::string("this protocol cannot be simulated:\n") + error.what());
+  }
+  progress_line.clear();
+  const double elapsed = seconds_since(start);
+  std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),
+              static_cast<long long>(progress.recorded), static_cast<long long>(progress.expected),
+              store.path().c_str());
+  std::printf("settings version %d, sha256 %.12s...; seed %llu\n", settings.version,
+              settings.sha256.c_str(), static_cast<unsigned long long>(seed));
+  if (progress.this_run > 0) {
+    std::printf("%lld trials now: %.0f simulated s in %.1f s, %.0f simulated seconds per second\n",
+                static_cast<long long>(progress.this_run), progress.simulated_seconds, elapsed,
+                progress.simulated_seconds / elapsed);
+  }
+  if (progress.recorded < progress.expected) {
+    std::fprintf(stderr, "stopped; the same command goes on from here\n");
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+#pragma once
+// What the servo knows of a haptic device. The servo calls read, then write, once a tick; both must
+// be quick and must not throw: trouble is reported as faults.
+
+#include <cstdint>
+#include <string>
+
+#include "rendering/probe.h"
+
+namespace palpate {
+
+struct DeviceCapabilities {
+  std::string name;
+  int sensed_freedom = 3;       ///< degrees of freedom sensed: 3 position, 5 position and axis
+  int actuated_freedom = 3;     ///< degrees of freedom driven: 3 force, 5 force and torque
+  double max_force = 0;         ///< N, of each device at an end of the stylus
+  double max_stiffness = 0;     ///< N/m that it can show at max_rate
+  double max_rate = 1000;       ///< Hz
+  double workspace_radius = 0;  ///< m about the device's centre, reached in every direction
+  double resolution = 0;        ///< m
+  bool simulated = false;
+};
+
+struct DeviceReading {
+  LineProbe stylus;  ///< m, tip and tail
+  std::uint8_t buttons = 0;
+  bool lost = false;  ///< no reading: unplugged, homing lost
+};
+
+class Device {
+ public:
+  virtual ~Device() = default;
+  virtual const DeviceCapabilities& capabilities() const = 0;
+  virtual DeviceReading read() noexcept = 0;
+  /// Forces on the hand, N: device 1 at the tip, device 2 at the tail (eq. 1).
+  virtual void write(const Vec3& device1, const Vec3& device2) noexcept = 0;
+};
+
+/// Where the time of a session comes from: the machine, or simulation.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  virtual std::int64_t now_ns() noexcept = 0;
+  /// Returns at `when_ns` or as soon after as the machine allows.
+  virtual void wait_until(std::int64_t when_ns) noexcept = 0;
+};
+
+/// Goes where it is told: a simulated session takes no longer than it must.
+class VirtualClock final : public Clock {
+ public:
+  explicit VirtualClock(std::int64_t start_ns = 0) : now_(start_ns) {}
+  std::int64_t now_ns() noexcept override { return now_; }
+  void wait_until(std::int64_t when_ns) noexcept override {
+    if (when_ns > now_) now_ = when_ns;
+  }
+
+ private:
+  std::int64_t now_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,116 @@
+#include "runner/devices/simulated.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+Vec3 round_to(const Vec3& v, double step) {
+  return {std::nearbyint(v.x / step) * step, std::nearbyint(v.y / step) * step,
+          std::nearbyint(v.z / step) * step};
+}
+
+/// The rotation vector (rad) that turns unit `from` into unit `to` by the shortest way.
+Vec3 rotation_between(const Vec3& from, const Vec3& to) {
+  const Vec3 c = glm::cross(from, to);
+  const double sine = glm::length(c);
+  if (sine == 0) return Vec3(0);
+  return std::atan2(sine, glm::dot(from, to)) / sine * c;
+}
+
+/// Rodrigues' formula.
+Vec3 rotate(const Vec3& v, const Vec3& rotation) {
+  const double angle = glm::length(rotation);
+  if (angle == 0) return v;
+  const Vec3 k = rotation / angle;
+  return std::cos(angle) * v + std::sin(angle) * glm::cross(k, v) +
+         (1 - std::cos(angle)) * glm::dot(k, v) * k;
+}
+
+}  // namespace
+
+SpringDamper::SpringDamper(double mass, double damping, double stiffness, double tick) {
+  const double decay = damping / (2 * mass);
+  const double omega2 = stiffness / mass - decay * decay;  // < 0: overdamped
+  const double omega = std::sqrt(std::abs(omega2));
+  const double angle = omega * tick;
+  double c = std::cos(angle), s = std::sin(angle) / omega;
+  if (omega2 < 0) {
+    c = std::cosh(angle);
+    s = std::sinh(angle) / omega;
+  }
+  if (angle < 1e-8) {
+    c = 1;
+    s = tick;
+  }
+  const double e = std::exp(-decay * tick);
+  xx_ = e * (c + decay * s);
+  xv_ = e * s;
+  vx_ = -e * s * stiffness / mass;
+  vv_ = e * (c - decay * s);
+}
+
+SimulatedStylus::SimulatedStylus(const SimulatedDeviceSettings& device, const HandImpedance& hand,
+                                 double length, double grip, double tick)
+    : settings_(device),
+      hand_(hand),
+      length_(length),
+      grip_(grip),
+      mass_(2 * device.end_mass + hand.mass),
+      friction_step_(device.friction / mass_ * tick),
+      shift_(mass_, hand.damping + device.damping, hand.stiffness, tick),
+      turn_(device.end_mass * (grip * grip + (length - grip) * (length - grip)), hand.turn_damping,
+            hand.turn_stiffness, tick) {
+  capabilities_ = {"simulated",
+                   5,
+                   5,
+                   device.max_force,
+                   device.max_stiffness,
+                   1 / tick,
+                   device.workspace_radius,
+                   device.resolution,
+                   true};
+}
+
+void SimulatedStylus::reset(const HandTarget& target) {
+  target_ = target;
+  position_ = target.grip;
+  axis_ = target.axis;
+  velocity_ = spin_ = force_ = torque_ = Vec3(0);
+}
+
+DeviceReading SimulatedStylus::read() noexcept {
+  // Translation: about the point where the hand's spring, its damper's pull along with the target,
+  // and the force held since the last tick are in balance.
+  const Vec3 balance = target_.grip + (force_ + hand_.damping * target_.velocity) / hand_.stiffness;
+  Vec3 offset = position_ - balance;
+  shift_.advance(offset, velocity_);
+  position_ = balance + offset;
+  const double speed = glm::length(velocity_);
+  if (speed > 0) velocity_ *= speed > friction_step_ ? 1 - friction_step_ / speed : 0;
+  const double distance = glm::length(position_);
+  if (distance > settings_.workspace_radius) {
+    position_ *= settings_.workspace_radius / distance;
+    velocity_ = Vec3(0);
+  }
+  // Rotation: the same about the target's axis. Torsion about the stylus is neither sensed nor
+  // driven.
+  const Vec3 turned_balance = torque_ / hand_.turn_stiffness;
+  Vec3 turned = rotation_between(target_.axis, axis_) - turned_balance;
+  turn_.advance(turned, spin_);
+  axis_ = glm::normalize(rotate(target_.axis, turned + turned_balance));
+  spin_ -= glm::dot(spin_, axis_) * axis_;
+
+  DeviceReading reading;
+  reading.stylus.tip = round_to(position_ - grip_ * axis_, settings_.resolution);
+  reading.stylus.tail = round_to(position_ + (length_ - grip_) * axis_, settings_.resolution);
+  return reading;
+}
+
+void SimulatedStylus::write(const Vec3& device1, const Vec3& device2) noexcept {
+  force_ = device1 + device2;
+  torque_ = glm::cross(axis_, (length_ - grip_) * device2 - grip_ * device1);
+}
+
+}  // namespace palpate

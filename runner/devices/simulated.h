@@ -1,0 +1,82 @@
+#pragma once
+// A stylus held at both ends by two simulated devices and, at the grip, by a simulated hand.
+
+#include <cstdint>
+
+#include "runner/device.h"
+
+namespace palpate {
+
+/// Each end of the stylus is held by one device.
+struct SimulatedDeviceSettings {
+  double end_mass = 0.075;         ///< kg, apparent, at each end
+  double damping = 0.5;            ///< N s/m, viscous, of both together
+  double friction = 0.05;          ///< N, Coulomb, of both together
+  double resolution = 3e-5;        ///< m, of each end's position
+  double max_force = 8.5;          ///< N, of each device
+  double max_stiffness = 3500;     ///< N/m
+  double workspace_radius = 0.25;  ///< m; the grip stops there
+};
+
+/// The hand as an impedance about a target: it never sees the object.
+struct HandImpedance {
+  double stiffness = 400;       ///< N/m
+  double damping = 10;          ///< N s/m
+  double mass = 0.1;            ///< kg, that moves with the stylus
+  double turn_stiffness = 1;    ///< N m/rad
+  double turn_damping = 0.035;  ///< N m s/rad
+};
+
+/// Where the hand wants the stylus.
+struct HandTarget {
+  Vec3 grip;           ///< m
+  Vec3 velocity;       ///< m/s, of grip
+  Vec3 axis{0, 0, 1};  ///< unit, tip to tail
+};
+
+/// The free motion of m x'' = -k x - b x' over one tick, exactly (matrix exponential), so that a
+/// stiff hand cannot blow up the simulation.
+class SpringDamper {
+ public:
+  SpringDamper(double mass, double damping, double stiffness, double tick);
+  void advance(Vec3& position, Vec3& velocity) const {
+    const Vec3 x = position;
+    position = xx_ * x + xv_ * velocity;
+    velocity = vx_ * x + vv_ * velocity;
+  }
+
+ private:
+  double xx_, xv_, vx_, vv_;
+};
+
+/// Five degrees of freedom sensed and driven. Deterministic. read() moves time on by one tick.
+class SimulatedStylus final : public Device {
+ public:
+  /// \param length, grip  m; grip measured from the tip, taken as the centre of the moving mass
+  SimulatedStylus(const SimulatedDeviceSettings& device, const HandImpedance& hand, double length,
+                  double grip, double tick);
+
+  /// At rest on its target, no force.
+  void reset(const HandTarget& target);
+  void set_target(const HandTarget& target) { target_ = target; }
+  /// Grip of the stylus as it is, m (not quantised): for a hand that feels where it is.
+  const Vec3& grip() const { return position_; }
+
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  DeviceReading read() noexcept override;
+  void write(const Vec3& device1, const Vec3& device2) noexcept override;
+
+ private:
+  SimulatedDeviceSettings settings_;
+  HandImpedance hand_;
+  double length_, grip_;
+  double mass_, friction_step_;
+  SpringDamper shift_, turn_;
+  DeviceCapabilities capabilities_;
+  HandTarget target_;
+  Vec3 position_, velocity_;   ///< m, m/s, of the grip
+  Vec3 axis_{0, 0, 1}, spin_;  ///< unit tip to tail; rad/s
+  Vec3 force_, torque_;        ///< N; N m about the grip, held over the tick
+};
+
+}  // namespace palpate

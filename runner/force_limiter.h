@@ -1,0 +1,43 @@
+#pragma once
+// The last stage before the hand: whatever comes in, what goes out is finite, small and changes
+// slowly, or zero.
+
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+struct ForceLimits {
+  double max_force = 6;     ///< N, of each device
+  double max_change = 0.5;  ///< N per tick, of each device
+  double ramp = 0.2;        ///< s, from nothing to full force when forces go on
+};
+
+struct DeviceForces {
+  Vec3 device1, device2;  ///< N, on the hand
+  bool limited = false;   ///< size or change was cut
+};
+
+class ForceLimiter {
+ public:
+  ForceLimiter(const ForceLimits& limits, double tick)
+      : limits_(limits), ramp_step_(tick / limits.ramp) {}
+
+  /// Both devices are scaled together where one is too strong, so that direction and moment keep
+  /// their sense. Not finite: zero for good (faulted) until clear().
+  DeviceForces apply(const Vec3& device1, const Vec3& device2) noexcept;
+  /// Zero force at once; the next apply starts a new ramp.
+  void release() noexcept;
+  /// Zero force at once and until clear().
+  void trip() noexcept;
+  bool tripped() const noexcept { return tripped_; }
+  void clear() noexcept { tripped_ = false; }
+
+ private:
+  ForceLimits limits_;
+  double ramp_step_;
+  double ramp_ = 0;  ///< 0 to 1
+  Vec3 last1_, last2_;
+  bool tripped_ = false;
+};
+
+}  // namespace palpate

@@ -1,0 +1,67 @@
+#pragma once
+// Where a perceived tip or stylus is deepest in each hypothesis of a block.
+
+#include <cmath>
+
+#include "runner/participants/shape_hypotheses.h"
+#include "runner/participants/shape_lines.h"
+
+namespace palpate {
+
+// The search along a line ends when the minimum is pinned down to this length. The distance comes
+// out better: it is interpolated between the slopes at both ends.
+inline constexpr float kSearchedLength = 0.00012f;  // m
+inline constexpr int kMostHalvings = 20;
+
+/// The deepest point of the line, of every hypothesis of a block.
+struct Deepest {
+  float distance[ShapeHypotheses::kBlock];  // m
+  float cosine[ShapeHypotheses::kBlock];    // outward normal . perceived direction
+};
+
+template <class ShapeLine>
+void find_at_tip(const ShapeLine& shape, Deepest& out) {
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+    const SurfacePoint p = shape.surface(i, 0.0f);
+    out.distance[i] = p.distance;
+    out.cosine[i] = shape.cosine(i, p.normal);
+  }
+}
+
+/// The distance to a convex shape is convex along a line, so the sign of its slope tells on which
+/// side the minimum lies.
+template <class ShapeLine>
+void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
+  // Half of the length that is still in question, and its middle.
+  float reach = 0.5f * length;
+  float middle[ShapeHypotheses::kBlock];
+  for (float& m : middle) m = reach;
+  for (int step = 0; step < kMostHalvings && 2.0f * reach > kSearchedLength; ++step) {
+    reach *= 0.5f;
+    for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+      middle[i] -= std::copysign(reach, shape.slope(i, middle[i]));
+    }
+  }
+  const float width = 2.0f * reach;
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+    const SurfacePoint a = shape.surface(i, middle[i] - reach);
+    const SurfacePoint b = shape.surface(i, middle[i] + reach);
+    // The tangents at a and b meet at the minimum of a kink and barely below that of a bend; mixed
+    // to slope zero, the two normals give the one that is perpendicular to the line. At an end of
+    // the line the slope has one sign: the other is taken as zero, and that end is the minimum.
+    const float falling = lane::min(dot(a.normal, shape.along(i)), 0.0f);
+    const float rising = lane::max(dot(b.normal, shape.along(i)), 0.0f);
+    const float bend = lane::max(rising - falling, 1e-6f);
+    const float meet = lane::clamp((a.distance - b.distance + rising * width) / bend, 0.0f, width);
+    const float share_b = -falling / bend;
+    const float share_a = 1.0f - share_b;
+    const FloatVec n{share_a * a.normal.x + share_b * b.normal.x,
+                     share_a * a.normal.y + share_b * b.normal.y,
+                     share_a * a.normal.z + share_b * b.normal.z};
+    const float size = std::sqrt(lane::max(dot(n, n), 1e-12f));
+    out.distance[i] = a.distance + falling * meet;
+    out.cosine[i] = shape.cosine(i, n) / size;
+  }
+}
+
+}  // namespace palpate

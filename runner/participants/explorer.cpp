@@ -1,0 +1,169 @@
+#include "runner/participants/explorer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace palpate {
+namespace {
+
+Vec3 unit_or(const Vec3& v, const Vec3& otherwise) {
+  const double length = glm::length(v);
+  return length > 1e-9 ? v / length : otherwise;
+}
+
+Vec3 any_perpendicular(const Vec3& n) {
+  return glm::normalize(glm::cross(n, std::abs(n.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
+}
+
+Vec3 random_perpendicular(Random& random, const Vec3& n) {
+  const double angle = 2 * std::numbers::pi * random.unit();
+  const Vec3 a = any_perpendicular(n);
+  return std::cos(angle) * a + std::sin(angle) * glm::cross(n, a);
+}
+
+Vec3 normal_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
+
+}  // namespace
+
+Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness,
+                   double tick)
+    : settings_(settings),
+      grip_(grip),
+      tick_(tick),
+      sink_(settings.motor.indentation * (1 + wall_stiffness / settings.hand.stiffness)),
+      max_offset_(settings.motor.max_indentation * wall_stiffness / settings.hand.stiffness),
+      past_(static_cast<std::size_t>(
+          std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
+
+HandTarget Explorer::begin(Random random) {
+  random_ = random;
+  std::fill(past_.begin(), past_.end(), Felt{});
+  now_ = 0;
+  draw_approach();
+  stage_ = Stage::approach;
+  tip_ = start_;
+  axis_ = goal_axis_;
+  return {tip_ + grip_ * axis_, Vec3(0), axis_};
+}
+
+void Explorer::draw_approach() {
+  Vec3 direction;
+  do {
+    direction = unit_or(normal_vector(random_), Vec3(0, 0, 1));
+  } while (direction.z < settings_.motor.approach_min_rise);
+  start_ = settings_.motor.approach_distance * direction;
+  aim_ = settings_.search.aim_sd * normal_vector(random_);
+  const double tilt = settings_.stylus.tilt + settings_.stylus.tilt_sd * random_.normal();
+  goal_axis_ =
+      std::cos(tilt) * direction + std::sin(tilt) * random_perpendicular(random_, direction);
+  // The hand stays above the table.
+  goal_axis_.z = std::max(goal_axis_.z, settings_.motor.approach_min_rise);
+  goal_axis_ = glm::normalize(goal_axis_);
+}
+
+HandTarget Explorer::step(const Felt& now, const LineProbe& stylus) {
+  const Felt known = past_[now_];
+  past_[now_] = now;
+  now_ = (now_ + 1) % past_.size();
+  const Vec3 v = velocity(known);
+  tip_ += tick_ * v;
+  turn_axis();
+  yield_to_force(stylus);
+  return {tip_ + grip_ * axis_, v, axis_};
+}
+
+Vec3 Explorer::velocity(const Felt& known) {
+  const auto& motor = settings_.motor;
+  if (known.contact) last_contact_ = known;
+  left_ -= tick_;
+  switch (stage_) {
+    case Stage::approach:
+      if (known.contact) {
+        stage_ = Stage::follow;
+        left_ = -motor.mean_follow * std::log(1 - random_.unit());
+        heading_ = random_perpendicular(random_, known.normal);
+        return slide(known);
+      }
+      // Through and out on the other side, or past the object: come again.
+      if (glm::dot(tip_ - aim_, aim_ - start_) > 0 && glm::length(tip_) > motor.approach_distance) {
+        stage_ = Stage::retreat;
+        draw_approach();
+      }
+      return motor.approach_speed * unit_or(aim_ - start_, Vec3(0, 0, -1));
+    case Stage::follow:
+      if (left_ <= 0) break;
+      if (known.contact) return slide(known);
+      stage_ = Stage::search;
+      left_ = settings_.search.give_up;
+      [[fallthrough]];
+    case Stage::search:
+      if (left_ <= 0) break;
+      if (known.contact) {
+        stage_ = Stage::follow;
+        left_ = -motor.mean_follow * std::log(1 - random_.unit());
+        return slide(known);
+      }
+      return motor.slide_speed * unit_or(-last_contact_.normal + settings_.search.pull_to_centre *
+                                                                     unit_or(-tip_, Vec3(0)),
+                                         Vec3(0, 0, -1));
+    case Stage::retreat:
+      return fly_to_start();
+  }
+  stage_ = Stage::retreat;
+  draw_approach();
+  return fly_to_start();
+}
+
+Vec3 Explorer::slide(const Felt& known) {
+  const double speed = settings_.motor.slide_speed;
+  // A random walk of the heading in the surface whose correlation fades as exp(-t / heading_time).
+  const double turn = std::sqrt(2 * tick_ / settings_.motor.heading_time) * random_.normal();
+  heading_ -= glm::dot(heading_, known.normal) * known.normal;
+  heading_ = unit_or(heading_, any_perpendicular(known.normal));
+  heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(known.normal, heading_);
+  // Towards the depth that gives the light force, as far as the felt place is known.
+  const Vec3 aimed = tip_ + known.along * axis_;
+  const double rise = glm::dot(known.surface - aimed, known.normal) - sink_;
+  return speed * heading_ + std::clamp(rise / tick_, -speed, speed) * known.normal;
+}
+
+Vec3 Explorer::fly_to_start() {
+  const double speed = settings_.motor.approach_speed;
+  const double radius = glm::length(tip_), shell = settings_.motor.approach_distance;
+  const Vec3 out = unit_or(tip_, Vec3(0, 0, 1));
+  if (radius < shell - speed * tick_) return speed * out;
+  const Vec3 way = start_ - tip_;
+  const double distance = glm::length(way);
+  if (distance <= speed * tick_) {
+    stage_ = Stage::approach;
+    return way / tick_;
+  }
+  // Round the object, not through it.
+  const Vec3 round = way - glm::dot(way, out) * out;
+  const Vec3 level = (shell - radius) / tick_ * out;
+  Vec3 v = speed * unit_or(round, any_perpendicular(out)) + level;
+  if (glm::length(v) > speed) v *= speed / glm::length(v);
+  return v;
+}
+
+void Explorer::turn_axis() {
+  const double step = settings_.stylus.turning * tick_;
+  const double cosine = std::clamp(glm::dot(axis_, goal_axis_), -1.0, 1.0);
+  if (cosine >= std::cos(step)) {
+    axis_ = goal_axis_;
+    return;
+  }
+  const Vec3 side = unit_or(goal_axis_ - cosine * axis_, any_perpendicular(axis_));
+  axis_ = glm::normalize(std::cos(step) * axis_ + std::sin(step) * side);
+}
+
+void Explorer::yield_to_force(const LineProbe& stylus) {
+  const Vec3 held = stylus.tip + grip_ * unit_or(stylus.tail - stylus.tip, axis_);
+  const Vec3 offset = tip_ + grip_ * axis_ - held;
+  const double length = glm::length(offset);
+  if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
+}
+
+}  // namespace palpate

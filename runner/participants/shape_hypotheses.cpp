@@ -1,0 +1,142 @@
+#include "runner/participants/shape_hypotheses.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+namespace palpate {
+namespace {
+
+constexpr int kConeAxes = 380;
+constexpr int kCylinderAxes = 150;
+constexpr int kAllRotations = 9120;  // 380 times the 24 symmetries of the cube
+
+/// A frame whose z axis is `axis`; the other two are arbitrary.
+Mat3 frame_around(const Vec3& axis) {
+  const Vec3 helper = std::abs(axis.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
+  const Vec3 x = glm::normalize(glm::cross(helper, axis));
+  return {x, glm::cross(axis, x), axis};
+}
+
+/// Fibonacci spiral from z = 1 to z = lowest: equal areas along a golden-angle spiral.
+std::vector<Mat3> spiral_axes(int count, double lowest) {
+  const double golden_angle = std::numbers::pi * (3 - std::sqrt(5.0));
+  std::vector<Mat3> frames;
+  for (int i = 0; i < count; ++i) {
+    const double z = 1 - (1 - lowest) * (i + 0.5) / count;
+    const double radius = std::sqrt(1 - z * z);
+    frames.push_back(frame_around(
+        {radius * std::cos(golden_angle * i), radius * std::sin(golden_angle * i), z}));
+  }
+  return frames;
+}
+
+/// Of all rotations that carry a cube into the same place, is this the smallest? In Rodrigues'
+/// vector the answer is a cube with its corners cut off (Frank 1988).
+bool in_cubic_zone(const Quat& q) {
+  const double w = std::abs(q.w);
+  const double x = std::abs(q.x);
+  const double y = std::abs(q.y);
+  const double z = std::abs(q.z);
+  const double face = (std::numbers::sqrt2 - 1) * w;
+  return x <= face && y <= face && z <= face && x + y + z <= w;
+}
+
+/// Super-Fibonacci spirals (Alexa 2022, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling
+/// of SO(3)", algorithm 1), of which those are kept that a cube can tell apart.
+std::vector<Mat3> cube_rotations() {
+  constexpr double kPsi = 1.533751168755204288118041;  // his constant: psi^4 = psi + 4
+  std::vector<Mat3> rotations;
+  for (int i = 0; i < kAllRotations; ++i) {
+    const double s = i + 0.5;
+    const double inner = std::sqrt(s / kAllRotations);
+    const double outer = std::sqrt(1 - s / kAllRotations);
+    const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
+    const double beta = 2 * std::numbers::pi * s / kPsi;
+    const Quat q(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
+                 outer * std::cos(beta));
+    if (in_cubic_zone(q)) rotations.push_back(glm::mat3_cast(q));
+  }
+  return rotations;
+}
+
+std::vector<Mat3> distinct_rotations(ShapeKind kind) {
+  switch (kind) {
+    case ShapeKind::cone:
+      return spiral_axes(kConeAxes, -1);
+    case ShapeKind::cylinder:
+      return spiral_axes(kCylinderAxes, 0);
+    case ShapeKind::cube:
+      return cube_rotations();
+    default:
+      return {Mat3(1)};
+  }
+}
+
+bool usable(double length) { return std::isfinite(length) && length > 0; }
+
+/// Empty if a simulated participant knows the shape.
+std::string fault_of(const ObjectSpec& stimulus) {
+  switch (stimulus.shape) {
+    case ShapeKind::sphere:
+      return usable(stimulus.radius) ? "" : "its radius is not positive";
+    case ShapeKind::cone:
+    case ShapeKind::cylinder:
+      return usable(stimulus.radius) && usable(stimulus.height)
+                 ? ""
+                 : "its radius or height is not positive";
+    case ShapeKind::cube:
+      return usable(stimulus.edge) ? "" : "its edge is not positive";
+    default:
+      return "a simulated participant knows sphere, cone, cylinder and cube, not mesh or compound";
+  }
+}
+
+}  // namespace
+
+ShapeHypotheses::ShapeHypotheses(const std::vector<ObjectSpec>& stimuli) {
+  std::string faults;
+  if (stimuli.empty()) faults = "\n  no stimuli: a simulated participant needs at least one";
+  for (std::size_t i = 0; i < stimuli.size(); ++i) {
+    const std::string fault = fault_of(stimuli[i]);
+    if (!fault.empty()) faults += "\n  stimulus " + std::to_string(i + 1) + ": " + fault;
+  }
+  if (!faults.empty()) {
+    throw std::invalid_argument("these stimuli cannot be simulated:" + faults);
+  }
+  for (const ObjectSpec& stimulus : stimuli) append(stimulus);
+}
+
+void ShapeHypotheses::append(const ObjectSpec& stimulus) {
+  const std::vector<Mat3> rotations = distinct_rotations(stimulus.shape);
+  Shape shape;
+  shape.kind = stimulus.shape;
+  shape.radius = static_cast<float>(stimulus.radius);
+  shape.half_size =
+      static_cast<float>((stimulus.shape == ShapeKind::cube ? stimulus.edge : stimulus.height) / 2);
+  shape.first = padded_size();
+  shape.count = static_cast<int>(rotations.size());
+  shapes_.push_back(shape);
+
+  const int blocks = (shape.count + kBlock - 1) / kBlock;
+  for (int i = 0; i < blocks * kBlock; ++i) {
+    const Mat3& r = rotations[static_cast<std::size_t>(i < shape.count ? i : shape.count - 1)];
+    for (int a = 0; a < 3; ++a) {
+      for (int c = 0; c < 3; ++c) {
+        axes_[static_cast<std::size_t>(3 * a + c)].push_back(static_cast<float>(r[a][c]));
+      }
+    }
+  }
+}
+
+Mat3 ShapeHypotheses::rotation(int hypothesis) const {
+  Mat3 r;
+  for (int a = 0; a < 3; ++a) {
+    for (int c = 0; c < 3; ++c) r[a][c] = axis_component(a, c)[hypothesis];
+  }
+  return r;
+}
+
+}  // namespace palpate

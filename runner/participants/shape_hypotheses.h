@@ -1,0 +1,57 @@
+#pragma once
+// What a simulated participant takes into consideration: every stimulus in every orientation that
+// can be told apart from the others.
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "stimuli/object_spec.h"
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+/// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads may share one.
+/// Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
+/// Cube: 384 rotations modulo its 24. Neighbours are 10 to 12 degrees apart; no orientation is
+/// further than 8, 10 and 12 degrees from the grid of cone, cylinder and cube.
+///
+/// Lies in flat single-precision arrays; a shape fills whole blocks, the rest of its last block
+/// repeats its last hypothesis ("padding").
+class ShapeHypotheses {
+ public:
+  static constexpr int kBlock = 32;
+
+  struct Shape {
+    ShapeKind kind = ShapeKind::sphere;
+    float radius = 0;     ///< m; sphere, cone, cylinder
+    float half_size = 0;  ///< m; half the height of a cone or cylinder, half the edge of a cube
+    int first = 0;        ///< index of its first hypothesis, a multiple of kBlock
+    int count = 0;        ///< of hypotheses, without the padding
+  };
+
+  /// Shape i is stimulus i in its own frame; poses and materials are ignored.
+  /// \throws std::invalid_argument naming every stimulus that is no sphere, cone, cylinder or cube
+  /// or has a size that is not positive; also for an empty list.
+  explicit ShapeHypotheses(const std::vector<ObjectSpec>& stimuli);
+
+  const std::vector<Shape>& shapes() const { return shapes_; }
+
+  int padded_size() const { return static_cast<int>(axes_[0].size()); }
+
+  /// Component c of local axis a (x, y, z: 0, 1, 2) in the world frame, of every hypothesis.
+  const float* axis_component(int a, int c) const {
+    return axes_[static_cast<std::size_t>(3 * a + c)].data();
+  }
+
+  /// World from local, of one hypothesis; columns are the local axes.
+  Mat3 rotation(int hypothesis) const;
+
+ private:
+  void append(const ObjectSpec& stimulus);
+
+  std::vector<Shape> shapes_;
+  std::array<std::vector<float>, 9> axes_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,241 @@
+#include "runner/participants/shape_observer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "runner/participants/deepest_point.h"
+#include "runner/participants/lane_math.h"
+#include "runner/participants/shape_lines.h"
+
+// The loops over the hypotheses of a block are written for the compiler to vectorise; the build
+// gives this file -fno-math-errno and -fno-trapping-math, which change no value.
+
+namespace palpate {
+namespace {
+
+constexpr int kBlock = ShapeHypotheses::kBlock;
+constexpr int kMostPlaces = 64;
+
+/// A percept and the settings, ready for the loops.
+struct Query {
+  Line line;
+  bool contact = false;
+  bool ray = false;
+
+  float half_precision = 0;       // 1 / (2 v), 1/m^2
+  float direction_precision = 0;  // 1/rad^2
+  float inverse_sd = 0;           // 1 / sqrt v, 1/m
+  float free_space_weight = 0;
+
+  int places = 0;            // 0: no torque cue
+  float place[kMostPlaces];  // m from the tip
+  float fit[kMostPlaces];    // likelihood of `along` at that place
+  float inverse_scale = 0;   // of the soft minimum, 1/m
+  float torque_floor = 0;
+};
+
+template <class ShapeLine>
+void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& deepest,
+                    float* log_likelihood) {
+  float weights[kBlock] = {};
+  float fits[kBlock] = {};
+  for (int k = 0; k < query.places; ++k) {
+    const float place = query.place[k];
+    const float fit = query.fit[k];
+    for (int i = 0; i < kBlock; ++i) {
+      const float height = shape.distance(i, place) - deepest.distance[i];
+      const float weight = lane::exp(-height * query.inverse_scale);
+      weights[i] += weight;
+      fits[i] += weight * fit;
+    }
+  }
+  for (int i = 0; i < kBlock; ++i) {
+    log_likelihood[i] += lane::log(fits[i] / weights[i] + query.torque_floor);
+  }
+}
+
+template <class ShapeLine>
+void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_likelihood) {
+  Deepest deepest;
+  if (query.ray) {
+    find_along_line(shape, query.line.length, deepest);
+  } else {
+    find_at_tip(shape, deepest);
+  }
+  if (query.contact) {
+    for (int i = 0; i < kBlock; ++i) {
+      const float d = deepest.distance[i];
+      log_likelihood[i] =
+          query.direction_precision * (deepest.cosine[i] - 1.0f) - d * d * query.half_precision;
+    }
+    if (query.places > 0) add_torque_cue(shape, query, deepest, log_likelihood);
+  } else {
+    for (int i = 0; i < kBlock; ++i) {
+      log_likelihood[i] =
+          query.free_space_weight * lane::log_normal_cdf(deepest.distance[i] * query.inverse_sd);
+    }
+  }
+}
+
+Query make_query(const Percept& percept, const ObserverSettings& settings) {
+  Query query;
+  query.contact = percept.contact;
+  query.ray = percept.ray;
+  query.line = {to_float(percept.tip), {0, 0, 0}, 0, to_float(percept.direction)};
+  const Vec3 span = percept.tail - percept.tip;
+  const double length = percept.ray ? glm::length(span) : 0;
+  if (length > 0) {
+    query.line.along = to_float(span / length);
+    query.line.length = static_cast<float>(length);
+  }
+
+  const double variance = settings.contact_sd * settings.contact_sd +
+                          settings.model_contact_sd * settings.model_contact_sd;
+  const double direction_variance = settings.direction_sd * settings.direction_sd +
+                                    settings.model_direction_sd * settings.model_direction_sd;
+  query.half_precision = static_cast<float>(0.5 / variance);
+  query.inverse_sd = static_cast<float>(1 / std::sqrt(variance));
+  query.direction_precision = static_cast<float>(1 / direction_variance);
+  query.free_space_weight = static_cast<float>(settings.free_space_weight);
+  query.inverse_scale = static_cast<float>(1 / settings.soft_min_scale);
+  query.torque_floor = static_cast<float>(settings.torque_floor);
+
+  if (percept.contact && percept.ray && percept.along) {
+    query.places = settings.places_along;
+    for (int k = 0; k < query.places; ++k) {
+      const double place = length * k / (query.places - 1);
+      const double error = (place - *percept.along) / settings.along_sd;
+      query.place[k] = static_cast<float>(place);
+      query.fit[k] = lane::exp(static_cast<float>(-0.5 * error * error));
+    }
+  }
+  return query;
+}
+
+void check(const ObserverSettings& s) {
+  std::string faults;
+  const auto want = [&faults](bool good, const char* fault) {
+    if (!good) faults += std::string("\n  ") + fault;
+  };
+  const auto positive = [](double x) { return std::isfinite(x) && x > 0; };
+  const auto not_negative = [](double x) { return std::isfinite(x) && x >= 0; };
+  want(not_negative(s.contact_sd) && not_negative(s.model_contact_sd) &&
+           positive(s.contact_sd + s.model_contact_sd),
+       "contact_sd and model_contact_sd: not negative, not both zero");
+  want(not_negative(s.direction_sd) && not_negative(s.model_direction_sd) &&
+           positive(s.direction_sd + s.model_direction_sd),
+       "direction_sd and model_direction_sd: not negative, not both zero");
+  want(positive(s.along_sd), "along_sd: positive");
+  want(positive(s.soft_min_scale), "soft_min_scale: positive");
+  want(s.places_along >= 2 && s.places_along <= kMostPlaces, "places_along: 2 to 64");
+  want(s.torque_floor >= 1e-30 && s.torque_floor <= 1, "torque_floor: 1e-30 to 1");
+  want(not_negative(s.free_space_weight), "free_space_weight: not negative");
+  want(std::isfinite(s.floor) && s.floor <= 0, "floor: not positive");
+  want(not_negative(s.beta), "beta: not negative");
+  want(positive(s.memory), "memory: positive");
+  want(positive(s.percept_rate), "percept_rate: positive");
+  want(s.threshold > 0 && s.threshold < 1, "threshold: between 0 and 1");
+  if (!faults.empty()) throw std::invalid_argument("settings of the observer:" + faults);
+}
+
+float log_prior(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape) {
+  return static_cast<float>(
+      -std::log(static_cast<double>(hypotheses.shapes().size()) * shape.count));
+}
+
+/// L of all hypotheses of one shape after a percept.
+template <class ShapeLine>
+void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
+                  const Query& query, const ObserverSettings& settings, float* log_posterior) {
+  const double kept = std::exp(-1 / (settings.percept_rate * settings.memory));
+  const float keep = static_cast<float>(kept);
+  const float regained = static_cast<float>(1 - kept) * log_prior(hypotheses, shape);
+  const float beta = static_cast<float>(settings.beta);
+  const float floor = static_cast<float>(settings.floor);
+  for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
+    const ShapeLine line(hypotheses, shape, first, query.line);
+    float log_likelihood[kBlock];
+    find_log_likelihood(line, query, log_likelihood);
+    for (int i = 0; i < kBlock; ++i) {
+      log_posterior[first + i] =
+          keep * log_posterior[first + i] + regained + beta * lane::max(log_likelihood[i], floor);
+    }
+  }
+}
+
+}  // namespace
+
+ShapeObserver::ShapeObserver(const ShapeHypotheses& hypotheses, const ObserverSettings& settings)
+    : hypotheses_(&hypotheses),
+      settings_(settings),
+      log_posterior_(static_cast<std::size_t>(hypotheses.padded_size())),
+      probabilities_(hypotheses.shapes().size()) {
+  check(settings);
+  reset();
+}
+
+void ShapeObserver::reset() {
+  for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
+    const int blocks = (shape.count + kBlock - 1) / kBlock;
+    std::fill_n(log_posterior_.begin() + shape.first, blocks * kBlock,
+                log_prior(*hypotheses_, shape));
+  }
+  find_posterior();
+}
+
+void ShapeObserver::update(const Percept& percept) {
+  const Query query = make_query(percept, settings_);
+  for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
+    float* const l = log_posterior_.data();
+    switch (shape.kind) {
+      case ShapeKind::cone:
+        update_shape<AxialLine<ConeProfile>>(*hypotheses_, shape, query, settings_, l);
+        break;
+      case ShapeKind::cylinder:
+        update_shape<AxialLine<CylinderProfile>>(*hypotheses_, shape, query, settings_, l);
+        break;
+      case ShapeKind::cube:
+        update_shape<CubeLine>(*hypotheses_, shape, query, settings_, l);
+        break;
+      default:
+        update_shape<SphereLine>(*hypotheses_, shape, query, settings_, l);
+    }
+  }
+  find_posterior();
+}
+
+void ShapeObserver::find_posterior() {
+  // A maximum and a sum for each place in a block: the compiler may not reorder one running sum.
+  const float* const l = log_posterior_.data();
+  float most[kBlock];
+  std::copy_n(l, kBlock, most);
+  for (int first = 0; first < hypotheses_->padded_size(); first += kBlock) {
+    for (int i = 0; i < kBlock; ++i) most[i] = lane::max(most[i], l[first + i]);
+  }
+  const float reference = *std::max_element(most, most + kBlock);
+
+  double total = 0;
+  for (std::size_t s = 0; s < probabilities_.size(); ++s) {
+    const ShapeHypotheses::Shape& shape = hypotheses_->shapes()[s];
+    const int end = shape.first + shape.count;
+    float sums[kBlock] = {};
+    for (int first = shape.first; first < end; first += kBlock) {
+      for (int i = 0; i < kBlock; ++i) {
+        const float mass = lane::exp(l[first + i] - reference);
+        sums[i] += first + i < end ? mass : 0.0f;
+      }
+    }
+    double sum = 0;
+    for (const float part : sums) sum += part;
+    probabilities_[s] = sum;
+    total += sum;
+  }
+  for (double& probability : probabilities_) probability /= total;
+  best_ = static_cast<int>(std::max_element(probabilities_.begin(), probabilities_.end()) -
+                           probabilities_.begin());
+}
+
+}  // namespace palpate

@@ -1,0 +1,85 @@
+#pragma once
+// How a simulated participant identifies a shape: Bayes' rule over shapes and orientations of known
+// size and centre, from a few percepts a second, with a fading memory. A mechanistic model that
+// stands in for no one.
+//
+// With v = contact_sd^2 + model_contact_sd^2, k = 1 / (direction_sd^2 + model_direction_sd^2), and
+// for each hypothesis the signed distance d and outward normal n_h (point: at the tip; ray: the
+// minimum over the stylus, and the normal there):
+//
+//   contact      l  = -d^2 / (2 v) + k (n_h . direction - 1)
+//   torque cue   l += ln(sum_k w_k exp(-(s_k - along)^2 / (2 along_sd^2)) / sum_k w_k
+//                        + torque_floor),       w_k = exp(-(d_k - d) / soft_min_scale)
+//   free space   l  = free_space_weight ln Phi(d / sqrt v)
+//   update       L <- lambda L + (1 - lambda) L0 + beta max(l, floor),
+//                lambda = exp(-1 / (percept_rate memory)),  L0 = -ln(shapes * hypotheses of shape)
+//
+// Where the minimum over the stylus lies on a kink inside the object (the perceived stylus cuts
+// through an edge), the distance has no gradient. n_h is then the one element of its
+// subdifferential that is perpendicular to the stylus, which is what makes the place a minimum and
+// is the normal of a contact between stylus and edge.
+
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "runner/participants/shape_hypotheses.h"
+#include "stimuli/vec.h"
+
+namespace palpate {
+
+struct ObserverSettings {
+  double contact_sd = 0.003;                                ///< m; of the perceived place
+  double model_contact_sd = 0.003;                          ///< m; slack of the hypotheses
+  double direction_sd = 15 * std::numbers::pi / 180;        ///< rad; of the perceived force
+  double model_direction_sd = 12 * std::numbers::pi / 180;  ///< rad; slack of the hypotheses
+  double along_sd = 0.015;                                  ///< m; of the place along the stylus
+  double soft_min_scale = 0.0015;  ///< m; how much deeper a place must be to count for more
+  int places_along = 15;           ///< places along the stylus, both ends included; 2 to 64
+  double torque_floor = 1e-4;      ///< likelihood of a place that does not fit at all
+  double free_space_weight = 0.2;  ///< share of the evidence of a percept without contact
+  double floor = -6;               ///< least log likelihood of one percept
+  double beta = 0.25;              ///< weight of a percept
+  double memory = 15;              ///< s; time constant of forgetting
+  double percept_rate = 6;         ///< Hz
+  double threshold = 0.95;         ///< posterior of a shape at which the observer responds
+};
+
+/// One glimpse of touch, noise included. Lengths in m, from the object's centre.
+struct Percept {
+  bool contact = false;
+  bool ray = false;  ///< the whole stylus touches, not only its tip
+  Vec3 tip;
+  Vec3 tail;                    ///< ray only
+  Vec3 direction;               ///< unit, of the force: outward normal; contact only
+  std::optional<double> along;  ///< m from the tip to the contact, torque over force; ray only
+};
+
+/// Keeps one posterior; any number may share the hypotheses, which must outlive them. The same
+/// percepts give the same posterior on every machine and in every thread.
+class ShapeObserver {
+ public:
+  /// \throws std::invalid_argument naming every setting that is out of range.
+  explicit ShapeObserver(const ShapeHypotheses& hypotheses, const ObserverSettings& settings = {});
+
+  void reset();  ///< Back to the prior: shapes alike, orientations of a shape alike.
+
+  /// Takes one percept in; call it percept_rate times a second. Allocates nothing.
+  /// Single precision: posteriors are within 0.001 of double precision.
+  void update(const Percept& percept);
+
+  int best() const { return best_; }  ///< Most probable shape; the first of equals.
+  double probability(int shape) const { return probabilities_[static_cast<std::size_t>(shape)]; }
+  bool decided() const { return probability(best_) > settings_.threshold; }
+
+ private:
+  void find_posterior();
+
+  const ShapeHypotheses* hypotheses_;
+  ObserverSettings settings_;
+  std::vector<float> log_posterior_;  // L, of every hypothesis; not normalised
+  std::vector<double> probabilities_;
+  int best_ = 0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,109 @@
+#include "runner/participants/simulated.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "runner/scene_builder.h"
+
+namespace palpate {
+
+SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
+                                           const ShapeHypotheses& hypotheses,
+                                           SimulatedStylus& stylus, const Protocol& protocol,
+                                           std::uint64_t seed, int number)
+    : settings_(own),
+      stylus_(stylus),
+      wall_stiffness_(protocol.material.stiffness),
+      period_(1 / protocol.servo_rate),
+      low_pass_(1 - std::exp(-period_ / own.percept.force_low_pass)),
+      seed_(seed),
+      number_(number),
+      workspace_{protocol.workspace.centre, protocol.workspace.scale},
+      explorer_(own, protocol.stylus.grip * protocol.workspace.scale, wall_stiffness_, period_),
+      observer_(hypotheses, own.observer) {}
+
+void SimulatedParticipant::begin_trial(const Trial& trial) {
+  const auto stream = [&](std::uint64_t use) {
+    return Random(seed_,
+                  {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
+                   static_cast<std::uint64_t>(trial.trial), use});
+  };
+  random_ = stream(1);
+  stylus_.reset(in_device(explorer_.begin(stream(2))));
+  observer_.reset();
+  ray_ = renderer_for(trial.renderer).side_contact();
+  for (int k = 0; k < 3; ++k) centre_error_[k] = settings_.percept.centre_jitter * random_.normal();
+  force_ = torque_ = Vec3(0);
+  next_percept_ = 1 / settings_.observer.percept_rate;
+  answer_at_.reset();
+}
+
+std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
+  if (sample.phase != Phase::feeling) return std::nullopt;  // rests at home
+  const double time = sample.tick * period_;
+  const Felt felt = feel(sample);
+  stylus_.set_target(in_device(explorer_.step(felt, sample.probe)));
+  if (answer_at_) {
+    if (time < *answer_at_) return std::nullopt;
+    return Answer{observer_.best(), sample.time_ns};
+  }
+  if (time >= next_percept_) {
+    next_percept_ += 1 / settings_.observer.percept_rate;
+    observer_.update(perceive(sample, felt));
+    if (observer_.decided()) answer_at_ = time + settings_.non_decision;
+  }
+  return std::nullopt;
+}
+
+HandTarget SimulatedParticipant::in_device(HandTarget target) const {
+  target.grip = workspace_.to_device(target.grip);
+  target.velocity /= workspace_.scale;
+  return target;
+}
+
+Felt SimulatedParticipant::feel(const Sample& sample) {
+  const Vec3 stylus = sample.probe.tail - sample.probe.tip;
+  force_ += low_pass_ * (sample.device1 + sample.device2 - force_);
+  torque_ += low_pass_ * (glm::cross(stylus, sample.device2) - torque_);
+  Felt felt;
+  const double strength = glm::length(force_);
+  felt.contact = strength > settings_.percept.force_threshold;
+  if (!felt.contact) return felt;
+  felt.normal = force_ / strength;
+  const double length = glm::length(stylus);
+  const Vec3 axis = stylus / length;
+  const Vec3 lever = glm::cross(axis, force_);
+  const double lever2 = glm::dot(lever, lever);
+  place_known_ = ray_ && lever2 > 0.01 * strength * strength;
+  if (place_known_) felt.along = std::clamp(glm::dot(lever, torque_) / lever2, 0.0, length);
+  felt.surface = sample.probe.tip + felt.along * axis + force_ / wall_stiffness_;
+  return felt;
+}
+
+Percept SimulatedParticipant::perceive(const Sample& sample, const Felt& felt) {
+  const auto noise = [this](double sd) {
+    return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
+  };
+  const auto tilted = [&noise](const Vec3& direction, double sd) {
+    const Vec3 e = noise(sd);  // what of it lies along the direction does not turn it
+    return glm::normalize(direction + e - glm::dot(e, direction) * direction);
+  };
+  Percept percept;
+  percept.contact = felt.contact;
+  percept.ray = ray_;
+  const Vec3 stylus = sample.probe.tail - sample.probe.tip;
+  const double length = glm::length(stylus);
+  percept.tip = sample.probe.tip - centre_error_ + noise(settings_.observer.contact_sd);
+  percept.tail = percept.tip + length * tilted(stylus / length, settings_.percept.axis_sd);
+  if (felt.contact) {
+    percept.direction = tilted(felt.normal, settings_.observer.direction_sd);
+    if (place_known_) {
+      percept.along =
+          std::clamp(felt.along + settings_.observer.along_sd * random_.normal(), 0.0, length);
+    }
+  }
+  return percept;
+}
+
+}  // namespace palpate

@@ -1,0 +1,8 @@
+#pragma once
+
+namespace palpate {
+
+/// The frozen settings file, embedded by the build.
+extern const char* const kSimulatedDefaults;
+
+}  // namespace palpate

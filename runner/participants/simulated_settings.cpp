@@ -1,0 +1,129 @@
+#include "runner/participants/simulated_settings.h"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "protocols/parse.h"
+#include "protocols/sha256.h"
+#include "runner/participants/simulated_defaults.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+using nlohmann::json;
+
+/// Every key of the patch must stand in the defaults, and be a number there.
+void check_patch(const json& patch, const json& defaults, const std::string& file,
+                 const std::string& place, std::vector<Fault>& faults) {
+  if (!patch.is_object()) {
+    faults.push_back({file, place, "an object was expected"});
+    return;
+  }
+  for (const auto& [key, value] : patch.items()) {
+    const std::string here = place + "/" + key;
+    if (!defaults.contains(key)) {
+      faults.push_back({file, here, "no such setting"});
+    } else if (defaults[key].is_object()) {
+      check_patch(value, defaults[key], file, here, faults);
+    } else if (defaults[key].is_number() &&
+               !(value.is_number() && std::isfinite(value.get<double>()))) {
+      faults.push_back({file, here, "a number was expected"});
+    } else if (key == "version") {
+      faults.push_back({file, here, "a patch cannot change the version"});
+    }
+  }
+}
+
+json with_patch(json settings, const std::string& path) {
+  if (path.empty()) return settings;
+  std::ifstream in(path, std::ios::binary);
+  if (!in) throw InputError({{path, "", "a readable file was expected"}});
+  json patch;
+  try {
+    patch = json::parse(in);
+  } catch (const json::parse_error& error) {
+    throw InputError({{path, "byte " + std::to_string(error.byte), "JSON was expected"}});
+  }
+  std::vector<Fault> faults;
+  check_patch(patch, settings, path, "", faults);
+  if (!faults.empty()) throw InputError(faults);
+  settings.merge_patch(patch);
+  return settings;
+}
+
+double degrees(const json& value) { return value.get<double>() * std::numbers::pi / 180; }
+
+SimulatedSettings read(const json& j) {
+  SimulatedSettings s;
+  s.version = j.at("version");
+  const json &percept = j.at("percept"), &observer = j.at("observer"), &motor = j.at("motor");
+  s.percept = {degrees(percept.at("axis_sd_deg")), percept.at("centre_jitter_m"),
+               percept.at("force_low_pass_s"), percept.at("force_threshold_n")};
+  s.observer.contact_sd = percept.at("contact_sd_m");
+  s.observer.direction_sd = degrees(percept.at("direction_sd_deg"));
+  s.observer.along_sd = percept.at("along_sd_m");
+  s.observer.percept_rate = percept.at("rate_hz");
+  s.observer.model_contact_sd = observer.at("model_contact_sd_m");
+  s.observer.model_direction_sd = degrees(observer.at("model_direction_sd_deg"));
+  s.observer.soft_min_scale = observer.at("soft_min_scale_m");
+  s.observer.places_along = observer.at("places_along");
+  s.observer.torque_floor = observer.at("torque_floor");
+  s.observer.free_space_weight = observer.at("free_space_weight");
+  s.observer.floor = observer.at("floor");
+  s.observer.beta = observer.at("beta");
+  s.observer.memory = observer.at("memory_s");
+  s.observer.threshold = observer.at("threshold");
+  s.non_decision = observer.at("non_decision_s");
+  s.motor = {motor.at("reaction_delay_s"),       motor.at("slide_speed_m_per_s"),
+             motor.at("approach_speed_m_per_s"), motor.at("indentation_m"),
+             motor.at("max_indentation_m"),      motor.at("heading_time_constant_s"),
+             motor.at("mean_follow_s"),          motor.at("approach_distance_m"),
+             motor.at("approach_min_rise")};
+  const json &search = j.at("search"), &stylus = j.at("stylus"), &hand = j.at("hand");
+  s.search = {search.at("aim_sd_m"), search.at("pull_to_centre"), search.at("give_up_s")};
+  s.stylus = {degrees(stylus.at("tilt_deg")), degrees(stylus.at("tilt_sd_deg")),
+              degrees(stylus.at("turning_deg_per_s"))};
+  s.hand = {hand.at("stiffness_n_per_m"), hand.at("damping_ns_per_m"), hand.at("mass_kg"),
+            hand.at("turn_stiffness_nm_per_rad"), hand.at("turn_damping_nms_per_rad")};
+  const json &device = j.at("device"), &between = j.at("between_participants");
+  s.device = {device.at("end_mass_kg"),       device.at("damping_ns_per_m"),
+              device.at("friction_n"),        device.at("resolution_m"),
+              device.at("max_force_n"),       device.at("max_stiffness_n_per_m"),
+              device.at("workspace_radius_m")};
+  s.between = {between.at("slide_speed_log_sd"), between.at("percept_noise_log_sd"),
+               between.at("reaction_delay_log_sd"), between.at("non_decision_log_sd"),
+               between.at("threshold_logit_sd")};
+  s.sha256 = sha256_hex(j.dump());
+  return s;
+}
+
+}  // namespace
+
+SimulatedSettings load_simulated_settings(const std::string& patch_path) {
+  return read(with_patch(json::parse(kSimulatedDefaults), patch_path));
+}
+
+SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number) {
+  Random random(seed, {static_cast<std::uint64_t>(number)});
+  const auto factor = [&random](double log_sd) { return std::exp(log_sd * random.normal()); };
+  SimulatedSettings own = settings;
+  own.motor.slide_speed *= factor(settings.between.slide_speed);
+  const double noise = factor(settings.between.percept_noise);
+  own.observer.contact_sd *= noise;
+  own.observer.direction_sd *= noise;
+  own.observer.along_sd *= noise;
+  own.percept.axis_sd *= noise;
+  own.percept.centre_jitter *= noise;
+  own.motor.reaction_delay *= factor(settings.between.reaction_delay);
+  own.non_decision *= factor(settings.between.non_decision);
+  const double p = settings.observer.threshold;
+  const double logit = std::log(p / (1 - p)) + settings.between.threshold * random.normal();
+  own.observer.threshold = 1 / (1 + std::exp(-logit));
+  return own;
+}
+
+}  // namespace palpate

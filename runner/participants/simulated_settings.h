@@ -1,0 +1,58 @@
+#pragma once
+// Every constant of the simulated participant, from a frozen and versioned file.
+
+#include <cstdint>
+#include <string>
+
+#include "runner/devices/simulated.h"
+#include "runner/participants/shape_observer.h"
+
+namespace palpate {
+
+struct SimulatedSettings {
+  int version = 1;
+  struct Percept {
+    double axis_sd;          ///< rad
+    double centre_jitter;    ///< m, per axis, drawn once a trial
+    double force_low_pass;   ///< s, time constant
+    double force_threshold;  ///< N; below it no contact is felt
+  } percept;
+  ObserverSettings observer;  ///< holds the percept's other noises and rate as well
+  double non_decision;        ///< s, from decision to response
+  struct Motor {
+    double reaction_delay;     ///< s; only what the controller knows of contact is delayed
+    double slide_speed;        ///< m/s
+    double approach_speed;     ///< m/s
+    double indentation;        ///< m; force is this times the object's stiffness
+    double max_indentation;    ///< m; the hand yields at once to more force than this stands for
+    double heading_time;       ///< s; correlation time of the heading
+    double mean_follow;        ///< s; exponential
+    double approach_distance;  ///< m from the centre, where an approach starts
+    double approach_min_rise;  ///< least upward component of the direction of approach
+  } motor;
+  struct Search {
+    double aim_sd;          ///< m, per axis
+    double pull_to_centre;  ///< weight beside the direction of pressing, after a loss
+    double give_up;         ///< s
+  } search;
+  struct Stylus {
+    double tilt, tilt_sd;  ///< rad, from the direction of approach
+    double turning;        ///< rad/s, at most
+  } stylus;
+  HandImpedance hand;
+  SimulatedDeviceSettings device;
+  struct Between {
+    double slide_speed, percept_noise, reaction_delay, non_decision;  ///< sd of the log
+    double threshold;                                                 ///< sd of the logit
+  } between;
+  std::string sha256;  ///< of the settings in force, patch included
+};
+
+/// The frozen defaults, with a JSON merge patch (RFC 7396) from `patch_path` on top when it is not
+/// empty: for ablations. \throws InputError naming unknown keys and wrong values.
+SimulatedSettings load_simulated_settings(const std::string& patch_path);
+
+/// What sets participant `number` of a study apart: its own speed, noise, delay, and threshold.
+SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number);
+
+}  // namespace palpate

@@ -1,0 +1,103 @@
+#include "runner/scene_builder.h"
+
+#include <algorithm>
+#include <charconv>
+#include <glm/geometric.hpp>
+
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+Pose compose(const Pose& outer, const Pose& inner) {
+  return {outer.orientation * inner.position + outer.position,
+          outer.orientation * inner.orientation};
+}
+
+/// Equal keys, equal meshes.
+std::string shape_key(const ObjectSpec& spec, bool side_contact) {
+  std::string key = std::to_string(static_cast<int>(spec.shape)) + (side_contact ? "s" : "p");
+  for (const double value : {spec.radius, spec.height, spec.edge}) {
+    char text[32];
+    key.append(1, ' ').append(text, std::to_chars(text, text + sizeof text, value).ptr);
+  }
+  return key + ' ' + std::to_string(spec.subdivisions) + ' ' + std::to_string(spec.segments) + ' ' +
+         spec.file;
+}
+
+}  // namespace
+
+const Renderer& renderer_for(RendererKind kind) {
+  return kind == RendererKind::ray ? ray_renderer() : point_renderer();
+}
+
+SceneBuilder::Prepared SceneBuilder::prepare(const ObjectSpec& spec, bool side_contact) {
+  Prepared& prepared = prepared_[shape_key(spec, side_contact)];
+  if (!prepared.mesh) {
+    prepared.mesh = std::make_shared<const ConvexMesh>(polygons_of(spec));
+    prepared.trees = std::make_shared<const ContactTrees>(*prepared.mesh, side_contact);
+  }
+  return prepared;
+}
+
+void SceneBuilder::place(const ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
+                         std::vector<SceneObject>& out) {
+  const Pose pose = compose(parent, spec.pose);
+  if (spec.shape == ShapeKind::compound) {
+    for (const ObjectSpec& part : spec.parts) place(part, pose, object, side_contact, out);
+    return;
+  }
+  const Prepared prepared = prepare(spec, side_contact);
+  out.push_back({prepared.mesh, pose, spec.material, object, prepared.trees});
+}
+
+Scene SceneBuilder::build(const std::vector<ObjectSpec>& objects, bool side_contact) {
+  std::vector<SceneObject> parts;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    try {
+      place(objects[i], Pose{}, static_cast<int>(i), side_contact, parts);
+    } catch (const MeshError& error) {
+      std::vector<std::string> faults;
+      for (const auto& fault : error.faults()) {
+        faults.push_back("object " + std::to_string(i) + ": " + fault);
+      }
+      throw MeshError(std::move(faults));
+    }
+  }
+  return Scene(std::move(parts), side_contact);
+}
+
+StimulusLibrary::StimulusLibrary(const Protocol& protocol) {
+  SceneBuilder builder;
+  for (const StimulusSpec& stimulus : protocol.stimuli) {
+    double reach = 0;
+    for (const bool sides : {false, true}) {
+      std::vector<SceneObject> objects;
+      try {
+        const Scene scene = builder.build({stimulus.object}, sides);
+        for (const ScenePart& part : scene.parts()) {
+          objects.push_back({part.mesh,
+                             {part.position, glm::quat_cast(part.to_world)},
+                             part.material,
+                             0,
+                             part.trees});
+          reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
+        }
+      } catch (const MeshError& error) {
+        throw MeshError({"stimulus '" + stimulus.name + "': " + error.what()});
+      }
+      (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
+    }
+    reaches_.push_back(reach);
+  }
+}
+
+Scene StimulusLibrary::scene(const Trial& trial) const {
+  const bool sides = renderer_for(trial.renderer).side_contact();
+  std::vector<SceneObject> objects = (sides ? with_sides_ : without_sides_)[trial.stimulus];
+  for (SceneObject& object : objects)
+    object.pose = compose({Vec3(0), trial.orientation}, object.pose);
+  return Scene(std::move(objects), sides);
+}
+
+}  // namespace palpate

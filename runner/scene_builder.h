@@ -1,0 +1,52 @@
+#pragma once
+// From what a protocol or scene file says to what the renderers need.
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+#include "rendering/renderer.h"
+#include "rendering/scene.h"
+
+namespace palpate {
+
+const Renderer& renderer_for(RendererKind kind);
+
+/// Places the convex parts of objects; equal shapes share one mesh and its trees.
+class SceneBuilder {
+ public:
+  /// \throws MeshError where a shape is no convex mesh, naming the object's index.
+  Scene build(const std::vector<ObjectSpec>& objects, bool side_contact);
+
+ private:
+  struct Prepared {
+    std::shared_ptr<const ConvexMesh> mesh;
+    std::shared_ptr<const ContactTrees> trees;
+  };
+  Prepared prepare(const ObjectSpec& spec, bool side_contact);
+  void place(const ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
+             std::vector<SceneObject>& out);
+
+  std::map<std::string, Prepared> prepared_;
+};
+
+/// The stimuli of a protocol, made once; gives each trial its scene. Safe to share between threads.
+class StimulusLibrary {
+ public:
+  /// \throws MeshError naming the stimulus.
+  explicit StimulusLibrary(const Protocol& protocol);
+
+  /// The trial's stimulus in the trial's orientation, about the origin of the workspace.
+  Scene scene(const Trial& trial) const;
+  /// Radius about the origin that holds the stimulus in any orientation, m.
+  double reach(int stimulus) const { return reaches_[stimulus]; }
+
+ private:
+  std::vector<std::vector<SceneObject>> with_sides_, without_sides_;  ///< by stimulus
+  std::vector<double> reaches_;
+};
+
+}  // namespace palpate
