@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <map>
 #include <utility>
 
 #include "analysis/text.h"
@@ -50,24 +50,30 @@ void warn_of_exclusions(Analysis& analysis) {
   }
 }
 
+/// "P3 (point: cone; ray: every shape)" for each participant without a pair somewhere.
 void warn_of_dropped(Analysis& analysis) {
-  std::vector<std::set<std::string>> by_person(analysis.table.participants.size());
-  std::vector<std::size_t> shapes(by_person.size());
-  for (const PairedShape& shape : analysis.shapes) {
-    for (const Dropped& dropped : shape.dropped) {
-      by_person[dropped.participant].insert(dropped.renderers.begin(), dropped.renderers.end());
-      ++shapes[dropped.participant];
+  const TrialTable& table = analysis.table;
+  if (table.renderers.size() < 2) return;
+  std::map<std::size_t, std::map<std::string, std::vector<std::string>>> shapes_of;
+  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
+    for (const Dropped& dropped : analysis.shapes[s].dropped) {
+      for (const std::string& renderer : dropped.renderers) {
+        shapes_of[dropped.participant][renderer].push_back(table.shapes[s]);
+      }
     }
   }
-  std::vector<std::string> names;
-  for (std::size_t p = 0; p < by_person.size(); ++p) {
-    if (shapes[p] == 0) continue;
-    names.push_back(analysis.table.participants[p] + " (" + counted(shapes[p], "shape", "shapes") +
-                    ", no time with " + joined(by_person[p]) + ")");
+  std::vector<std::string> people;
+  for (const auto& [participant, renderers] : shapes_of) {
+    std::string text;
+    for (const auto& [renderer, shapes] : renderers) {
+      text += (text.empty() ? "" : "; ") + renderer + ": " +
+              (shapes.size() == table.shapes.size() ? "every shape" : joined(shapes));
+    }
+    people.push_back(table.participants[participant] + " (" + text + ")");
   }
-  if (!names.empty() && analysis.table.renderers.size() == 2) {
-    analysis.warnings.push_back("Left out of paired comparisons: " + joined(names) + ".");
-  }
+  if (people.empty()) return;
+  analysis.warnings.push_back(
+      "Left out of paired comparisons where there is no time: " + joined(people) + ".");
 }
 
 void warn_of_times(Analysis& analysis) {

@@ -1,0 +1,122 @@
+#include "analysis/report_text.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "analysis/tables.h"
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kColumns = 100;
+constexpr std::size_t kNameColumns = 24;   // of a name in a table
+constexpr std::size_t kValueColumns = 70;  // of a text in the last table
+
+std::string repeated(const char* what, std::size_t times) {
+  std::string out;
+  for (std::size_t i = 0; i < times; ++i) out += what;
+  return out;
+}
+
+/// Paragraph in lines of at most kColumns; words that are longer are cut.
+void put_wrapped(std::string& out, const std::string& text, const std::string& indent) {
+  std::string line = indent;
+  bool empty = true;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(' ', at), text.size());
+    const std::string word = shortened(text.substr(at, end - at), kColumns - indent.size());
+    at = end + 1;
+    if (!empty && width(line) + 1 + width(word) > kColumns) {
+      out += line + "\n";
+      line = indent;
+      empty = true;
+    }
+    line += (empty ? "" : " ") + word;
+    empty = false;
+  }
+  out += line + "\n";
+}
+
+/// Columns first..last-1 with the names before them.
+void put_columns(std::string& out, const std::vector<std::vector<std::string>>& rows,
+                 const std::vector<std::size_t>& widths, std::size_t first, std::size_t last,
+                 std::size_t n_names) {
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    std::string line = "  " + pad_right(rows[r][0], widths[0]);
+    for (std::size_t c = first; c < last; ++c) {
+      line += "  ";
+      line += c < n_names ? pad_right(rows[r][c], widths[c]) : pad_left(rows[r][c], widths[c]);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += line + "\n";
+    if (r == 0) {
+      std::size_t rule = widths[0];
+      for (std::size_t c = first; c < last; ++c) rule += widths[c] + 2;
+      out += "  " + repeated("─", rule) + "\n";
+    }
+  }
+}
+
+void put_table(std::string& out, const Table& table) {
+  const bool text_only = table.n_names == table.header.size();  // its last column may be long
+  std::vector<std::vector<std::string>> rows{table.header};
+  rows.insert(rows.end(), table.rows.begin(), table.rows.end());
+  std::vector<std::size_t> widths(table.header.size());
+  for (auto& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      row[c] = shortened(row[c], text_only && c == 1 ? kValueColumns : kNameColumns);
+      widths[c] = std::max(widths[c], width(row[c]));
+    }
+  }
+  put_wrapped(out, table.caption, "");
+  std::size_t first = 1;
+  while (first < widths.size()) {
+    std::size_t last = first, used = 2 + widths[0];
+    while (last < widths.size() && (last == first || used + 2 + widths[last] <= kColumns)) {
+      used += 2 + widths[last++];
+    }
+    if (first > 1) out += "  (continued)\n";
+    put_columns(out, rows, widths, first, last, table.n_names);
+    first = last;
+  }
+  for (const std::string& note : table.notes) put_wrapped(out, note, "  ");
+}
+
+}  // namespace
+
+std::string report_text(const Analysis& analysis) {
+  std::string out;
+  const std::string label = simulated_label(analysis.table.simulated);
+  if (!label.empty()) {
+    out += repeated("═", kColumns) + "\n";
+    put_wrapped(
+        out,
+        label + (analysis.table.simulated == Simulated::yes
+                     ? ": every figure below comes from a model of a person, not from people."
+                     : ": the figures below mix a model of a person with people."),
+        "  ");
+    out += repeated("═", kColumns) + "\n\n";
+  }
+  put_wrapped(out, answer(analysis), "");
+  const Counts& counts = analysis.description.counts;
+  put_wrapped(out,
+              counted(counts.n_participants, "participant", "participants") + ", " +
+                  counted(counts.n_trials, "trial", "trials") + ", " +
+                  fixed(100 * counts.accuracy.value_or(0), 1) + " % correct; " +
+                  counted(counts.n_used_for_times, "time", "times") + " used.",
+              "");
+  for (const std::string& warning : analysis.warnings) {
+    put_wrapped(out, "Warning: " + warning, "");
+  }
+  for (const Table& table : all_tables(analysis)) {
+    out += "\n";
+    put_table(out, table);
+  }
+  return out;
+}
+
+}  // namespace palpate

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate {
+
+/// Writes the few elements that our figures need. Lengths in px, y down; text is escaped here.
+class Svg {
+ public:
+  enum class Anchor { start, middle, end };
+  struct TextStyle {
+    double size = 13;  ///< px
+    std::string_view colour = "#1f2328";
+    Anchor anchor = Anchor::start;
+    bool bold = false;
+    double turned = 0;  ///< degrees, clockwise, about the anchor
+  };
+
+  void line(double x1, double y1, double x2, double y2, std::string_view colour, double width = 1,
+            double opacity = 1);
+  void rect(double x, double y, double width, double height, std::string_view fill,
+            std::string_view stroke = "none", double corner = 0);
+  void circle(double x, double y, double radius, std::string_view fill, double opacity = 1);
+  void square(double x, double y, double half, std::string_view fill, double opacity = 1);
+  void diamond(double x, double y, double half, std::string_view stroke);
+  void triangle(double x, double y, double half, bool up, std::string_view fill);
+  void text(double x, double y, std::string_view text, const TextStyle& style);
+  /// What follows until end_group() shows `title` when pointed at.
+  void begin_group(std::string_view title);
+  void end_group();
+
+  /// Puts the elements of another on top.
+  void append(const Svg& other) { body_ += other.body_; }
+
+  /// The finished document.
+  std::string document(double width, double height, std::string_view title,
+                       std::string_view description) const;
+
+ private:
+  std::string body_;
+};
+
+/// Rough width of a text in a sans-serif font, px.
+double text_width(std::string_view text, double size, bool bold = false);
+/// Lines of at most `width` px, broken at spaces.
+std::vector<std::string> wrapped(std::string_view text, double width, double size,
+                                 bool bold = false);
+
+}  // namespace palpate

@@ -1,0 +1,280 @@
+#include "analysis/tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr const char* kMissing = "–";
+
+std::string number(const std::optional<double>& value, int decimals) {
+  return value ? fixed(*value, decimals) : kMissing;
+}
+
+std::string percent(const std::optional<double>& value, int decimals = 1) {
+  return value ? fixed(*value, decimals) + " %" : kMissing;
+}
+
+std::optional<double> hundredfold(const std::optional<double>& share) {
+  if (!share) return std::nullopt;
+  return 100 * *share;
+}
+
+/// A change: with its sign.
+std::string signed_fixed(double value, int decimals) {
+  const std::string text = fixed(value, decimals);
+  return (value > 0 && text.find_first_not_of("0.") != std::string::npos ? "+" : "") + text;
+}
+
+std::string p_or_missing(const std::optional<double>& p) { return p ? p_text(*p) : kMissing; }
+
+std::string reduction_interval(const std::optional<Interval>& log_ratio) {
+  if (!log_ratio) return kMissing;
+  const Interval percent = percent_reduction(*log_ratio);
+  return fixed(percent.low, 1) + " to " + fixed(percent.high, 1);
+}
+
+/// "Response times" or "Response times (SIMULATED PARTICIPANTS)".
+std::string caption(const Analysis& analysis, const std::string& what) {
+  const std::string label = simulated_label(analysis.table.simulated);
+  return label.empty() ? what : what + " (" + label + ")";
+}
+
+/// A note for each reason, with the shapes that it holds for.
+class Reasons {
+ public:
+  void add(const std::string& reason, const std::string& shape) {
+    if (reason.empty()) return;
+    for (auto& [known, shapes] : reasons_) {
+      if (known == reason) {
+        if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+        return;
+      }
+    }
+    reasons_.push_back({reason, {shape}});
+  }
+  void put(std::vector<std::string>& notes) const {
+    for (const auto& [reason, shapes] : reasons_) {
+      notes.push_back("Undefined for " + joined(shapes) + ": " + reason + ".");
+    }
+  }
+
+ private:
+  std::vector<std::pair<std::string, std::vector<std::string>>> reasons_;
+};
+
+}  // namespace
+
+Table reduction_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "How much faster with the ray: reduction of response time");
+  table.header = {"shape",    "geometric", "95 % interval", "arithmetic",
+                  "p (Holm)", "pairs",     "paper"};
+  Reasons reasons;
+  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
+    const PairedShape& shape = analysis.shapes[s];
+    const std::string& name = analysis.table.shapes[s];
+    const std::string paper = paper_reduction(name);
+    table.rows.push_back({name, percent(shape.percent_reduction_geometric),
+                          reduction_interval(shape.t_test.log_ratio_ci95),
+                          percent(shape.percent_reduction_arithmetic),
+                          p_or_missing(shape.t_test.p_holm), std::to_string(shape.n_pairs),
+                          paper.empty() ? kMissing : paper});
+    reasons.add(shape.t_test.undefined, name);
+  }
+  table.notes = {
+      "Geometric: 100 (1 − exp m), m the mean over participants of mean log ray − mean log point; "
+      "interval and p from the paired t-test on m, p adjusted over the shapes (Holm). Positive: "
+      "the "
+      "ray is faster. Arithmetic: from mean times, which the paper may have used.",
+      "Paper: Ho, Basdogan & Srinivasan 2000, fig. 15; n.s.: no significant difference."};
+  reasons.put(table.notes);
+  return table;
+}
+
+Table times_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Response times in s, correct trials");
+  table.n_names = 2;
+  table.header = {"shape",  "renderer",       "mean",   "sd",
+                  "median", "geometric mean", "people", "trials"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+      const TimesCell& cell = analysis.description.times[r][s];
+      table.rows.push_back({analysis.table.shapes[s], analysis.table.renderers[r],
+                            number(cell.mean_of_participant_means, 2),
+                            number(cell.sd_of_participant_means, 2),
+                            number(cell.mean_of_participant_medians, 2),
+                            number(cell.geomean_of_participant_geomeans, 2),
+                            std::to_string(cell.n_participants), std::to_string(cell.n_trials)});
+    }
+  }
+  table.notes = {
+      "Each is taken per participant first, then averaged over participants; sd is "
+      "between participants."};
+  return table;
+}
+
+Table accuracy_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Accuracy, all trials");
+  table.n_names = 2;
+  table.header = {"shape",          "renderer", "accuracy",  "of answered",
+                  "mean of people", "correct",  "no answer", "trials"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+      const AccuracyCell& cell = analysis.description.accuracy[r][s];
+      table.rows.push_back({analysis.table.shapes[s], analysis.table.renderers[r],
+                            percent(hundredfold(cell.accuracy)),
+                            percent(hundredfold(cell.accuracy_answered)),
+                            percent(hundredfold(cell.mean_of_participant_accuracies)),
+                            std::to_string(cell.n_correct), std::to_string(cell.n_timeouts),
+                            std::to_string(cell.n_trials)});
+    }
+  }
+  table.notes = {"A time-out counts as wrong; “of answered” leaves time-outs out."};
+  return table;
+}
+
+Table speed_accuracy_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Speed and accuracy together, ray against point");
+  table.header = {"shape", "time", "accuracy point", "accuracy ray", "accuracy", "reading"};
+  if (analysis.table.renderers.size() < 2) return table;
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    const auto point =
+        hundredfold(analysis.description.accuracy[0][s].mean_of_participant_accuracies);
+    const auto ray =
+        hundredfold(analysis.description.accuracy[1][s].mean_of_participant_accuracies);
+    const auto& reduction = analysis.shapes[s].percent_reduction_geometric;
+    std::optional<double> change;
+    if (point && ray) change = *ray - *point;
+    std::string reading = kMissing;
+    constexpr double kNotable = 1;  // percent of time, percentage points of accuracy
+    if (change && reduction) {
+      const bool faster = *reduction > kNotable, slower = *reduction < -kNotable;
+      const bool better = *change > kNotable, worse = *change < -kNotable;
+      reading = (faster && worse) || (slower && better) ? "trade-off possible" : "no trade-off";
+    }
+    table.rows.push_back({analysis.table.shapes[s],
+                          reduction ? signed_fixed(-*reduction, 1) + " %" : kMissing,
+                          percent(point), percent(ray),
+                          change ? signed_fixed(*change, 1) + " points" : kMissing, reading});
+  }
+  table.notes = {
+      "Trade-off possible: faster and less accurate, or slower and more accurate, by more "
+      "than 1 % of the time and 1 percentage point."};
+  return table;
+}
+
+std::vector<Table> confusion_tables(const Analysis& analysis) {
+  std::vector<Table> tables;
+  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+    Table table;
+    table.caption = caption(analysis, "Confusion with " + analysis.table.renderers[r] +
+                                          ": shown (rows), answered (columns)");
+    table.header = {"shown"};
+    table.header.insert(table.header.end(), analysis.table.answers.begin(),
+                        analysis.table.answers.end());
+    table.header.emplace_back("no response");
+    for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+      std::vector<std::string> row{analysis.table.shapes[s]};
+      for (const std::size_t n : analysis.description.confusion[r][s]) {
+        row.push_back(std::to_string(n));
+      }
+      table.rows.push_back(std::move(row));
+    }
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+Table tests_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Tests of ray − point on log times, over participants");
+  table.header = {"shape",      "t", "df",           "p",       "p (Holm)", "dz",
+                  "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"};
+  Reasons reasons;
+  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
+    const PairedShape& shape = analysis.shapes[s];
+    const std::string& name = analysis.table.shapes[s];
+    table.rows.push_back(
+        {name, number(shape.t_test.t, 2), number(shape.t_test.df, 0), p_or_missing(shape.t_test.p),
+         p_or_missing(shape.t_test.p_holm), number(shape.effect_size.dz, 2),
+         number(shape.effect_size.hedges_gz, 2), number(shape.wilcoxon.positive_rank_sum, 1),
+         p_or_missing(shape.wilcoxon.p), reduction_interval(shape.bootstrap.log_ratio_ci95)});
+    for (const std::string& reason : {shape.t_test.undefined, shape.effect_size.undefined,
+                                      shape.wilcoxon.undefined, shape.bootstrap.undefined}) {
+      reasons.add(reason, name);
+    }
+  }
+  table.notes = {
+      "t, dz and gz are negative when the ray is faster. Primary: the paired t-test, "
+      "Holm-adjusted. "
+      "Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the percent "
+      "reduction, " +
+      std::to_string(kResamples) + " resamples, seed " + std::to_string(analysis.settings.seed) +
+      "."};
+  reasons.put(table.notes);
+  return table;
+}
+
+Table exclusions_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "From trials to times");
+  table.header = {"renderer", "trials", "wrong", "no response", "too fast", "used", "left out"};
+  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+    const Exclusions& lost = analysis.exclusions[r];
+    table.rows.push_back({analysis.table.renderers[r], std::to_string(lost.n_trials),
+                          std::to_string(lost.n_wrong), std::to_string(lost.n_timeouts),
+                          std::to_string(lost.n_too_fast), std::to_string(lost.n_used),
+                          percent(100 * lost.share_excluded())});
+  }
+  table.notes = {"Too fast: correct answers before " + fixed(analysis.settings.too_fast, 3) +
+                 " s. " + counted(analysis.table.n_practice, "practice trial", "practice trials") +
+                 " set aside before."};
+  return table;
+}
+
+Table provenance_table(const Analysis& analysis) {
+  const Provenance& from = analysis.table.provenance;
+  Table table;
+  table.caption = "Where this comes from";
+  table.n_names = 2;
+  table.n_names = 2;
+  table.header = {"what", "value"};
+  const auto add = [&](const char* what, const std::string& value) {
+    if (!value.empty()) table.rows.push_back({what, value});
+  };
+  add("source", from.source);
+  add("participants", counted(analysis.table.participants.size(), "participant", "participants") +
+                          (analysis.table.simulated == Simulated::yes     ? ", simulated"
+                           : analysis.table.simulated == Simulated::mixed ? ", partly simulated"
+                                                                          : ""));
+  add("protocol", from.protocol_name);
+  for (const std::string& sha : from.protocol_sha256) add("protocol SHA-256", sha);
+  add("observer SHA-256", from.observer_sha256);
+  for (const std::string& version : from.program_versions) add("recorded with palpate", version);
+  add("analysed with palpate", analysis.program_version);
+  return table;
+}
+
+std::vector<Table> all_tables(const Analysis& analysis) {
+  std::vector<Table> tables{reduction_table(analysis), times_table(analysis),
+                            accuracy_table(analysis)};
+  if (analysis.table.renderers.size() == 2) tables.push_back(speed_accuracy_table(analysis));
+  std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
+  tables.push_back(tests_table(analysis));
+  tables.push_back(exclusions_table(analysis));
+  tables.push_back(provenance_table(analysis));
+  return tables;
+}
+
+}  // namespace palpate
