@@ -11,6 +11,7 @@
 #include "stimuli/coplanar.h"
 #include "stimuli/facet_outlines.h"
 #include "stimuli/half_edges.h"
+#include "stimuli/polygon.h"
 
 namespace palpate {
 namespace {
@@ -23,8 +24,8 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
   check_flatness(mesh, shapes, faults);
   double volume = 0, area = 0;
   for (const FaceShape& shape : shapes) {
-    volume += glm::dot(shape.middle - mesh.points[0], shape.area) / 3;
-    area += glm::length(shape.area);
+    volume += glm::dot(shape.middle - mesh.points[0], shape.normal) * shape.area / 3;
+    area += shape.area;
   }
   const bool closed = std::find(mesh.twin.begin(), mesh.twin.end(), kNone) == mesh.twin.end();
   if (closed && !(std::abs(volume) > 2 * mesh.error * area)) {
@@ -84,16 +85,9 @@ std::vector<Index> order_in_space(const HalfEdges& mesh, const FacetOutlines& ou
   return order;
 }
 
-// The plane through a polygon: Newell's normal, and midway between the corners that stand out most
-// and least.
-Facet plane_of(const std::vector<Vec3>& corners) {
-  Vec3 middle, area;
-  for (const Vec3& corner : corners) middle += corner - corners[0];
-  middle = corners[0] + middle / static_cast<double>(corners.size());
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    area += glm::cross(corners[k] - middle, corners[(k + 1) % corners.size()] - middle);
-  }
-  Facet facet{glm::normalize(area), 0, 0, static_cast<Index>(corners.size())};
+// In the plane through a polygon, midway between the corners that stand out most and least.
+Facet facet_of(const std::vector<Vec3>& corners) {
+  Facet facet{plane_of(corners).normal, 0, 0, static_cast<Index>(corners.size())};
   double low = std::numeric_limits<double>::max(), high = -low;
   for (const Vec3& corner : corners) {
     low = std::min(low, glm::dot(facet.normal, corner));
@@ -112,14 +106,14 @@ class ConvexMesh::Builder {
       : out_(out),
         mesh_(mesh),
         outlines_(outlines),
-        facet_of_(outlines.region_count()),
+        number_of_(outlines.region_count()),
         side_of_(outlines.side_count()),
         edge_of_(outlines.side_count(), kNone),
         vertex_of_(mesh.points.size(), kNone) {}
 
   void build() {
     const std::vector<Index> order = order_in_space(mesh_, outlines_);
-    for (Index f = 0; f < order.size(); ++f) facet_of_[order[f]] = f;
+    for (Index f = 0; f < order.size(); ++f) number_of_[order[f]] = f;
     out_.facets_.reserve(order.size());
     out_.sides_.reserve(outlines_.side_count());
     out_.edges_.reserve(outlines_.side_count() / 2);
@@ -146,7 +140,7 @@ class ConvexMesh::Builder {
     const Index first = outlines_.first[region], end = outlines_.first[region + 1];
     corners_.clear();
     for (Index s = first; s < end; ++s) corners_.push_back(mesh_.from(outlines_.start[s]));
-    Facet facet = plane_of(corners_);
+    Facet facet = facet_of(corners_);
     facet.first_side = static_cast<Index>(out_.sides_.size());
     out_.facets_.push_back(facet);
     for (Index s = first; s < end; ++s) {
@@ -157,7 +151,7 @@ class ConvexMesh::Builder {
 
   void add_side(Index s, Index next, const Vec3& from, const Vec3& to) {
     const Index opposite = outlines_.opposite[s];
-    const Index across = facet_of_[outlines_.region[opposite]];
+    const Index across = number_of_[outlines_.region[opposite]];
     const Index v0 = vertex(s), v1 = vertex(next);
     if (edge_of_[opposite] == kNone) {
       edge_of_[s] = static_cast<Index>(out_.edges_.size());
@@ -214,7 +208,7 @@ class ConvexMesh::Builder {
   ConvexMesh& out_;
   const HalfEdges& mesh_;
   const FacetOutlines& outlines_;
-  std::vector<Index> facet_of_;           // of each region
+  std::vector<Index> number_of_;          // of each region
   std::vector<Index> side_of_, edge_of_;  // of each side of the outlines
   std::vector<Index> vertex_of_;          // of each welded point
   std::vector<Index> soup_vertex_;        // of each vertex

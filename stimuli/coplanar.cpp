@@ -5,7 +5,9 @@
 #include <deque>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numeric>
+#include <utility>
+
+#include "stimuli/polygon.h"
 
 namespace palpate {
 namespace {
@@ -43,10 +45,9 @@ class Region {
   }
 
   void add(const FaceShape& shape, Index face) {
-    const double weight = glm::length(shape.area);
     area_ += shape.area;
-    weight_ += weight;
-    moment_ += weight * (shape.middle - mesh_.points[0]);
+    normal_ += shape.area * shape.normal;
+    moment_ += shape.area * (shape.middle - mesh_.points[0]);
     for (Index h = mesh_.first[face]; h < mesh_.first[face + 1]; ++h) {
       low_ = glm::min(low_, mesh_.from(h));
       high_ = glm::max(high_, mesh_.from(h));
@@ -56,10 +57,10 @@ class Region {
   // Does the face beyond half-edge h lie in the plane? The plane is known to the error over the
   // region's width, and the face reaches past it: allow for that.
   bool holds(Index h) const {
-    const Vec3 normal = glm::normalize(area_);
-    const Vec3 middle = mesh_.points[0] + moment_ / weight_;
+    const Vec3 normal = glm::normalize(normal_);
+    const Vec3 middle = mesh_.points[0] + moment_ / area_;
     const Vec3 side = mesh_.to(h) - mesh_.from(h);
-    const double length = glm::length(side), width = weight_ / glm::distance(low_, high_);
+    const double length = glm::length(side), width = area_ / glm::distance(low_, high_);
     const Index beyond = mesh_.twin[h], face = mesh_.face[beyond];
     const Reach reach = reach_of(mesh_, beyond, -side / length, length);
     const double allowed = 2 * kCoplanar * mesh_.error * (1 + reach.across / width);
@@ -71,8 +72,8 @@ class Region {
 
  private:
   const HalfEdges& mesh_;
-  Vec3 area_, moment_, low_, high_;
-  double weight_ = 0;
+  Vec3 normal_, moment_, low_, high_;
+  double area_ = 0;
 };
 
 void grow(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index seed, Index number,
@@ -137,22 +138,13 @@ void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
 
 std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
   std::vector<FaceShape> shapes(mesh.face_count());
+  std::vector<Vec3> corners;
   for (Index f = 0; f < mesh.face_count(); ++f) {
-    FaceShape& shape = shapes[f];
-    const Index first = mesh.first[f], end = mesh.first[f + 1];
-    const Vec3 base = mesh.from(first);
-    double longest = 0;
-    for (Index h = first; h < end; ++h) {
-      const Vec3 arm = mesh.from(h) - base;
-      shape.area += 0.5 * glm::cross(arm, mesh.to(h) - base);
-      shape.middle += arm;
-      longest = std::max(longest, glm::distance(mesh.from(h), mesh.to(h)));
-    }
-    shape.middle = base + shape.middle / static_cast<double>(end - first);
-    const double area = glm::length(shape.area);
-    shape.height = 2 * area / longest;
-    shape.thin = !(shape.height > 4 * mesh.error);
-    if (area > 0) shape.normal = shape.area / area;
+    corners.clear();
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
+    const PolygonPlane plane = plane_of(corners);
+    const double height = 2 * plane.area / plane.diameter;
+    shapes[f] = {plane.area, plane.normal, plane.middle, !(height > 4 * mesh.error)};
   }
   return shapes;
 }
@@ -202,7 +194,7 @@ std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<Fac
     if (shapes[f].thin) {
       thin.push_back(f);
     } else {
-      seeds.emplace_back(-glm::dot(shapes[f].area, shapes[f].area), f);
+      seeds.emplace_back(-shapes[f].area, f);
     }
   }
   std::sort(seeds.begin(), seeds.end());

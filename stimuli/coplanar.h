@@ -11,10 +11,9 @@ namespace palpate {
 
 /// What the merging needs to know of a face.
 struct FaceShape {
-  Vec3 area;          ///< m^2, along the outward normal, as long as the face is large
-  Vec3 normal;        ///< unit; of no use when thin
+  double area = 0;    ///< m^2
+  Vec3 normal;        ///< unit, outward; of no use when thin
   Vec3 middle;        ///< m, mean of the corners
-  double height = 0;  ///< m, area over the longest side: how far it is from being a line
   bool thin = false;  ///< no wider than the error of its corners: it has no plane of its own
 };
 std::vector<FaceShape> shapes_of(const HalfEdges& mesh);

@@ -39,9 +39,10 @@ Vec3 rim_corner(double radius, double z, int k, int segments) {
   const auto angle = [&](std::int64_t part) {
     return std::numbers::pi / 2 * static_cast<double>(part) / segments;
   };
-  const bool low = 2 * rest <= segments;
-  const double c = low ? std::cos(angle(rest)) : std::sin(angle(segments - rest));
-  const double s = low ? std::sin(angle(rest)) : std::cos(angle(segments - rest));
+  const bool low = 2 * rest < segments;
+  double c = low ? std::cos(angle(rest)) : std::sin(angle(segments - rest));
+  double s = low ? std::sin(angle(rest)) : std::cos(angle(segments - rest));
+  if (2 * rest == segments) c = s;  // 45 degrees
   const std::array<std::array<double, 2>, 4> turned{{{c, s}, {-s, c}, {-c, -s}, {s, -c}}};
   const auto& direction = turned[static_cast<std::size_t>(quarter)];
   return {radius * direction[0], radius * direction[1], z};

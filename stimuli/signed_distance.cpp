@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <stdexcept>
 
 namespace palpate {
@@ -115,7 +116,7 @@ SurfaceDistance signed_distance(const ConvexMesh& mesh, const Vec3& point) {
     most = height;
   }
   if (most <= 0) return {most, front->normal};
-  SurfaceDistance nearest{glm::distance(point, mesh.vertices()[0]), front->normal};
+  SurfaceDistance nearest{std::numeric_limits<double>::infinity(), front->normal};
   for (const Edge& edge : mesh.edges()) {
     const Vec3 apart = point - nearest_on(mesh, edge, point);
     const double distance = glm::length(apart);

@@ -1,0 +1,252 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "stimuli/convex_mesh.h"
+#include "stimuli/primitives.h"
+#include "tests/shared/random_polyhedron.h"
+
+namespace palpate {
+namespace {
+
+using testing::placed;
+using testing::triangulated;
+
+std::vector<std::string> faults_of(const PolygonSoup& soup) {
+  try {
+    const ConvexMesh mesh(soup);
+  } catch (const MeshError& error) {
+    return error.faults();
+  }
+  return {};
+}
+
+bool mentions(const std::vector<std::string>& faults, const std::string& text) {
+  return std::any_of(faults.begin(), faults.end(), [&](const std::string& fault) {
+    return fault.find(text) != std::string::npos;
+  });
+}
+
+#define EXPECT_FAULT(soup, text)                                           \
+  do {                                                                     \
+    const std::vector<std::string> found = faults_of(soup);                \
+    EXPECT_TRUE(mentions(found, text)) << ::testing::PrintToString(found); \
+  } while (false)
+
+void append(PolygonSoup& soup, const PolygonSoup& other) {
+  const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+  soup.vertices.insert(soup.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (auto face : other.faces) {
+    for (std::uint32_t& v : face) v += first;
+    soup.faces.push_back(face);
+  }
+}
+
+// A solid over the star polygon {5/2}: all its edges are convex, but it winds round twice.
+std::vector<Vec3> pentagram_corners(double z) {
+  std::vector<Vec3> corners;
+  for (int k = 0; k < 5; ++k) {
+    const double angle = 4 * std::numbers::pi * k / 5;
+    corners.emplace_back(std::cos(angle), std::sin(angle), z);
+  }
+  return corners;
+}
+
+PolygonSoup double_star_pyramids() {
+  PolygonSoup soup;
+  soup.vertices = pentagram_corners(0);
+  soup.vertices.emplace_back(0, 0, 1);
+  soup.vertices.emplace_back(0, 0, -1);
+  for (std::uint32_t k = 0; k < 5; ++k) {
+    soup.faces.push_back({k, (k + 1) % 5, 5});
+    soup.faces.push_back({(k + 1) % 5, k, 6});
+  }
+  return soup;
+}
+
+PolygonSoup star_prism() {
+  PolygonSoup soup;
+  soup.vertices = pentagram_corners(-1);
+  const std::vector<Vec3> top = pentagram_corners(1);
+  soup.vertices.insert(soup.vertices.end(), top.begin(), top.end());
+  for (std::uint32_t k = 0; k < 5; ++k) {
+    const std::uint32_t next = (k + 1) % 5;
+    soup.faces.push_back({k, next, 5 + next, 5 + k});
+  }
+  soup.faces.push_back({4, 3, 2, 1, 0});
+  soup.faces.push_back({5, 6, 7, 8, 9});
+  return soup;
+}
+
+TEST(ConvexMeshFaults, NamesAnOpenSurface) {
+  PolygonSoup soup = cube(0.06);
+  soup.faces.pop_back();
+  EXPECT_FAULT(soup, "open: edge");
+  EXPECT_FAULT(soup, "open: 1 more");
+}
+
+TEST(ConvexMeshFaults, NamesATurnedFace) {
+  PolygonSoup soup = cube(0.06);
+  std::reverse(soup.faces[3].begin(), soup.faces[3].end());
+  EXPECT_FAULT(soup, "turned face: edge");
+  EXPECT_FAULT(soup, "face 3 (vertices");
+}
+
+TEST(ConvexMeshFaults, NamesAnObjectInsideOut) {
+  PolygonSoup soup = cube(0.06);
+  for (auto& face : soup.faces) std::reverse(face.begin(), face.end());
+  const std::vector<std::string> faults = faults_of(soup);
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_NE(faults[0].find("inside out"), std::string::npos);
+}
+
+TEST(ConvexMeshFaults, NamesADent) {
+  PolygonSoup soup = icosphere(0.03, 2);
+  soup.vertices[20] *= 0.9;
+  EXPECT_FAULT(soup, "not convex: edge");
+}
+
+TEST(ConvexMeshFaults, FindsDentsOfAMillionthOfTheSize) {
+  PolygonSoup soup = triangulated(cube(1));
+  ASSERT_TRUE(faults_of(soup).empty());
+  const auto centre = static_cast<std::uint32_t>(soup.vertices.size());
+  soup.vertices.emplace_back(0, 0, 0.5 - 1e-6);
+  std::erase_if(soup.faces, [&](const std::vector<std::uint32_t>& face) {
+    return std::all_of(face.begin(), face.end(),
+                       [&](std::uint32_t v) { return soup.vertices[v].z == 0.5; });
+  });
+  for (std::uint32_t k = 0; k < 4; ++k) soup.faces.push_back({4 + k, 4 + (k + 1) % 4, centre});
+  EXPECT_FAULT(soup, "not convex: edge");
+  soup.vertices[centre].z = 0.5 + 1e-6;
+  EXPECT_TRUE(faults_of(soup).empty());
+}
+
+TEST(ConvexMeshFaults, NamesSeparatePieces) {
+  PolygonSoup soup = cube(0.06);
+  append(soup, placed(cube(0.02), Quat(1, 0, 0, 0), 1, Vec3(0.2, 0, 0)));
+  EXPECT_FAULT(soup, "separate pieces: face 6");
+}
+
+TEST(ConvexMeshFaults, NamesBodiesThatTouchInACorner) {
+  PolygonSoup soup = cube(1);
+  append(soup, placed(cube(1), Quat(1, 0, 0, 0), 1, Vec3(1, 1, 1)));
+  EXPECT_FAULT(soup, "separate pieces");
+}
+
+TEST(ConvexMeshFaults, NamesAnEdgeOfFourFaces) {
+  PolygonSoup soup = cube(1);
+  append(soup, placed(cube(1), Quat(1, 0, 0, 0), 1, Vec3(1, 1, 0)));
+  EXPECT_FAULT(soup, "shared edge: edge");
+}
+
+TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
+  EXPECT_FAULT(double_star_pyramids(), "wound vertex");
+  EXPECT_FAULT(star_prism(), "wound facet");
+  Random random(1);
+  for (int i = 0; i < 20; ++i) {
+    const Quat turn = uniform_rotation(random);
+    EXPECT_FAULT(placed(double_star_pyramids(), turn, 0.05, Vec3(0.2)), "wound vertex");
+    EXPECT_FAULT(placed(star_prism(), turn, 0.05, Vec3(0.2)), "wound facet");
+  }
+}
+
+TEST(ConvexMeshFaults, NamesPlacesThatAreNone) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200}) {
+    PolygonSoup soup = cube(0.06);
+    soup.vertices[5].y = bad;
+    EXPECT_FAULT(soup, "not a place: vertex 5");
+  }
+}
+
+TEST(ConvexMeshFaults, NamesVerticesThatDoNotExist) {
+  PolygonSoup soup = cube(0.06);
+  soup.faces[2][1] = 8;
+  EXPECT_FAULT(soup, "no such vertex: face 2");
+  soup.faces[2][1] = 0xffffffff;
+  EXPECT_FAULT(soup, "found 4294967295");
+}
+
+TEST(ConvexMeshFaults, NamesFacesWithTooFewOrCrossedCorners) {
+  PolygonSoup soup = cube(0.06);
+  soup.faces[4] = {1, 2};
+  EXPECT_FAULT(soup, "too few corners: face 4");
+  soup = cube(0.06);
+  soup.faces[0] = {0, 3, 2, 1, 3};
+  EXPECT_FAULT(soup, "crossed face: face 0");
+}
+
+TEST(ConvexMeshFaults, NamesAFaceThatIsNotPlane) {
+  PolygonSoup soup = cube(0.06);
+  soup.vertices[6] *= 1.001;
+  EXPECT_FAULT(soup, "bent face: face 1");
+}
+
+TEST(ConvexMeshFaults, NamesAFlatObject) {
+  PolygonSoup soup;
+  soup.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  soup.faces = {{0, 1, 2}, {0, 2, 1}};
+  EXPECT_FAULT(soup, "flat");
+  soup.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
+  soup.faces = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  EXPECT_FAULT(soup, "flat");
+  soup.vertices.assign(4, Vec3(1, 1, 1));
+  EXPECT_FALSE(faults_of(soup).empty());
+}
+
+TEST(ConvexMeshFaults, NamesAnEmptySoup) {
+  EXPECT_FAULT(PolygonSoup{}, "empty");
+  PolygonSoup soup;
+  soup.vertices = cube(1).vertices;
+  EXPECT_FAULT(soup, "empty");
+}
+
+TEST(ConvexMeshFaults, ListsEveryKindButOnlyTheFirstOfEach) {
+  PolygonSoup soup = icosphere(0.03, 3);
+  std::reverse(soup.faces[100].begin(), soup.faces[100].end());
+  soup.faces.resize(soup.faces.size() - 50);
+  const std::vector<std::string> faults = faults_of(soup);
+  EXPECT_TRUE(mentions(faults, "turned face: edge"));
+  EXPECT_TRUE(mentions(faults, "open: edge"));
+  EXPECT_TRUE(mentions(faults, " more"));
+  EXPECT_LE(faults.size(), 20U);
+}
+
+// Any soup either becomes a mesh or is refused: nothing else.
+TEST(ConvexMeshFaults, RandomSoupsNeverCrash) {
+  Random random(2);
+  for (int i = 0; i < 3000; ++i) {
+    PolygonSoup soup = random.below(2) == 0 ? triangulated(cube(1)) : icosphere(1, 1);
+    for (std::uint64_t damage = 1 + random.below(4); damage > 0; --damage) {
+      auto& face = soup.faces[random.below(soup.faces.size())];
+      switch (random.below(6)) {
+        case 0:
+          face[random.below(face.size())] =
+              static_cast<std::uint32_t>(random.below(soup.vertices.size() + 1));
+          break;
+        case 1:
+          std::swap(face[0], face[1]);
+          break;
+        case 2:
+          face.push_back(static_cast<std::uint32_t>(random.below(soup.vertices.size())));
+          break;
+        case 3:
+          soup.vertices[random.below(soup.vertices.size())] =
+              soup.vertices[random.below(soup.vertices.size())];
+          break;
+        case 4:
+          soup.vertices[random.below(soup.vertices.size())] *= random.normal();
+          break;
+        default:
+          soup.faces.push_back(face);
+      }
+    }
+    faults_of(soup);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
