@@ -28,6 +28,25 @@ void find_at_tip(const ShapeLine& shape, Deepest& out) {
   }
 }
 
+/// Surface and slope at one place of the line, of every hypothesis of a block.
+struct SlopedSurface {
+  float distance[ShapeHypotheses::kBlock];  // m
+  float slope[ShapeHypotheses::kBlock];     // of the distance along the line
+  float x[ShapeHypotheses::kBlock];         // unit outward normal, in the shape's own frame
+  float y[ShapeHypotheses::kBlock];
+  float z[ShapeHypotheses::kBlock];
+};
+
+template <class ShapeLine>
+inline void store(const ShapeLine& shape, int i, float s, SlopedSurface& out) {
+  const SurfacePoint p = shape.surface(i, s);
+  out.distance[i] = p.distance;
+  out.slope[i] = dot(p.normal, shape.along(i));
+  out.x[i] = p.normal.x;
+  out.y[i] = p.normal.y;
+  out.z[i] = p.normal.z;
+}
+
 /// The distance to a convex shape is convex along a line, so the sign of its slope tells on which
 /// side the minimum lies.
 template <class ShapeLine>
@@ -42,24 +61,28 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
       middle[i] -= std::copysign(reach, shape.slope(i, middle[i]));
     }
   }
+  // A loop each: with both in one, g++ 12 turns the selections into branches and gives up on
+  // vectors.
+  SlopedSurface a;
+  SlopedSurface b;
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] - reach, a);
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] + reach, b);
   const float width = 2.0f * reach;
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-    const SurfacePoint a = shape.surface(i, middle[i] - reach);
-    const SurfacePoint b = shape.surface(i, middle[i] + reach);
     // The tangents at a and b meet at the minimum of a kink and barely below that of a bend; mixed
     // to slope zero, the two normals give the one that is perpendicular to the line. At an end of
     // the line the slope has one sign: the other is taken as zero, and that end is the minimum.
-    const float falling = lane::min(dot(a.normal, shape.along(i)), 0.0f);
-    const float rising = lane::max(dot(b.normal, shape.along(i)), 0.0f);
+    const float falling = lane::min(a.slope[i], 0.0f);
+    const float rising = lane::max(b.slope[i], 0.0f);
     const float bend = lane::max(rising - falling, 1e-6f);
-    const float meet = lane::clamp((a.distance - b.distance + rising * width) / bend, 0.0f, width);
+    const float meet =
+        lane::clamp((a.distance[i] - b.distance[i] + rising * width) / bend, 0.0f, width);
     const float share_b = -falling / bend;
     const float share_a = 1.0f - share_b;
-    const FloatVec n{share_a * a.normal.x + share_b * b.normal.x,
-                     share_a * a.normal.y + share_b * b.normal.y,
-                     share_a * a.normal.z + share_b * b.normal.z};
+    const FloatVec n{share_a * a.x[i] + share_b * b.x[i], share_a * a.y[i] + share_b * b.y[i],
+                     share_a * a.z[i] + share_b * b.z[i]};
     const float size = std::sqrt(lane::max(dot(n, n), 1e-12f));
-    out.distance[i] = a.distance + falling * meet;
+    out.distance[i] = a.distance[i] + falling * meet;
     out.cosine[i] = shape.cosine(i, n) / size;
   }
 }

@@ -1,0 +1,70 @@
+// Cost of one percept to a simulated participant: 6 of them in each simulated second.
+
+#include <benchmark/benchmark.h>
+
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "runner/participants/shape_observer.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+std::vector<ObjectSpec> four_shapes() {
+  std::vector<ObjectSpec> stimuli(4);
+  stimuli[0].shape = ShapeKind::sphere;
+  stimuli[1].shape = ShapeKind::cone;
+  stimuli[2].shape = ShapeKind::cylinder;
+  stimuli[3].shape = ShapeKind::cube;
+  return stimuli;
+}
+
+/// Touches all over a sphere of the size of the stimuli, the stylus leaning on it.
+std::vector<Percept> percepts(bool ray, bool contact) {
+  Random random(1);
+  const auto direction = [&random] {
+    return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+  };
+  std::vector<Percept> made(64);
+  for (Percept& percept : made) {
+    percept.ray = ray;
+    percept.contact = contact;
+    percept.direction = direction();
+    const Vec3 along = glm::normalize(glm::cross(percept.direction, direction()));
+    const double place = ray ? 0.12 * random.unit() : 0;
+    percept.tip = 0.031 * percept.direction - place * along;
+    percept.tail = percept.tip + 0.12 * along;
+    if (ray && contact) percept.along = place;
+  }
+  return made;
+}
+
+void update(benchmark::State& state, bool ray, bool contact) {
+  const ShapeHypotheses hypotheses(four_shapes());
+  ShapeObserver observer(hypotheses);
+  const std::vector<Percept> made = percepts(ray, contact);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    observer.update(made[next]);
+    next = (next + 1) % made.size();
+    benchmark::DoNotOptimize(observer.probability(0));
+  }
+}
+
+BENCHMARK_CAPTURE(update, point_contact, false, true);
+BENCHMARK_CAPTURE(update, point_free_space, false, false);
+BENCHMARK_CAPTURE(update, ray_contact, true, true);
+BENCHMARK_CAPTURE(update, ray_free_space, true, false);
+
+void build_hypotheses(benchmark::State& state) {
+  const std::vector<ObjectSpec> stimuli = four_shapes();
+  for (auto _ : state) {
+    ShapeHypotheses hypotheses(stimuli);
+    benchmark::DoNotOptimize(hypotheses.padded_size());
+  }
+}
+BENCHMARK(build_hypotheses);
+
+}  // namespace
+}  // namespace palpate
