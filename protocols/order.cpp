@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "protocols/schedule.h"
 
@@ -146,6 +147,32 @@ std::vector<int> construct(Arrangement arrangement, Random& random) {
   return order;
 }
 
+/// Whether the trial at i holds the limits with those around it.
+bool fits(const std::vector<int>& order, std::size_t i, const Protocol::Order& limits) {
+  const auto distance = static_cast<std::size_t>(limits.min_distance.value_or(1));
+  for (std::size_t k = 1; k < distance && k < order.size(); ++k) {
+    if (i >= k && order[i - k] == order[i]) return false;
+    if (i + k < order.size() && order[i + k] == order[i]) return false;
+  }
+  if (!limits.max_run) return true;
+  std::size_t first = i, last = i;
+  while (first > 0 && order[first - 1] == order[i]) --first;
+  while (last + 1 < order.size() && order[last + 1] == order[i]) ++last;
+  return last - first < static_cast<std::size_t>(*limits.max_run);
+}
+
+/// Swaps pairs of trials at random where the limits allow it. Either direction of a swap is equally
+/// likely, so in the long run all orders that swaps connect are too.
+void mix(std::vector<int>& order, const Protocol::Order& limits, Random& random) {
+  constexpr std::size_t kSwaps = 30;  // a trial; measured: order_test.cpp
+  for (std::size_t n = kSwaps * order.size(); n > 0; --n) {
+    const std::size_t i = random.below(order.size());
+    const std::size_t j = random.below(order.size());
+    std::swap(order[i], order[j]);
+    if (!fits(order, i, limits) || !fits(order, j, limits)) std::swap(order[i], order[j]);
+  }
+}
+
 std::vector<int> in_sequence(std::vector<int> counts) {
   std::vector<int> order;
   for (bool any = true; any;) {
@@ -227,7 +254,9 @@ std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Ord
     return sequence;
   }
   if (auto uniform = try_uniform(start, draw_budget, random)) return *std::move(uniform);
-  return construct(start, random);
+  std::vector<int> constructed = construct(start, random);
+  mix(constructed, order, random);
+  return constructed;
 }
 
 }  // namespace palpate
