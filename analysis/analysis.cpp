@@ -152,7 +152,7 @@ std::string answer(const Analysis& analysis) {
     }
   }
   if (unknown.size() == analysis.shapes.size()) {
-    return "Ray or point, which is faster? The data cannot say: " +
+    return "These data cannot say whether ray or point is faster: " +
            analysis.shapes.front().t_test.undefined + ".";
   }
   constexpr std::size_t kNamed = 6;  // beyond it a sentence of names answers nothing
@@ -162,12 +162,22 @@ std::string answer(const Analysis& analysis) {
            " shapes";
   };
   std::vector<std::string> parts;
-  if (!faster.empty()) parts.push_back("faster than the point for " + list(faster));
-  if (!slower.empty()) parts.push_back("slower for " + list(slower));
-  if (!neither.empty()) parts.push_back("not clearly different for " + list(neither));
+  if (!faster.empty()) parts.push_back("The ray is faster than the point for " + list(faster));
+  if (!slower.empty()) {
+    parts.push_back((parts.empty() ? "The ray is slower than the point for " : "slower for ") +
+                    list(slower));
+  }
+  if (!neither.empty()) {
+    parts.push_back((parts.empty() ? "No clear difference between ray and point for "
+                                   : "no clear difference for ") +
+                    list(neither));
+  }
   if (!unknown.empty()) parts.push_back("not testable for " + list(unknown));
-  std::string sentence = "The ray is ";
-  for (std::size_t i = 0; i < parts.size(); ++i) sentence += (i > 0 ? "; " : "") + parts[i];
+  std::string sentence;
+  for (const std::string& part : parts) {
+    if (!sentence.empty()) sentence += "; ";
+    sentence += part;
+  }
   return sentence + ".";
 }
 

@@ -23,6 +23,7 @@ constexpr std::size_t kLongestLabel = 18;  // characters of a shape's name
 struct Axes {
   double left = 0, width = 0, top = 0, bottom = 0;  // px
   double low = 0, high = 1;                         // values at bottom and top
+  double step = 1;                                  // between ticks
   double slot = 0;                                  // px for each shape
   double y(double value) const {
     return bottom - (std::clamp(value, low, high) - low) / (high - low) * (bottom - top);
@@ -41,13 +42,13 @@ double tick_step(double span) {
 
 /// Widens to whole ticks.
 void round_ends(Axes& axes) {
-  const double step = tick_step(axes.high - axes.low);
-  axes.low = step * std::floor(axes.low / step + 1e-9);
-  axes.high = step * std::ceil(axes.high / step - 1e-9);
+  axes.step = tick_step(axes.high - axes.low);
+  axes.low = axes.step * std::floor(axes.low / axes.step + 1e-9);
+  axes.high = axes.step * std::ceil(axes.high / axes.step - 1e-9);
 }
 
 void draw_grid(Svg& svg, const Axes& axes) {
-  const double step = tick_step(axes.high - axes.low);
+  const double step = axes.step;
   const int decimals = step < 1 ? static_cast<int>(std::ceil(-std::log10(step) - 1e-9)) : 0;
   const int count = static_cast<int>(std::lround((axes.high - axes.low) / step));
   for (int i = 0; i <= count; ++i) {
@@ -209,7 +210,7 @@ void draw_reductions(Svg& svg, Axes& axes, const Analysis& analysis) {
   }
 }
 
-void draw_legends(Svg& svg, const Axes& left, const Axes& right, double y) {
+void draw_legends(Svg& svg, const Axes& left, const Axes& right, double y, bool with_paper) {
   double x = left.left;
   svg.circle(x + 6, y - 4, 6, kPoint);
   svg.text(x + 18, y, "point", {13});
@@ -220,8 +221,9 @@ void draw_legends(Svg& svg, const Axes& left, const Axes& right, double y) {
   x = right.left;
   svg.circle(x + 6, y - 4, 6, kInk);
   svg.text(x + 18, y, "this data", {13});
+  if (!with_paper) return;
   svg.diamond(x + 92, y - 4, 6.5, kPaper);
-  svg.text(x + 105, y, "paper", {13});
+  svg.text(x + 105, y, "Ho et al. 2000", {13});
 }
 
 std::string description_of(const Analysis& analysis) {
@@ -257,13 +259,13 @@ std::string figure15(const Analysis& analysis) {
   times.width = std::max(300.0, n * times.slot);
   times.slot = times.width / n;
   reductions.left = times.left + times.width + kGap + 34;
-  reductions.width = std::max(220.0, n * reductions.slot);
+  reductions.width = std::max(280.0, n * reductions.slot);
   reductions.slot = reductions.width / n;
   const double total = reductions.left + reductions.width + kMargin;
 
   const std::string label = simulated_label(analysis.table.simulated);
   const std::string title = answer(analysis);
-  const auto lines = wrapped(title, total - 2 * kMargin, 20, true);
+  const auto lines = lines_of(title, total - 2 * kMargin, 20, true);
   const Counts& counts = analysis.description.counts;
   Svg svg;
   double y = kMargin + 18;
@@ -291,7 +293,9 @@ std::string figure15(const Analysis& analysis) {
   svg.text(reductions.left, y, "Reduction of the time with the ray (%)",
            {15, kInk, Svg::Anchor::start, true});
   y += 24;
-  draw_legends(svg, times, reductions, y);
+  draw_legends(svg, times, reductions, y, std::ranges::any_of(names, [](const std::string& name) {
+                 return !paper_reduction(name).empty();
+               }));
 
   times.top = reductions.top = y + 38;
   times.bottom = reductions.bottom = times.top + kPlotHeight;
@@ -307,7 +311,7 @@ std::string figure15(const Analysis& analysis) {
       "reduction, "
       "paired t-test on log times, p adjusted after Holm). Above 0 the ray is faster. Paper: Ho, "
       "Basdogan & Srinivasan 2000, fig. 15; n.s.: no significant difference.";
-  for (const std::string& line : wrapped(note, total - 2 * kMargin, 12)) {
+  for (const std::string& line : lines_of(note, total - 2 * kMargin, 12)) {
     svg.text(kMargin, y, line, {12, kSoft});
     y += 17;
   }

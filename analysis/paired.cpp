@@ -12,7 +12,7 @@ namespace palpate {
 
 namespace {
 
-constexpr const char* kOnePair = "one pair: nothing to tell chance from effect";
+constexpr const char* kOnePair = "one participant cannot tell chance from effect";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
 constexpr const char* kNoVariance = "no variance: all differences are alike";
 

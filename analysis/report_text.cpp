@@ -22,23 +22,13 @@ std::string repeated(const char* what, std::size_t times) {
   return out;
 }
 
-/// Paragraph in lines of at most kColumns; words that are longer are cut.
+/// Paragraph in lines of at most kColumns; a word that is longer is cut.
 void put_wrapped(std::string& out, const std::string& text, const std::string& indent) {
-  std::string line = indent;
-  bool empty = true;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find(' ', at), text.size());
-    const std::string word = shortened(text.substr(at, end - at), kColumns - indent.size());
-    at = end + 1;
-    if (!empty && width(line) + 1 + width(word) > kColumns) {
-      out += line + "\n";
-      line = indent;
-      empty = true;
-    }
-    line += (empty ? "" : " ") + word;
-    empty = false;
+  const std::size_t room = kColumns - indent.size();
+  const auto fits = [&](std::string_view line) { return width(line) <= room; };
+  for (const std::string& line : wrapped(text, fits)) {
+    out += indent + shortened(line, room) + "\n";
   }
-  out += line + "\n";
 }
 
 /// Columns first..last-1 with the names before them.

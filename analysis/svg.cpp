@@ -1,6 +1,5 @@
 #include "analysis/svg.h"
 
-#include <algorithm>
 #include <charconv>
 #include <initializer_list>
 #include <utility>
@@ -118,22 +117,12 @@ std::string Svg::document(double width, double height, std::string_view title,
 }
 
 double text_width(std::string_view text, double size, bool bold) {
-  return static_cast<double>(width(text)) * size * (bold ? 0.57 : 0.53);
+  return static_cast<double>(width(text)) * size * (bold ? 0.52 : 0.48);
 }
 
-std::vector<std::string> wrapped(std::string_view text, double width, double size, bool bold) {
-  std::vector<std::string> lines{""};
-  while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find(' '));
-    text.remove_prefix(std::min(word.size() + 1, text.size()));
-    std::string longer = lines.back() + (lines.back().empty() ? "" : " ") + std::string(word);
-    if (!lines.back().empty() && text_width(longer, size, bold) > width) {
-      lines.emplace_back(word);
-    } else {
-      lines.back() = std::move(longer);
-    }
-  }
-  return lines;
+std::vector<std::string> lines_of(std::string_view text, double width, double size, bool bold) {
+  return wrapped(text,
+                 [&](std::string_view line) { return text_width(line, size, bold) <= width; });
 }
 
 }  // namespace palpate

@@ -45,8 +45,8 @@ class Svg {
 
 /// Rough width of a text in a sans-serif font, px.
 double text_width(std::string_view text, double size, bool bold = false);
-/// Lines of at most `width` px, broken at spaces.
-std::vector<std::string> wrapped(std::string_view text, double width, double size,
-                                 bool bold = false);
+/// The text in lines of at most `width` px.
+std::vector<std::string> lines_of(std::string_view text, double width, double size,
+                                  bool bold = false);
 
 }  // namespace palpate

@@ -1,8 +1,10 @@
 #include "analysis/text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 namespace palpate {
 
@@ -105,6 +107,28 @@ std::string pad_left(std::string_view text, std::size_t columns) {
 std::string shortened(std::string_view text, std::size_t columns) {
   if (width(text) <= columns) return std::string(text);
   return std::string(text.substr(0, bytes_of(text, columns - 1))) + "…";
+}
+
+std::vector<std::string> wrapped(std::string_view text,
+                                 const std::function<bool(std::string_view)>& fits) {
+  std::vector<std::string> lines{""};
+  while (!text.empty()) {
+    std::size_t end = text.find(' ');
+    if (end != std::string_view::npos && text.substr(end + 1).starts_with('%')) {
+      end = text.find(' ', end + 1);
+    }
+    const std::string_view word = text.substr(0, end);
+    text.remove_prefix(std::min(word.size() + 1, text.size()));
+    std::string longer = lines.back();
+    if (!longer.empty()) longer += ' ';
+    longer += word;
+    if (!lines.back().empty() && !fits(longer)) {
+      lines.emplace_back(word);
+    } else {
+      lines.back() = std::move(longer);
+    }
+  }
+  return lines;
 }
 
 std::string counted(std::size_t n, std::string_view one, std::string_view many) {

@@ -2,8 +2,10 @@
 // Text for terminals, SVG and HTML. Nothing that came from a file is printed raw.
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace palpate {
 
@@ -25,6 +27,11 @@ std::string pad_left(std::string_view text, std::size_t columns);
 
 /// At most `columns` characters, the last an ellipsis where something was cut.
 std::string shortened(std::string_view text, std::size_t columns);
+
+/// Lines that fit, broken at spaces but never before a percent sign; a word that does not fit alone
+/// stands alone all the same.
+std::vector<std::string> wrapped(std::string_view text,
+                                 const std::function<bool(std::string_view)>& fits);
 
 /// "1 trial", "2 trials".
 std::string counted(std::size_t n, std::string_view one, std::string_view many);

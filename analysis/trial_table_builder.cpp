@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 namespace palpate {
@@ -48,7 +49,7 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   row.correct = raw.correct && !raw.timed_out;
   row.response_time = raw.response_time;
   shown_.resize(stimuli_.names().size());
-  shown_[row.shape] = true;
+  if (shown_[row.shape] == 0) shown_[row.shape] = ++n_shown_;
   n_simulated_ += raw.simulated;
   n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
   n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
@@ -99,14 +100,15 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   const auto& names = stimuli_.names();
   std::vector<std::uint32_t> order(names.size()), place(names.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    if (shown_[a] != shown_[b]) return static_cast<bool>(shown_[a]);
-    return rank(names[a], listed) < rank(names[b], listed);
-  });
+  const auto level = [&](std::uint32_t i) {
+    return std::tuple(shown_[i] == 0, rank(names[i], listed), shown_[i], i);
+  };
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
   for (std::uint32_t i = 0; i < order.size(); ++i) {
     place[order[i]] = i;
     table.answers.push_back(names[order[i]]);
-    if (shown_[order[i]]) table.shapes.push_back(names[order[i]]);
+    if (shown_[order[i]] > 0) table.shapes.push_back(names[order[i]]);
   }
   table.renderers.assign(renderers_.names().begin(), renderers_.names().end());
   std::sort(table.renderers.begin(), table.renderers.end());  // point before ray

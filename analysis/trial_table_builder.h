@@ -53,7 +53,9 @@ class TrialTableBuilder {
   void check_places(TrialTable& table);
 
   Interner participants_, renderers_, stimuli_;
-  std::vector<bool> shown_;  ///< by number of stimulus
+  /// By number of stimulus: 1 for the one shown first, 2, ...; 0: never shown, only answered.
+  std::vector<std::uint32_t> shown_;
+  std::uint32_t n_shown_ = 0;
   std::vector<TrialRow> rows_;
   std::vector<Place> places_;
   std::size_t n_practice_ = 0, n_simulated_ = 0, n_contradicting_ = 0, n_late_answers_ = 0;

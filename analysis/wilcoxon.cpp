@@ -62,7 +62,7 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
   Wilcoxon test;
   if (differences.size() < 2) {
     test.undefined = differences.empty() ? "no participant has times for both renderers"
-                                         : "one pair: nothing to tell chance from effect";
+                                         : "one participant cannot tell chance from effect";
     return test;
   }
   const double tolerance = 1e-10 * std::max(1.0, std::fabs(mean(differences)));

@@ -1,0 +1,142 @@
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "analysis/analysis.h"
+#include "analysis/figure.h"
+#include "analysis/report_html.h"
+#include "analysis/report_json.h"
+#include "analysis/report_text.h"
+#include "analysis/trials.h"
+#include "data/store.h"
+#include "runner/commands/command.h"
+
+namespace palpate {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Output {
+  const char* option;
+  std::string path;
+  std::string (*write)(const Analysis&);
+};
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error) ||
+         fs::equivalent(a, b, error);
+}
+
+/// No output may be the data, or another output.
+void check_outputs(const std::vector<Output>& outputs, const std::string& source) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    const std::string& path = outputs[i].path;
+    const std::string option = std::string("--") + outputs[i].option + " " + path;
+    if (path.empty()) throw UsageError(option + ": expected a path");
+    if (same_file(path, source)) {
+      throw UsageError(option + ": this is the data to analyse; it would be overwritten");
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (same_file(path, outputs[k].path)) {
+        throw UsageError(option + ": --" + outputs[k].option + " writes the same file");
+      }
+    }
+    if (fs::is_directory(path)) {
+      throw UsageError(option + ": expected a file; this is a folder");
+    }
+  }
+}
+
+/// Beside the target first, then renamed: the target is whole or untouched. What is no regular file
+/// (a pipe, a terminal) is written to as it is.
+void write_whole(const std::string& path, const std::string& text) {
+  std::error_code error;
+  const bool in_place = fs::exists(path, error) && !fs::is_regular_file(path, error);
+  const std::string target = in_place ? path : fs::weakly_canonical(path, error).string();
+  const std::string draft = in_place ? path : target + ".part";
+  std::ofstream out(draft, std::ios::binary);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  error.clear();
+  if (out && !in_place) fs::rename(draft, target, error);
+  if (!out || error) {
+    if (!in_place) fs::remove(draft, error);
+    throw std::runtime_error(path +
+                             ": cannot be written; check the folder, its permissions and the disk");
+  }
+}
+
+TrialTable read_trials(const std::string& database, const std::string& csv) {
+  if (!csv.empty()) return read_trials_csv(csv);
+  try {
+    return read_trials_store(database);
+  } catch (const StoreRefused& error) {
+    throw UsageError(error.what());  // the file named is bad input: status 2
+  }
+}
+
+}  // namespace
+
+int analyze_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR]";
+  line.summary =
+      "Is a shape identified faster with the ray than with the point renderer, by how much, how "
+      "sure?\n"
+      "The answer and its tables go to stdout. Files that are there already are replaced.";
+  line.example =
+      "  palpate analyze --db study.db\n"
+      "  palpate analyze --csv trials.csv --json analysis.json --report report.html   (other "
+      "people's\n"
+      "      data: participant_id, session, block, trial, renderer, shape, response, correct and\n"
+      "      response_time are enough)";
+  std::string database, csv, json, report, figures;
+  AnalysisSettings settings;
+  auto add = line.options.add_options();
+  namespace po = boost::program_options;
+  add("db", po::value(&database)->value_name("FILE"), "the study's database");
+  add("csv", po::value(&csv)->value_name("FILE"), "trials as CSV, one row a trial");
+  add("json", po::value(&json)->value_name("FILE"), "write every figure as JSON");
+  add("report", po::value(&report)->value_name("FILE.html"), "write a report to look at and print");
+  add("figures", po::value(&figures)->value_name("DIR"), "write figure15.svg into this folder");
+  add("too-fast-s", po::value(&settings.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
+      "leave correct answers before this time out of the times");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  if (database.empty() == csv.empty()) {
+    throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + line.usage +
+                     "\nMore: add --help");
+  }
+  if (!(settings.too_fast > 0) || !std::isfinite(settings.too_fast)) {
+    throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
+  }
+  std::vector<Output> outputs;
+  if (values->count("json")) outputs.push_back({"json", json, report_json});
+  if (values->count("report")) outputs.push_back({"report", report, report_html});
+  if (values->count("figures")) {
+    outputs.push_back({"figures", (fs::path(figures) / "figure15.svg").string(), figure15});
+  }
+  check_outputs(outputs, csv.empty() ? database : csv);
+
+  const Analysis analysis = analyze(read_trials(database, csv), settings, PALPATE_VERSION);
+  if (values->count("figures")) {
+    std::error_code error;
+    fs::create_directories(figures, error);
+    if (error) throw std::runtime_error(figures + ": " + error.message());
+  }
+  for (const Output& output : outputs) write_whole(output.path, output.write(analysis));
+  std::cout << report_text(analysis);
+  return 0;
+}
+
+}  // namespace palpate
