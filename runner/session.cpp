@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr double kSecond = 1e-9;
+constexpr double kSecond_ns = 1e9;
 
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -41,7 +41,7 @@ void Session::step() {
       if (plan_.done() > 0) {
         parts_.participant.read(texts.break_text);
         parts_.clock.wait_until(parts_.clock.now_ns() +
-                                std::llround(parts_.protocol.breaks.min_seconds / kSecond));
+                                std::llround(parts_.protocol.breaks.min_seconds * kSecond_ns));
       }
       state_ = State::trial;
       break;
@@ -84,7 +84,7 @@ void Session::run_trial() {
                       protocol.home.rest};
   parts_.participant.begin_trial(trial);
   parts_.servo.prepare(parts_.library.scene(trial), renderer_for(trial.renderer), home);
-  const std::int64_t limit_ns = std::llround(protocol.response.time_out / kSecond);
+  const std::int64_t limit_ns = std::llround(protocol.response.time_out * kSecond_ns);
   std::optional<Answer> answer;
   std::uint32_t faults = 0;
   while (!answer && !record_.timed_out && !(faults & servo_fault::kTripped)) {
@@ -110,7 +110,7 @@ void Session::run_trial() {
   record_.response_time = protocol.response.time_out;
   if (answer) {
     record_.response_ns = answer->time_ns;
-    record_.response_time = static_cast<double>(record_.response_ns - record_.onset_ns) * kSecond;
+    record_.response_time = static_cast<double>(record_.response_ns - record_.onset_ns) / kSecond_ns;
     record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
@@ -131,7 +131,7 @@ void Session::note(const Sample& sample) {
   }
   const Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
-    record_.first_contact_time = static_cast<double>(sample.time_ns - record_.onset_ns) * kSecond;
+    record_.first_contact_time = static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
   }
   if (!parts_.protocol.samples) return;
   SampleRecord kept;

@@ -76,7 +76,6 @@ HandTarget Explorer::step(const Felt& now, const LineProbe& stylus) {
 
 Vec3 Explorer::velocity(const Felt& known) {
   const auto& motor = settings_.motor;
-  if (known.contact) last_contact_ = known;
   left_ -= tick_;
   switch (stage_) {
     case Stage::approach:
@@ -105,9 +104,9 @@ Vec3 Explorer::velocity(const Felt& known) {
         left_ = -motor.mean_follow * std::log(1 - random_.unit());
         return slide(known);
       }
-      return motor.slide_speed * unit_or(-last_contact_.normal + settings_.search.pull_to_centre *
-                                                                     unit_or(-tip_, Vec3(0)),
-                                         Vec3(0, 0, -1));
+      heading_ = unit_or(
+          heading_ + settings_.search.pull_to_centre * tick_ * unit_or(-tip_, Vec3(0)), heading_);
+      return motor.slide_speed * heading_;
     case Stage::retreat:
       return fly_to_start();
   }

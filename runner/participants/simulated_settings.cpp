@@ -84,7 +84,7 @@ SimulatedSettings read(const json& j) {
              motor.at("mean_follow_s"),          motor.at("approach_distance_m"),
              motor.at("approach_min_rise")};
   const json &search = j.at("search"), &stylus = j.at("stylus"), &hand = j.at("hand");
-  s.search = {search.at("aim_sd_m"), search.at("pull_to_centre"), search.at("give_up_s")};
+  s.search = {search.at("aim_sd_m"), search.at("pull_to_centre_per_s"), search.at("give_up_s")};
   s.stylus = {degrees(stylus.at("tilt_deg")), degrees(stylus.at("tilt_sd_deg")),
               degrees(stylus.at("turning_deg_per_s"))};
   s.hand = {hand.at("stiffness_n_per_m"), hand.at("damping_ns_per_m"), hand.at("mass_kg"),

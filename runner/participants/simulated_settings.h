@@ -32,7 +32,7 @@ struct SimulatedSettings {
   } motor;
   struct Search {
     double aim_sd;          ///< m, per axis
-    double pull_to_centre;  ///< weight beside the direction of pressing, after a loss
+    double pull_to_centre;  ///< 1/s; how fast the heading is steered to the centre after a loss
     double give_up;         ///< s
   } search;
   struct Stylus {
