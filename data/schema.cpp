@@ -56,6 +56,7 @@ void create_database(const std::string& path) {
   try {
     guarded(path, [&] {
       SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+      db.exec("PRAGMA page_size = " + std::to_string(kPageSize));
       db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
       SQLite::Transaction transaction(db);
       db.exec(schema_sql());

@@ -12,6 +12,8 @@ namespace palpate {
 inline constexpr int kSchemaVersion = 1;
 inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", in every file of ours
 
+inline constexpr int kPageSize = 4096;  ///< bytes; a file of ours is whole pages
+
 /// schema.sql as it was when the program was built.
 const char* schema_sql();
 

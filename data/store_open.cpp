@@ -73,6 +73,19 @@ void require_ours(const std::string& file, const std::string& path) {
   }
 }
 
+/// SQLite fills a last page that is cut short with zeros. Beside a log that is right: the log has
+/// the page.
+void require_whole_pages(const std::string& file) {
+  std::error_code error;
+  const auto log = std::filesystem::file_size(file + "-wal", error);
+  if (!error && log > 0) return;
+  const auto size = std::filesystem::file_size(file, error);
+  if (!error && size % kPageSize != 0) {
+    throw SQLite::Exception("it has " + std::to_string(size) + " bytes, no whole number of pages",
+                            SQLITE_CORRUPT);
+  }
+}
+
 bool may_write(const std::string& file) {
   return ::access(file.c_str(), W_OK) == 0 &&
          ::access(std::filesystem::path(file).parent_path().c_str(), W_OK) == 0;
@@ -109,8 +122,9 @@ void Store::Impl::require_running(const Run& run) {
   SQLite::Statement find(
       *db, "SELECT 1 FROM runs WHERE id = ? AND session_id = ? AND end_reason = 'running'");
   Binder(find) << run.id << run.session_id;
-  if (!find.executeStep())
+  if (!find.executeStep()) {
     refuse("this run of session " + std::to_string(run.session) + " is over");
+  }
 }
 
 void Store::Impl::require_still_there() {
@@ -141,13 +155,23 @@ Store Store::open(const std::string& path, Mode mode) {
   if (path.empty() || error) throw StoreRefused("'" + path + "' is no path of a database");
   const bool writes = mode == Mode::write_or_create;
   const fs::file_status status = fs::status(impl->file, error);
-  if (fs::exists(status) && !fs::is_regular_file(status))
+  if (fs::exists(status) && !fs::is_regular_file(status)) {
     impl->refuse("is not a file; name a file");
-  if (!writes && !fs::exists(status))
+  }
+  if (!writes && !fs::exists(status)) {
     impl->refuse("there is no such file (or its folder may not be read)");
+  }
   if (writes) {
     impl->lock.emplace(impl->file);
-    if (!fs::exists(impl->file)) create_database(impl->file);
+    if (!fs::exists(impl->file)) {
+      // SQLite would play the left-over log into the new file.
+      if (fs::exists(impl->file + "-wal")) {
+        impl->refuse("is gone but its log " + impl->file +
+                     "-wal is there and may hold trials; put the database back beside it, or move "
+                     "the log away to begin a new one");
+      }
+      create_database(impl->file);
+    }
   }
   if (fs::file_size(impl->file, error) == 0 && !error) {
     impl->refuse(
@@ -156,6 +180,7 @@ Store Store::open(const std::string& path, Mode mode) {
   }
   guarded(path, [&] {
     require_ours(impl->file, path);
+    require_whole_pages(impl->file);
     if (writes) {
       impl->db.emplace(impl->file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
     } else {

@@ -1,0 +1,113 @@
+#include "data/samples_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "data/store.h"
+
+namespace palpate {
+namespace {
+
+std::vector<std::uint64_t> bits_of(const SampleRecord& sample) {
+  std::vector<std::uint64_t> bits{sample.tick,         sample.contacts,
+                                  sample.contact_type, sample.buttons,
+                                  sample.faults,       std::bit_cast<std::uint64_t>(sample.depth)};
+  for (const auto& vector : {sample.tip, sample.tail, sample.force, sample.torque}) {
+    for (const double x : vector) bits.push_back(std::bit_cast<std::uint64_t>(x));
+  }
+  return bits;
+}
+
+void expect_same_bits(const std::vector<SampleRecord>& samples) {
+  const std::string packed = pack_samples(samples);
+  const auto back =
+      unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(samples.size()));
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ASSERT_EQ(bits_of(back[i]), bits_of(samples[i])) << "sample " << i;
+  }
+}
+
+/// A stroke over an object, sampled at 1 kHz with sensor noise.
+std::vector<SampleRecord> a_stroke(int ticks) {
+  std::mt19937 noise(7);
+  std::vector<SampleRecord> samples(static_cast<std::size_t>(ticks));
+  for (int t = 0; t < ticks; ++t) {
+    auto& s = samples[static_cast<std::size_t>(t)];
+    s.tick = static_cast<std::uint32_t>(t);
+    const auto jitter = [&] { return 1e-6 * static_cast<double>(noise() % 100); };
+    s.tip = {0.03 * std::sin(t * 1e-3) + jitter(), 0.02 * std::cos(t * 2e-3) + jitter(),
+             0.03 + jitter()};
+    s.tail = {s.tip[0], s.tip[1] + jitter(), s.tip[2] + 0.12};
+    s.depth = t % 2000 < 1000 ? 1e-3 * std::abs(std::sin(t * 3e-3)) : 0;
+    s.force = {0, 0, 800 * s.depth};
+    s.contacts = s.depth > 0;
+  }
+  return samples;
+}
+
+TEST(SamplesCodec, EveryBitPatternComesBack) {
+  std::mt19937_64 random(1);
+  std::vector<SampleRecord> samples(257);
+  for (auto& s : samples) {
+    s.tick = static_cast<std::uint32_t>(random());
+    for (auto* vector : {&s.tip, &s.tail, &s.force, &s.torque}) {
+      for (double& x : *vector) x = std::bit_cast<double>(random());
+    }
+    s.depth = std::bit_cast<double>(random());
+    s.contacts = static_cast<std::uint8_t>(random());
+    s.contact_type = static_cast<std::uint8_t>(random());
+    s.buttons = static_cast<std::uint8_t>(random());
+    s.faults = static_cast<std::uint8_t>(random());
+  }
+  using Limits = std::numeric_limits<double>;
+  samples[3].tip = {Limits::quiet_NaN(), std::bit_cast<double>(0x7FF0000000000001u), -0.0};
+  samples[4].force = {Limits::infinity(), -Limits::infinity(), Limits::denorm_min()};
+  samples[5].depth = std::bit_cast<double>(0xFFFFFFFFFFFFFFFFu);
+  expect_same_bits(samples);
+}
+
+TEST(SamplesCodec, NoneOneAndManyComeBack) {
+  expect_same_bits({});
+  expect_same_bits(a_stroke(1));
+  expect_same_bits(a_stroke(10'000));
+}
+
+TEST(SamplesCodec, AStrokeWithNoiseTakesLessThanHalf) {
+  const auto samples = a_stroke(10'000);
+  EXPECT_LT(pack_samples(samples).size(), samples.size() * 56);  // 112 bytes each before
+}
+
+TEST(SamplesCodec, DamageIsRefused) {
+  const auto samples = a_stroke(100);
+  const std::string packed = pack_samples(samples);
+  const auto unpack = [](const std::string& bytes, std::int64_t count) {
+    return unpack_samples(bytes.data(), bytes.size(), count);
+  };
+  EXPECT_THROW(unpack(packed.substr(0, packed.size() - 1), 100), StoreError);
+  EXPECT_THROW(unpack(packed + "x", 100), StoreError);
+  EXPECT_THROW(unpack(packed, 99), StoreError);
+  EXPECT_THROW(unpack(packed, 101), StoreError);
+  EXPECT_THROW(unpack(packed, -1), StoreError);
+  EXPECT_THROW(unpack(packed, std::numeric_limits<std::int64_t>::max()), StoreError);
+  EXPECT_THROW(unpack("", 1), StoreError);
+  for (std::size_t i = 0; i < packed.size(); ++i) {
+    std::string damaged = packed;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x10);
+    try {
+      const auto back = unpack(damaged, 100);
+      // A bit that zlib does not use (in its header) changes nothing.
+      for (std::size_t k = 0; k < back.size(); ++k)
+        ASSERT_EQ(bits_of(back[k]), bits_of(samples[k]));
+    } catch (const StoreError&) {
+      continue;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

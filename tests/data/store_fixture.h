@@ -1,0 +1,96 @@
+#pragma once
+// A folder of its own for every test, and values that differ in every field.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+#include "data/store.h"
+
+namespace palpate::testing {
+
+class TemporaryFolder {
+ public:
+  TemporaryFolder() : path_(::testing::TempDir() + "palpate-store-XXXXXX") {
+    if (::mkdtemp(path_.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  const std::string& path() const { return path_; }
+  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+
+ private:
+  std::string path_;
+};
+
+inline ProtocolInfo a_protocol(char digit = 'a') {
+  return {.name = "ho2000", .text = "{\"version\": 1}\n", .sha256 = std::string(64, digit)};
+}
+
+inline RunInfo a_run(int session = 1) {
+  RunInfo info;
+  info.session = session;
+  info.clock = {.utc_ns = 1'700'000'000'123'456'789, .monotonic_ns = 5'000'000'000};
+  info.program_version = "0.1.0";
+  info.device = "falcon";
+  return info;
+}
+
+/// As it is known before it is shown.
+inline TrialRecord a_plan(int trial, int session = 1) {
+  TrialRecord plan;
+  plan.session = session;
+  plan.block = 1 + trial / 10;
+  plan.trial = trial;
+  plan.renderer = "ray";
+  plan.shape = "cube";
+  plan.orientation_wxyz = {0.5, -0.5, 0.1 * trial, 1.0 / 3.0};
+  return plan;
+}
+
+/// As it is known when it is over.
+inline TrialRecord a_record(int trial, int session = 1) {
+  TrialRecord record = a_plan(trial, session);
+  record.response = "cone";
+  record.response_time = 1.1 * trial;
+  record.first_contact_time = 0.7 * trial;
+  record.onset_ns = 6'000'000'000 + trial * 20'000'000'000LL;
+  record.response_ns = record.onset_ns + trial * 1'100'000'000LL;
+  record.ticks = 1100u * static_cast<unsigned>(trial);
+  record.longest_period_ns = 1'003'000;
+  record.max_force = 3.25;
+  return record;
+}
+
+inline std::string contents_of(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+inline void write_file(const std::string& path, const std::string& contents) {
+  std::ofstream(path, std::ios::binary) << contents;
+}
+
+/// The message of the StoreError that `work` throws; "" and a failure when it throws none.
+template <class Work>
+std::string error_of(Work&& work) {
+  try {
+    work();
+  } catch (const StoreError& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no StoreError";
+  return "";
+}
+
+inline bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+}  // namespace palpate::testing
