@@ -111,12 +111,14 @@ inline ProbePath wandering_path(Random& random, const ConvexMesh& mesh, double l
   return path;
 }
 
-/// Smooth, near the surface all the time: from a little outside to `press` half thicknesses of
-/// depth along the ray from the middle, with free stretches in between. About `step` sizes a tick.
+/// Starts well outside; then smooth and near the surface all the time: from a little outside to
+/// `press` half thicknesses of depth along the ray from the middle. About `step` sizes a tick.
+/// \param side  false: it is the tip that slides, wherever the rest of the probe is
 inline ProbePath sliding_path(Random& random, const ConvexMesh& mesh, double length, int ticks,
-                              double step, double press = 0.3) {
+                              double step, double press = 0.3, bool side = true) {
   const Vec3 middle = middle_of(mesh);
   const double thickness = half_thickness(mesh);
+  const double far = 2 * mesh.size() + length;
   const Wave3 place(random), turn(random);
   const Wave share(random), press_wave(random);
   ProbePath path;
@@ -124,17 +126,15 @@ inline ProbePath sliding_path(Random& random, const ConvexMesh& mesh, double len
   for (int tick = 0; tick < ticks; ++tick, travelled += step) {
     const Vec3 out = safe_direction(place(travelled));
     const Vec3 direction = safe_direction(turn(travelled));
-    const double at_share = 0.5 + 0.5 * share(travelled);
+    const double at_share = side ? 0.5 + 0.5 * share(travelled) : 0;
     double inside = 0;
-    double outside = 2 * mesh.size() + length;
+    double outside = far;
     for (int halving = 0; halving < 24; ++halving) {
       const double half = (inside + outside) / 2;
-      const bool deep =
-          reference_depth(mesh, probe_at(middle + half * out, direction, length, at_share)).depth >
-          0;
-      (deep ? inside : outside) = half;
+      const LineProbe probe = probe_at(middle + half * out, direction, side ? length : 0, at_share);
+      (reference_depth(mesh, probe).depth > 0 ? inside : outside) = half;
     }
-    const double depth = thickness * press * (0.35 + press_wave(travelled));
+    const double depth = tick == 0 ? -far : thickness * press * (0.35 + press_wave(travelled));
     path.push_back(probe_at(middle + (inside - depth) * out, direction, length, at_share));
   }
   return path;

@@ -1,0 +1,88 @@
+// Random objects, random ways over them: what must hold at every tick.
+
+#include <gtest/gtest.h>
+
+#include "tests/shared/random_mesh.h"
+#include "tests/shared/render_checks.h"
+
+namespace palpate {
+namespace {
+
+using testing::Bench;
+using testing::PathCheck;
+using testing::ProbePath;
+
+class EveryTick : public ::testing::TestWithParam<const Renderer*> {
+ protected:
+  /// Probes shorter than, about as long as, and much longer than the object.
+  static double random_length(Random& random, const ConvexMesh& mesh) {
+    const double shares[] = {0, 0.05, 0.5, 1, 3, 10};
+    return shares[random.below(6)] * testing::uniform(random, 0.7, 1.3) * mesh.size();
+  }
+
+  template <class MakePath>
+  PathCheck follow(std::uint64_t kind, std::uint64_t seeds, MakePath&& make_path) {
+    PathCheck check;
+    for (std::uint64_t seed = 0; seed < seeds && !HasFailure(); ++seed) {
+      Random random(seed, {kind});
+      const auto mesh = std::make_shared<const ConvexMesh>(testing::random_convex_mesh(random));
+      const double length = random_length(random, *mesh);
+      const ProbePath path = make_path(random, *mesh, length);
+      Bench bench(*GetParam(), mesh, testing::random_pose(random, mesh->size()));
+      EXPECT_EQ(check.follow(bench, path), "")
+          << "seed " << seed << ", facets " << mesh->facets().size() << ", size " << mesh->size()
+          << ", length " << length;
+    }
+    return check;
+  }
+};
+
+TEST_P(EveryTick, SlidingSlowly) {
+  const bool side = GetParam()->side_contact();
+  const PathCheck check =
+      follow(1, 100, [side](Random& random, const ConvexMesh& mesh, double length) {
+        return testing::sliding_path(random, mesh, length, 300, 0.005, 0.3, side);
+      });
+  EXPECT_GT(check.in_contact, check.ticks / 3);
+  EXPECT_GT(check.free, check.ticks / 50);
+}
+
+TEST_P(EveryTick, SlidingFastAndDeep) {
+  const bool side = GetParam()->side_contact();
+  const PathCheck check =
+      follow(2, 100, [side](Random& random, const ConvexMesh& mesh, double length) {
+        return testing::sliding_path(random, mesh, length, 200, 0.05, 1.5, side);
+      });
+  EXPECT_GT(check.in_contact, check.ticks / 3);
+}
+
+TEST_P(EveryTick, Wandering) {
+  const PathCheck check = follow(3, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+    return testing::wandering_path(random, mesh, length, 400, 0.01);
+  });
+  EXPECT_GT(check.in_contact, check.ticks / 50);
+  EXPECT_GT(check.free, check.ticks / 50);
+}
+
+TEST_P(EveryTick, PassingFast) {
+  const PathCheck check = follow(4, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+    const double step = 0.02 * std::pow(1000, random.unit());
+    return testing::fast_passes(random, mesh, length, 300, step);
+  });
+  EXPECT_GT(check.in_contact, check.ticks / 50);
+}
+
+TEST_P(EveryTick, Jumping) {
+  const PathCheck check = follow(5, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+    return testing::jumping_path(random, mesh, length, 200);
+  });
+  EXPECT_GT(check.in_contact, check.ticks / 10);
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, EveryTick, ::testing::Values(&point_renderer(), &ray_renderer()),
+                         [](const auto& parameter) {
+                           return std::string(parameter.param->name());
+                         });
+
+}  // namespace
+}  // namespace palpate
