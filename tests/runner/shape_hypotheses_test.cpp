@@ -1,0 +1,140 @@
+#include "runner/participants/shape_hypotheses.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "stimuli/orientation.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+ObjectSpec spec(ShapeKind kind) {
+  ObjectSpec made;
+  made.shape = kind;
+  return made;
+}
+
+const std::vector<ShapeKind> kKinds{ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
+                                    ShapeKind::cube};
+
+double degrees(double cosine) { return std::acos(std::min(cosine, 1.0)) * 180 / std::numbers::pi; }
+
+/// Angle between two orientations of a shape, modulo its symmetry; degrees.
+double angle(ShapeKind kind, const Mat3& a, const Mat3& b) {
+  if (kind == ShapeKind::sphere) return 0;
+  if (kind == ShapeKind::cone) return degrees(glm::dot(a[2], b[2]));
+  if (kind == ShapeKind::cylinder) return degrees(std::abs(glm::dot(a[2], b[2])));
+  // The 24 rotations of a cube permute its axes and flip them; the trace of a' b s gives the angle.
+  double best = -1;
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (int flips = 0; flips < 8; ++flips) {
+      Mat3 s(0);
+      for (int k = 0; k < 3; ++k) {
+        s[k][order[static_cast<std::size_t>(k)]] = ((flips >> k) & 1) != 0 ? -1 : 1;
+      }
+      if (glm::dot(glm::cross(s[0], s[1]), s[2]) < 0) continue;
+      const Mat3 bs = b * s;
+      const double trace = glm::dot(a[0], bs[0]) + glm::dot(a[1], bs[1]) + glm::dot(a[2], bs[2]);
+      best = std::max(best, (trace - 1) / 2);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return degrees(best);
+}
+
+TEST(ShapeHypotheses, CountsAndLayout) {
+  const ShapeHypotheses hypotheses(
+      {spec(kKinds[0]), spec(kKinds[1]), spec(kKinds[2]), spec(kKinds[3])});
+  const std::vector<int> counts{1, 380, 150, 384};
+  ASSERT_EQ(hypotheses.shapes().size(), 4u);
+  int end = 0;
+  for (std::size_t s = 0; s < 4; ++s) {
+    const ShapeHypotheses::Shape& shape = hypotheses.shapes()[s];
+    EXPECT_EQ(shape.kind, kKinds[s]);
+    EXPECT_EQ(shape.count, counts[s]);
+    EXPECT_EQ(shape.first % ShapeHypotheses::kBlock, 0);
+    EXPECT_GE(shape.first, end);
+    end = shape.first + shape.count;
+  }
+  EXPECT_LE(end, hypotheses.padded_size());
+  EXPECT_EQ(hypotheses.padded_size() % ShapeHypotheses::kBlock, 0);
+}
+
+TEST(ShapeHypotheses, EveryHypothesisIsARotation) {
+  const ShapeHypotheses hypotheses({spec(ShapeKind::cone), spec(ShapeKind::cube)});
+  for (int i = 0; i < hypotheses.padded_size(); ++i) {
+    const Mat3 r = hypotheses.rotation(i);
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) ASSERT_NEAR(glm::dot(r[a], r[b]), a == b ? 1 : 0, 1e-6);
+    }
+    ASSERT_NEAR(glm::dot(glm::cross(r[0], r[1]), r[2]), 1, 1e-6);
+  }
+}
+
+TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
+  const std::vector<double> bounds{0, 8, 10, 12};  // degrees; the header promises them
+  const std::vector<double> typical{0, 4.5, 5, 6.5};
+  for (std::size_t k = 1; k < kKinds.size(); ++k) {
+    const ShapeHypotheses hypotheses({spec(kKinds[k])});
+    Random random(3);
+    double worst = 0;
+    double sum = 0;
+    constexpr int kDraws = 400;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      const Mat3 wanted = glm::mat3_cast(uniform_rotation(random));
+      double nearest = 180;
+      for (int i = 0; i < hypotheses.shapes()[0].count; ++i) {
+        nearest = std::min(nearest, angle(kKinds[k], wanted, hypotheses.rotation(i)));
+      }
+      worst = std::max(worst, nearest);
+      sum += nearest;
+    }
+    EXPECT_LT(worst, bounds[k]) << k;
+    EXPECT_LT(sum / kDraws, typical[k]) << k;
+  }
+}
+
+TEST(ShapeHypotheses, NoTwoAreAlike) {
+  for (const ShapeKind kind : {ShapeKind::cone, ShapeKind::cylinder, ShapeKind::cube}) {
+    const ShapeHypotheses hypotheses({spec(kind)});
+    for (int i = 0; i < hypotheses.shapes()[0].count; i += 7) {
+      for (int j = 0; j < i; ++j) {
+        ASSERT_GT(angle(kind, hypotheses.rotation(i), hypotheses.rotation(j)), 2) << i << ' ' << j;
+      }
+    }
+  }
+}
+
+std::string message_of(const std::vector<ObjectSpec>& stimuli) {
+  try {
+    const ShapeHypotheses hypotheses(stimuli);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST(ShapeHypotheses, NamesEveryStimulusThatNobodyKnows) {
+  ObjectSpec flat = spec(ShapeKind::cylinder);
+  flat.height = 0;
+  const std::string message =
+      message_of({spec(ShapeKind::mesh), spec(ShapeKind::sphere), spec(ShapeKind::compound), flat});
+  EXPECT_NE(message.find("stimulus 1: a simulated participant knows sphere"), std::string::npos);
+  EXPECT_EQ(message.find("stimulus 2"), std::string::npos);
+  EXPECT_NE(message.find("stimulus 3: a simulated participant knows"), std::string::npos);
+  EXPECT_NE(message.find("stimulus 4: its radius or height"), std::string::npos);
+  EXPECT_NE(message_of({}).find("no stimuli"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate
