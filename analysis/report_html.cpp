@@ -1,7 +1,9 @@
 #include "analysis/report_html.h"
 
+#include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "analysis/figure.h"
 #include "analysis/tables.h"
@@ -23,14 +25,15 @@ h1 { font-size: 1.75rem; line-height: 1.25; margin: 0 0 .5rem; text-wrap: balanc
 .lead { color: var(--soft); margin: 0 0 1.5rem; }
 .simulated { background: var(--amber); color: var(--amber-ink); border-radius: .5rem;
   padding: .6rem 1rem; margin: 0 0 1.5rem; font-weight: 600; }
-.warnings { border-left: 4px solid #b7791f; padding: .1rem 0 .1rem 1rem; margin: 0 0 1.5rem; }
+.warnings { border-left: 4px solid #b7791f; padding: .1rem 0 .1rem 1rem; margin: 0 0 1.5rem;
+  list-style: none; }
 .warnings li { margin: .3rem 0; overflow-wrap: anywhere; }
-figure { margin: 0 0 2rem; }
+figure { margin: 0 0 2rem; overflow-x: auto; }
 figure svg { width: 100%; height: auto; display: block; border-radius: .5rem;
   border: 1px solid var(--rule); }
 section { margin: 2.25rem 0; overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .94rem; }
-caption { text-align: left; font-weight: 600; font-size: 1.05rem; padding-bottom: .5rem; }
+caption { text-align: left; white-space: nowrap; font-weight: 600; font-size: 1.05rem; padding-bottom: .5rem; }
 th, td { padding: .3rem .9rem; text-align: right; white-space: nowrap; }
 th { color: var(--soft); font-weight: 600; font-size: .85rem; border-bottom: 2px solid var(--rule); }
 td { border-bottom: 1px solid var(--rule); }
@@ -39,8 +42,17 @@ th.name:first-child, td.name:first-child { padding-left: 0; }
 tbody tr:hover { background: var(--band); }
 .note { color: var(--soft); font-size: .88rem; margin: .5rem 0 0; max-width: 48rem; }
 @media print { body { max-width: none; padding: 0; font-size: 11pt; }
-  section, figure { break-inside: avoid; } }
+  section, figure { break-inside: avoid; } figure svg { min-width: 0 !important; } }
 )css";
+
+/// Text with each number kept on one line with its percent sign.
+std::string escaped_sentence(std::string_view text) {
+  std::string out = escaped(text);
+  for (std::size_t at = 0; (at = out.find(" %", at)) != std::string::npos;) {
+    out.replace(at, 1, "\u00a0");
+  }
+  return out;
+}
 
 void put_row(std::string& out, const std::vector<std::string>& cells, std::size_t n_names,
              const std::string& tag) {
@@ -61,7 +73,7 @@ void put_table(std::string& out, const Table& table) {
   for (const auto& row : table.rows) put_row(out, row, table.n_names, "td");
   out += "</tbody>\n</table>\n";
   for (const std::string& note : table.notes) {
-    out += "<p class=\"note\">" + escaped(note) + "</p>\n";
+    out += "<p class=\"note\">" + escaped_sentence(note) + "</p>\n";
   }
   out += "</section>\n";
 }
@@ -70,7 +82,7 @@ void put_table(std::string& out, const Table& table) {
 
 std::string report_html(const Analysis& analysis) {
   const std::string label = simulated_label(analysis.table.simulated);
-  const std::string title = escaped(answer(analysis));
+  const std::string title = escaped_sentence(answer(analysis));
   const Counts& counts = analysis.description.counts;
   std::string out =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
@@ -95,7 +107,7 @@ std::string report_html(const Analysis& analysis) {
   if (!analysis.warnings.empty()) {
     out += "<ul class=\"warnings\">\n";
     for (const std::string& warning : analysis.warnings) {
-      out += "<li>" + escaped(warning) + "</li>\n";
+      out += "<li>Warning: " + escaped_sentence(warning) + "</li>\n";
     }
     out += "</ul>\n";
   }

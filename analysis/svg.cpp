@@ -110,7 +110,8 @@ std::string Svg::document(double width, double height, std::string_view title,
                     h = std::to_string(static_cast<int>(height));
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h +
          "\" viewBox=\"0 0 " + w + " " + h +
-         "\" role=\"img\" aria-labelledby=\"figure-title figure-description\" font-family=\"" +
+         "\" style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
+         "px\" role=\"img\" aria-labelledby=\"figure-title figure-description\" font-family=\"" +
          std::string(kFont) + "\">\n<title id=\"figure-title\">" + escaped(title) +
          "</title>\n<desc id=\"figure-description\">" + escaped(description) + "</desc>\n" + body_ +
          "</svg>\n";

@@ -35,7 +35,7 @@ class Svg {
   /// Puts the elements of another on top.
   void append(const Svg& other) { body_ += other.body_; }
 
-  /// The finished document.
+  /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small.
   std::string document(double width, double height, std::string_view title,
                        std::string_view description) const;
 

@@ -99,7 +99,7 @@ class CsvTrials {
 
  private:
   static std::string line(const CsvReader& reader) {
-    return "line " + std::to_string(reader.line());
+    return reader.line() == 0 ? "file" : "line " + std::to_string(reader.line());
   }
 
   void read_header(const CsvReader& reader) {
