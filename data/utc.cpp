@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <limits>
 
 namespace palpate {
 
@@ -21,6 +22,18 @@ std::string format_utc(std::int64_t unix_ns) {
       static_cast<int>(time.minutes().count()), static_cast<int>(time.seconds().count()),
       static_cast<int>(time.subseconds().count()));
   return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  std::int64_t since = 0, sum = 0;
+  if (__builtin_sub_overflow(monotonic_ns, clock.monotonic_ns, &since)) {
+    return monotonic_ns < 0 ? Limits::min() : Limits::max();
+  }
+  if (__builtin_add_overflow(clock.utc_ns, since, &sum)) {
+    return since < 0 ? Limits::min() : Limits::max();
+  }
+  return sum;
 }
 
 }  // namespace palpate

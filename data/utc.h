@@ -11,9 +11,8 @@ namespace palpate {
 /// \param unix_ns since 1970-01-01T00:00:00Z; any value, also before.
 std::string format_utc(std::int64_t unix_ns);
 
-/// Where `monotonic_ns` of a session clock lies on the calendar, ns since 1970.
-inline std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns) {
-  return clock.utc_ns + (monotonic_ns - clock.monotonic_ns);
-}
+/// Where `monotonic_ns` of a session clock lies on the calendar, ns since 1970. Sums beyond the
+/// range stay at its end: the values may come from a damaged file.
+std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns);
 
 }  // namespace palpate

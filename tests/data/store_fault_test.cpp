@@ -45,11 +45,14 @@ int show_until_full(Store& store, const Run& run, std::string& error) {
 bool on_a_small_disk(const std::string& folder, const std::function<void()>& body) {
   constexpr int kImpossible = 77;
   const uid_t user = ::getuid();
+  const gid_t group = ::getgid();
   const pid_t child = ::fork();
   if (child == 0) {
     if (::unshare(CLONE_NEWNS) != 0) {
       if (::unshare(CLONE_NEWUSER | CLONE_NEWNS) != 0) ::_exit(kImpossible);
+      write_file("/proc/self/setgroups", "deny");
       write_file("/proc/self/uid_map", "0 " + std::to_string(user) + " 1");
+      write_file("/proc/self/gid_map", "0 " + std::to_string(group) + " 1");
     }
     if (::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
         ::mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=1m") != 0) {

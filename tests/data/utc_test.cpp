@@ -26,5 +26,13 @@ TEST(ToUnixNs, MovesBySessionTime) {
   EXPECT_EQ(to_unix_ns(stamp, 40), 990);
 }
 
+TEST(ToUnixNs, StaysAtTheEndsOfTheRange) {
+  using Limits = std::numeric_limits<std::int64_t>;
+  EXPECT_EQ(to_unix_ns({.utc_ns = 1'000, .monotonic_ns = 0}, Limits::max()), Limits::max());
+  EXPECT_EQ(to_unix_ns({.utc_ns = 0, .monotonic_ns = -1}, Limits::max()), Limits::max());
+  EXPECT_EQ(to_unix_ns({.utc_ns = 0, .monotonic_ns = 1}, Limits::min()), Limits::min());
+  EXPECT_EQ(to_unix_ns({.utc_ns = -1'000, .monotonic_ns = 0}, Limits::min()), Limits::min());
+}
+
 }  // namespace
 }  // namespace palpate
