@@ -86,16 +86,18 @@ class Builder : public nlohmann::json_sax<json> {
     const auto newlines = std::count(before.begin(), before.end(), '\n');
     const std::size_t line_start = before.rfind('\n') + 1;  // npos + 1 is 0
     std::string what = error.what();
-    // "[json.exception.parse_error.101] parse error at line 2, column 1: syntax error ...": ours
-    // says where in its own way.
+    // "[json.exception.parse_error.101] parse error at line 2, column 1: syntax error ...; last
+    // read:
+    // ...": ours says where in its own way, and leaves out what may be long or ill-formed.
     const std::size_t message = what.find(": ");
     if (what.find("parse error at") != std::string::npos && message != std::string::npos) {
       what = what.substr(message + 2);
+      what = what.substr(0, what.find("; last read"));
     } else {
       what = "number out of range: '" + last_token + "'";
     }
     faults_.add_syntax_error(static_cast<int>(newlines) + 1, static_cast<int>(end - line_start) + 1,
-                             "no JSON (UTF-8): " + what);
+                             "expected JSON in UTF-8: " + what);
     return false;
   }
 

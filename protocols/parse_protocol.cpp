@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "protocols/json_document.h"
@@ -111,7 +112,7 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
     faults.add(place, "expected an object of a stimulus for each key" + found(*keys));
     return;
   }
-  std::map<std::string, std::string> key_of;  // by stimulus
+  std::map<std::string, std::optional<std::string>> key_of;  // by stimulus
   for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
   for (const auto& [key, value] : keys->items()) {
     const std::string here = child_pointer(place, key);
@@ -125,15 +126,15 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
       faults.add(here, "expected the name of a stimulus" + found(value));
       continue;
     }
-    if (!stimulus->second.empty()) {
+    if (stimulus->second) {
       faults.add(here, "expected one key for each stimulus; '" + stimulus->first +
-                           "' has the key '" + stimulus->second + "' already");
+                           "' has the key '" + *stimulus->second + "' already");
     }
     stimulus->second = key;
     protocol.response.keys[key] = stimulus->first;
   }
   for (const auto& [name, key] : key_of) {
-    if (key.empty() && !name.empty()) faults.add(place, "no key for the stimulus '" + name + "'");
+    if (!key && !name.empty()) faults.add(place, "no key for the stimulus '" + name + "'");
   }
 }
 

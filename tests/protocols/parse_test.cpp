@@ -1,0 +1,262 @@
+#include "protocols/parse.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "protocols/sha256.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kFolder = PALPATE_SOURCE_DIR "/tests/protocols/";
+
+std::string text_of(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+std::vector<fs::path> json_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const fs::path& path = entry.path();
+    const bool schema = path.stem().extension() == ".schema";
+    if (path.extension() == ".json" && !schema) files.push_back(path);
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+bool is_scene(const fs::path& path) { return path.filename().string().rfind("scene", 0) == 0; }
+
+void parse(const fs::path& path) {
+  if (is_scene(path)) {
+    parse_scene(path.string());
+  } else {
+    parse_protocol(path.string());
+  }
+}
+
+std::vector<Fault> faults_of(const std::string& text) {
+  try {
+    parse_protocol_text(text, "p.json");
+  } catch (const InputError& error) {
+    return error.faults();
+  }
+  return {};
+}
+
+TEST(Parse, AcceptsGoodFiles) {
+  const std::vector<fs::path> files = json_files(kFolder + "good");
+  EXPECT_EQ(files.size(), 3u);
+  for (const fs::path& file : files) EXPECT_NO_THROW(parse(file)) << file;
+}
+
+TEST(Parse, AcceptsThePublishedProtocols) {
+  const std::vector<fs::path> files = json_files(PALPATE_SOURCE_DIR "/protocols");
+  EXPECT_GE(files.size(), 4u);
+  for (const fs::path& file : files) {
+    EXPECT_NO_THROW(EXPECT_EQ(parse_protocol(file.string()).name, file.stem())) << file;
+  }
+}
+
+// Beside every bad file stand the places of its faults: all of them, and no others.
+TEST(Parse, NamesEveryFaultOfBadFiles) {
+  const std::vector<fs::path> files = json_files(kFolder + "bad");
+  EXPECT_GE(files.size(), 40u);
+  for (const fs::path& file : files) {
+    std::vector<std::string> expected, places;
+    std::istringstream lines(text_of(fs::path(file).replace_extension(".faults")));
+    for (std::string line; std::getline(lines, line);) expected.push_back(line);
+    try {
+      parse(file);
+    } catch (const InputError& error) {
+      for (const Fault& fault : error.faults()) {
+        EXPECT_EQ(fault.file, file);
+        EXPECT_GT(fault.line, 0) << fault.place;
+        EXPECT_FALSE(fault.expected.empty());
+        places.push_back(fault.place);
+      }
+    }
+    std::sort(expected.begin(), expected.end());
+    std::sort(places.begin(), places.end());
+    EXPECT_EQ(places, expected) << file;
+  }
+}
+
+TEST(Parse, ReadsEveryKey) {
+  const std::string file = kFolder + "good/everything.json";
+  const Protocol p = parse_protocol(file);
+  EXPECT_EQ(p.name, "everything-2");
+  EXPECT_EQ(p.title, "Alles, mit Umlauten: äöü 触覚");
+  EXPECT_EQ(p.description, "Every key once.");
+  EXPECT_EQ(p.renderers, (std::vector{RendererKind::ray, RendererKind::point}));
+  EXPECT_EQ(p.renderer_order, RendererOrder::fixed);
+  ASSERT_EQ(p.stimuli.size(), 6u);
+  const ObjectSpec& ball = p.stimuli[0].object;
+  EXPECT_EQ(p.stimuli[0].name, "ball");
+  EXPECT_EQ(ball.shape, ShapeKind::sphere);
+  EXPECT_EQ(ball.radius, 0.02);
+  EXPECT_EQ(ball.subdivisions, 3);
+  EXPECT_EQ(ball.pose.position, Vec3(0, 0, 0.01));
+  EXPECT_EQ(ball.pose.orientation, Quat(0.6, 0, 0.8, 0));
+  EXPECT_EQ(ball.material.stiffness, 500);
+  EXPECT_EQ(ball.material.damping, 1);
+  const ObjectSpec& hat = p.stimuli[1].object;
+  EXPECT_EQ(hat.shape, ShapeKind::cone);
+  EXPECT_EQ(hat.height, 0.03);
+  EXPECT_EQ(hat.segments, 32);
+  EXPECT_EQ(hat.material.stiffness, 600);
+  EXPECT_EQ(hat.material.damping, 0.5);  // the protocol's
+  EXPECT_EQ(p.stimuli[2].object.shape, ShapeKind::cylinder);
+  EXPECT_EQ(p.stimuli[2].object.material.damping, 2);
+  EXPECT_EQ(p.stimuli[2].object.material.stiffness, 400);
+  EXPECT_EQ(p.stimuli[3].object.edge, 0.04);
+  EXPECT_EQ(p.stimuli[4].object.file, kFolder + "good/tetrahedron.obj");
+  const ObjectSpec& dumbbell = p.stimuli[5].object;
+  ASSERT_EQ(dumbbell.parts.size(), 2u);
+  EXPECT_EQ(dumbbell.parts[0].material.stiffness, 700);  // the compound's
+  EXPECT_EQ(dumbbell.parts[1].parts.at(0).material.stiffness, 700);
+  EXPECT_EQ(dumbbell.parts[1].parts.at(0).material.damping, 3);
+  EXPECT_EQ(p.repetitions, 12);
+  EXPECT_EQ(p.order.kind, OrderKind::random);
+  EXPECT_EQ(p.order.max_run, 2);
+  EXPECT_EQ(p.order.min_distance, std::nullopt);
+  EXPECT_EQ(p.blocks_per_renderer, 3);
+  EXPECT_EQ(p.orientation, OrientationKind::listed);
+  ASSERT_EQ(p.orientations.size(), 2u);
+  EXPECT_NEAR(glm::length(p.orientations[1]), 1, 1e-15);  // normalised from 7 digits
+  EXPECT_EQ(p.practice.repetitions, 1);
+  EXPECT_EQ(p.practice.criterion, 0.75);
+  EXPECT_EQ(p.practice.max_rounds, 3);
+  EXPECT_EQ(p.sessions.count, 2);
+  EXPECT_EQ(p.sessions.max_minutes, 45);
+  EXPECT_EQ(p.sessions.warm_up_trials, 4);
+  EXPECT_EQ(p.breaks.every_trials, 24);
+  EXPECT_EQ(p.breaks.min_seconds, 15);
+  EXPECT_EQ(p.response.keys.at("KP_4"), "die");
+  EXPECT_EQ(p.response.keys.at("ä"), "can");
+  EXPECT_EQ(p.response.time_out, 20.5);
+  EXPECT_TRUE(p.response.feedback);
+  EXPECT_EQ(p.stylus.length, 0.1);
+  EXPECT_EQ(p.stylus.grip, 0.05);
+  EXPECT_EQ(p.workspace.centre, Vec3(0, 0.01, 0.02));
+  EXPECT_EQ(p.workspace.scale, 1.5);
+  EXPECT_EQ(p.material.stiffness, 400);
+  EXPECT_EQ(p.servo_rate, 2000);
+  EXPECT_EQ(p.home.rest, 0.25);
+  EXPECT_EQ(p.home.margin, 0.02);
+  EXPECT_EQ(p.texts.instructions, "Tasten!");
+  EXPECT_EQ(p.texts.practice, "Übung");
+  EXPECT_EQ(p.texts.break_text, "Pause");
+  EXPECT_EQ(p.texts.end, "Danke");
+  EXPECT_TRUE(p.samples);
+  EXPECT_EQ(p.seed, 18446744073709551615u);
+  EXPECT_EQ(p.source_text, text_of(file));
+  EXPECT_EQ(p.sha256, sha256_hex(text_of(file)));
+}
+
+TEST(Parse, LeavesDefaultsAlone) {
+  const Protocol p = parse_protocol(kFolder + "good/minimal.json");
+  EXPECT_EQ(p.renderer_order, RendererOrder::counterbalanced);
+  EXPECT_EQ(p.orientation, OrientationKind::uniform);
+  EXPECT_EQ(p.practice.max_rounds, 1);
+  EXPECT_EQ(p.response.time_out, 60);
+  EXPECT_EQ(p.stylus.length, 0.12);
+  EXPECT_EQ(p.stimuli[0].object.material.stiffness, 800);
+  EXPECT_EQ(p.seed, 0u);
+  EXPECT_FALSE(p.order.max_run);
+}
+
+TEST(Parse, ReadsAScene) {
+  const std::vector<ObjectSpec> objects = parse_scene(kFolder + "good/scene.json");
+  ASSERT_EQ(objects.size(), 3u);
+  EXPECT_EQ(objects[0].shape, ShapeKind::cube);
+  EXPECT_EQ(objects[0].edge, 0.05);
+  EXPECT_EQ(objects[1].file, kFolder + "good/tetrahedron.obj");
+  EXPECT_EQ(objects[2].parts.size(), 1u);
+}
+
+TEST(Parse, SaysWhereAndWhat) {
+  std::string text = text_of(kFolder + "good/minimal.json");
+  text.replace(text.find("radius_m"), 8, "raduis_m");
+  try {
+    parse_protocol_text(text, "p.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(),
+                 "p.json:5: /stimuli/0/radius_m: missing; this key is required\n"
+                 "p.json:5: /stimuli/0/raduis_m: unknown key; did you mean 'radius_m'?");
+  }
+}
+
+TEST(Parse, CountsLinesOfNumbersBeforeANewline) {
+  const std::vector<Fault> faults = faults_of("{\n\"version\":\n7\n,\n\"seed\": -1\n}");
+  ASSERT_GE(faults.size(), 2u);
+  EXPECT_EQ(faults.front().place, "/version");
+  EXPECT_EQ(faults.front().line, 3);
+  EXPECT_EQ(faults.back().place, "/seed");
+  EXPECT_EQ(faults.back().line, 5);
+}
+
+TEST(Parse, KeysCannotBreakTheListOfFaults) {
+  try {
+    parse_protocol_text("{\"a\\n\\u001b[2Jb\": 1}", "p.json");
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("/a??[2Jb: unknown key"), std::string::npos) << what;
+    EXPECT_EQ(std::count(what.begin(), what.end(), '\n') + 1,
+              std::ptrdiff_t(error.faults().size()));
+  }
+}
+
+TEST(Parse, UnreadableFilesAreInputErrors) {
+  EXPECT_THROW(parse_protocol(kFolder + "nowhere.json"), InputError);
+  EXPECT_THROW(parse_protocol(kFolder), InputError);
+  EXPECT_THROW(parse_scene(kFolder + "nowhere.json"), InputError);
+}
+
+// Damaged files are refused or accepted, and nothing else happens.
+TEST(Parse, SurvivesDamage) {
+  const std::string good = text_of(kFolder + "good/everything.json");
+  const std::string pieces = "{}[]\",:0-1e9.\\\xff\n truenull";
+  Random random(11);
+  int refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::string text = good;
+    for (std::uint64_t n = 1 + random.below(3); n > 0; --n) {
+      const std::size_t at = random.below(text.size());
+      switch (random.below(3)) {
+        case 0:
+          text[at] = pieces[random.below(pieces.size())];
+          break;
+        case 1:
+          text.erase(at, 1 + random.below(20));
+          break;
+        default:
+          text.insert(at, 1, pieces[random.below(pieces.size())]);
+      }
+    }
+    try {
+      parse_protocol_text(text, kFolder + "good/damaged.json");
+    } catch (const InputError& error) {
+      EXPECT_FALSE(error.faults().empty());
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 1000);
+}
+
+}  // namespace
+}  // namespace palpate

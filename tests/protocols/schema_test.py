@@ -1,0 +1,111 @@
+"""Holds the published JSON Schemas against the same good and bad files as the parser.
+
+Usage: schema_test.py SOURCE_DIR
+"""
+
+import json
+import pathlib
+import sys
+
+import jsonschema
+
+# Beyond JSON Schema: it cannot compare values with each other, count across the file or look for
+# files, and the JSON reader drops keys that are given twice. The program refuses these.
+PROGRAM_ONLY = {
+    "compounds-too-deep", "grip-off-the-stylus", "key-for-unknown", "keys-given-twice",
+    "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
+    "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key",
+    "too-many-trials", "two-keys",
+}
+
+
+def refuse_constant(word):
+    raise ValueError(f"{word} is no JSON")
+
+
+def read(path):
+    return json.loads(path.read_bytes().decode("utf-8"), parse_constant=refuse_constant)
+
+
+def rewrite(value, replace):
+    """Every $ref passed through replace()."""
+    if isinstance(value, dict):
+        return {k: replace(v) if k == "$ref" else rewrite(v, replace) for k, v in value.items()}
+    if isinstance(value, list):
+        return [rewrite(v, replace) for v in value]
+    return value
+
+
+def load_schemas(folder):
+    """The two schemas; the protocols' with the scenes' inside, for a validator without files."""
+    scene = read(folder / "scene.schema.json")
+    protocol = read(folder / "protocol.schema.json")
+    for schema in (scene, protocol):
+        jsonschema.Draft202012Validator.check_schema(schema)
+    inner = rewrite(scene, lambda ref: ref.replace("#/$defs/", "#/$defs/scene/$defs/"))
+    inner.pop("$schema")
+    bundled = rewrite(
+        protocol, lambda ref: ref.replace("scene.schema.json#/$defs/", "#/$defs/scene/$defs/"))
+    bundled["$defs"]["scene"] = inner
+    return jsonschema.Draft202012Validator(scene), jsonschema.Draft202012Validator(bundled)
+
+
+def properties(schema):
+    """All keys that a schema names."""
+    found = set()
+    if isinstance(schema, dict):
+        found |= set(schema.get("properties", {}))
+        for value in schema.values():
+            found |= properties(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            found |= properties(value)
+    return found
+
+
+def keys(value):
+    if isinstance(value, dict):
+        return set(value).union(*map(keys, value.values()))
+    return set().union(*map(keys, value)) if isinstance(value, list) else set()
+
+
+def main(source):
+    tests = source / "tests" / "protocols"
+    scene, protocol = load_schemas(source / "protocols")
+    failures = []
+
+    def faults(path):
+        validator = scene if path.name.startswith("scene") else protocol
+        try:
+            document = read(path)
+        except (ValueError, RecursionError) as error:
+            return [str(error)]
+        if "1e999" in path.read_text(encoding="utf-8"):
+            return ["Python reads a number that is too large as infinity"]
+        return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
+
+    good = sorted((tests / "good").glob("*.json")) + [
+        p for p in sorted((source / "protocols").glob("*.json")) if ".schema" not in p.name]
+    for path in good:
+        failures += [f"{path.name}, which is good: {fault}" for fault in faults(path)]
+    bad = sorted((tests / "bad").glob("*.json"))
+    for path in bad:
+        accepted = not faults(path)
+        if accepted and path.stem not in PROGRAM_ONLY:
+            failures.append(f"{path.name}: the schema accepts it")
+        if not accepted and path.stem in PROGRAM_ONLY:
+            failures.append(f"{path.name}: the schema refuses it, so it is not for the program only")
+    # The parser accepts everything.json: so it knows every key that the schema names.
+    unused = properties(protocol.schema) - keys(read(tests / "good" / "everything.json"))
+    unused -= {"objects"}  # of scenes
+    if unused:
+        failures.append(f"everything.json lacks {sorted(unused)}")
+    if len(good) < 7 or len(bad) < 40:
+        failures.append(f"only {len(good)} good and {len(bad)} bad files were found")
+
+    print("\n".join(failures) or f"{len(good)} good and {len(bad)} bad files: as they should be")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(pathlib.Path(sys.argv[1])))
