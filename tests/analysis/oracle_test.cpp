@@ -18,7 +18,9 @@ using Json = nlohmann::json;
 
 const std::string kFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
-Json load(const std::string& name) { return Json::parse(std::ifstream(kFixtures + name + ".json")); }
+Json load(const std::string& name) {
+  return Json::parse(std::ifstream(kFixtures + name + ".json"));
+}
 
 /// Whatever the oracle names must be there and agree; what it leaves out is not looked at.
 void expect_agrees(const Json& expected, const Json& actual, const std::string& place) {
@@ -88,8 +90,7 @@ TEST(BootstrapOracle, SameResamplesGiveTheSameInterval) {
 TEST(BootstrapOracle, OwnResamplesComeCloseToMany) {
   for (const Json& set : load("bca")) {
     Random random(1);
-    const Bootstrap found =
-        bootstrap_mean(set["differences"].get<std::vector<double>>(), random);
+    const Bootstrap found = bootstrap_mean(set["differences"].get<std::vector<double>>(), random);
     ASSERT_EQ(found.undefined, "");
     EXPECT_EQ(found.resamples, 9999U);
     const auto near = [&](double found_end, int i) {

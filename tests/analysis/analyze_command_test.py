@@ -1,0 +1,140 @@
+"""The analyze command from outside: files are well-formed, names are text, statuses are right.
+
+Usage: analyze_command_test.py PALPATE FIXTURES
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree as xml
+from html.parser import HTMLParser
+
+PALPATE, FIXTURES = sys.argv[1], pathlib.Path(sys.argv[2])
+HEADER = "participant_id,session,block,trial,renderer,shape,response,correct,response_time\n"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+class Tags(HTMLParser):
+    """Every element and attribute of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.attributes = set(), {}
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        for name, value in attrs:
+            self.attributes.setdefault(name, []).append(value)
+
+
+class Analyze(unittest.TestCase):
+    def setUp(self):
+        self.scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(self.scratch.cleanup)
+        self.dir = pathlib.Path(self.scratch.name)
+
+    def run_palpate(self, *args):
+        return subprocess.run([PALPATE, "analyze", *map(str, args)], capture_output=True, text=True,
+                              encoding="utf-8")
+
+    def hostile(self, people, shapes):
+        """A study whose names are markup."""
+        rows = []
+        for who in people:
+            for number, (renderer, shape) in enumerate(
+                    ((r, s) for r in ("point", "ray") for s in shapes for _ in range(2)), 1):
+                quoted = ['"%s"' % name.replace('"', '""') for name in (who, shape)]
+                rows.append(f"{quoted[0]},1,1,{number},{renderer},{quoted[1]},{quoted[1]},1,"
+                            f"{2 + 0.1 * number + 0.01 * len(who) * number}\n")
+        path = self.dir / "trials.csv"
+        path.write_text(HEADER + "".join(rows), encoding="utf-8")
+        return path
+
+    def all_outputs(self, csv):
+        done = self.run_palpate("--csv", csv, "--json", self.dir / "a.json", "--report",
+                                self.dir / "a.html", "--figures", self.dir / "figures")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        return (done.stdout, json.loads((self.dir / "a.json").read_text("utf-8")),
+                (self.dir / "a.html").read_text("utf-8"),
+                (self.dir / "figures" / "figure15.svg").read_text("utf-8"))
+
+    def test_names_are_text_not_markup(self):
+        who = ["<script>alert(1)</script>", "b&\"'<img src=x onerror=alert(1)>", "]]>", "c" * 200]
+        csv = self.hostile(who, ["cone", "</svg><script>", "a&b"])
+        text, figures, page, svg = self.all_outputs(csv)
+        self.assertIn("</svg><script>", figures["times"]["ray"])
+        root = xml.fromstring(svg)
+        self.assertEqual({e.tag for e in root.iter()} - {SVG + t for t in (
+            "svg", "title", "desc", "g", "line", "rect", "circle", "polygon", "text")}, set())
+        self.assertIn(who[0], [e.text for e in root.iter(SVG + "title")])
+        xml.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
+        tags = Tags(page)
+        self.assertFalse({"script", "img", "iframe", "link", "object"} & tags.tags)
+        self.assertFalse([name for name in tags.attributes if name.startswith("on")])
+        self.assertFalse({"href", "src"} & set(tags.attributes))
+        self.assertIn("default-src 'none'", page)
+
+    def test_every_fixture_gives_well_formed_files(self):
+        for csv in sorted(FIXTURES.glob("*.csv")):
+            with self.subTest(csv=csv.name):
+                text, figures, page, svg = self.all_outputs(csv)
+                xml.fromstring(svg)
+                xml.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
+                self.assertTrue(all(len(line) <= 100 for line in text.splitlines()))
+                labelled = figures["simulated"] is True
+                self.assertEqual("SIMULATED" in text, labelled)
+                self.assertEqual("SIMULATED" in page, labelled)
+                self.assertEqual("SIMULATED" in svg, labelled)
+
+    def test_a_second_run_replaces_its_files_and_leaves_no_others(self):
+        csv = FIXTURES / "full.csv"
+        first, second = self.all_outputs(csv), self.all_outputs(csv)
+        self.assertEqual(first, second)
+        self.assertEqual(sorted(p.name for p in self.dir.iterdir()), ["a.html", "a.json", "figures"])
+
+    def test_bad_input_is_status_2_and_writes_nothing(self):
+        bad = self.dir / "bad.csv"
+        bad.write_text(HEADER + "P1,1,1,1,ray,cone,cone,1,soon\n")
+        for args in (["--csv", bad], ["--csv", self.dir / "none.csv"], ["--db", bad], [],
+                     ["--csv", bad, "--db", bad], ["--csv", FIXTURES / "full.csv", "--too-fast-s", 0],
+                     ["--csv", self.dir], ["--nonsense"]):
+            with self.subTest(args=args):
+                done = self.run_palpate(*args, "--json", self.dir / "a.json")
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertNotEqual(done.stderr, "")
+                self.assertEqual(done.stdout, "")
+                self.assertFalse((self.dir / "a.json").exists())
+        self.assertIn("line 2, column response_time", self.run_palpate("--csv", bad).stderr)
+
+    def test_the_data_is_never_overwritten(self):
+        csv = self.hostile(["A"], ["cone"])
+        before = csv.read_bytes()
+        (self.dir / "link").symlink_to(csv)
+        for out in (csv, self.dir / "." / "trials.csv", self.dir / "link"):
+            self.assertEqual(self.run_palpate("--csv", csv, "--json", out).returncode, 2)
+        self.assertEqual(csv.read_bytes(), before)
+        self.assertEqual(self.run_palpate("--csv", csv, "--json", self.dir / "same", "--report",
+                                          self.dir / "same").returncode, 2)
+
+    def test_what_cannot_be_written_is_status_1(self):
+        csv = self.hostile(["A", "B"], ["cone"])
+        done = self.run_palpate("--csv", csv, "--json", self.dir / "no" / "folder.json")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("folder.json", done.stderr)
+
+    def test_the_limit_for_anticipations_is_a_setting(self):
+        csv = FIXTURES / "full.csv"
+        used = []
+        for limit in ("0.1", "0.2", "0.21"):
+            self.run_palpate("--csv", csv, "--too-fast-s", limit, "--json", self.dir / "a.json")
+            used.append(json.loads((self.dir / "a.json").read_text())["counts"]["n_used_for_times"])
+        self.assertTrue(used[0] > used[1] > used[2], used)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,225 @@
+// The CSV reader: what it takes, and that every fault is named with its place.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "analysis/trials.h"
+#include "protocols/parse.h"
+
+namespace palpate {
+namespace {
+
+const std::string kHeader =
+    "participant_id,session,block,trial,renderer,shape,response,correct,response_time\n";
+
+const std::string kNul(1, '\0');
+
+class TrialsCsv : public ::testing::Test {
+ protected:
+  ~TrialsCsv() override { std::remove(path_.c_str()); }
+
+  TrialTable read(const std::string& text) {
+    std::ofstream(path_, std::ios::binary) << text;
+    return read_trials_csv(path_);
+  }
+  std::vector<Fault> faults(const std::string& text) {
+    try {
+      read(text);
+    } catch (const InputError& error) {
+      return error.faults();
+    }
+    ADD_FAILURE() << "no fault found in " << text.substr(0, 300);
+    return {};
+  }
+  /// Exactly one fault, at this place, with this in its words.
+  void expect_fault(const std::string& text, const std::string& place, const std::string& words) {
+    const auto found = faults(text);
+    ASSERT_EQ(found.size(), 1U) << text.substr(0, 300);
+    EXPECT_EQ(found[0].file, path_);
+    EXPECT_EQ(found[0].place, place);
+    EXPECT_NE(found[0].expected.find(words), std::string::npos) << found[0].expected;
+  }
+
+  const std::string path_ =
+      ::testing::TempDir() + "palpate_trials_" + std::to_string(::getpid()) + ".csv";
+};
+
+TEST_F(TrialsCsv, ReadsTheNineColumns) {
+  const TrialTable table = read(kHeader +
+                                "P1,1,1,1,ray,cube,sphere,0,2.5\n"
+                                "P1,1,1,2,point,cone,cone,1,0.25\n"
+                                "P2,1,1,1,ray,cone,,0,60\n");
+  EXPECT_EQ(table.participants, (std::vector<std::string>{"P1", "P2"}));
+  EXPECT_EQ(table.renderers, (std::vector<std::string>{"point", "ray"}));
+  EXPECT_EQ(table.shapes, (std::vector<std::string>{"cone", "cube"}));
+  EXPECT_EQ(table.answers, (std::vector<std::string>{"cone", "cube", "sphere"}));
+  ASSERT_EQ(table.rows.size(), 3U);
+  EXPECT_EQ(table.rows[0].renderer, 1);
+  EXPECT_EQ(table.rows[0].shape, 1);
+  EXPECT_EQ(table.rows[0].answer, 2);
+  EXPECT_FALSE(table.rows[0].correct);
+  EXPECT_EQ(table.rows[1].response_time, 0.25);
+  EXPECT_TRUE(table.rows[1].correct);
+  EXPECT_TRUE(table.rows[2].timed_out) << "an empty response, as there is no column timed_out";
+  EXPECT_EQ(table.rows[2].answer, -1);
+  EXPECT_EQ(table.simulated, Simulated::no);
+  EXPECT_TRUE(table.warnings.empty());
+}
+
+TEST_F(TrialsCsv, ToleratesByteOrderMarkCrlfQuotesAnyOrderAndNoLastNewline) {
+  const TrialTable table = read(
+      "\xEF\xBB\xBFresponse_time,note,correct,response,shape,renderer,trial,block,session,"
+      "participant_id\r\n"
+      "2,\"a \"\"quoted\"\", two\r\nlines\",1,cone,cone,ray,1,1,1,\"P,1\"\r\n"
+      "\r\n"
+      "3,,1,cone,\"cone\",ray,2,1,1,\"P,1\"");
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_EQ(table.participants, (std::vector<std::string>{"P,1"}));
+  EXPECT_EQ(table.rows[1].response_time, 3);
+}
+
+TEST_F(TrialsCsv, LinesAreCountedThroughQuotedNewlines) {
+  expect_fault("note," + kHeader + "\"1\n2\n3\",P1,1,1,1,ray,cone,cone,1,2\n" +
+                   ",P1,1,1,2,ray,cone,cone,1,fast\n",
+               "line 5, column response_time", "'fast'");
+}
+
+TEST_F(TrialsCsv, PracticeIsLeftOutAndOnlyAOneIsATimeOut) {
+  const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",practice,timed_out\n";
+  const TrialTable table = read(header +
+                                "P1,1,1,1,ray,torus,torus,1,2,1,0\n"
+                                "P1,1,1,2,ray,cone,,0,60,0,1\n"
+                                "P1,1,1,3,ray,cone,,0,7,0,0\n");
+  EXPECT_EQ(table.n_practice, 1U);
+  EXPECT_EQ(table.shapes, (std::vector<std::string>{"cone"}));
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_TRUE(table.rows[0].timed_out);
+  EXPECT_FALSE(table.rows[1].timed_out);
+}
+
+TEST_F(TrialsCsv, OwnShapesStandInTheOrderInWhichTheyAreShown) {
+  const TrialTable table = read(kHeader +
+                                "P1,1,1,1,ray,torus,wedge,0,2\n"
+                                "P1,1,1,2,ray,prism,prism,1,2\n"
+                                "P1,1,1,3,ray,wedge,ring,0,2\n"
+                                "P1,1,1,4,ray,cube,cube,1,2\n");
+  EXPECT_EQ(table.shapes, (std::vector<std::string>{"cube", "torus", "prism", "wedge"}));
+  EXPECT_EQ(table.answers.back(), "ring");
+}
+
+TEST_F(TrialsCsv, KnowsWhoIsSimulatedAndWhereRowsComeFrom) {
+  const std::string header =
+      kHeader.substr(0, kHeader.size() - 1) + ",simulated,protocol_sha256,program_version\n";
+  const std::string one = "P1,1,1,1,ray,cone,cone,1,2,1,abc,0.1.0\n";
+  EXPECT_EQ(read(header + one).simulated, Simulated::yes);
+  const TrialTable mixed = read(header + one + "P2,1,1,1,ray,cone,cone,1,2,0,abc,0.2.0\n");
+  EXPECT_EQ(mixed.simulated, Simulated::mixed);
+  EXPECT_EQ(mixed.provenance.protocol_sha256, (std::vector<std::string>{"abc"}));
+  EXPECT_EQ(mixed.provenance.program_versions, (std::vector<std::string>{"0.1.0", "0.2.0"}));
+}
+
+TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
+  const auto found = faults(kHeader + "P1,0,1.5,x,rays,,cone,yes,-1\n" +
+                            "P1,1,1,1,ray,cone,cone,1,2\n" + "\t,1,1,2,ray,cone,cone,1,nan\n");
+  std::vector<std::string> places;
+  for (const Fault& fault : found) places.push_back(fault.place);
+  EXPECT_EQ(places, (std::vector<std::string>{
+                        "line 2, column session", "line 2, column block", "line 2, column trial",
+                        "line 2, column renderer", "line 2, column shape", "line 2, column correct",
+                        "line 2, column response_time", "line 4, column participant_id",
+                        "line 4, column response_time"}));
+}
+
+TEST_F(TrialsCsv, BadTimes) {
+  for (const char* time : {"", " 2", "2 ", "+2", "inf", "nan", "-0.1", "1e7", "1e999", "2s"}) {
+    expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,1," + time + "\n",
+                 "line 2, column response_time", "a time in s");
+  }
+  // A decimal comma is one field more.
+  expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,1,1,5\n", "line 2", "expected 9 fields");
+}
+
+TEST_F(TrialsCsv, MissingAndDoubleColumns) {
+  const auto missing = faults("participant_id,session,block,trial,renderer,shape,response\n");
+  ASSERT_EQ(missing.size(), 2U);
+  EXPECT_NE(missing[0].expected.find("'correct'"), std::string::npos);
+  EXPECT_NE(missing[1].expected.find("'response_time'"), std::string::npos);
+  expect_fault("shape," + kHeader + "cone,P1,1,1,1,ray,cone,cone,1,2\n", "line 1, column shape",
+               "each column once");
+  const auto semicolons = faults("participant_id;session;block\nP1;1;1\n");
+  ASSERT_FALSE(semicolons.empty());
+  EXPECT_NE(semicolons[0].expected.find("commas"), std::string::npos);
+}
+
+TEST_F(TrialsCsv, BrokenFiles) {
+  const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
+  expect_fault("", "file", "at least one trial");
+  expect_fault(kHeader, "file", "at least one trial");
+  expect_fault(kHeader + row + "P1,1,1\n", "line 3", "expected 9 fields");
+  expect_fault(kHeader + row + "\"P1,1,1,2,ray,cone,cone,1,2\n" + row, "line 3", "never closed");
+  expect_fault(kHeader + row + "\"P1\"x,1,1,2,ray,cone,cone,1,2\n", "line 3", "after the closing");
+  expect_fault(kHeader + row + "P\"1,1,1,2,ray,cone,cone,1,2\n", "line 3", "quote inside");
+  expect_fault(kHeader + row + "P" + kNul + ",1,1,2,ray,cone,cone,1,2\n", "line 3", "NUL");
+  expect_fault(kHeader + row + "\"P" + kNul + "\",1,1,2,ray,cone,cone,1,2\n", "line 3", "NUL");
+  expect_fault(kHeader + row + "P\xFF,1,1,2,ray,cone,cone,1,2\n", "line 3, column participant_id",
+               "UTF-8");
+  expect_fault(kHeader + "P1,1,1,1,ray,cone,no_response,0,2\n", "line 2, column response", "empty");
+  EXPECT_THROW(read_trials_csv(::testing::TempDir()), InputError);
+  EXPECT_THROW(read_trials_csv(path_ + ".is_not_there"), InputError);
+}
+
+TEST_F(TrialsCsv, OverlongFieldsAreRefusedWhereverTheyStand) {
+  const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n", huge(3U << 20, 'x');
+  expect_fault(kHeader + row + huge + ",1,1,2,ray,cone,cone,1,2\n", "line 3", "1 MiB");
+  expect_fault(kHeader + row + "\"" + huge + "\",1,1,2,ray,cone,cone,1,2\n", "line 3", "1 MiB");
+  expect_fault(huge + "\n" + row, "line 1", "1 MiB");
+  // Below the limit, across the reader's blocks: a fault of the one field.
+  expect_fault(kHeader + row + std::string(700000, 'x') + ",1,1,2,ray,cone,cone,1,2\n",
+               "line 3, column participant_id", "1 to 200 bytes");
+  const TrialTable table = read("note," + kHeader + "\"" + std::string(700000, '\n') + "\"," + row +
+                                ",P1,1,1,2,ray,cone,cone,1,2\n");
+  EXPECT_EQ(table.rows.size(), 2U);
+}
+
+TEST_F(TrialsCsv, ManyFaultsAreListedThenCounted) {
+  std::string text = kHeader;
+  for (int i = 0; i < 1000; ++i) text += "P1,1,1,1,ray,cone,cone,1,never\n";
+  const auto found = faults(text);
+  ASSERT_EQ(found.size(), kMaxFaults + 1);
+  EXPECT_NE(found.back().expected.find("950 more"), std::string::npos);
+}
+
+TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
+  const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
+  expect_fault(kHeader + row + row, "file", "twice");
+  EXPECT_EQ(read(kHeader + row + "P1,1,1,1,ray,cone,cone,1,2.5\n").warnings.size(), 1U);
+}
+
+TEST_F(TrialsCsv, ContradictionsAreWarnedOf) {
+  EXPECT_EQ(read(kHeader + "P1,1,1,1,ray,cone,cube,1,2\n").warnings.size(), 1U);
+  EXPECT_EQ(read(kHeader + "P1,1,1,1,ray,cone,,1,60\n").warnings.size(), 1U);
+}
+
+TEST_F(TrialsCsv, RowsFlowThroughTheBuffersBlocks) {
+  std::string text = kHeader;
+  constexpr int kRows = 30000;  // some three blocks
+  for (int i = 1; i <= kRows; ++i) {
+    const bool quoted = i % 7 == 0;
+    text += quoted ? "\"P1\"" : "P1";
+    text += ",1,1," + std::to_string(i) + ",ray,cone," + (quoted ? "\"cone\"" : "cone") + ",1," +
+            std::to_string(i) + ".5\n";
+  }
+  const TrialTable table = read(text);
+  ASSERT_EQ(table.rows.size(), static_cast<std::size_t>(kRows));
+  for (int i = 0; i < kRows; ++i) {
+    ASSERT_EQ(table.rows[static_cast<std::size_t>(i)].response_time, i + 1.5);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
