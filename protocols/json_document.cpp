@@ -1,6 +1,7 @@
 #include "protocols/json_document.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -219,9 +220,9 @@ std::string read_text_file(const std::string& path) {
   if (!stream)
     refuse(std::filesystem::exists(path, error) ? "it cannot be opened" : "there is none");
   std::string text;
-  char buffer[1 << 16];
-  while (stream.read(buffer, sizeof buffer) || stream.gcount() > 0) {
-    text.append(buffer, static_cast<std::size_t>(stream.gcount()));
+  std::array<char, 1 << 16> buffer{};
+  while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
     if (text.size() > kMaxBytes) {
       refuse("it has more than " + std::to_string(kMaxBytes >> 20u) + " MB");
     }

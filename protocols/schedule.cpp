@@ -40,6 +40,7 @@ std::uint64_t code(const Group& group) { return group.size() == 1 ? code(group.f
 
 std::vector<std::string> names_of(const Protocol& protocol) {
   std::vector<std::string> names;
+  names.reserve(protocol.stimuli.size());
   for (const StimulusSpec& stimulus : protocol.stimuli) names.push_back(stimulus.name);
   return names;
 }
@@ -89,7 +90,9 @@ std::vector<Trial> ordered_trials(const Protocol& protocol, const Group& group,
 }
 
 std::vector<int> equal_counts(const Protocol& protocol, const Group& group, int repetitions) {
-  return std::vector<int>(protocol.stimuli.size(), repetitions * static_cast<int>(group.size()));
+  const int count = repetitions * static_cast<int>(group.size());
+  std::vector<int> counts(protocol.stimuli.size(), count);
+  return counts;
 }
 
 /// Listed orientations: for each stimulus and renderer the list as evenly as it goes, shuffled.
@@ -141,8 +144,8 @@ void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, Rando
 
 std::vector<Trial> practice_trials(const Protocol& protocol, int participant_number,
                                    const Group& group, int round) {
-  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
-  const std::uint64_t number = static_cast<std::uint64_t>(round);
+  const auto participant = static_cast<std::uint64_t>(participant_number);
+  const auto number = static_cast<std::uint64_t>(round);
   Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
   std::vector<Trial> trials = ordered_trials(
       protocol, group, equal_counts(protocol, group, protocol.practice.repetitions), random);
@@ -154,11 +157,12 @@ std::vector<Trial> practice_trials(const Protocol& protocol, int participant_num
 
 std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_number,
                                   const Group& group, int session) {
-  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
-  const std::uint64_t number = static_cast<std::uint64_t>(session);
+  const auto participant = static_cast<std::uint64_t>(participant_number);
+  const auto number = static_cast<std::uint64_t>(session);
   Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
   const int stimuli = static_cast<int>(protocol.stimuli.size());
   std::vector<int> counts;
+  counts.reserve(protocol.stimuli.size());
   for (int i = 0; i < stimuli; ++i) {
     counts.push_back(share(protocol.sessions.warm_up_trials, stimuli, i));
   }
@@ -171,7 +175,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
 
 std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
                                const std::vector<Group>& groups) {
-  const std::uint64_t participant = static_cast<std::uint64_t>(participant_number);
+  const auto participant = static_cast<std::uint64_t>(participant_number);
   std::vector<Block> blocks;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     for (int b = 0; b < protocol.blocks_per_renderer; ++b) {

@@ -1,3 +1,4 @@
+#include <array>
 #include <cstddef>
 #include <iomanip>
 #include <iostream>
@@ -57,13 +58,13 @@ void print_summary(const Protocol& protocol, std::ostream& out) {
   std::vector<std::string> renderers, stimuli;
   for (const RendererKind kind : protocol.renderers) renderers.emplace_back(to_string(kind));
   for (const StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
-  const char* const orders[] = {"in this order", "counterbalanced", "interleaved"};
+  constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
   const double rest = protocol.home.rest;
   const auto n = static_cast<double>(trials.size());
 
   out << protocol.name << (protocol.title.empty() ? "" : ": " + protocol.title) << "\n"
       << "  renderers   " << list(renderers) << " ("
-      << orders[static_cast<int>(protocol.renderer_order)] << ")\n"
+      << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
       << "  stimuli     " << list(stimuli) << "\n"
       << "  trials      " << counted << " for each participant ("
       << counted / static_cast<long long>(protocol.renderers.size()) << " with each renderer), "
