@@ -44,13 +44,13 @@ void load(std::span<LoadedContact> contacts) {
   }
 }
 
-Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe, double length) {
+Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe) {
   Loads loads;
   for (const auto& c : contacts) {
     const Vec3 force = c.force * c.contact.normal;
     loads.force += force;
     loads.torque += glm::cross(c.contact.point - probe.tip, force);
-    if (length > 0) loads.device2 += (c.contact.along / length) * force;
+    loads.device2 += c.place * force;
   }
   loads.device1 = loads.force - loads.device2;
   return loads;

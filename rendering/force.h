@@ -11,12 +11,14 @@ namespace palpate {
 /// A contact in the world frame with what decides its force.
 struct LoadedContact {
   Contact contact;
+  double place = 0;          ///< of the contact point on the probe: 0 at the tip to 1 at the tail
   double stiffness = 0;      ///< N/m
   double damping = 0;        ///< N s/m
   double closing_speed = 0;  ///< m/s, of the probe at the contact, against the normal
   double share = 0;          ///< m, of the ideal probe's translation along the normal (set by load)
   double force = 0;          ///< N, along the normal, on the hand; never negative (set by load)
   int object = -1;           ///< parts of one compound share it
+  std::uint32_t part = 0;    ///< index of the part in the scene
 };
 
 /// Sets the share and the force of each contact: k share + b closing_speed, never pulling. A
@@ -34,8 +36,8 @@ struct Loads {
 };
 
 /// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
-/// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F. A probe of zero length: device 1 takes all.
-/// \param length  m, of the probe
-Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe, double length);
+/// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, L1/L the contact's place on the probe. A probe of zero
+/// length is touched at place 0: device 1 takes all.
+Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe);
 
 }  // namespace palpate

@@ -15,9 +15,8 @@ struct PointProbe {
   }
 
   static void describe(const ConvexMesh&, const WalkResult&, const Vec3&, const Vec3&, double,
-                       Contact& contact) {
-    contact.type = ContactType::point_polygon;
-    contact.along = 0;
+                       LoadedContact& c) {
+    c.contact.type = ContactType::point_polygon;
   }
 };
 

@@ -43,12 +43,12 @@ struct SegmentProbe {
     return first_contact_segment(mesh, trees, before, after, tolerance);
   }
 
-  /// Type of the contact and its place along the probe, m from the tip. Frame of the mesh.
+  /// Type of the contact and its place along the probe. Frame of the mesh.
   static void describe(const ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
-                       const Vec3& d, double length, Contact& contact) {
+                       const Vec3& d, double length, LoadedContact& c) {
     const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
-    contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
-    contact.along = hit.place * length;
+    c.contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
+    c.place = hit.place;
     // Of an edge's two faces the one that the probe is nearer to parallel with.
     std::uint32_t face = hit.facet.index;
     if (edge) {
@@ -66,9 +66,8 @@ struct SegmentProbe {
     if (!touching_portion(mesh, face, tip + hit.depth * hit.normal, d, enter, leave)) return;
     const double theta = std::asin(rise / length);
     const double middle = 0.5 * (enter + leave);
-    contact.along =
-        std::clamp(middle + theta / kEpsilon * 0.5 * (enter - leave), enter, leave) * length;
-    contact.type = ContactType::segment_face;
+    c.place = std::clamp(middle + theta / kEpsilon * 0.5 * (enter - leave), enter, leave);
+    c.contact.type = ContactType::segment_face;
   }
 };
 

@@ -18,8 +18,6 @@ inline constexpr std::uint32_t kWalkCapped = 4;  ///< a walk met its limit of st
 inline constexpr std::uint32_t kContactsDropped = 8;  ///< more contacts than kMaxContacts
 }  // namespace render_fault
 
-inline constexpr int kMaxContacts = 32;  ///< parts that may be touched at once
-
 /// What a tick renders. World frame.
 struct Rendering {
   Vec3 force;       ///< N, on the hand

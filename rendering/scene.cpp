@@ -42,13 +42,14 @@ RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
+  state.contacts.reserve(std::min(parts_.size(), kMaxContacts));
   return state;
 }
 
 void survey(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  const double moved = std::max(glm::length(probe.tip - state.surveyed.tip),
-                                glm::length(probe.tail - state.surveyed.tail));
-  if (moved < state.clearance) return;
+  const Vec3 tip_way = probe.tip - state.surveyed.tip, tail_way = probe.tail - state.surveyed.tail;
+  const double moved2 = std::max(glm::dot(tip_way, tip_way), glm::dot(tail_way, tail_way));
+  if (moved2 < state.clearance * state.clearance) return;
   // How far the probe came in this tick: what it may have passed on the way counts as near.
   const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
                                                 glm::length(probe.tail - state.last.tail))

@@ -7,12 +7,15 @@
 
 #include "rendering/facet_walk.h"
 #include "rendering/first_contact.h"
+#include "rendering/force.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate {
+
+inline constexpr std::size_t kMaxContacts = 32;  ///< parts that may be touched at once
 
 /// One convex part to be placed in a scene.
 struct SceneObject {
@@ -55,9 +58,10 @@ struct RenderState {
   std::vector<PartState> parts;
   std::vector<std::uint32_t> near_parts;  ///< in order; the others are out of reach for now
   LineProbe surveyed;                     ///< where the probe was when near_parts was drawn up
-  double clearance = -1;  ///< m; that far from `surveyed` the other parts are out of reach
-  LineProbe last;         ///< last good pose
+  double clearance = 0;  ///< m; that far from `surveyed` the other parts are out of reach
+  LineProbe last;        ///< last good pose
   bool has_last = false;
+  std::vector<LoadedContact> contacts;  ///< of the last tick; with room for all
 };
 
 /// Immutable; shared by the servo and the display.

@@ -3,7 +3,6 @@
 // where along the probe a contact stands. Included by point_renderer.cpp and ray_renderer.cpp
 // alone.
 
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <span>
@@ -88,9 +87,6 @@ struct Tick {
   const LineProbe& probe;
   double length;  ///< m, of the probe; 0 for a point
   double rate;    ///< 1/s, ticks; 0 when unknown
-  std::array<LoadedContact, kMaxContacts> contacts{};
-  std::array<std::uint32_t, kMaxContacts> parts{};  ///< that the contacts are with
-  std::size_t count = 0;
   std::uint32_t faults = 0;
 
   /// \param shift  m, world: what the part's siblings have already moved the ideal probe by
@@ -104,22 +100,22 @@ struct Tick {
     memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
     if (!touching) return;
-    if (count == contacts.size()) {
+    if (state.contacts.size() == kMaxContacts) {
       faults |= render_fault::kContactsDropped;
       return;
     }
-    parts[count] = index;
-    LoadedContact& c = contacts[count++];
-    Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c.contact);
+    LoadedContact& c = state.contacts.emplace_back();
+    c.part = index;
+    Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c);
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth + glm::dot(c.contact.normal, shift);
     c.stiffness = part.material.stiffness;
     c.damping = part.material.damping;
     c.object = part.object;
     if (c.damping > 0 && rate > 0) {
-      const double fraction = length > 0 ? c.contact.along / length : 0;
+      const double place = c.place;
       const Vec3 motion =
-          (1 - fraction) * (probe.tip - state.last.tip) + fraction * (probe.tail - state.last.tail);
+          (1 - place) * (probe.tip - state.last.tip) + place * (probe.tail - state.last.tail);
       c.closing_speed = -glm::dot(motion, c.contact.normal) * rate;
     }
   }
@@ -159,6 +155,7 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
     return out;
   }
   survey(scene, state, probe);
+  state.contacts.clear();
   Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0,
                    state.has_last && dt > 0 ? 1 / dt : 0};
   const std::span<const std::uint32_t> near(state.near_parts);
@@ -174,9 +171,9 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
   state.last = probe;
   state.has_last = true;
   out.faults = tick.faults;
-  if (tick.count == 0) return out;
+  if (state.contacts.empty()) return out;
 
-  const std::span<LoadedContact> contacts(tick.contacts.data(), tick.count);
+  const std::span<LoadedContact> contacts(state.contacts);
   load(contacts);
   std::size_t deepest = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -186,15 +183,15 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
       if (c.object == contacts[i].object) shift += c.share * c.contact.normal;
     }
     Contact& contact = contacts[i].contact;
-    state.parts[tick.parts[i]].share = contacts[i].share * contact.normal;
-    const double fraction = tick.length > 0 ? contact.along / tick.length : 0;
-    contact.point = probe.tip + fraction * (probe.tail - probe.tip) + shift;
+    state.parts[contacts[i].part].share = contacts[i].share * contact.normal;
+    contact.along = contacts[i].place * tick.length;
+    contact.point = probe.tip + contacts[i].place * (probe.tail - probe.tip) + shift;
     if (i == 0 || contact.depth > contacts[deepest].contact.depth) {
       deepest = i;
       out.ideal = {probe.tip + shift, probe.tail + shift};
     }
   }
-  const Loads loads = sum_loads(contacts, probe, tick.length);
+  const Loads loads = sum_loads(contacts, probe);
   if (!finite(loads.force) || !finite(loads.torque)) {
     out.faults |= render_fault::kNonFinite;
     return out;
@@ -203,7 +200,7 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
   if constexpr (Probe::kSegment) out.torque = loads.torque;
   out.device1 = loads.device1;
   out.device2 = loads.device2;
-  out.contacts = static_cast<int>(tick.count);
+  out.contacts = static_cast<int>(contacts.size());
   out.object = contacts[deepest].object;
   out.deepest = contacts[deepest].contact;
   return out;

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# Installs the Debian packages that are missing. Usage: install_packages.sh build|tests|quality
+set -euo pipefail
+
+build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libglm-dev libsqlite3-dev
+  libsqlitecpp-dev nlohmann-json3-dev zlib1g-dev)
+tests=(libbenchmark-dev libgtest-dev librsvg2-bin libxml2-utils python3 python3-jsonschema)
+quality=(clang clang-format clang-tidy)
+
+case "${1:-}" in
+  build) wanted=("${build[@]}") ;;
+  tests) wanted=("${build[@]}" "${tests[@]}") ;;
+  quality) wanted=("${build[@]}" "${tests[@]}" "${quality[@]}") ;;
+  *)
+    echo "usage: $0 build|tests|quality" >&2
+    exit 2
+    ;;
+esac
+
+missing=()
+for package in "${wanted[@]}"; do
+  dpkg-query -W -f '${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
+
+if [ "$(id -u)" -eq 0 ]; then
+  as_root=()
+elif command -v sudo > /dev/null; then
+  as_root=(sudo)
+else
+  echo "These packages are missing and need an administrator: apt-get install ${missing[*]}" >&2
+  exit 1
+fi
+echo "Installing: ${missing[*]}" >&2
+"${as_root[@]}" apt-get update -q > /dev/null
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}" > /dev/null
