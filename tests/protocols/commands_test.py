@@ -1,0 +1,83 @@
+"""Runs `palpate validate` and `palpate schedule` as a user does.
+
+Usage: commands_test.py PALPATE SOURCE_DIR
+"""
+
+import csv
+import io
+import json
+import pathlib
+import subprocess
+import sys
+import unittest
+
+PALPATE, SOURCE = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
+HO2000 = str(SOURCE / "protocols" / "ho2000.json")
+BAD = SOURCE / "tests" / "protocols" / "bad"
+COLUMNS = ("participant_id session block trial renderer shape orientation_w orientation_x "
+           "orientation_y orientation_z practice protocol_sha256 program_version").split()
+
+
+def run(*args):
+    return subprocess.run([PALPATE, *args], capture_output=True, check=False)
+
+
+class Validate(unittest.TestCase):
+    def test_summarises_the_published_protocols(self):
+        for path in (SOURCE / "protocols").glob("*.json"):
+            if ".schema" in path.name:
+                continue
+            done = run("validate", str(path))
+            self.assertEqual((done.returncode, done.stderr), (0, b""), path)
+            self.assertIn(json.loads(path.read_text(encoding="utf-8"))["title"].encode(), done.stdout)
+
+    def test_lists_all_faults_on_stderr(self):
+        path = BAD / "out-of-range.json"
+        done = run("validate", str(path))
+        self.assertEqual((done.returncode, done.stdout), (2, b""))
+        lines = done.stderr.decode().splitlines()
+        places = path.with_suffix(".faults").read_text(encoding="utf-8").split()
+        self.assertEqual(len(lines), len(places))
+        for place in places:
+            self.assertTrue(any(f": {place}: expected" in line for line in lines), place)
+
+    def test_missing_file_and_wrong_usage(self):
+        self.assertEqual(run("validate", "nowhere.json").returncode, 2)
+        self.assertEqual(run("validate").returncode, 2)
+        self.assertEqual(run("validate", "--help").returncode, 0)
+
+
+class Schedule(unittest.TestCase):
+    def test_csv_is_the_same_as_json(self):
+        done = run("schedule", HO2000, "--participant", "2", "--format", "csv")
+        self.assertEqual(done.returncode, 0)
+        text = done.stdout.decode()
+        self.assertEqual(text.count("\r\n"), 609)
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+        self.assertEqual(list(rows[0]), COLUMNS)
+        document = json.loads(run("schedule", HO2000, "--participant", "2", "--format", "json").stdout)
+        self.assertEqual(document["participant_number"], 2)
+        self.assertEqual(len(document["trials"]), len(rows))
+        for row, trial in zip(rows, document["trials"]):
+            self.assertEqual(row["participant_id"], "2")
+            self.assertEqual(row["protocol_sha256"], document["protocol_sha256"])
+            self.assertEqual([float(row["orientation_" + c]) for c in "wxyz"],
+                             trial["orientation_wxyz"])
+            for key in ("session", "block", "trial", "renderer", "shape"):
+                self.assertEqual(row[key], str(trial[key]))
+            self.assertEqual(row["practice"], "0")
+
+    def test_table_has_a_row_for_each_trial(self):
+        done = run("schedule", HO2000, "--participant", "1")
+        self.assertEqual(len(done.stdout.splitlines()), 609)
+
+    def test_wrong_usage(self):
+        for args in ([], ["--participant", "0"], ["--participant", "x"],
+                     ["--participant", "1", "--format", "xml"]):
+            done = run("schedule", HO2000, *args)
+            self.assertEqual((done.returncode, done.stdout), (2, b""), args)
+            self.assertNotEqual(done.stderr, b"")
+
+
+if __name__ == "__main__":
+    unittest.main()
