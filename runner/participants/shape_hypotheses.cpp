@@ -123,9 +123,9 @@ void ShapeHypotheses::append(const ObjectSpec& stimulus) {
   const int blocks = (shape.count + kBlock - 1) / kBlock;
   for (int i = 0; i < blocks * kBlock; ++i) {
     const Mat3& r = rotations[static_cast<std::size_t>(i < shape.count ? i : shape.count - 1)];
-    for (int a = 0; a < 3; ++a) {
-      for (int c = 0; c < 3; ++c) {
-        axes_[static_cast<std::size_t>(3 * a + c)].push_back(static_cast<float>(r[a][c]));
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        axes_[a][c].push_back(static_cast<float>(r[static_cast<int>(a)][static_cast<int>(c)]));
       }
     }
   }

@@ -37,12 +37,10 @@ class ShapeHypotheses {
 
   const std::vector<Shape>& shapes() const { return shapes_; }
 
-  int padded_size() const { return static_cast<int>(axes_[0].size()); }
+  int padded_size() const { return static_cast<int>(axes_[0][0].size()); }
 
   /// Component c of local axis a (x, y, z: 0, 1, 2) in the world frame, of every hypothesis.
-  const float* axis_component(int a, int c) const {
-    return axes_[static_cast<std::size_t>(3 * a + c)].data();
-  }
+  const float* axis_component(int a, int c) const { return axes_[a][c].data(); }
 
   /// World from local, of one hypothesis; columns are the local axes.
   Mat3 rotation(int hypothesis) const;
@@ -51,7 +49,7 @@ class ShapeHypotheses {
   void append(const ObjectSpec& stimulus);
 
   std::vector<Shape> shapes_;
-  std::array<std::vector<float>, 9> axes_;
+  std::array<std::array<std::vector<float>, 3>, 3> axes_;  // axis, component
 };
 
 }  // namespace palpate

@@ -151,10 +151,10 @@ template <class ShapeLine>
 void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
                   const Query& query, const ObserverSettings& settings, float* log_posterior) {
   const double kept = std::exp(-1 / (settings.percept_rate * settings.memory));
-  const float keep = static_cast<float>(kept);
+  const auto keep = static_cast<float>(kept);
   const float regained = static_cast<float>(1 - kept) * log_prior(hypotheses, shape);
-  const float beta = static_cast<float>(settings.beta);
-  const float floor = static_cast<float>(settings.floor);
+  const auto beta = static_cast<float>(settings.beta);
+  const auto floor = static_cast<float>(settings.floor);
   for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
     const ShapeLine line(hypotheses, shape, first, query.line);
     float log_likelihood[kBlock];

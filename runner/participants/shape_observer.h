@@ -56,7 +56,7 @@ struct Percept {
 };
 
 /// Keeps one posterior; any number may share the hypotheses, which must outlive them. The same
-/// percepts give the same posterior on every machine and in every thread.
+/// percepts give the same bits in every thread and at every optimisation level.
 class ShapeObserver {
  public:
   /// \throws std::invalid_argument naming every setting that is out of range.

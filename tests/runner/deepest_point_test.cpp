@@ -7,17 +7,15 @@
 #include <vector>
 
 #include "stimuli/random.h"
+#include "tests/runner/ideal_touches.h"
 #include "tests/runner/observer_reference.h"
 
 namespace palpate {
 namespace {
 
 using test::deepest_on_segment;
+using test::random_direction;
 using test::turned_distance;
-
-Vec3 random_direction(Random& random) {
-  return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
-}
 
 /// Calls check with the line as the first block of the only stimulus sees it.
 template <class Check>
