@@ -2,10 +2,10 @@
 
 #include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
+
+#include <algorithm>
+#include <vector>
 
 #include "data/store.h"
 #include "tests/data/child_process.h"
@@ -137,20 +137,22 @@ TEST_F(StoreOpen, ATruncatedFileIsRefused) {
 TEST_F(StoreOpen, ADamagedPageIsFoundWhenTheFileIsOpened) {
   make_study();
   const std::string whole = contents_of(path_);
-  for (std::size_t page = 1; page < whole.size() / 4096; ++page) {
+  const std::size_t pages = whole.size() / 4096;
+  std::vector<std::size_t> unseen;
+  for (std::size_t page = 0; page < pages; ++page) {
     std::string damaged = whole;
     std::fill_n(damaged.begin() + static_cast<std::ptrdiff_t>(page * 4096), 4096, '\x5A');
     write_file(path_, damaged);
     try {
-      // A page of an index may be hit: it is damage that shows only when that index is read.
-      Store store = read(path_);
-      int trials = 0;
-      store.for_each_trial([&](const StoredTrial&) { ++trials; });
-      EXPECT_EQ(trials, 300) << "page " << page;
+      read(path_);
+      unseen.push_back(page);
     } catch (const StoreRefused& error) {
-      EXPECT_TRUE(contains(error.what(), "damaged")) << error.what();
+      EXPECT_TRUE(contains(error.what(), page == 0 ? "not a palpate database" : "damaged"))
+          << error.what();
     }
   }
+  EXPECT_GT(pages, 20u);
+  EXPECT_LE(unseen.size(), 1u) << "only the samples are not looked at";
 }
 
 TEST_F(StoreOpen, PathsThatAreNoFiles) {
