@@ -14,6 +14,14 @@
 namespace palpate {
 namespace {
 
+int open_lock_file(const std::string& file, const std::string& path) {
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (descriptor >= 0) return descriptor;
+  throw StoreError(path + ": cannot be opened for writing, its lock file " + file +
+                   " cannot be made: " + std::generic_category().message(errno) +
+                   "; check that the folder exists and that you may write there");
+}
+
 std::string holder(int descriptor) {
   std::array<char, 32> text{};
   const ssize_t length = ::pread(descriptor, text.data(), text.size(), 0);
@@ -34,12 +42,7 @@ bool is_current(int descriptor, const std::string& file) {
 
 WriterLock::WriterLock(const std::string& path) : file_(path + ".lock") {
   while (true) {
-    descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (descriptor_ < 0) {
-      throw StoreError(path + ": cannot be opened for writing, its lock file " + file_ +
-                       " cannot be made: " + std::generic_category().message(errno) +
-                       "; check that the folder exists and that you may write there");
-    }
+    descriptor_ = open_lock_file(file_, path);
     if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
       const int error = errno;
       const std::string who = holder(descriptor_);
