@@ -79,6 +79,24 @@ TEST_P(EveryTick, Jumping) {
   EXPECT_GT(check.in_contact, check.ticks / 10);
 }
 
+// A rim of n corners is a ring of n silhouette edges on about n facets: the longest way that a walk
+// can have. Jumps make it walk halfway round.
+TEST_P(EveryTick, JumpingOverRims) {
+  PathCheck check;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    Random random(seed, {6});
+    const int corners = 64 << (seed % 4);
+    const PolygonSoup soup = seed % 3
+                                 ? cone(0.05, testing::uniform(random, 0.005, 0.1), corners)
+                                 : cylinder(0.05, testing::uniform(random, 0.005, 0.1), corners);
+    const auto mesh = std::make_shared<const ConvexMesh>(soup);
+    const double length = random_length(random, *mesh);
+    Bench bench(*GetParam(), mesh);
+    ASSERT_EQ(check.follow(bench, testing::jumping_path(random, *mesh, length, 100)), "")
+        << "seed " << seed << ", corners " << corners;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Both, EveryTick, ::testing::Values(&point_renderer(), &ray_renderer()),
                          [](const auto& parameter) {
                            return std::string(parameter.param->name());

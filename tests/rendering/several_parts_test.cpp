@@ -1,0 +1,179 @@
+// Several objects, and concave objects made of convex parts.
+
+#include <gtest/gtest.h>
+
+#include "tests/shared/random_mesh.h"
+#include "tests/shared/render_checks.h"
+
+namespace palpate {
+namespace {
+
+using testing::kTick;
+using testing::placed_object;
+
+constexpr double kStiffness = 800;  // N/m
+
+std::shared_ptr<const ConvexMesh> box(const Vec3& low, const Vec3& high) {
+  PolygonSoup soup = cube(1);
+  for (Vec3& v : soup.vertices) v = 0.5 * (low + high) + v * (high - low);
+  return std::make_shared<const ConvexMesh>(soup);
+}
+
+/// A slab with its top at z = 0, from x = -50 to 50 mm, cut at these places, one object.
+Scene slab_cut_at(const std::vector<double>& cuts, double overlap = 0) {
+  std::vector<SceneObject> parts;
+  double from = -0.05;
+  for (std::size_t i = 0; i <= cuts.size(); ++i) {
+    const double to = i < cuts.size() ? cuts[i] : 0.05;
+    const double extra = i < cuts.size() ? overlap : 0;
+    parts.push_back(
+        placed_object(box({from, -0.05, -0.04}, {to + extra, 0.05, 0}), {}, kStiffness, 0));
+    from = to;
+  }
+  return Scene(parts);
+}
+
+class SeveralParts : public ::testing::TestWithParam<const Renderer*> {
+ protected:
+  static Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe) {
+    return GetParam()->tick(scene, state, probe, kTick);
+  }
+};
+
+LineProbe upright(double x, double depth) {
+  return {{x, 0.003, -depth}, {x + 0.01, 0.013, 0.1 - depth}};
+}
+
+TEST_P(SeveralParts, SlidingOverASeamNeitherDoublesNorTraps) {
+  for (const double overlap : {0.0, 0.001, 0.01}) {
+    const Scene scene = slab_cut_at({0.0}, overlap);
+    for (const double direction : {1.0, -1.0}) {
+      for (const double pace : {1e-5, 1e-4, 3.3e-3}) {
+        for (const double depth : {1e-5, 1e-3, 5e-3}) {
+          RenderState state = scene.initial_state();
+          tick(scene, state, upright(-0.03 * direction, -0.01));
+          for (double gone = -0.03 - 0.37 * pace; gone < 0.03; gone += pace) {
+            const Rendering r = tick(scene, state, upright(gone * direction, depth));
+            ASSERT_LE(glm::length(r.force - Vec3(0, 0, kStiffness * depth)), 1e-9)
+                << "overlap " << overlap << " pace " << pace << " depth " << depth << " at "
+                << gone * direction << ": " << r.force.x << " " << r.force.y << " " << r.force.z;
+            ASSERT_GE(r.contacts, 1);
+            ASSERT_EQ(r.object, 0);
+          }
+          const Rendering left = tick(scene, state, upright(0.03 * direction, -0.001));
+          ASSERT_EQ(left.contacts, 0);
+          ASSERT_EQ(left.force, Vec3());
+        }
+      }
+    }
+  }
+}
+
+TEST_P(SeveralParts, ManySeamsFeelLikeNone) {
+  const Scene cut = slab_cut_at({-0.02, -0.011, -0.01, 0.003, 0.02});
+  const Scene whole = slab_cut_at({});
+  int in_contact = 0;
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    Random random(seed, {41});
+    const testing::Wave x(random), y(random), z(random);
+    RenderState cut_state = cut.initial_state();
+    RenderState whole_state = whole.initial_state();
+    for (int i = 0; i < 400; ++i) {
+      const double travelled = 0.02 * i;
+      const Vec3 tip(0.04 * x(travelled), 0.04 * y(travelled),
+                     i == 0 ? 0.01 : 0.003 * (z(travelled) - 0.3));
+      const LineProbe probe{tip, tip + Vec3(0.01, -0.005, 0.1)};
+      const Rendering a = tick(cut, cut_state, probe);
+      const Rendering b = tick(whole, whole_state, probe);
+      ASSERT_LE(glm::length(a.force - b.force), 1e-9)
+          << "seed " << seed << " tick " << i << " tip " << tip.x << " " << tip.y << " " << tip.z
+          << ", " << a.force.x << " " << a.force.y << " " << a.force.z << " for " << b.force.z;
+      ASSERT_LE(glm::length(a.torque - b.torque), 1e-10);
+      in_contact += b.contacts;
+    }
+  }
+  EXPECT_GT(in_contact, 5000);
+}
+
+TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
+  const auto left = box({-0.05, -0.02, -0.02}, {-0.01, 0.02, 0});
+  const auto right = box({0.01, -0.02, -0.02}, {0.05, 0.02, 0.001});
+  const std::vector<SceneObject> both{placed_object(left, {}, 500, 0),
+                                      placed_object(right, {}, 900, 1)};
+  const Scene together(both), only_left({both[0]}), only_right({placed_object(right, {}, 900, 0)});
+  int both_touched = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    Random random(seed, {42});
+    const testing::Wave3 place(random), turn(random);
+    RenderState state = together.initial_state();
+    RenderState left_state = only_left.initial_state();
+    RenderState right_state = only_right.initial_state();
+    for (int i = 0; i < 300; ++i) {
+      const double travelled = 0.02 * i;
+      const Vec3 direction = glm::normalize(Vec3(1, 0, 0) + 0.4 * turn(travelled));
+      const Vec3 at = Vec3(0.03, 0.02, 0.006) * place(travelled) + Vec3(0, 0, i ? 0 : 0.1);
+      const LineProbe probe = testing::probe_at(at, direction, 0.08, 0.5);
+      const Rendering sum = tick(together, state, probe);
+      const Rendering l = tick(only_left, left_state, probe);
+      const Rendering r = tick(only_right, right_state, probe);
+      ASSERT_EQ(sum.contacts, l.contacts + r.contacts) << "seed " << seed << " tick " << i;
+      ASSERT_LE(glm::length(sum.force - l.force - r.force), 1e-12);
+      ASSERT_LE(glm::length(sum.torque - l.torque - r.torque), 1e-13);
+      ASSERT_LE(glm::length(sum.device1 - l.device1 - r.device1), 1e-12);
+      ASSERT_LE(glm::length(sum.device2 - l.device2 - r.device2), 1e-12);
+      const bool right_deeper = r.deepest.depth > l.deepest.depth;
+      if (sum.contacts > 0) {
+        ASSERT_EQ(sum.object, right_deeper ? 1 : 0);
+        ASSERT_EQ(sum.deepest.depth, std::max(l.deepest.depth, r.deepest.depth));
+      }
+      both_touched += l.contacts && r.contacts;
+    }
+  }
+  if (GetParam()->side_contact()) {
+    EXPECT_GT(both_touched, 500);
+  }
+}
+
+TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
+  const Scene corner(
+      {placed_object(box({-0.05, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kStiffness, 0),
+       placed_object(box({-0.09, -0.05, -0.04}, {-0.05, 0.05, 0.05}), {}, kStiffness, 0)});
+  RenderState state = corner.initial_state();
+  const auto at = [](double x, double z) {
+    return LineProbe{{-0.05 + x, 0.002, z}, {-0.05 + x + 0.05, 0.003, z + 0.08}};
+  };
+  tick(corner, state, at(0.01, 0.01));
+  tick(corner, state, at(0.01, -0.001));
+  Rendering r;
+  for (int i = 0; i <= 120; ++i) r = tick(corner, state, at(0.01 - 1e-4 * i, -0.001));
+  EXPECT_EQ(r.contacts, 2);
+  EXPECT_LE(glm::length(r.force - kStiffness * Vec3(0.002, 0, 0.001)), 1e-8)
+      << r.force.x << " " << r.force.y << " " << r.force.z;
+  // And back out of it.
+  for (int i = 0; i <= 40; ++i) r = tick(corner, state, at(-0.002 + 1e-4 * i, -0.001));
+  EXPECT_EQ(r.contacts, 1);
+  EXPECT_LE(glm::length(r.force - kStiffness * Vec3(0, 0, 0.001)), 1e-8);
+}
+
+TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
+  const Scene scene = slab_cut_at({0.0});
+  for (const double x : {-0.02, -0.001, 0.0, 0.004, 0.02}) {
+    RenderState state = scene.initial_state();
+    const auto stick = [&](double depth) {
+      return LineProbe{{x - 0.02, 0.003, -depth}, {x + 0.02, 0.003, -depth}};
+    };
+    ray_renderer().tick(scene, state, stick(-0.01), kTick);
+    const Rendering r = ray_renderer().tick(scene, state, stick(0.001), kTick);
+    EXPECT_LE(glm::length(r.force - Vec3(0, 0, 0.8)), 1e-9)
+        << "x " << x << ": " << r.force.x << " " << r.force.y << " " << r.force.z;
+    EXPECT_LE(glm::length(r.device1 + r.device2 - r.force), 1e-12);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, SeveralParts, ::testing::Values(&point_renderer(), &ray_renderer()),
+                         [](const auto& parameter) {
+                           return std::string(parameter.param->name());
+                         });
+
+}  // namespace
+}  // namespace palpate
