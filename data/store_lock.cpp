@@ -30,6 +30,11 @@ std::string holder(int descriptor) {
   return pid.empty() ? "another program" : "process " + pid;
 }
 
+[[noreturn]] void refuse_second_writer(const std::string& path, const std::string& who) {
+  throw StoreRefused(path + ": is open for writing in " + who +
+                     "; wait until that has ended, or use another database and merge later");
+}
+
 // Whether the path still leads to the open file: an ending writer removes it.
 bool is_current(int descriptor, const std::string& file) {
   struct stat opened {
@@ -52,8 +57,7 @@ WriterLock::WriterLock(const std::string& path) : file_(path + ".lock") {
         throw StoreError(path + ": cannot be locked: " + std::generic_category().message(error) +
                          "; keep the database on a local disk");
       }
-      throw StoreRefused(path + ": is open for writing in " + who +
-                         "; wait until that has ended, or use another database and merge later");
+      refuse_second_writer(path, who);
     }
     if (is_current(descriptor_, file_)) break;
     ::close(descriptor_);
