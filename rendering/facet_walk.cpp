@@ -191,6 +191,16 @@ Measured resume(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
   return measure_face<kSegment>(mesh, start.index, tip, d);
 }
 
+WalkResult to_result(const Measured& at, bool capped) {
+  WalkResult result;
+  result.normal = at.normal;
+  result.depth = at.depth;
+  result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
+  result.capped = capped;
+  if (at.depth >= 0) result.facet = at.facet;
+  return result;
+}
+
 template <bool kSegment>
 WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
   const double gain = kDepthRounding * mesh.size();
@@ -215,13 +225,27 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
       break;
     }
   }
-  WalkResult result;
-  result.normal = at.normal;
-  result.depth = at.depth;
-  result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
-  result.capped = capped;
-  if (at.depth >= 0) result.facet = at.facet;
-  return result;
+  return to_result(at, capped);
+}
+
+template <bool kSegment>
+WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+  Measured nearest = measure_face<kSegment>(mesh, 0, tip, d);
+  for (std::uint32_t i = 1; i < mesh.facets().size(); ++i) {
+    const Measured m = measure_face<kSegment>(mesh, i, tip, d);
+    if (m.depth < nearest.depth) nearest = m;
+  }
+  if constexpr (kSegment) {
+    for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) {
+      const Slopes slopes = slopes_at(mesh, mesh.edges()[i], d);
+      Measured m;
+      if (slopes.silhouette() && measure_edge(mesh, i, slopes.left >= 0, tip, d, m) &&
+          m.depth < nearest.depth) {
+        nearest = m;
+      }
+    }
+  }
+  return to_result(nearest, false);
 }
 
 }  // namespace
@@ -233,6 +257,14 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
   return walk<false>(mesh, start, tip, Vec3(0));
+}
+
+WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+  return nearest_facet<true>(mesh, tip, d);
+}
+
+WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip) {
+  return nearest_facet<false>(mesh, tip, Vec3(0));
 }
 
 }  // namespace palpate

@@ -37,4 +37,9 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 /// The same walk with the probe shrunk to its tip: faces only.
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
 
+/// The facet of M of least depth, by looking at all of them: where there is no history to walk
+/// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.
+WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
+WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip);
+
 }  // namespace palpate

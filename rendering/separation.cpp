@@ -107,13 +107,13 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
 }
 
 void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
-                           SeparatingPlane& plane, std::uint32_t& support) {
+                           double tolerance, SeparatingPlane& plane, std::uint32_t& support) {
   constexpr int kIterations = 40;
   Vec3 direction = plane.normal;
   if (!(glm::dot(direction, direction) > 0.5)) direction = 0.5 * (tip + tail) - mesh.centre();
   if (!(glm::dot(direction, direction) > 0)) direction = Vec3(1, 0, 0);
   plane.valid = false;
-  double best_gap = 0;
+  double best_gap = -tolerance;
   double distance =
       0;  // upper bound: to the nearest point of the current simplex; 0 before there is one
   Simplex simplex;

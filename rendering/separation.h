@@ -26,9 +26,9 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
 /// Looks for a plane between the mesh and the segment, starting from `plane.normal` (any direction
 /// where there is none) and the vertex `support`; both are updated. Gilbert, Johnson & Keerthi
 /// 1988, stopped at the first direction that shows at least half of the distance. plane.valid says
-/// whether one was found; where the two are nearer than rounding, none may be found although one
-/// exists.
+/// whether one was found. \param tolerance  m; a probe that is no deeper than this is at the
+/// surface: the plane it touches counts, although it does not separate strictly
 void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
-                           SeparatingPlane& plane, std::uint32_t& support);
+                           double tolerance, SeparatingPlane& plane, std::uint32_t& support);
 
 }  // namespace palpate

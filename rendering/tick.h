@@ -22,10 +22,10 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
   return walk_point(mesh, start, tip);
 }
 
-/// A face that the last search for a plane ended at: where a walk without a history may begin.
-inline MinkowskiFacet face_near(const ConvexMesh& mesh, std::uint32_t vertex) {
-  const Edge& edge = mesh.edges()[mesh.fan_edges()[mesh.fan_first()[vertex]]];
-  return {MinkowskiFacet::Kind::face, false, edge.left};
+template <class Probe>
+WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+  if constexpr (Probe::kSegment) return nearest_facet_segment(mesh, tip, d);
+  return nearest_facet_point(mesh, tip);
 }
 
 /// The probe, translated by `shift` in the world, in the frame of the part's mesh.
@@ -56,12 +56,10 @@ bool track(const ScenePart& part, PartState& state, const LineProbe* before, con
     return false;
   }
   if (state.plane.separates(tip, tail)) return false;  // the common case in free space
-  find_separating_plane(mesh, tip, tail, state.plane, state.support);
+  find_separating_plane(mesh, tip, tail, part.tolerance, state.plane, state.support);
   if (state.blocked || !before) {
-    state.blocked =
-        !state.plane.valid &&
-        (state.blocked ||
-         walk<Probe>(mesh, face_near(mesh, state.support), tip, d).depth > part.tolerance);
+    state.blocked = !state.plane.valid &&
+                    (state.blocked || nearest_facet<Probe>(mesh, tip, d).depth > part.tolerance);
     return false;
   }
   const LineProbe from = to_local<Probe>(part, *before, state.yielded);
@@ -70,8 +68,8 @@ bool track(const ScenePart& part, PartState& state, const LineProbe* before, con
   if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, tip, d);
   if (hit.facet.kind == Kind::none) {
     if (state.plane.valid) return false;
-    // Neither a plane nor a crossing: nearer than rounding, or inside by it.
-    hit = walk<Probe>(mesh, face_near(mesh, state.support), tip, d);
+    // Neither a plane nor a crossing: rounding hid the way in, so the nearest way out it is. Rare.
+    hit = nearest_facet<Probe>(mesh, tip, d);
     if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return false;
   }
   state.facet = hit.facet;

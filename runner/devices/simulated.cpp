@@ -84,11 +84,15 @@ DeviceReading SimulatedStylus::read() noexcept {
   // Translation: about the point where the hand's spring, its damper's pull along with the target,
   // and the force held since the last tick are in balance.
   const Vec3 balance = target_.grip + (force_ + hand_.damping * target_.velocity) / hand_.stiffness;
-  Vec3 offset = position_ - balance;
-  shift_.advance(offset, velocity_);
-  position_ = balance + offset;
-  const double speed = glm::length(velocity_);
-  if (speed > 0) velocity_ *= speed > friction_step_ ? 1 - friction_step_ / speed : 0;
+  Vec3 offset = position_ - balance, velocity = velocity_;
+  shift_.advance(offset, velocity);
+  const double speed = glm::length(velocity);
+  if (speed > friction_step_) {
+    position_ = balance + offset;
+    velocity_ = (1 - friction_step_ / speed) * velocity;
+  } else {
+    velocity_ = Vec3(0);  // friction holds it
+  }
   const double distance = glm::length(position_);
   if (distance > settings_.workspace_radius) {
     position_ *= settings_.workspace_radius / distance;

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+
+#include "runner/device.h"
+
+namespace palpate::testing {
+
+/// Reads what a function of the tick says, keeps what was written last.
+class FakeDevice final : public Device {
+ public:
+  explicit FakeDevice(std::function<DeviceReading(int tick)> script) : script_(std::move(script)) {
+    capabilities_ = {"fake", 5, 5, 8, 3000, 1000, 0.2, 0, true};
+  }
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  DeviceReading read() noexcept override { return script_(tick_++); }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    force = device1 + device2;
+    last1 = device1;
+    last2 = device2;
+  }
+
+  Vec3 force, last1, last2;
+
+ private:
+  DeviceCapabilities capabilities_;
+  std::function<DeviceReading(int)> script_;
+  int tick_ = 0;
+};
+
+}  // namespace palpate::testing

@@ -1,0 +1,116 @@
+// The simulated stylus against physics integrated in small steps and against closed forms.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "runner/devices/simulated.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kTick = 1e-3;
+
+/// x'' = -(k x + b x') / m in 1000 small steps a tick (semi-implicit Euler).
+void small_steps(double m, double b, double k, double& x, double& v) {
+  constexpr int kSteps = 20000;
+  const double h = kTick / kSteps;
+  for (int i = 0; i < kSteps; ++i) {
+    v += h * -(k * x + b * v) / m;
+    x += h * v;
+  }
+}
+
+TEST(SpringDamper, AgreesWithSmallSteps) {
+  const double cases[][3] = {
+      {0.25, 10.5, 400}, {0.25, 200, 400}, {0.25, 20, 400}, {0.05, 0, 5e4}, {0.001, 50, 1e6}};
+  for (const auto& [m, b, k] : cases) {
+    double x = 0.01, v = -0.3;
+    Vec3 px(x, 0, 0), pv(v, 0, 0);
+    SpringDamper(m, b, k, kTick).advance(px, pv);
+    small_steps(m, b, k, x, v);
+    EXPECT_NEAR(px.x, x, 2e-4 * (std::abs(x) + 0.01)) << m << " " << b << " " << k;
+    EXPECT_NEAR(pv.x, v, 2e-4 * (std::abs(v) + 1)) << m << " " << b << " " << k;
+  }
+}
+
+TEST(SpringDamper, IsStableForAnyStiffness) {
+  for (double k = 1; k < 1e12; k *= 10) {
+    const SpringDamper spring(0.1, 1, k, kTick);
+    Vec3 x(1, 0, 0), v(0);
+    for (int i = 0; i < 100000; ++i) spring.advance(x, v);
+    ASSERT_LT(std::abs(x.x), 1e-6) << k;
+  }
+}
+
+SimulatedDeviceSettings ideal_device() {
+  SimulatedDeviceSettings s;
+  s.friction = 0;
+  s.resolution = 1e-12;
+  return s;
+}
+
+TEST(SimulatedStylus, SettlesWhereHandAndForceBalance) {
+  const HandImpedance hand;
+  SimulatedStylus stylus(ideal_device(), hand, 0.12, 0.06, kTick);
+  stylus.reset({{0, 0, 0.1}, {0, 0, 0}, {0, 0, 1}});
+  const Vec3 force1(0.4, 0, 1), force2(-0.2, 0.1, 0.2);
+  DeviceReading reading;
+  for (int i = 0; i < 5000; ++i) {
+    stylus.write(force1, force2);
+    reading = stylus.read();
+  }
+  const Vec3 grip = 0.5 * (reading.stylus.tip + reading.stylus.tail);
+  EXPECT_NEAR(glm::length(grip - (Vec3(0, 0, 0.1) + (force1 + force2) / hand.stiffness)), 0, 1e-9);
+  // Moments balance too: turn_stiffness * angle = what the ends' forces give about the grip.
+  const Vec3 axis = glm::normalize(reading.stylus.tail - reading.stylus.tip);
+  const double angle = std::acos(axis.z);
+  const Vec3 torque = glm::cross(axis, 0.06 * force2 - 0.06 * force1);
+  EXPECT_NEAR(hand.turn_stiffness * angle, glm::length(torque), 1e-6);
+  EXPECT_NEAR(glm::length(reading.stylus.tail - reading.stylus.tip), 0.12, 1e-9);
+}
+
+TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagOfTheHandsDamper) {
+  SimulatedDeviceSettings device = ideal_device();
+  device.damping = 0;
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  stylus.reset({{0, 0, 0}, {0, 0, 0}, {0, 0, 1}});
+  Vec3 target(0);
+  const Vec3 velocity(0.06, 0, 0);
+  for (int i = 0; i < 2000; ++i) {
+    target += kTick * velocity;
+    stylus.set_target({target, velocity, {0, 0, 1}});
+    stylus.read();
+  }
+  EXPECT_NEAR(stylus.grip().x, target.x, 1e-4);
+}
+
+TEST(SimulatedStylus, CoulombFrictionStopsASlowMotion) {
+  SimulatedDeviceSettings device = ideal_device();
+  device.friction = 0.5;
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  stylus.reset({{0, 0, 0}, {0, 0, 0}, {0, 0, 1}});
+  stylus.set_target({{0.001, 0, 0}, {0, 0, 0}, {0, 0, 1}});  // 0.4 N pull: less than the friction
+  for (int i = 0; i < 2000; ++i) stylus.read();
+  EXPECT_NEAR(stylus.grip().x, 0, 1e-6);
+}
+
+TEST(SimulatedStylus, EndsAreRoundedToTheResolutionAndStayInTheWorkspace) {
+  SimulatedDeviceSettings device;
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  stylus.reset({{0.01234567, 0.02, -0.03}, {0, 0, 0}, glm::normalize(Vec3(1, 2, 3))});
+  const LineProbe probe = stylus.read().stylus;
+  for (const Vec3& end : {probe.tip, probe.tail}) {
+    for (int k = 0; k < 3; ++k) {
+      const double steps = end[k] / device.resolution;
+      EXPECT_NEAR(steps, std::round(steps), 1e-6);
+    }
+  }
+  stylus.set_target({{1, 0, 0}, {0, 0, 0}, {0, 0, 1}});
+  for (int i = 0; i < 5000; ++i) stylus.read();
+  EXPECT_LE(glm::length(stylus.grip()), device.workspace_radius + 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate
