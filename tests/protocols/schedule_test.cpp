@@ -193,19 +193,19 @@ TEST(Schedule, FurtherRoundsOfPracticeDifferAndHoldTheLimits) {
   Protocol protocol = ho2000();
   protocol.practice.repetitions = 5;
   protocol.order.max_run = 1;
-  std::set<std::string> rounds;
+  std::set<std::vector<int>> orders;
   for (const RendererKind renderer : protocol.renderers) {
     for (int round = 1; round <= 10; ++round) {
       const std::vector<Trial> trials = practice_round(protocol, 3, renderer, round);
       EXPECT_EQ(trials.size(), 20u);
-      rounds.insert(text_of(trials));
       std::vector<int> stimuli;
       for (const Trial& trial : trials) stimuli.push_back(trial.stimulus);
       EXPECT_EQ(longest_run(stimuli), 1);
+      orders.insert(stimuli);
       EXPECT_EQ(trials.front().renderer, renderer);
     }
   }
-  EXPECT_EQ(rounds.size(), 20u);
+  EXPECT_EQ(orders.size(), 20u);
   protocol.renderer_order = RendererOrder::interleaved;
   EXPECT_EQ(practice_round(protocol, 3, RendererKind::ray, 1).size(), 40u);
 }
@@ -264,6 +264,12 @@ TEST(Schedule, ListedOrientationsAreUsedEvenly) {
   }
   EXPECT_EQ(used.size(), 2u * 4 * 5);
   for (const auto& [what, times] : used) EXPECT_TRUE(times == 15 || times == 16) << times;
+  // Which of them comes once more is a matter of chance.
+  std::set<double> once_more;
+  for (const auto& [what, times] : used) {
+    if (times == 16) once_more.insert(std::get<2>(what));
+  }
+  EXPECT_GT(once_more.size(), 1u);
   protocol.orientations.clear();
   EXPECT_THROW(schedule(protocol, 1), ScheduleError);
 }
