@@ -203,7 +203,15 @@ std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<Fac
   for (const auto& [area, face] : seeds) {
     if (region_of[face] == kNone) grow(mesh, shapes, face, count++, region_of);
   }
+  if (count == 0) return region_of;
   place_thin_faces(mesh, std::move(thin), region_of);
+  // Numbered as the faces come: what follows then walks through memory and does not jump.
+  std::vector<Index> number(count, kNone);
+  Index next = 0;
+  for (Index& region : region_of) {
+    if (number[region] == kNone) number[region] = next++;
+    region = number[region];
+  }
   return region_of;
 }
 

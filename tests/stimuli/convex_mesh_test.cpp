@@ -186,7 +186,7 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
   for (int i = 0; i < 50; ++i) {
     const auto rounded = [&](PolygonSoup soup) {
       soup = placed(triangulated(soup), uniform_rotation(random), 0.06, Vec3(0.1));
-      for (Vec3& vertex : soup.vertices) vertex = Vec3(glm::vec3(vertex));
+      for (Vec3& vertex : soup.vertices) vertex = testing::single_precision(vertex);
       soup.coordinate_error = 0.2 * 0x1p-24;
       const ConvexMesh mesh(soup);
       expect_convex_mesh(mesh, 4e-7 * mesh.size());
