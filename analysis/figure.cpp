@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "analysis/axes.h"
 #include "analysis/svg.h"
 #include "analysis/text.h"
 
@@ -15,49 +16,8 @@ namespace {
 
 // Okabe & Ito (2008): told apart with every common colour vision; shapes differ as well.
 constexpr std::string_view kPoint = "#0072b2", kRay = "#d55e00", kPaper = "#009e73";
-constexpr std::string_view kInk = "#1f2328", kSoft = "#59636e", kGrid = "#e3e6ea";
 constexpr double kMargin = 28, kPlotHeight = 310, kGap = 44;
 constexpr std::size_t kLongestLabel = 18;  // characters of a shape's name
-
-/// One panel's frame; maps values to px.
-struct Axes {
-  double left = 0, width = 0, top = 0, bottom = 0;  // px
-  double low = 0, high = 1;                         // values at bottom and top
-  double step = 1;                                  // between ticks
-  double slot = 0;                                  // px for each shape
-  double y(double value) const {
-    return bottom - (std::clamp(value, low, high) - low) / (high - low) * (bottom - top);
-  }
-  double centre(std::size_t shape) const {
-    return left + (static_cast<double>(shape) + 0.5) * slot;
-  }
-};
-
-/// 1, 2 or 5 times a power of ten, about `span` / 5.
-double tick_step(double span) {
-  const double power = std::pow(10.0, std::floor(std::log10(span / 5)));
-  const double factor = span / 5 / power;
-  return power * (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10);
-}
-
-/// Widens to whole ticks.
-void round_ends(Axes& axes) {
-  axes.step = tick_step(axes.high - axes.low);
-  axes.low = axes.step * std::floor(axes.low / axes.step + 1e-9);
-  axes.high = axes.step * std::ceil(axes.high / axes.step - 1e-9);
-}
-
-void draw_grid(Svg& svg, const Axes& axes) {
-  const double step = axes.step;
-  const int decimals = step < 1 ? static_cast<int>(std::ceil(-std::log10(step) - 1e-9)) : 0;
-  const int count = static_cast<int>(std::lround((axes.high - axes.low) / step));
-  for (int i = 0; i <= count; ++i) {
-    const double value = axes.low + i * step, y = axes.y(value);
-    const bool zero = std::fabs(value) < step / 2;
-    svg.line(axes.left, y, axes.left + axes.width, y, zero ? kSoft : kGrid, zero ? 1.2 : 1);
-    svg.text(axes.left - 8, y + 4, fixed(value, decimals), {12, kSoft, Svg::Anchor::end});
-  }
-}
 
 void draw_names(Svg& svg, const Axes& axes, const std::vector<std::string>& names, bool turned) {
   for (std::size_t s = 0; s < names.size(); ++s) {
@@ -69,21 +29,6 @@ void draw_names(Svg& svg, const Axes& axes, const std::vector<std::string>& name
       svg.text(axes.centre(s), axes.bottom + 22, name, {13, kInk, Svg::Anchor::middle});
     }
   }
-}
-
-/// An interval with end caps; arrowheads where it leaves the axes.
-void draw_interval(Svg& svg, const Axes& axes, double x, double low, double high,
-                   std::string_view colour) {
-  const double top = axes.y(high), bottom = axes.y(low);
-  svg.line(x, bottom, x, top, colour, 2);
-  if (high > axes.high)
-    svg.triangle(x, top + 4, 5, true, colour);
-  else
-    svg.line(x - 5, top, x + 5, top, colour, 2);
-  if (low < axes.low)
-    svg.triangle(x, bottom - 4, 5, false, colour);
-  else
-    svg.line(x - 5, bottom, x + 5, bottom, colour, 2);
 }
 
 void draw_mean(Svg& svg, bool ray, double x, double y, double half, double opacity = 1) {
@@ -149,7 +94,7 @@ void draw_times(Svg& svg, Axes& axes, const Analysis& analysis) {
   // Two people's interval may be ten times their times: it is cut rather than the rest flattened.
   axes.high = std::max(largest, std::min(largest_end, 1.5 * largest));
   if (axes.high <= 0) axes.high = 1;
-  round_ends(axes);
+  axes.round_ends();
   draw_grid(svg, axes);
   for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
     draw_people(svg, axes, analysis, s, point, ray);
@@ -186,7 +131,7 @@ void draw_reductions(Svg& svg, Axes& axes, const Analysis& analysis) {
     axes.high = std::max(axes.high, ends.high);
   }
   axes.low = std::max(axes.low, -150.0);  // a slowing-down has no end: cut it
-  round_ends(axes);
+  axes.round_ends();
   draw_grid(svg, axes);
   for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
     const PairedShape& shape = analysis.shapes[s];

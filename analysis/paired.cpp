@@ -138,6 +138,7 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
   }
 
   std::vector<std::optional<double>> p;
+  p.reserve(all.size());
   for (const PairedShape& shape : all) p.push_back(shape.t_test.p);
   const auto adjusted = holm(p);
   for (std::size_t s = 0; s < all.size(); ++s) all[s].t_test.p_holm = adjusted[s];

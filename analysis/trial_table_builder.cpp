@@ -1,6 +1,7 @@
 #include "analysis/trial_table_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>

@@ -1,10 +1,11 @@
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -48,7 +49,10 @@ class TrialTableBuilder {
     std::uint32_t participant;
     std::int32_t session, block, trial;
     std::uint32_t row;
-    auto operator<=>(const Place&) const = default;
+    bool operator<(const Place& other) const {
+      return std::tie(participant, session, block, trial, row) <
+             std::tie(other.participant, other.session, other.block, other.trial, other.row);
+    }
   };
   void check_places(TrialTable& table);
 
