@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "data/store.h"
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
 #include "stimuli/convex_mesh.h"
@@ -81,6 +82,9 @@ int main(int argc, char** argv) {
     return 2;
   } catch (const palpate::MeshError& error) {
     std::cerr << error.what() << "\n";
+    return 2;
+  } catch (const palpate::StoreRefused& error) {
+    std::cerr << "palpate: " << error.what() << "\n";
     return 2;
   } catch (const std::exception& error) {
     std::cerr << "palpate: " << error.what() << "\n";

@@ -1,0 +1,204 @@
+"""The program from outside: help, statuses, render by hand calculation, simulate through kills.
+
+Usage: commands_test.py PALPATE PROTOCOLS
+"""
+
+import csv
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
+COMMANDS = ["analyze", "export", "render", "schedule", "simulate", "validate"]
+
+
+class FromOutside(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def write(self, name, text):
+        path = self.dir / name
+        path.write_text(text)
+        return path
+
+
+class Usage(FromOutside):
+    def test_every_command_has_help_with_an_example(self):
+        listed = self.palpate("--help").stdout
+        for command in COMMANDS:
+            self.assertIn(command, listed)
+            text = self.palpate(command, "--help").stdout
+            self.assertIn(f"palpate {command}", text)
+            self.assertIn("Examples:", text)
+        self.assertRegex(self.palpate("--version").stdout, r"^palpate \d+\.\d+\.\d+\n$")
+
+    def test_wrong_usage_is_status_2_and_says_so_on_stderr(self):
+        for args in ([], ["no-such"], ["simulate"], ["render", "--renderer", "ray"], ["simulate", "x", "--nope"],
+                     ["validate", self.dir / "missing.json"], ["schedule", PROTOCOLS / "quick.json"],
+                     ["simulate", PROTOCOLS / "quick.json", "--db", self.dir / "x.db", "--participants", "0"]):
+            done = self.palpate(*args, status=2)
+            self.assertEqual(done.stdout, "")
+            self.assertTrue(done.stderr)
+        self.assertEqual(list(self.dir.iterdir()), [])
+
+    def test_results_that_cannot_be_written_are_a_failure(self):
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PALPATE, "--help"], stdout=full, stderr=subprocess.PIPE)
+        self.assertEqual(done.returncode, 1)
+
+
+class Render(FromOutside):
+    HEADER = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n"
+    CUBE = '{"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 800}]}'
+
+    def render(self, scene, renderer, rows):
+        path = self.HEADER + "".join(",".join(map(repr, row)) + "\n" for row in rows)
+        out = self.dir / "out.csv"
+        self.palpate("render", "--scene", self.write("scene.json", scene), "--renderer", renderer, "--trajectory",
+                     self.write("path.csv", path), "--out", out)
+        with open(out, newline="") as file:
+            return [{k: v if k == "contact_type" else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+    def test_a_tip_pressed_into_the_top_of_a_cube(self):
+        rows = self.render(self.CUBE, "point", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [0.001, 0.01, 0, 0.024, 0.01, 0, 0.144]])
+        self.assertEqual(rows[0]["contact_type"], "none")
+        self.assertEqual((rows[0]["contacts"], rows[0]["object"], rows[0]["depth"]), (0, -1, 0))
+        self.assertEqual(rows[0]["ideal_tip_z"], 0.03)
+        self.assertEqual(rows[1]["contact_type"], "point-polygon")
+        self.assertAlmostEqual(rows[1]["force_z"], 0.8, 12)
+        self.assertAlmostEqual(rows[1]["ideal_tip_z"], 0.025, 12)
+        self.assertAlmostEqual(rows[1]["device1_z"], 0.8, 12)
+        self.assertEqual([rows[1][f"torque_{k}"] for k in "xyz"], [0, 0, 0])
+
+    def test_a_stick_laid_across_an_edge_is_split_by_equation_1(self):
+        d = 0.12 / 2 ** 0.5  # the stick in the x = 0 plane, at 45 degrees over the edge (y, z) = (0.025, 0.025)
+
+        def stick(gap):
+            centre = 0.025 + gap / 2 ** 0.5  # along (0, 1, 1) / sqrt 2 from the edge, contact at 0.04 from the tip
+            return [0, centre - 0.04 / 0.12 * d, centre + 0.04 / 0.12 * d, 0, centre + 0.08 / 0.12 * d, centre - 0.08 / 0.12 * d]
+
+        row = self.render(self.CUBE, "ray", [[0, *stick(0.004)], [0.001, *stick(-0.001)]])[1]
+        self.assertEqual(row["contact_type"], "segment-edge")
+        self.assertAlmostEqual(row["depth"], 0.001, 12)
+        self.assertAlmostEqual(row["force_y"], 0.8 / 2 ** 0.5, 10)
+        self.assertAlmostEqual(row["device1_y"] / row["force_y"], 2 / 3, 9)
+        self.assertAlmostEqual(row["device2_y"] / row["force_y"], 1 / 3, 9)
+        self.assertAlmostEqual(abs(row["torque_x"]), 0.8 * 0.04, 10)
+        self.assertAlmostEqual(row["contact_y"], 0.025, 12)
+
+    def test_a_path_that_starts_inside_gives_no_force_until_it_has_left(self):
+        z = [0.02, 0.021, 0.03, 0.024]
+        rows = self.render(self.CUBE, "ray", [[0.001 * i, 0, 0, h, 0, 0, h + 0.12] for i, h in enumerate(z)])
+        self.assertEqual([row["contacts"] for row in rows], [0, 0, 0, 1])
+
+    def test_bad_input_lists_every_fault_and_writes_nothing(self):
+        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": -1, "colour": 3}, {"shape": "egg"}]}')
+        good = self.write("good.csv", self.HEADER + "0,0,0,1,0,0,2\n")
+        out = self.dir / "out.csv"
+        done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
+        for place in ("/objects/0/edge_m", "/objects/0/colour", "/objects/1/shape"):
+            self.assertIn(place, done.stderr)
+        scene = self.write("scene.json", self.CUBE)
+        for text, place in (("t,x\n", "line 1"), (self.HEADER, "row"), (self.HEADER + "0,0,0,1,0,0\n1,a\n", "line 3"),
+                            (self.HEADER + "1,0,0,1,0,0,2\n1,0,0,1,0,0,2\n", "line 3")):
+            done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory",
+                                self.write("bad.csv", text), "--out", out, status=2)
+            self.assertIn(place, done.stderr)
+        self.assertFalse(out.exists())
+
+
+class Simulate(FromOutside):
+    def simulate(self, db, *more, status=0):
+        return self.palpate("simulate", PROTOCOLS / "quick.json", "--db", db, "--participants", 3, *more, status=status)
+
+    def csv_of(self, db):
+        out = self.dir / "trials.csv"
+        self.palpate("export", "--db", db, "--format", "csv", "--out", out, "--force")
+        self.assertFalse((self.dir / "attempts.csv").exists())
+        return out.read_bytes()
+
+    def start(self, db):
+        return subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", db, "--participants", "3"],
+                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def test_the_record_is_the_same_through_kills_and_interrupts(self):
+        whole, broken = self.dir / "whole.db", self.dir / "broken.db"
+        self.simulate(whole, "--jobs", 1)
+        expected = self.csv_of(whole)
+        self.assertEqual(expected.count(b"\n"), 1 + 3 * 24)
+        draw = random.Random(5)
+        stopped = 0
+        for attempt in range(60):
+            child = self.start(broken)
+            time.sleep(draw.uniform(0, 0.25))
+            child.send_signal(draw.choice([signal.SIGKILL, signal.SIGINT, signal.SIGTERM]))
+            stopped += child.wait() != 0
+        self.assertGreater(stopped, 5)
+        self.simulate(broken)
+        self.assertEqual(self.csv_of(broken), expected)
+        self.assertIn("72 of 72", self.simulate(broken).stdout)
+
+    def test_other_seeds_and_settings_do_not_mix_into_one_database(self):
+        db = self.dir / "one.db"
+        self.simulate(db)
+        self.simulate(db, "--seed", 2, status=2)
+        patch = self.write("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')
+        self.simulate(self.dir / "other.db", "--settings", patch)
+        self.assertNotEqual(self.csv_of(db), self.csv_of(self.dir / "other.db"))
+
+    def test_a_second_writer_is_refused(self):
+        db = self.dir / "busy.db"
+        child = subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "ho2000.json", "--db", db],
+                                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            while not db.exists() or db.stat().st_size == 0:
+                time.sleep(0.01)
+            time.sleep(0.2)
+            self.assertIsNone(child.poll())
+            done = self.simulate(db, status=2)
+            self.assertIn("busy.db", done.stderr)
+        finally:
+            child.kill()
+            child.wait()
+
+    def test_all_that_comes_out_is_labelled_simulated(self):
+        db = self.dir / "one.db"
+        self.assertIn("SIMULATED", self.simulate(db).stdout)
+        rows = list(csv.DictReader(self.csv_of(db).decode().splitlines()))
+        self.assertEqual({row["simulated"] for row in rows}, {"1"})
+        self.assertIn("SIMULATED", self.palpate("analyze", "--db", db, "--json", self.dir / "a.json").stdout)
+        self.assertTrue(json.loads((self.dir / "a.json").read_text())["simulated"])
+
+    def test_database_and_csv_give_the_same_analysis(self):
+        db = self.dir / "one.db"
+        self.simulate(db)
+        self.csv_of(db)
+        from_db, from_csv = self.dir / "db.json", self.dir / "csv.json"
+        self.palpate("analyze", "--db", db, "--json", from_db)
+        self.palpate("analyze", "--csv", self.dir / "trials.csv", "--json", from_csv)
+        a, b = json.loads(from_db.read_text()), json.loads(from_csv.read_text())
+        for key in ("counts", "accuracy", "confusion", "times", "paired_by_shape"):
+            self.assertEqual(a[key], b[key])
+
+    def test_files_are_private(self):
+        db = self.dir / "one.db"
+        self.simulate(db)
+        self.assertEqual(os.stat(db).st_mode & 0o777, 0o600)
+
+
+if __name__ == "__main__":
+    sys.exit(unittest.main(argv=sys.argv[:1]))
