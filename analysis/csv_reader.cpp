@@ -119,7 +119,6 @@ CsvReader::Quoted CsvReader::split_quoted() {
       for (++at;; ++at) {
         if (at >= text.size()) return Quoted::incomplete;
         if (text[at] == '"') {
-          if (at + 1 >= text.size() && !at_end_) return Quoted::incomplete;
           if (at + 1 < text.size() && text[at + 1] == '"') {
             ++at;
           } else {

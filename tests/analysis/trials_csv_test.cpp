@@ -178,6 +178,7 @@ TEST_F(TrialsCsv, OverlongFieldsAreRefusedWhereverTheyStand) {
   expect_fault(kHeader + row + huge + ",1,1,2,ray,cone,cone,1,2\n", "line 3", "1 MiB");
   expect_fault(kHeader + row + "\"" + huge + "\",1,1,2,ray,cone,cone,1,2\n", "line 3", "1 MiB");
   expect_fault(huge + "\n" + row, "line 1", "1 MiB");
+  expect_fault(std::string((1U << 20) + 100, 'x') + "\n" + row, "line 1", "1 MiB");
   // Below the limit, across the reader's blocks: a fault of the one field.
   expect_fault(kHeader + row + std::string(700000, 'x') + ",1,1,2,ray,cone,cone,1,2\n",
                "line 3, column participant_id", "1 to 200 bytes");
@@ -218,6 +219,21 @@ TEST_F(TrialsCsv, RowsFlowThroughTheBuffersBlocks) {
   ASSERT_EQ(table.rows.size(), static_cast<std::size_t>(kRows));
   for (int i = 0; i < kRows; ++i) {
     ASSERT_EQ(table.rows[static_cast<std::size_t>(i)].response_time, i + 1.5);
+  }
+}
+
+TEST_F(TrialsCsv, ABlockMayEndAnywhereInAQuotedRecord) {
+  constexpr int kRows = 6000;  // some two blocks
+  const std::string note = "\"a \"\"b\"\"\nc\"";
+  for (std::size_t pad = 0; pad < 60; ++pad) {  // more than a record: every byte is last once
+    std::string text = "note," + kHeader + std::string(pad, 'x') + ",P1,1,1,1,ray,cone,cone,1,2\n";
+    for (int i = 2; i <= kRows; ++i) {
+      text += note + ",P1,1,1," + std::to_string(i) + ",ray,\"cone\",cone,1,\"1." +
+              std::to_string(i) + "\"\n";
+    }
+    const TrialTable table = read(text);
+    ASSERT_EQ(table.rows.size(), static_cast<std::size_t>(kRows)) << pad;
+    ASSERT_EQ(table.shapes.size(), 1U) << pad;
   }
 }
 
