@@ -42,7 +42,7 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
     const Index twin = mesh.twin[h];
     if (twin == kNone || twin < h) continue;
     if (shapes[mesh.face[h]].thin || shapes[mesh.face[twin]].thin) continue;
-    if (outward * fold(mesh, shapes, h) >= -kCoplanar) continue;
+    if (outward * fold_at(mesh, shapes, h) >= -kCoplanar) continue;
     faults.add("not convex", [&] {
       return mesh.name_edge(h) + " is a dent against " + mesh.name_face(mesh.face[twin]) +
              "; expected convex edges only";
@@ -87,7 +87,7 @@ std::vector<Index> order_in_space(const HalfEdges& mesh, const FacetOutlines& ou
 
 // In the plane through a polygon, midway between the corners that stand out most and least.
 Facet facet_of(const std::vector<Vec3>& corners) {
-  Facet facet{plane_of(corners).normal, 0, 0, static_cast<Index>(corners.size())};
+  Facet facet{plane_of(corners).normal, 0, 0, static_cast<Index>(corners.size()), {}};
   double low = std::numeric_limits<double>::max(), high = -low;
   for (const Vec3& corner : corners) {
     low = std::min(low, glm::dot(facet.normal, corner));
@@ -146,6 +146,12 @@ class ConvexMesh::Builder {
     for (Index s = first; s < end; ++s) {
       add_side(s, s + 1 == end ? first : s + 1, corners_[s - first],
                corners_[s + 1 == end ? 0 : s + 1 - first]);
+    }
+    if (facet.side_count == 3) {
+      for (Index i = 0; i < 3; ++i) {
+        const Side& side = out_.sides_[facet.first_side + i];
+        out_.facets_.back().triangle[i] = {side.edge, side.across};
+      }
     }
   }
 
@@ -232,7 +238,7 @@ ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   faults.throw_if_any();
   Builder builder(*this, mesh, outlines);
   builder.build();
-  check_convexity(*this, builder.soup_vertex(), 16 * kCoplanar * mesh.error, faults);
+  check_convexity(*this, builder.soup_vertex(), mesh.error, faults);
   faults.throw_if_any();
 }
 

@@ -2,6 +2,7 @@
 // A closed convex polyhedron, prepared for local search: merged coplanar facets, edges with their
 // two facets, the fan of edges around every vertex.
 
+#include <array>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -39,12 +40,20 @@ struct Side {
   std::uint32_t across;  ///< the facet beyond this side
 };
 
-/// A maximal planar polygon of the surface.
-struct Facet {
+/// What lies beyond a side.
+struct Neighbour {
+  std::uint32_t edge = 0;    ///< index into edges
+  std::uint32_t across = 0;  ///< index into facets
+};
+
+/// A maximal planar polygon of the surface. One cache line: a step from triangle to triangle on a
+/// large mesh then reads nothing but facets.
+struct alignas(64) Facet {
   Vec3 normal;               ///< unit, outward
   double offset;             ///< m; the plane is dot(normal, p) == offset
   std::uint32_t first_side;  ///< its sides are sides[first_side .. first_side + side_count)
   std::uint32_t side_count;
+  std::array<Neighbour, 3> triangle;  ///< of the three sides, in order; triangles only
 };
 
 /// An edge between two facets that are not coplanar. Seen from outside, with v0 below and v1 above,

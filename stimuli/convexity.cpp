@@ -1,9 +1,12 @@
 #include "stimuli/convexity.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <string>
+
+#include "stimuli/fold.h"
 
 namespace palpate {
 namespace {
@@ -34,9 +37,9 @@ Index other_end(const Edge& edge, Index vertex) { return edge.v0 == vertex ? edg
 
 class Checker {
  public:
-  Checker(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, double tolerance,
+  Checker(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, double error,
           MeshFaults& faults)
-      : mesh_(mesh), soup_vertex_(soup_vertex), tolerance_(tolerance), faults_(faults) {}
+      : mesh_(mesh), soup_vertex_(soup_vertex), error_(error), faults_(faults) {}
 
   void check_facet(Index facet) {
     const Facet& shape = mesh_.facets()[facet];
@@ -55,6 +58,21 @@ class Checker {
       return;
     }
     check_plane(facet, lowest);
+  }
+
+  // Before facets were merged every fold was looked at. Dents within the error merge as well, and
+  // many of them make dents between facets that are beyond it.
+  void check_edge(Index number) {
+    const Edge& edge = mesh_.edges()[number];
+    const Vec3 side = place(edge.v1) - place(edge.v0);
+    const double folded =
+        fold(mesh_.facets()[edge.left].normal, mesh_.facets()[edge.right].normal, side,
+             reach_of(edge.left, edge.v0, side), reach_of(edge.right, edge.v1, -side), error_);
+    if (folded >= -2 * kCoplanar) return;
+    faults_.add("not convex", [&] {
+      return "the facets with the vertices " + names(edge.left) + " and " + names(edge.right) +
+             " form a dent; expected convex edges only";
+    });
   }
 
   void check_vertex(Index vertex) {
@@ -92,6 +110,17 @@ class Checker {
     return edge.left == facet ? edge.v0 : edge.v1;
   }
 
+  Reach reach_of(Index facet, Index from, const Vec3& side) const {
+    const Index corners = mesh_.facets()[facet].side_count;
+    // Some tell enough of a facet with many.
+    const Index stride = std::max<Index>(1, corners / 16);
+    Reach reach(side);
+    for (Index k = 0; k < corners; k += stride) {
+      reach.include(place(corner(facet, k)) - place(from));
+    }
+    return reach;
+  }
+
   const Facet& leaving_facet(Index edge, Index vertex) const {
     const Edge& e = mesh_.edges()[edge];
     return mesh_.facets()[e.v0 == vertex ? e.left : e.right];
@@ -109,7 +138,7 @@ class Checker {
   void check_plane(Index facet, Index from) {
     const Facet& shape = mesh_.facets()[facet];
     Index top = from;
-    double height = tolerance_;
+    double height = 16 * kCoplanar * error_;
     for (bool climbing = true; climbing;) {
       climbing = false;
       const Index here = top;
@@ -132,17 +161,18 @@ class Checker {
 
   const ConvexMesh& mesh_;
   const std::vector<Index>& soup_vertex_;
-  double tolerance_;
+  double error_;
   MeshFaults& faults_;
   std::vector<Vec3> directions_, corners_;
 };
 
 }  // namespace
 
-void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex,
-                     double tolerance, MeshFaults& faults) {
-  Checker checker(mesh, soup_vertex, tolerance, faults);
+void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, double error,
+                     MeshFaults& faults) {
+  Checker checker(mesh, soup_vertex, error, faults);
   for (Index f = 0; f < mesh.facets().size(); ++f) checker.check_facet(f);
+  for (Index e = 0; e < mesh.edges().size(); ++e) checker.check_edge(e);
   for (Index v = 0; v < mesh.vertices().size(); ++v) checker.check_vertex(v);
 }
 

@@ -15,23 +15,14 @@ namespace {
 using Index = HalfEdges::Index;
 constexpr Index kNone = HalfEdges::kNone;
 
-// How a face lies against one of its sides.
-struct Reach {
-  double across = 0;    // m, how far it extends from the line of the side
-  double overhang = 0;  // m, how far it extends past the ends of the side
-};
-
-Reach reach_of(const HalfEdges& mesh, Index h, const Vec3& along, double length) {
+Reach reach_of(const HalfEdges& mesh, Index h) {
   const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
   // Some corners tell enough of a polygon with many: trying all would cost their number squared.
   const Index stride = std::max<Index>(1, corners / 16);
-  Reach reach;
+  Reach reach(mesh.to(h) - mesh.from(h));
   for (Index k = 0; k < corners; k += stride) {
     const Index corner = mesh.first[face] + (h - mesh.first[face] + 2 + k) % corners;
-    const Vec3 arm = mesh.from(corner) - mesh.from(h);
-    const double t = glm::dot(arm, along);
-    reach.across = std::max(reach.across, glm::length(arm - t * along));
-    reach.overhang = std::max({reach.overhang, -t, t - length});
+    reach.include(mesh.from(corner) - mesh.from(h));
   }
   return reach;
 }
@@ -59,11 +50,10 @@ class Region {
   bool holds(Index h) const {
     const Vec3 normal = glm::normalize(normal_);
     const Vec3 middle = mesh_.points[0] + moment_ / area_;
-    const Vec3 side = mesh_.to(h) - mesh_.from(h);
-    const double length = glm::length(side), width = area_ / glm::distance(low_, high_);
+    const double width = area_ / glm::distance(low_, high_);
     const Index beyond = mesh_.twin[h], face = mesh_.face[beyond];
-    const Reach reach = reach_of(mesh_, beyond, -side / length, length);
-    const double allowed = 2 * kCoplanar * mesh_.error * (1 + reach.across / width);
+    const double reach = reach_of(mesh_, beyond).across();
+    const double allowed = 2 * kCoplanar * mesh_.error * (1 + reach / width);
     for (Index k = mesh_.first[face]; k < mesh_.first[face + 1]; ++k) {
       if (std::abs(glm::dot(normal, mesh_.from(k) - middle)) > allowed) return false;
     }
@@ -87,7 +77,7 @@ void grow(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index see
     for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
       const Index beyond = mesh.face[mesh.twin[h]];
       if (region_of[beyond] != kNone || shapes[beyond].thin) continue;
-      if (std::abs(fold(mesh, shapes, h)) > kCoplanar || !region.holds(h)) continue;
+      if (std::abs(fold_at(mesh, shapes, h)) > kCoplanar || !region.holds(h)) continue;
       region.add(shapes[beyond], beyond);
       region_of[beyond] = number;
       border.push_back(beyond);
@@ -165,24 +155,10 @@ void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
   }
 }
 
-double fold(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
+double fold_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
   const Index twin = mesh.twin[h];
-  const Vec3& ours = shapes[mesh.face[h]].normal;
-  const Vec3& theirs = shapes[mesh.face[twin]].normal;
-  const Vec3 side = mesh.to(h) - mesh.from(h);
-  const double length = glm::length(side);
-  const Vec3 along = side / length;
-  double sine = glm::dot(glm::cross(ours, theirs), along);
-  // Past a right angle the sine falls again, the fold does not. At more than 60 degrees faces are
-  // not one plane however little is known of them: that keeps the sides of needles apart.
-  const bool sharp = glm::dot(ours, theirs) < 0.5;
-  if (sharp) sine = sine < 0 ? -1 : 1;
-  const Reach near = reach_of(mesh, h, along, length);
-  const Reach far = reach_of(mesh, twin, -along, length);
-  const double lever = 1 + std::max(near.overhang, far.overhang) / length;
-  const double moved = sine * near.across * far.across / (near.across + far.across);
-  const double folded = moved / (mesh.error * lever);
-  return sharp ? std::copysign(std::max(std::abs(folded), 2 * kCoplanar), folded) : folded;
+  return fold(shapes[mesh.face[h]].normal, shapes[mesh.face[twin]].normal,
+              mesh.to(h) - mesh.from(h), reach_of(mesh, h), reach_of(mesh, twin), mesh.error);
 }
 
 std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,

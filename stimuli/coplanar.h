@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "stimuli/fold.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_faults.h"
 
@@ -22,11 +23,8 @@ std::vector<FaceShape> shapes_of(const HalfEdges& mesh);
 void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
                     MeshFaults& faults);
 
-/// How far two faces that share an edge are from being one plane, as the distance by which corners
-/// would have to be moved, over the error of the corners: below kCoplanar they are one plane within
-/// what is known of them, positive when the edge is convex.
-double fold(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, HalfEdges::Index h);
-inline constexpr double kCoplanar = 4;
+/// The fold (fold.h) between the face of a half-edge and the face across.
+double fold_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, HalfEdges::Index h);
 
 /// For each face the number of the maximal planar region that it belongs to; regions are numbered
 /// from 0. \param[out] count the number of regions.

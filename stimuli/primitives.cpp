@@ -55,6 +55,7 @@ void add_rim(PolygonSoup& soup, double radius, double z, int segments) {
 // The corners first .. first + segments, as seen from above (counter-clockwise) or from below.
 std::vector<Index> rim_polygon(Index first, int segments, bool from_above) {
   std::vector<Index> polygon;
+  polygon.reserve(static_cast<std::size_t>(segments));
   for (int k = 0; k < segments; ++k) {
     polygon.push_back(first + static_cast<Index>(from_above ? k : segments - 1 - k));
   }

@@ -19,7 +19,7 @@ std::uint64_t splitmix64(std::uint64_t& state) {
 
 }  // namespace
 
-Random::Random(std::uint64_t seed, std::initializer_list<std::uint64_t> stream) : state_{} {
+Random::Random(std::uint64_t seed, std::initializer_list<std::uint64_t> stream) {
   // Hashing before each element is mixed in makes its position count, and keeps (seed, element)
   // apart from (seed ^ element, 0). With no stream this is the usual seeding of xoshiro256++.
   for (const std::uint64_t element : stream) seed = splitmix64(seed) ^ element;

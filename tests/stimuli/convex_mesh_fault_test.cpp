@@ -142,6 +142,38 @@ TEST(ConvexMeshFaults, NamesAnEdgeOfFourFaces) {
   EXPECT_FAULT(soup, "shared edge: edge");
 }
 
+TEST(ConvexMeshFaults, NamesAVertexWhereTheSurfaceMeetsItself) {
+  PolygonSoup soup = icosphere(0.03, 2);
+  soup.vertices[7] = soup.vertices[3];
+  EXPECT_FAULT(soup, "shared vertex: vertex 3");
+}
+
+// A hollow of so many strips that every fold between them is within the error of the corners.
+TEST(ConvexMeshFaults, SeesAHollowOfFoldsTooFineToSee) {
+  constexpr std::uint32_t kStrips = 200;
+  PolygonSoup soup;
+  soup.coordinate_error = 1e-6;
+  std::vector<std::uint32_t> front{0, 1}, back;
+  soup.vertices = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}};
+  for (std::uint32_t k = 0; k <= kStrips; ++k) {
+    const double x = 1 - 2.0 * k / kStrips;
+    const double z = -0.02 * (1 - x * x);
+    soup.vertices.emplace_back(x, -1, z);
+    soup.vertices.emplace_back(x, 1, z);
+    front.push_back(4 + 2 * k);
+    back.push_back(5 + 2 * (kStrips - k));
+    if (k > 0) soup.faces.push_back({2 + 2 * k, 3 + 2 * k, 5 + 2 * k, 4 + 2 * k});
+  }
+  back.insert(back.end(), {2, 3});
+  soup.faces.push_back(front);
+  soup.faces.push_back(back);
+  soup.faces.push_back({3, 2, 1, 0});
+  soup.faces.push_back({1, 2, 5, 4});
+  soup.faces.push_back({0, 4 + 2 * kStrips, 5 + 2 * kStrips, 3});
+  EXPECT_FAULT(soup, "form a dent");
+  EXPECT_FALSE(mentions(faults_of(soup), "not convex: edge"));
+}
+
 TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
   EXPECT_FAULT(double_star_pyramids(), "wound vertex");
   EXPECT_FAULT(star_prism(), "wound facet");

@@ -101,7 +101,7 @@ TEST(ConvexMesh, DuplicateVerticesAreWelded) {
 
 TEST(ConvexMesh, UnusedVerticesDoNotCount) {
   PolygonSoup soup = cube(0.06);
-  soup.vertices.emplace_back(1e6, 0, 0);
+  soup.vertices.emplace_back(1e12, 0, 0);
   expect_counts(soup, {8, 12, 6});
 }
 
@@ -198,10 +198,40 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
   }
 }
 
+TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
+  Random random(10);
+  for (int i = 0; i < 300; ++i) {
+    const Vec3 axes(1, 0.03 + 0.97 * random.unit(), 0.03 + 0.97 * random.unit());
+    PolygonSoup soup = placed(cut(testing::random_polyhedron(random, 5 + i % 30, axes), i % 4),
+                              uniform_rotation(random), 0.06, Vec3(0.1));
+    for (Vec3& vertex : soup.vertices) vertex = testing::single_precision(vertex);
+    soup.coordinate_error = 0.2 * 0x1p-24;
+    const ConvexMesh mesh(soup);
+    ASSERT_LE(mesh.facets().size(), static_cast<std::size_t>(2 * (5 + i % 30) - 4));
+  }
+}
+
+// Where neighbours are one plane within what is known of them but the whole is round, merging must
+// end somewhere: facets stay within a few errors of the surface.
+TEST(ConvexMesh, SurfacesFinerThanTheirErrorStayRound) {
+  PolygonSoup soup = cylinder(1, 1, 2000);
+  soup.coordinate_error = 2e-6;
+  const ConvexMesh mesh(soup);
+  EXPECT_LT(mesh.facets().size(), 1500U);
+  EXPECT_GT(mesh.facets().size(), 300U);
+  for (const Facet& facet : mesh.facets()) {
+    if (std::abs(facet.normal.z) < 0.5) {
+      EXPECT_NEAR(facet.offset, 1, 5e-5);
+    }
+  }
+}
+
 // Facets that follow each other in memory are near each other: most neighbours of a facet of a
 // large sphere are within the same small part of the array.
 TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {
-  const ConvexMesh mesh(icosphere(0.03, 5));
+  PolygonSoup soup = icosphere(0.03, 5);
+  Random(9).shuffle(soup.faces);
+  const ConvexMesh mesh(soup);
   std::size_t near = 0;
   for (const Edge& edge : mesh.edges()) {
     const auto gap = std::abs(static_cast<long>(edge.left) - static_cast<long>(edge.right));
