@@ -40,7 +40,7 @@ class EveryTick : public ::testing::TestWithParam<const Renderer*> {
 TEST_P(EveryTick, SlidingSlowly) {
   const bool side = GetParam()->side_contact();
   const PathCheck check =
-      follow(1, 100, [side](Random& random, const ConvexMesh& mesh, double length) {
+      follow(1, 300, [side](Random& random, const ConvexMesh& mesh, double length) {
         return testing::sliding_path(random, mesh, length, 300, 0.005, 0.3, side);
       });
   EXPECT_GT(check.in_contact, check.ticks / 3);
@@ -50,14 +50,14 @@ TEST_P(EveryTick, SlidingSlowly) {
 TEST_P(EveryTick, SlidingFastAndDeep) {
   const bool side = GetParam()->side_contact();
   const PathCheck check =
-      follow(2, 100, [side](Random& random, const ConvexMesh& mesh, double length) {
+      follow(2, 300, [side](Random& random, const ConvexMesh& mesh, double length) {
         return testing::sliding_path(random, mesh, length, 200, 0.05, 1.5, side);
       });
   EXPECT_GT(check.in_contact, check.ticks / 3);
 }
 
 TEST_P(EveryTick, Wandering) {
-  const PathCheck check = follow(3, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+  const PathCheck check = follow(3, 600, [](Random& random, const ConvexMesh& mesh, double length) {
     return testing::wandering_path(random, mesh, length, 400, 0.01);
   });
   EXPECT_GT(check.in_contact, check.ticks / 50);
@@ -65,7 +65,7 @@ TEST_P(EveryTick, Wandering) {
 }
 
 TEST_P(EveryTick, PassingFast) {
-  const PathCheck check = follow(4, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+  const PathCheck check = follow(4, 600, [](Random& random, const ConvexMesh& mesh, double length) {
     const double step = 0.02 * std::pow(1000, random.unit());
     return testing::fast_passes(random, mesh, length, 300, step);
   });
@@ -73,7 +73,7 @@ TEST_P(EveryTick, PassingFast) {
 }
 
 TEST_P(EveryTick, Jumping) {
-  const PathCheck check = follow(5, 200, [](Random& random, const ConvexMesh& mesh, double length) {
+  const PathCheck check = follow(5, 600, [](Random& random, const ConvexMesh& mesh, double length) {
     return testing::jumping_path(random, mesh, length, 200);
   });
   EXPECT_GT(check.in_contact, check.ticks / 10);
@@ -83,7 +83,7 @@ TEST_P(EveryTick, Jumping) {
 // can have. Jumps make it walk halfway round.
 TEST_P(EveryTick, JumpingOverRims) {
   PathCheck check;
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+  for (std::uint64_t seed = 0; seed < 120; ++seed) {
     Random random(seed, {6});
     const int corners = 64 << (seed % 4);
     const PolygonSoup soup = seed % 3

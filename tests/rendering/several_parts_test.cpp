@@ -155,6 +155,34 @@ TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
   EXPECT_LE(glm::length(r.force - kStiffness * Vec3(0, 0, 0.001)), 1e-8);
 }
 
+TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
+  int in_contact = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    Random random(seed, {43});
+    std::vector<SceneObject> parts;
+    for (std::uint64_t i = 0; i < 2 + seed % 3; ++i) {
+      parts.push_back(placed_object(std::make_shared<const ConvexMesh>(testing::random_polyhedron(
+                                        random, 12, Vec3(0.04, 0.03, 0.02))),
+                                    testing::random_pose(random, 0.025), kStiffness, 0));
+    }
+    const Scene scene(parts);
+    RenderState state = scene.initial_state();
+    const ConvexMesh around(icosphere(0.05, 1));
+    tick(scene, state, {Vec3(1, 1, 1), Vec3(1, 1, 1.1)});
+    for (const LineProbe& probe : testing::wandering_path(random, around, 0.12, 400, 0.01)) {
+      const Rendering r = tick(scene, state, probe);
+      in_contact += r.contacts > 0;
+      if (r.contacts > 0) continue;
+      for (const SceneObject& part : parts) {
+        LineProbe local = testing::to_local(part.pose, probe);
+        if (!GetParam()->side_contact()) local.tail = local.tip;
+        ASSERT_LE(reference_depth(*part.mesh, local).depth, 1e-9) << "seed " << seed;
+      }
+    }
+  }
+  EXPECT_GT(in_contact, 1000);
+}
+
 TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
   const Scene scene = slab_cut_at({0.0});
   for (const double x : {-0.02, -0.001, 0.0, 0.004, 0.02}) {
