@@ -14,7 +14,7 @@ namespace {
 
 using Kind = MinkowskiFacet::Kind;
 
-constexpr std::uint32_t kNoSide = ~0u;
+constexpr std::uint32_t kNone = ~0u;
 constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by halving
 constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below this: no contact edge
 constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is rounding, not a step
@@ -26,14 +26,15 @@ std::uint32_t corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& si
 
 bool outside(const Side& side, const Vec3& p) { return glm::dot(side.inward, p) < side.offset; }
 
-/// The side of a polygon with many sides that p lies beyond: halving over the fan of triangles at
-/// corner 0, so that a cap of a thousand sides costs ten comparisons.
-std::uint32_t violated_side_of_many(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+/// What p, a point of the plane of a polygon with many sides, lies over: halving over the fan of
+/// triangles at corner 0, so that a cap of a thousand sides costs ten comparisons.
+Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
   const Facet& facet = mesh.facets()[index];
   const Side* sides = &mesh.sides()[facet.first_side];
   const std::uint32_t count = facet.side_count;
-  if (outside(sides[0], p)) return facet.first_side;
-  if (outside(sides[count - 1], p)) return facet.first_side + count - 1;
+  const auto beyond = [&](std::uint32_t i) { return Neighbour{sides[i].edge, sides[i].across}; };
+  if (outside(sides[0], p)) return beyond(0);
+  if (outside(sides[count - 1], p)) return beyond(count - 1);
   const Vec3 apex = mesh.vertices()[corner(mesh, index, sides[0])];
   const Vec3 turn = glm::cross(facet.normal, p - apex);  // in-plane, a quarter turn ahead of p
   std::uint32_t low = 1, high = count - 1;  // p lies between the rays to corner low and corner high
@@ -42,24 +43,37 @@ std::uint32_t violated_side_of_many(const ConvexMesh& mesh, std::uint32_t index,
     const Vec3 ray = mesh.vertices()[corner(mesh, index, sides[middle])] - apex;
     (glm::dot(ray, turn) <= 0 ? low : high) = middle;
   }
-  return outside(sides[low], p) ? facet.first_side + low : kNoSide;
+  return outside(sides[low], p) ? beyond(low) : Neighbour{kNone, kNone};
 }
 
-/// The side that p, a point of the facet's plane, lies farthest beyond; kNoSide when p is inside.
-std::uint32_t violated_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+/// What p, a point of the facet's plane, lies over when it is past a side; edge kNone when it is
+/// inside.
+Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
   const Facet& facet = mesh.facets()[index];
-  if (facet.side_count > kScanSides) return violated_side_of_many(mesh, index, p);
-  std::uint32_t worst = kNoSide;
-  double worst_margin = 0;
+  if (facet.side_count > kScanSides) return beyond_many(mesh, index, p);
+  Neighbour beyond{kNone, kNone};
+  double worst = 0;
+  if (facet.side_count == 3) {
+    // Past a side is above the plane of the facet there, which a step reads next anyway.
+    for (const Neighbour& next : facet.triangle) {
+      const Facet& across = mesh.facets()[next.across];
+      const double height = glm::dot(across.normal, p) - across.offset;
+      if (height > worst) {
+        worst = height;
+        beyond = next;
+      }
+    }
+    return beyond;
+  }
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
     const Side& side = mesh.sides()[i];
-    const double margin = glm::dot(side.inward, p) - side.offset;
-    if (margin < worst_margin) {
-      worst_margin = margin;
-      worst = i;
+    const double distance = side.offset - glm::dot(side.inward, p);
+    if (distance > worst) {
+      worst = distance;
+      beyond = {side.edge, side.across};
     }
   }
-  return worst;
+  return beyond;
 }
 
 /// One facet of M measured against the probe.
@@ -108,7 +122,7 @@ bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, 
   const double c2 = glm::dot(c, c);
   if (c2 <= kParallel * kParallel * glm::dot(e, e) * glm::dot(d, d)) return false;
   const double inverse = 1 / c2;
-  const double scale = (left_ahead ? 1 : -1) * std::sqrt(inverse);
+  const double scale = (left_ahead ? inverse : -inverse) * std::sqrt(c2);
   const Vec3 w = tip - v0;
   m.facet = {Kind::edge, left_ahead, index};
   m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
@@ -119,26 +133,53 @@ bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, 
   return true;
 }
 
-/// The silhouette edge at `vertex` other than `from`; the fan around a vertex crosses the
-/// silhouette exactly twice. Returns `from` when rounding hides the second one.
-std::uint32_t other_silhouette_edge(const ConvexMesh& mesh, std::uint32_t vertex,
-                                    std::uint32_t from, const Vec3& d, bool& left_ahead) {
+/// A silhouette edge and its face ahead.
+struct SilhouetteEdge {
+  std::uint32_t edge = kNone;
+  bool left_ahead = false;
+};
+
+/// The other silhouette edge at one end of `from`, which is one; the faces around a vertex change
+/// sides exactly twice. Turns about the vertex counter-clockwise, from face to face, until they do.
+/// Edge kNone when rounding hides the second one, or where not all faces are triangles.
+SilhouetteEdge turn_about(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+                          bool left_ahead, const Vec3& d) {
+  // Out of the face on the left the next side starts at v1, out of the one on the right at v0.
+  const bool ahead = about_v1 == left_ahead;
+  std::uint32_t edge = from;
+  const Facet* face = &mesh.facets()[about_v1 ? mesh.edges()[from].left : mesh.edges()[from].right];
+  while (face->side_count == 3) {
+    const auto& sides = face->triangle;
+    const Neighbour& next = sides[edge == sides[0].edge ? 1 : edge == sides[1].edge ? 2 : 0];
+    edge = next.edge;
+    if (edge == from) return {};
+    const Facet* across = &mesh.facets()[next.across];
+    if ((glm::dot(across->normal, d) >= 0) != ahead) {
+      const bool face_is_left = face == &mesh.facets()[mesh.edges()[edge].left];
+      return {edge, face_is_left == ahead};
+    }
+    face = across;
+  }
+  return {};
+}
+
+/// The same by looking through the vertex' fan.
+SilhouetteEdge search_fan(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+                          const Vec3& d) {
+  const std::uint32_t vertex = about_v1 ? mesh.edges()[from].v1 : mesh.edges()[from].v0;
   for (std::uint32_t i = mesh.fan_first()[vertex]; i < mesh.fan_first()[vertex + 1]; ++i) {
     const std::uint32_t candidate = mesh.fan_edges()[i];
-    if (candidate == from) continue;
     const Slopes slopes = slopes_at(mesh, mesh.edges()[candidate], d);
-    if (slopes.silhouette()) {
-      left_ahead = slopes.left >= 0;
-      return candidate;
-    }
+    if (candidate != from && slopes.silhouette()) return {candidate, slopes.left >= 0};
   }
-  return from;
+  return {};
 }
 
 /// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
 /// face.
 template <bool kSegment>
-Measured step_from_face(const ConvexMesh& mesh, const Side& side, const Vec3& tip, const Vec3& d) {
+Measured step_from_face(const ConvexMesh& mesh, const Neighbour& side, const Vec3& tip,
+                        const Vec3& d) {
   if constexpr (kSegment) {
     const Slopes slopes = slopes_at(mesh, mesh.edges()[side.edge], d);
     Measured next;
@@ -159,13 +200,13 @@ bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip,
     return true;
   }
   if (at.along_edge < 0 || at.along_edge > 1) {
-    const std::uint32_t vertex = at.along_edge < 0 ? edge.v0 : edge.v1;
-    bool left_ahead = false;
-    const std::uint32_t index = other_silhouette_edge(mesh, vertex, at.facet.index, d, left_ahead);
-    if (index == at.facet.index) return false;
-    if (measure_edge(mesh, index, left_ahead, tip, d, next)) return true;
+    const bool about_v1 = at.along_edge > 1;
+    SilhouetteEdge other = turn_about(mesh, at.facet.index, about_v1, at.facet.left_ahead, d);
+    if (other.edge == kNone) other = search_fan(mesh, at.facet.index, about_v1, d);
+    if (other.edge == kNone) return false;
+    if (measure_edge(mesh, other.edge, other.left_ahead, tip, d, next)) return true;
     // Parallel to the probe: its two faces meet there with the same depth.
-    next = measure_face<true>(mesh, mesh.edges()[index].left, tip, d);
+    next = measure_face<true>(mesh, mesh.edges()[other.edge].left, tip, d);
     return true;
   }
   return false;
@@ -213,9 +254,9 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
       if (!step_from_edge(mesh, at, tip, d, next)) break;
     } else {
       const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
-      const std::uint32_t side = violated_side(mesh, at.facet.index, end + at.depth * at.normal);
-      if (side == kNoSide) break;
-      next = step_from_face<kSegment>(mesh, mesh.sides()[side], tip, d);
+      const Neighbour side = beyond_side(mesh, at.facet.index, end + at.depth * at.normal);
+      if (side.edge == kNone) break;
+      next = step_from_face<kSegment>(mesh, side, tip, d);
     }
     if (!(next.depth < at.depth - gain)) break;
     at = next;
