@@ -182,6 +182,7 @@ TEST_F(MeshFile, StatesHowExactTheNumbersAre) {
   EXPECT_NEAR(error("12.3456789012 0.5 0.0125"), 0.5e-10, 1e-16);       // twelve digits
   EXPECT_NEAR(error("1234.5678 0.5 0.01"), 1234.5678 * 0x1p-24, 1e-9);  // %.8g of a float
   EXPECT_NEAR(error("0.1 0.05 0"), 0.5e-6, 1e-12);                      // by hand
+  EXPECT_NEAR(error("0.0010 0.0000 0.0005"), 1e-7, 1e-12);              // never above 1e-4 of it
   EXPECT_LT(error("0.12345678901234567 0 0"), 1e-16);
   const double single = static_cast<float>(0.1);
   EXPECT_NEAR(error(printed("%.17g", single) + " 0 0"), single * 0x1p-24, 1e-15);
