@@ -261,7 +261,7 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
     if (!(next.depth < at.depth - gain)) break;
     at = next;
     // A path straight across the object visits some sqrt(facets) of them.
-    if (++steps > 16 && steps > 16 + 4 * std::sqrt(static_cast<double>(mesh.facets().size()))) {
+    if (++steps > static_cast<int>(mesh.facets().size() + mesh.edges().size())) {
       capped = true;
       break;
     }
@@ -298,6 +298,15 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
   return walk<false>(mesh, start, tip, Vec3(0));
+}
+
+WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                              const Vec3& d) {
+  return to_result(resume<true>(mesh, start, tip, d), false);
+}
+
+WalkResult same_facet_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
+  return to_result(resume<false>(mesh, start, tip, Vec3(0)), false);
 }
 
 WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {

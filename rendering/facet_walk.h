@@ -42,4 +42,9 @@ WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& 
 WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
 WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip);
 
+/// The plane of the facet of the last tick, wherever on it the probe is now: a walk of no steps.
+WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                              const Vec3& d);
+WalkResult same_facet_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+
 }  // namespace palpate

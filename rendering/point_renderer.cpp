@@ -1,5 +1,5 @@
+#include "rendering/render.h"
 #include "rendering/renderer.h"
-#include "rendering/tick.h"
 
 namespace palpate {
 namespace {

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <numbers>
 
+#include "rendering/render.h"
 #include "rendering/renderer.h"
-#include "rendering/tick.h"
 
 namespace palpate {
 namespace {

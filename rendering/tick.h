@@ -1,8 +1,7 @@
 #pragma once
-// The tick that both renderers share; they differ in what touches (a point or a segment) and in
-// where along the probe a contact stands. Included by point_renderer.cpp and ray_renderer.cpp
-// alone.
+// How one convex part is touched, found or followed, by either kind of probe.
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <span>
@@ -11,6 +10,14 @@
 #include "rendering/renderer.h"
 
 namespace palpate::tick {
+
+// Farther off (m) than any device or hand: a reading beyond it is a fault, like NaN, and sums of
+// squares below it are exact enough to separate objects.
+constexpr double kFarthest = 1e6;
+
+inline bool plausible(const Vec3& v) {
+  return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
+}
 
 inline bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -87,14 +94,16 @@ struct Tick {
   double rate;    ///< 1/s, ticks; 0 when unknown
   std::uint32_t faults = 0;
 
-  /// \param shift  m, world: what the part's siblings have already moved the ideal probe by
+  const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
+
+  /// Follows one part and adds its contact, if there is one, to the tick's.
+  /// \param shift  m, world: what the part's siblings move the ideal probe by
   void touch(std::uint32_t index, const Vec3& shift) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
     const LineProbe local = to_local<Probe>(part, probe, shift);
     WalkResult hit;
-    const bool touching =
-        track<Probe>(part, memory, state.has_last ? &state.last : nullptr, local, hit, faults);
+    const bool touching = track<Probe>(part, memory, last(), local, hit, faults);
     memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
     if (!touching) return;
@@ -117,91 +126,6 @@ struct Tick {
       c.closing_speed = -glm::dot(motion, c.contact.normal) * rate;
     }
   }
-
-  /// What the other parts of the same compound move the ideal probe by.
-  Vec3 shift_of_siblings(std::span<const std::uint32_t> group, std::uint32_t index) const {
-    Vec3 shift(0);
-    for (const std::uint32_t other : group) {
-      if (other != index) shift += state.parts[other].share;
-    }
-    return shift;
-  }
-
-  /// Parts of one compound: each is met where the others let the ideal probe be, so that the probe
-  /// slides over a seam instead of running into the inner wall behind it. Those that hold the probe
-  /// come first: when one lets go, the next takes over in the same tick.
-  void touch_compound(std::span<const std::uint32_t> group) {
-    for (const bool held : {true, false}) {
-      for (const std::uint32_t index : group) {
-        PartState& memory = state.parts[index];
-        if ((memory.facet.kind != MinkowskiFacet::Kind::none) != held) continue;
-        touch(index, shift_of_siblings(group, index));
-        if (memory.facet.kind == MinkowskiFacet::Kind::none) memory.share = Vec3(0);
-      }
-    }
-  }
 };
-
-/// All parts in reach, their forces, and the sum.
-template <class Probe>
-Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe, double dt) {
-  Rendering out;
-  out.ideal = probe;
-  if (!finite(probe.tip) || !finite(probe.tail)) {
-    out.faults = render_fault::kNonFinite;
-    out.ideal = state.last;
-    return out;
-  }
-  survey(scene, state, probe);
-  state.contacts.clear();
-  Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0,
-                   state.has_last && dt > 0 ? 1 / dt : 0};
-  const std::span<const std::uint32_t> near(state.near_parts);
-  for (std::size_t begin = 0, end = 0; begin < near.size(); begin = end) {
-    const int object = scene.parts()[near[begin]].object;
-    for (end = begin + 1; end < near.size() && scene.parts()[near[end]].object == object;) ++end;
-    if (end - begin == 1) {
-      tick.touch(near[begin], state.parts[near[begin]].share = Vec3(0));
-    } else {
-      tick.touch_compound(near.subspan(begin, end - begin));
-    }
-  }
-  state.last = probe;
-  state.has_last = true;
-  out.faults = tick.faults;
-  if (state.contacts.empty()) return out;
-
-  const std::span<LoadedContact> contacts(state.contacts);
-  load(contacts);
-  std::size_t deepest = 0;
-  for (std::size_t i = 0; i < contacts.size(); ++i) {
-    // Where the ideal probe is: moved by all contacts with the same object.
-    Vec3 shift(0);
-    for (const auto& c : contacts) {
-      if (c.object == contacts[i].object) shift += c.share * c.contact.normal;
-    }
-    Contact& contact = contacts[i].contact;
-    state.parts[contacts[i].part].share = contacts[i].share * contact.normal;
-    contact.along = contacts[i].place * tick.length;
-    contact.point = probe.tip + contacts[i].place * (probe.tail - probe.tip) + shift;
-    if (i == 0 || contact.depth > contacts[deepest].contact.depth) {
-      deepest = i;
-      out.ideal = {probe.tip + shift, probe.tail + shift};
-    }
-  }
-  const Loads loads = sum_loads(contacts, probe);
-  if (!finite(loads.force) || !finite(loads.torque)) {
-    out.faults |= render_fault::kNonFinite;
-    return out;
-  }
-  out.force = loads.force;
-  if constexpr (Probe::kSegment) out.torque = loads.torque;
-  out.device1 = loads.device1;
-  out.device2 = loads.device2;
-  out.contacts = static_cast<int>(contacts.size());
-  out.object = contacts[deepest].object;
-  out.deepest = contacts[deepest].contact;
-  return out;
-}
 
 }  // namespace palpate::tick
