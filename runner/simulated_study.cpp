@@ -97,10 +97,13 @@ struct Shared {
   StimulusLibrary library;
   ShapeHypotheses hypotheses;
   std::uint64_t seed;
+  const std::atomic<bool>& stop;    ///< asked for from outside
+  std::atomic<bool> failed{false};  ///< a worker or the store threw
+
+  bool halting() const { return stop || failed; }
 };
 
-void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue,
-                 const std::atomic<bool>& stop) {
+void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue) {
   const Protocol& protocol = shared.protocol;
   const SimulatedSettings own = individual(shared.settings, shared.seed, work.participant.number);
   SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -114,7 +117,8 @@ void run_session(const Shared& shared, const Work& work, std::size_t index, Queu
   Session session({protocol, shared.library, servo, clock, participant, log},
                   plan_of(protocol, work), work.info.clock);
   // A trial that was shown is recorded, also when it is the last for now.
-  while (session.state() != Session::State::end && (!stop || session.state() == Session::State::response)) {
+  while (session.state() != Session::State::end &&
+         (!shared.halting() || session.state() == Session::State::response)) {
     session.step();
   }
 }
@@ -214,8 +218,8 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
                              const std::function<void(const StudyProgress&)>& report) {
   std::vector<ObjectSpec> shapes;
   for (const StimulusSpec& stimulus : protocol.stimuli) shapes.push_back(stimulus.object);
-  const Shared shared{protocol, settings, StimulusLibrary(protocol), ShapeHypotheses(shapes),
-                      plan.seed};
+  Shared shared{protocol,  settings, StimulusLibrary(protocol), ShapeHypotheses(shapes),
+                plan.seed, stop};
   const SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
                                protocol.stylus.grip, 1 / protocol.servo_rate);
   std::string reasons;
@@ -231,17 +235,16 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
       work;  // the workers' own copy: the recorder moves its clocks on
   Queue queue(protocol.samples ? 8 : 4096);
   std::atomic<std::size_t> next{0};
-  std::atomic<bool> halt{false};
   const int workers = std::max(1, std::min(plan.jobs, static_cast<int>(work.size())));
   const auto worker = [&] {
     std::exception_ptr error;
     try {
-      for (std::size_t i = next++; i < sessions.size() && !halt; i = next++) {
-        run_session(shared, sessions[i], i, queue, halt);
+      for (std::size_t i = next++; i < sessions.size() && !shared.halting(); i = next++) {
+        run_session(shared, sessions[i], i, queue);
       }
     } catch (...) {
       error = std::current_exception();
-      halt = true;
+      shared.failed = true;
     }
     queue.worker_done(error);
   };
@@ -250,14 +253,13 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
   std::exception_ptr failure;
   for (bool all_done = false; !all_done;) {
     auto came = queue.take(workers, all_done);
-    if (stop) halt = true;
     if (failure) continue;  // the workers are finishing their trials; nothing more can be recorded
     try {
       recorder.record(std::move(came), progress);
       if (report) report(progress);
     } catch (...) {
       failure = std::current_exception();
-      halt = true;
+      shared.failed = true;
     }
   }
   threads.clear();

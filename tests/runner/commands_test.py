@@ -123,7 +123,7 @@ class Render(FromOutside):
 
 class Simulate(FromOutside):
     def simulate(self, db, *more, status=0):
-        return self.palpate("simulate", PROTOCOLS / "quick.json", "--db", db, "--participants", 3, *more, status=status)
+        return self.palpate("simulate", PROTOCOLS / "quick.json", "--db", db, *(more or ["--participants", 3]), status=status)
 
     def csv_of(self, db):
         out = self.dir / "trials.csv"
@@ -131,33 +131,35 @@ class Simulate(FromOutside):
         self.assertFalse((self.dir / "attempts.csv").exists())
         return out.read_bytes()
 
-    def start(self, db):
-        return subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", db, "--participants", "3"],
-                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
     def test_the_record_is_the_same_through_kills_and_interrupts(self):
-        whole, broken = self.dir / "whole.db", self.dir / "broken.db"
-        self.simulate(whole, "--jobs", 1)
+        people = ["--participants", "8"]
+        whole = self.dir / "whole.db"
+        self.simulate(whole, *people, "--jobs", 1)
         expected = self.csv_of(whole)
-        self.assertEqual(expected.count(b"\n"), 1 + 3 * 24)
+        self.assertEqual(expected.count(b"\n"), 1 + 8 * 24)
         draw = random.Random(5)
         stopped = 0
-        for attempt in range(60):
-            child = self.start(broken)
-            time.sleep(draw.uniform(0, 0.25))
-            child.send_signal(draw.choice([signal.SIGKILL, signal.SIGINT, signal.SIGTERM]))
-            stopped += child.wait() != 0
-        self.assertGreater(stopped, 5)
-        self.simulate(broken)
-        self.assertEqual(self.csv_of(broken), expected)
-        self.assertIn("72 of 72", self.simulate(broken).stdout)
+        for number in range(100):
+            broken = self.dir / f"broken{number}.db"
+            for _ in range(4):
+                child = subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", broken, *people],
+                                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                time.sleep(draw.uniform(0, 0.4))
+                child.send_signal(draw.choice([signal.SIGKILL, signal.SIGINT, signal.SIGTERM]))
+                stopped += child.wait() != 0
+            self.simulate(broken, *people)
+            self.assertEqual(self.csv_of(broken), expected)
+            self.assertIn("192 of 192", self.simulate(broken, *people).stdout)
+            if stopped >= 12:
+                return
+        self.fail(f"only {stopped} interruptions in 100 studies")
 
     def test_other_seeds_and_settings_do_not_mix_into_one_database(self):
         db = self.dir / "one.db"
         self.simulate(db)
-        self.simulate(db, "--seed", 2, status=2)
+        self.simulate(db, "--participants", 3, "--seed", 2, status=2)
         patch = self.write("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')
-        self.simulate(self.dir / "other.db", "--settings", patch)
+        self.simulate(self.dir / "other.db", "--participants", 3, "--settings", patch)
         self.assertNotEqual(self.csv_of(db), self.csv_of(self.dir / "other.db"))
 
     def test_a_second_writer_is_refused(self):
