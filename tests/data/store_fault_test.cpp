@@ -167,9 +167,28 @@ TEST(StoreFault, AVanishedFileIsNoticed) {
   });
 }
 
+/// Root may write everything: while this lives, the test is nobody, who owns the folder.
+class Unprivileged {
+ public:
+  explicit Unprivileged(const fs::path& folder) : was_root_(::geteuid() == 0) {
+    constexpr ::uid_t kNobody = 65534;
+    if (was_root_ && (::chown(folder.c_str(), kNobody, kNobody) != 0 || ::seteuid(kNobody) != 0)) {
+      throw std::runtime_error("cannot become an unprivileged user");
+    }
+  }
+  ~Unprivileged() {
+    if (was_root_ && ::seteuid(0) != 0) std::abort();
+  }
+  Unprivileged(const Unprivileged&) = delete;
+  Unprivileged& operator=(const Unprivileged&) = delete;
+
+ private:
+  bool was_root_;
+};
+
 TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
-  if (::getuid() == 0) GTEST_SKIP() << "root may write everything";
   const TemporaryFolder folder;
+  const Unprivileged unprivileged(folder.path());
   write(folder / "study.db");
   fs::permissions(folder / "study.db", fs::perms::owner_read);
   EXPECT_TRUE(contains(error_of([&] { write(folder / "study.db"); }), "may not be written"));
