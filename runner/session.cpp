@@ -110,7 +110,8 @@ void Session::run_trial() {
   record_.response_time = protocol.response.time_out;
   if (answer) {
     record_.response_ns = answer->time_ns;
-    record_.response_time = static_cast<double>(record_.response_ns - record_.onset_ns) / kSecond_ns;
+    record_.response_time =
+        static_cast<double>(record_.response_ns - record_.onset_ns) / kSecond_ns;
     record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
@@ -131,7 +132,8 @@ void Session::note(const Sample& sample) {
   }
   const Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
-    record_.first_contact_time = static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
+    record_.first_contact_time =
+        static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
   }
   if (!parts_.protocol.samples) return;
   SampleRecord kept;

@@ -56,25 +56,6 @@ void check_outputs(const std::vector<Output>& outputs, const std::string& source
   }
 }
 
-/// Beside the target first, then renamed: the target is whole or untouched. What is no regular file
-/// (a pipe, a terminal) is written to as it is.
-void write_whole(const std::string& path, const std::string& text) {
-  std::error_code error;
-  const bool in_place = fs::exists(path, error) && !fs::is_regular_file(path, error);
-  const std::string target = in_place ? path : fs::weakly_canonical(path, error).string();
-  const std::string draft = in_place ? path : target + ".part";
-  std::ofstream out(draft, std::ios::binary);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  error.clear();
-  if (out && !in_place) fs::rename(draft, target, error);
-  if (!out || error) {
-    if (!in_place) fs::remove(draft, error);
-    throw std::runtime_error(path +
-                             ": cannot be written; check the folder, its permissions and the disk");
-  }
-}
-
 TrialTable read_trials(const std::string& database, const std::string& csv) {
   if (!csv.empty()) return read_trials_csv(csv);
   try {

@@ -1,5 +1,7 @@
 #include "runner/commands/command.h"
 
+#include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <optional>
 
@@ -21,7 +23,9 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
   try {
     po::store(po::command_line_parser(args).options(all).positional(positional).run(), values);
     if (values.count("help")) {
-      std::cout << "Usage: " << usage << "\n\n" << summary << "\n\n" << options << "\nExamples:\n"
+      std::cout << "Usage: " << usage << "\n\n"
+                << summary << "\n\n"
+                << options << "\nExamples:\n"
                 << example << "\n";
       return std::nullopt;
     }
@@ -35,6 +39,25 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
     }
   }
   return values;
+}
+
+void write_whole(const std::string& path, const std::string& text) {
+  std::error_code error;
+  const bool in_place =
+      std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
+  const std::string target =
+      in_place ? path : std::filesystem::weakly_canonical(path, error).string();
+  const std::string draft = in_place ? path : target + ".part";
+  std::ofstream out(draft, std::ios::binary);
+  out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  out.close();
+  error.clear();
+  if (out && !in_place) std::filesystem::rename(draft, target, error);
+  if (!out || error) {
+    if (!in_place) std::filesystem::remove(draft, error);
+    throw std::runtime_error(path +
+                             ": cannot be written; check the folder, its permissions and the disk");
+  }
 }
 
 }  // namespace palpate

@@ -31,6 +31,10 @@ struct CommandLine {
   std::optional<boost::program_options::variables_map> parse(const std::vector<std::string>& args);
 };
 
+/// Writes a file whole or leaves it untouched: beside the target first, then renamed. What is no
+/// regular file (a pipe, a terminal) is written to as it is. \throws std::runtime_error.
+void write_whole(const std::string& path, const std::string& text);
+
 int analyze_command(const std::vector<std::string>& args);
 int export_command(const std::vector<std::string>& args);
 int render_command(const std::vector<std::string>& args);

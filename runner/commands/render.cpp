@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 
@@ -104,21 +103,6 @@ void append_row(std::string& out, double t, const Rendering& r) {
   append(out, r.deepest.depth);
   out += ',' + std::to_string(r.contacts) + ',' + to_string(r.deepest.type) + ',' +
          std::to_string(r.object) + '\n';
-}
-
-/// Beside the target first, then renamed: the target is whole or untouched.
-void write_whole(const std::string& path, const std::string& text) {
-  const std::string draft = path + ".part";
-  std::ofstream out(draft, std::ios::binary);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(draft, path, error);
-  if (!out || error) {
-    std::filesystem::remove(draft, error);
-    throw std::runtime_error(path +
-                             ": cannot be written; check the folder, its permissions and the disk");
-  }
 }
 
 }  // namespace

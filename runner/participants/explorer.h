@@ -50,7 +50,7 @@ class Explorer {
   Vec3 tip_, axis_{0, 0, 1};               ///< where the hand wants the stylus
   Vec3 start_, aim_, goal_axis_{0, 0, 1};  ///< of the approach
   Vec3 heading_;                           ///< unit
-  double left_ = 0;  ///< s, of this stage
+  double left_ = 0;                        ///< s, of this stage
 };
 
 }  // namespace palpate
