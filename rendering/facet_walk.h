@@ -9,14 +9,18 @@
 namespace palpate {
 
 /// A facet of M, the Minkowski sum of the object and the mirrored probe: a facet of the object with
-/// the deeper end of the probe, or a silhouette edge of the object with the probe's direction.
+/// the deeper end of the probe, or a silhouette edge of the object with the probe's direction. One
+/// word: it is copied at every step, and a word that was written in parts is slow to read back.
 struct MinkowskiFacet {
-  enum class Kind : std::uint8_t { none, face, edge };
-  Kind kind = Kind::none;
+  enum class Kind : std::uint32_t { none, face, edge };
+  MinkowskiFacet() = default;
+  MinkowskiFacet(Kind k, bool ahead, std::uint32_t i) : kind(k), left_ahead(ahead), index(i) {}
+
+  Kind kind : 2 = Kind::none;
   /// Edge only: which of its two faces turned towards the tail (dot(normal, d) >= 0) at the last
   /// tick.
-  bool left_ahead = false;
-  std::uint32_t index = 0;  ///< of the facet or edge in the mesh
+  bool left_ahead : 1 = false;
+  std::uint32_t index : 29 = 0;  ///< of the facet or edge in the mesh
 };
 
 /// Where a walk ended. Mesh frame.
