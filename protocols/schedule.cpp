@@ -41,6 +41,7 @@ std::uint64_t code(const Group& group) { return group.size() == 1 ? code(group.f
 std::vector<std::string> names_of(const Protocol& protocol) {
   std::vector<std::string> names;
   names.reserve(protocol.stimuli.size());
+  names.reserve(protocol.stimuli.size());
   for (const StimulusSpec& stimulus : protocol.stimuli) names.push_back(stimulus.name);
   return names;
 }
@@ -53,6 +54,7 @@ std::vector<Group> groups_in_order(const Protocol& protocol, int participant_num
     row = latin_square_row(static_cast<int>(row.size()), participant_number);
   }
   std::vector<Group> groups;
+  groups.reserve(row.size());
   for (const int index : row) {
     groups.push_back({protocol.renderers[static_cast<std::size_t>(index)]});
   }

@@ -42,7 +42,7 @@ class Queue {
     records_.emplace_back(work, record);
     if (records_.size() >= room_) done_.notify_all();
   }
-  void worker_done(std::exception_ptr error) {
+  void worker_done(const std::exception_ptr& error) {
     const std::lock_guard lock(mutex_);
     ++workers_done_;
     if (error && !error_) error_ = error;
@@ -165,7 +165,7 @@ class Recorder {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
   }
 
-  void record(std::deque<std::pair<std::size_t, TrialRecord>> came, StudyProgress& progress) {
+  void record(std::deque<std::pair<std::size_t, TrialRecord>>&& came, StudyProgress& progress) {
     std::map<std::size_t, std::vector<TrialRecord>> by_work;
     for (auto& [index, record] : came) by_work[index].push_back(std::move(record));
     for (auto& [index, records] : by_work) {
@@ -249,6 +249,7 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
     queue.worker_done(error);
   };
   std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(workers));
   for (int i = 0; i < workers; ++i) threads.emplace_back(worker);
   std::exception_ptr failure;
   for (bool all_done = false; !all_done;) {

@@ -24,7 +24,7 @@ void check_patch(const json& patch, const json& defaults, const std::string& fil
     return;
   }
   for (const auto& [key, value] : patch.items()) {
-    const std::string here = place + "/" + key;
+    const std::string here = std::string(place).append("/").append(key);
     if (!defaults.contains(key)) {
       faults.push_back({file, here, "no such setting"});
     } else if (defaults[key].is_object()) {
