@@ -59,7 +59,9 @@ Scene SceneBuilder::build(const std::vector<ObjectSpec>& objects, bool side_cont
     } catch (const MeshError& error) {
       std::vector<std::string> faults;
       for (const auto& fault : error.faults()) {
-        faults.push_back("object " + std::to_string(i) + ": " + fault);
+        const std::string& file = objects[i].file;
+        faults.push_back("/objects/" + std::to_string(i) + (file.empty() ? "" : " (" + file + ")") +
+                         ": " + fault);
       }
       throw MeshError(std::move(faults));
     }

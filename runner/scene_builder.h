@@ -18,7 +18,7 @@ const Renderer& renderer_for(RendererKind kind);
 /// Places the convex parts of objects; equal shapes share one mesh and its trees.
 class SceneBuilder {
  public:
-  /// \throws MeshError where a shape is no convex mesh, naming the object's index.
+  /// \throws MeshError where a shape is no convex mesh, with the place as a JSON pointer.
   Scene build(const std::vector<ObjectSpec>& objects, bool side_contact);
 
  private:

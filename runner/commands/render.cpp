@@ -105,6 +105,17 @@ void append_row(std::string& out, double t, const Rendering& r) {
          std::to_string(r.object) + '\n';
 }
 
+Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& objects,
+                  const Renderer& renderer) {
+  try {
+    return SceneBuilder().build(objects, renderer.side_contact());
+  } catch (const MeshError& error) {
+    std::vector<std::string> faults;
+    for (const std::string& fault : error.faults()) faults.push_back(path + ": " + fault);
+    throw MeshError(std::move(faults));
+  }
+}
+
 }  // namespace
 
 int render_command(const std::vector<std::string>& args) {
@@ -134,8 +145,7 @@ int render_command(const std::vector<std::string>& args) {
   const std::vector<ObjectSpec> objects = parse_scene(scene_path);
   const std::vector<TrajectoryRow> rows =
       read_trajectory((*values)["trajectory"].as<std::string>());
-  SceneBuilder builder;
-  const Scene scene = builder.build(objects, renderer.side_contact());
+  const Scene scene = build_scene(scene_path, objects, renderer);
   RenderState state = scene.initial_state();
   std::string out = std::string(kForceHeader) + '\n';
   for (std::size_t i = 0; i < rows.size(); ++i) {

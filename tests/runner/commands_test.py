@@ -112,6 +112,11 @@ class Render(FromOutside):
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
         for place in ("/objects/0/edge_m", "/objects/0/colour", "/objects/1/shape"):
             self.assertIn(place, done.stderr)
+        self.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
+        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": 1}, {"shape": "mesh", "file": "open.obj"}]}')
+        done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
+        for word in ("scene.json: /objects/1", "open.obj", "open"):
+            self.assertIn(word, done.stderr)
         scene = self.write("scene.json", self.CUBE)
         for text, place in (("t,x\n", "line 1"), (self.HEADER, "row"), (self.HEADER + "0,0,0,1,0,0\n1,a\n", "line 3"),
                             (self.HEADER + "1,0,0,1,0,0,2\n1,0,0,1,0,0,2\n", "line 3")):
