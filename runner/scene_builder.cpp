@@ -57,11 +57,11 @@ Scene SceneBuilder::build(const std::vector<ObjectSpec>& objects, bool side_cont
     try {
       place(objects[i], Pose{}, static_cast<int>(i), side_contact, parts);
     } catch (const MeshError& error) {
+      std::string place = "/objects/" + std::to_string(i);
+      if (!objects[i].file.empty()) place += " (" + objects[i].file + ")";
       std::vector<std::string> faults;
       for (const auto& fault : error.faults()) {
-        const std::string& file = objects[i].file;
-        faults.push_back("/objects/" + std::to_string(i) + (file.empty() ? "" : " (" + file + ")") +
-                         ": " + fault);
+        faults.push_back(std::string(place).append(": ").append(fault));
       }
       throw MeshError(std::move(faults));
     }

@@ -111,7 +111,9 @@ Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& object
     return SceneBuilder().build(objects, renderer.side_contact());
   } catch (const MeshError& error) {
     std::vector<std::string> faults;
-    for (const std::string& fault : error.faults()) faults.push_back(path + ": " + fault);
+    for (const std::string& fault : error.faults()) {
+      faults.push_back(std::string(path).append(": ").append(fault));
+    }
     throw MeshError(std::move(faults));
   }
 }
