@@ -57,11 +57,11 @@ Scene SceneBuilder::build(const std::vector<ObjectSpec>& objects, bool side_cont
     try {
       place(objects[i], Pose{}, static_cast<int>(i), side_contact, parts);
     } catch (const MeshError& error) {
-      std::string place = "/objects/" + std::to_string(i);
-      if (!objects[i].file.empty()) place += " (" + objects[i].file + ")";
+      std::string where = "/objects/" + std::to_string(i);
+      if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
       std::vector<std::string> faults;
       for (const auto& fault : error.faults()) {
-        faults.push_back(std::string(place).append(": ").append(fault));
+        faults.push_back(std::string(where).append(": ").append(fault));
       }
       throw MeshError(std::move(faults));
     }
