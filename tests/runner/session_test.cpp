@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <filesystem>
 #include <limits>
 
 #include "protocols/parse.h"
@@ -168,6 +169,52 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
   EXPECT_TRUE(station.log.finished.empty());
   ASSERT_EQ(station.log.cut.size(), 1u);
   EXPECT_NE(station.log.cut[0].find("not finite"), std::string::npos);
+}
+
+// The way of a live session into the store: begun on disk, cut off by a fault, shown again.
+TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
+  std::string pattern = ::testing::TempDir() + "session-XXXXXX";
+  const std::filesystem::path folder = mkdtemp(pattern.data());
+  {
+    Station station;
+    const Protocol& protocol = station.protocol;
+    Store store = Store::open(folder / "live.db", Store::Mode::write_or_create);
+    const Participant participant =
+        store.enrol({protocol.name, protocol.source_text, protocol.sha256}, "P01");
+    RunInfo info;
+    info.program_version = "0.0.0";
+    info.device = "fake";
+    FakeDevice failing([](int tick) {
+      return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
+    });
+    Servo servo(failing, station.clock, 1000, ForceLimits{});
+    const palpate::Run first = store.begin_run(participant, info);
+    DurableLog log(store, first);
+    Scripted respondent({});
+    Session session({protocol, station.library, servo, station.clock, respondent, log},
+                    SessionPlan(protocol, participant.number, 1), {0, 0});
+    EXPECT_THROW(run(session), SessionFault);
+    EXPECT_EQ(failing.force, Vec3(0));
+    store.end_run(first, RunEnd::aborted, station.clock.now_ns());
+
+    const SessionProgress before = store.progress(participant, 1);
+    EXPECT_EQ(before.completed.size(), 2u);
+    EXPECT_EQ(before.cut_off, 1);
+    SessionPlan plan(protocol, participant.number, 1);
+    for (const TrialRecord& record : before.completed) plan.answered(record.correct);
+    const palpate::Run second = store.begin_run(participant, info);
+    DurableLog again(store, second);
+    Session resumed({protocol, station.library, station.servo, station.clock, respondent, again},
+                    plan, {0, 0});
+    run(resumed);
+    store.end_run(second, RunEnd::done, station.clock.now_ns());
+    const SessionProgress after = store.progress(participant, 1);
+    ASSERT_EQ(after.completed.size(), 6u);
+    for (const TrialRecord& record : after.completed) {
+      EXPECT_EQ(record.attempt, record.trial == 3 ? 2 : 1);
+    }
+  }
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
