@@ -15,6 +15,8 @@ constexpr Interval kPosition{-1000, 1000, "m"};
 // Stiffer than the stiffest haptic devices by an order of magnitude: a slipped decimal point.
 constexpr Interval kStiffness{0, 1e5, "N/m", true};
 constexpr Interval kDamping{0, 1000, "N s/m"};
+constexpr Interval kFriction{0, 10};
+constexpr std::size_t kMaxLayers = 16;
 constexpr Interval kSubdivisions{0, 8};  // 8: 1.3 million triangles
 constexpr Interval kSegments{3, 4096};
 constexpr int kMaxCompounds = 8;  // within each other
@@ -108,11 +110,47 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
   return spec;
 }
 
+/// A coefficient given alone serves for both; given both, sticking holds at least as much.
+void read_friction(ObjectReader& reader, Material& material) {
+  reader.number("friction_dynamic", material.friction_dynamic, kFriction);
+  if (reader.has("friction_dynamic") && !reader.has("friction_static"))
+    material.friction_static = material.friction_dynamic;
+  reader.number("friction_static", material.friction_static, kFriction);
+  if (reader.has("friction_static") && !reader.has("friction_dynamic"))
+    material.friction_dynamic = material.friction_static;
+  if (reader.has("friction_static") && reader.has("friction_dynamic") &&
+      material.friction_static < material.friction_dynamic) {
+    reader.faults().add(reader.pointer("friction_static"),
+                        "expected at least friction_dynamic: sticking holds more than sliding");
+  }
+}
+
+void read_layers(ObjectReader& reader, Material& material) {
+  const nlohmann::json* const list = reader.array("layers", 0, kMaxLayers);
+  if (list == nullptr) return;
+  material.layers.clear();
+  double above = 0;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    ObjectReader layer((*list)[i], child_pointer(reader.pointer("layers"), i), reader.faults());
+    Layer read;
+    layer.number("depth_m", read.depth, kLength, Need::required);
+    layer.number("stiffness_n_per_m", read.stiffness, kStiffness, Need::required);
+    layer.refuse_unknown_keys();
+    if (layer.has("depth_m") && read.depth <= above && read.depth > 0) {
+      reader.faults().add(layer.pointer("depth_m"), "expected to be deeper than the layer above");
+    }
+    above = read.depth;
+    material.layers.push_back(read);
+  }
+}
+
 }  // namespace
 
 void read_material(ObjectReader& reader, Material& material) {
   reader.number("stiffness_n_per_m", material.stiffness, kStiffness);
   reader.number("damping_ns_per_m", material.damping, kDamping);
+  read_friction(reader, material);
+  read_layers(reader, material);
 }
 
 ObjectSpec read_object(ObjectReader& reader, const Material& default_material,

@@ -52,7 +52,8 @@ StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol,
   Material material = protocol.material;
   reader.section("material", [&](ObjectReader& section) {
     read_material(section, material);
-    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m"}) {
+    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m", "friction_static",
+                            "friction_dynamic", "layers"}) {
       if (section.has(key) && reader.has(key)) {
         reader.faults().add(reader.pointer(key), "expected in 'material' or here, found in both");
       }

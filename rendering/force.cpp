@@ -37,17 +37,36 @@ void load(std::span<LoadedContact> contacts) {
     }
     begin = end;
   }
-  for (auto& c : contacts) {
-    c.force = c.stiffness * c.share;
-    if (c.damping > 0 && c.share > 0)
-      c.force = std::max(0.0, c.force + c.damping * c.closing_speed);
+  for (auto& c : contacts) c.force = c.stiffness * c.share;
+}
+
+double layered_force(const Material& material, double share) {
+  double force = 0, from = 0, stiffness = material.stiffness;
+  for (const Layer& layer : material.layers) {
+    if (share <= layer.depth) break;
+    force += stiffness * (layer.depth - from);
+    from = layer.depth;
+    stiffness = layer.stiffness;
   }
+  return force + stiffness * (share - from);
+}
+
+void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& grip) {
+  const Vec3& n = c.contact.normal;
+  Vec3 lag = grip.lag - motion;
+  lag -= glm::dot(lag, n) * n;
+  const double pull = c.stiffness * glm::length(lag);
+  const double holds = (grip.sliding ? material.friction_dynamic : material.friction_static);
+  grip.sliding = pull > holds * c.force;
+  if (grip.sliding) lag *= material.friction_dynamic * c.force / pull;
+  grip.lag = c.lag = lag;
+  grip.held = true;
 }
 
 Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe) {
   Loads loads;
   for (const auto& c : contacts) {
-    const Vec3 force = c.force * c.contact.normal;
+    const Vec3 force = c.force * c.contact.normal + c.stiffness * c.lag;
     loads.force += force;
     loads.torque += glm::cross(c.contact.point - probe.tip, force);
     loads.device2 += c.place * force;

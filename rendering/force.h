@@ -5,27 +5,47 @@
 #include <span>
 
 #include "rendering/contact.h"
+#include "rendering/probe.h"
+#include "stimuli/object_spec.h"
 
 namespace palpate {
 
 /// A contact in the world frame with what decides its force.
 struct LoadedContact {
   Contact contact;
-  double place = 0;          ///< of the contact point on the probe: 0 at the tip to 1 at the tail
-  double stiffness = 0;      ///< N/m
-  double damping = 0;        ///< N s/m
-  double closing_speed = 0;  ///< m/s, of the probe at the contact, against the normal
-  double share = 0;          ///< m, of the ideal probe's translation along the normal (set by load)
-  double force = 0;          ///< N, along the normal, on the hand; never negative (set by load)
-  int object = -1;           ///< parts of one compound share it
-  std::uint32_t part = 0;    ///< index of the part in the scene
+  double place = 0;        ///< of the contact point on the probe: 0 at the tip to 1 at the tail
+  double stiffness = 0;    ///< N/m, at the surface
+  double share = 0;        ///< m, of the ideal probe's translation along the normal (set by load)
+  double force = 0;        ///< N, along the normal, on the hand; never negative (set by load)
+  Vec3 lag;                ///< m, of the ideal probe along the surface (set by rub)
+  int object = -1;         ///< parts of one compound share it
+  std::uint32_t part = 0;  ///< index of the part in the scene
 };
 
-/// Sets the share and the force of each contact: k share + b closing_speed, never pulling. A
-/// contact that is alone has its whole depth; contacts with parts of one compound share the
-/// shortest translation that satisfies them all, so that a seam between two parts neither doubles
-/// the force nor lets it drop. Contacts of one object stand side by side.
+/// Sets the share and the force of each contact: k share. A contact that is alone has its whole
+/// depth; contacts with parts of one compound share the shortest translation that satisfies them
+/// all, so that a seam between two parts neither doubles the force nor lets it drop. Contacts of
+/// one object stand side by side.
 void load(std::span<LoadedContact> contacts);
+
+/// The force, N, of a material with layers at `share` m below its surface: the sum of each layer's
+/// stiffness times the part of the way that lies in it.
+double layered_force(const Material& material, double share);
+
+/// What a contact remembers for friction.
+struct Grip {
+  Vec3 lag;              ///< m, of the ideal probe along the surface, world frame
+  bool sliding = false;  ///< else it sticks
+  bool held = false;     ///< in contact at the last tick
+};
+
+/// One tick of Coulomb friction through the ideal probe's lag along the surface: it stays where it
+/// is while the lag's spring asks for no more than the static coefficient times the normal force,
+/// else it slides, held back by the dynamic one. Zilles & Salisbury 1995 (god-object), Harwin &
+/// Melder 2002 (friction cone). The lag turns with the surface by projection, which never feeds it.
+/// \param c       loaded; its lag is set
+/// \param motion  m, of the probe at the contact since the last tick
+void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& grip);
 
 /// Force and moment of contacts, and their split on two devices at the ends of the stylus.
 struct Loads {

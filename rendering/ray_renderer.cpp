@@ -100,7 +100,8 @@ class RayRenderer final : public Renderer {
   bool side_contact() const override { return true; }
   Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
                  double dt) const noexcept override {
-    return tick::render<SegmentProbe>(scene, state, probe, dt);
+    return scene.plain_springs() ? tick::render<SegmentProbe, true>(scene, state, probe, dt)
+                                 : tick::render<SegmentProbe, false>(scene, state, probe, dt);
   }
 };
 

@@ -33,6 +33,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
     part.tolerance = 1e-12 * part.mesh->size() +
                      8 * std::numeric_limits<double>::epsilon() * glm::length(part.sphere_centre);
     part.material = object.material;
+    plain_springs_ = plain_springs_ && part.material.plain_spring();
     part.object = object.object;
     parts_.push_back(std::move(part));
   }

@@ -51,6 +51,7 @@ struct PartState {
   bool blocked = false;       ///< the trial began inside: no force until it has been left once
   Vec3 share;    ///< m; its part of the ideal probe's translation, where parts share one
   Vec3 yielded;  ///< m; the translation that its siblings' shares gave it at the last tick
+  Grip grip;     ///< where the material has friction
 };
 
 /// A renderer's whole memory. Copy it to replay from here.
@@ -71,10 +72,13 @@ class Scene {
   explicit Scene(std::vector<SceneObject> objects, bool side_contact = true);
 
   const std::vector<ScenePart>& parts() const { return parts_; }
+  /// Whether all contacts are plain springs: then damping, friction and layers are left out.
+  bool plain_springs() const { return plain_springs_; }
   RenderState initial_state() const;
 
  private:
   std::vector<ScenePart> parts_;
+  bool plain_springs_ = true;
 };
 
 /// Lists the parts that the probe can reach soon, unless the last list still holds. No allocation.

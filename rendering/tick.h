@@ -91,7 +91,6 @@ struct Tick {
   RenderState& state;
   const LineProbe& probe;
   double length;  ///< m, of the probe; 0 for a point
-  double rate;    ///< 1/s, ticks; 0 when unknown
   std::uint32_t faults = 0;
 
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
@@ -117,14 +116,7 @@ struct Tick {
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth + glm::dot(c.contact.normal, shift);
     c.stiffness = part.material.stiffness;
-    c.damping = part.material.damping;
     c.object = part.object;
-    if (c.damping > 0 && rate > 0) {
-      const double place = c.place;
-      const Vec3 motion =
-          (1 - place) * (probe.tip - state.last.tip) + place * (probe.tail - state.last.tail);
-      c.closing_speed = -glm::dot(motion, c.contact.normal) * rate;
-    }
   }
 };
 

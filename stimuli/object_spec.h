@@ -11,10 +11,22 @@ namespace palpate {
 
 enum class ShapeKind { sphere, cone, cylinder, cube, mesh, compound };
 
-/// How an object feels.
+/// What an object is made of below `depth`.
+struct Layer {
+  double depth = 0;      ///< m, below the surface along the contact normal
+  double stiffness = 0;  ///< N/m
+};
+
+/// How an object feels. What is 0 or empty is left out of the tick.
 struct Material {
-  double stiffness = 800;  ///< N/m, along the contact normal
-  double damping = 0;      ///< N s/m, along the contact normal; 0 leaves the term out
+  double stiffness = 800;       ///< N/m, along the contact normal, from the surface on
+  double damping = 0;           ///< N s/m, along the contact normal
+  double friction_static = 0;   ///< Coulomb's coefficient while the contact sticks; >= dynamic
+  double friction_dynamic = 0;  ///< while it slides
+  std::vector<Layer> layers;    ///< of other stiffness under the surface, by increasing depth
+
+  bool has_friction() const { return friction_static > 0; }
+  bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
 /// Local frames: sphere, cube and cylinder centred, cylinder axis +z; cone axis +z, apex at

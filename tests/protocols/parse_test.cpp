@@ -112,6 +112,11 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(ball.pose.orientation, Quat(0.6, 0, 0.8, 0));
   EXPECT_EQ(ball.material.stiffness, 500);
   EXPECT_EQ(ball.material.damping, 1);
+  EXPECT_EQ(ball.material.friction_static, 0.5);
+  EXPECT_EQ(ball.material.friction_dynamic, 0.25);
+  ASSERT_EQ(ball.material.layers.size(), 2u);
+  EXPECT_EQ(ball.material.layers[1].depth, 0.002);
+  EXPECT_EQ(ball.material.layers[1].stiffness, 900);
   const ObjectSpec& hat = p.stimuli[1].object;
   EXPECT_EQ(hat.shape, ShapeKind::cone);
   EXPECT_EQ(hat.height, 0.03);
@@ -120,6 +125,9 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(hat.material.damping, 0.5);  // the protocol's
   EXPECT_EQ(p.stimuli[2].object.shape, ShapeKind::cylinder);
   EXPECT_EQ(p.stimuli[2].object.material.damping, 2);
+  EXPECT_EQ(p.stimuli[2].object.material.friction_static, 0.125);  // one given serves for both
+  EXPECT_EQ(p.stimuli[2].object.material.friction_dynamic, 0.125);
+  EXPECT_TRUE(p.stimuli[3].object.material.layers.empty());
   EXPECT_EQ(p.stimuli[2].object.material.stiffness, 400);
   EXPECT_EQ(p.stimuli[3].object.edge, 0.04);
   EXPECT_EQ(p.stimuli[4].object.file, kFolder + "good/tetrahedron.obj");
