@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
@@ -47,7 +48,10 @@ void remove_database(const std::string& file) {
 
 }  // namespace
 
-std::span<const Migration> migrations() { return {}; }
+std::span<const Migration> migrations() {
+  static const std::array<Migration, 1> steps = {{{1, withdrawal_sql()}}};
+  return steps;
+}
 
 void create_database(const std::string& path) {
   const std::string draft = path + ".palpate-new";
@@ -60,6 +64,7 @@ void create_database(const std::string& path) {
       db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
       SQLite::Transaction transaction(db);
       db.exec(schema_sql());
+      db.exec(withdrawal_sql());
       db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
       set_version(db, kSchemaVersion);
       transaction.commit();

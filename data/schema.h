@@ -9,13 +9,15 @@
 
 namespace palpate {
 
-inline constexpr int kSchemaVersion = 1;
+inline constexpr int kSchemaVersion = 2;
 inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", in every file of ours
 
 inline constexpr int kPageSize = 4096;  ///< bytes; a file of ours is whole pages
 
-/// schema.sql as it was when the program was built.
+/// schema.sql (version 1) and withdrawal.sql (what version 2 adds) as they were when the program
+/// was built.
 const char* schema_sql();
+const char* withdrawal_sql();
 
 /// Turns version `from` into `from + 1`.
 struct Migration {
@@ -23,7 +25,7 @@ struct Migration {
   const char* sql;
 };
 
-/// The migrations to kSchemaVersion, in order. Version 1 is the first: none so far.
+/// The migrations to kSchemaVersion, in order.
 std::span<const Migration> migrations();
 
 /// Makes the database whole or not at all: built as `path`.new, synced, renamed. 0600.
@@ -35,6 +37,11 @@ void require_application_id(SQLite::Database& db, const std::string& path);
 
 /// The version of an open database. \throws StoreRefused: it is not ours, or newer than `newest`.
 int checked_version(SQLite::Database& db, const std::string& path, int newest = kSchemaVersion);
+
+/// Every table and index of ours in the file is the one that we would make, so that its CHECKs hold
+/// where quick_check says so, and nothing runs by itself (triggers). Others' tables are left alone.
+/// \throws StoreRefused.
+void require_our_schema(SQLite::Database& db, const std::string& path, int version);
 
 /// Brings a database of version `from` to `to`: copies it to a new `path`.v<from>.backup (0600),
 /// then runs every step in one transaction. \return the path of the copy. \throws StoreError; the

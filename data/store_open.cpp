@@ -36,7 +36,9 @@ void mark_dead_runs(SQLite::Database& db) {
 /// Cheap damage is found before a participant sits down. Not the samples: they may be gigabytes,
 /// and carry their own checksums.
 void quick_check(SQLite::Database& db, const std::string& path) {
-  for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts"}) {
+  for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
+                            "exports", "export_participants", "tombstones", "tombstone_exports"}) {
+    if (!db.tableExists(table)) continue;  // of a later version
     SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
     if (!check.executeStep()) continue;
     const std::string found = check.getColumn(0).getString();
@@ -190,6 +192,7 @@ Store Store::open(const std::string& path, Mode mode) {
     db.exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
     if (!writes) db.exec("BEGIN");
     const int version = checked_version(db, path);
+    require_our_schema(db, path, version);
     if (writes) {
       if (sqlite3_db_readonly(db.getHandle(), "main") == 1) {
         throw StoreError(path + ": may not be written; check its permissions");
@@ -201,9 +204,6 @@ Store Store::open(const std::string& path, Mode mode) {
             ": this disk does not allow a write-ahead log; keep the database on a local disk");
       }
       db.exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
-    } else if (version < kSchemaVersion) {
-      impl->refuse("was written by an older palpate (schema version " + std::to_string(version) +
-                   "); open it for writing once (palpate run or simulate) to bring it up to date");
     }
     quick_check(db, path);
     if (writes) mark_dead_runs(db);

@@ -1,4 +1,5 @@
-// Version 1 is the first, so the way from one version to the next is tested with made-up steps.
+// The way from one version to the next, with made-up steps from the current one on; then the real
+// way from version 1.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
@@ -16,10 +17,11 @@ namespace {
 
 using namespace palpate::testing;
 
+constexpr int kNow = kSchemaVersion;
 constexpr Migration kSteps[] = {
-    {1, "ALTER TABLE participants ADD COLUMN glove TEXT NOT NULL DEFAULT 'none'"},
-    {2, "UPDATE participants SET glove = 'nitrile'; CREATE TABLE gloves (name TEXT) STRICT"},
-    {3, "DROP TABLE gloves"},
+    {kNow, "ALTER TABLE participants ADD COLUMN glove TEXT NOT NULL DEFAULT 'none'"},
+    {kNow + 1, "UPDATE participants SET glove = 'nitrile'; CREATE TABLE gloves (name TEXT) STRICT"},
+    {kNow + 2, "DROP TABLE gloves"},
 };
 
 class Migrating : public ::testing::Test {
@@ -37,47 +39,50 @@ class Migrating : public ::testing::Test {
   }
   /// The database still is the one that the fixture made, and a store takes it.
   void expect_untouched() {
-    EXPECT_EQ(version_of(path_), 1);
+    EXPECT_EQ(version_of(path_), kNow);
     EXPECT_EQ(Store::open(path_, Store::Mode::write_or_create).counts().completed, 2);
   }
   const TemporaryFolder folder_;
   const std::string path_ = folder_ / "study.db";
+  const std::string copy_ = path_ + ".v" + std::to_string(kNow) + ".backup";
 };
 
 TEST_F(Migrating, RunsTheStepsInOrderAfterACopy) {
   std::string copy;
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-    copy = migrate(db, path_, 1, 3, kSteps);
-    EXPECT_EQ(db.execAndGet("PRAGMA user_version").getInt(), 3);
+    copy = migrate(db, path_, kNow, kNow + 2, kSteps);
+    EXPECT_EQ(db.execAndGet("PRAGMA user_version").getInt(), kNow + 2);
     EXPECT_EQ(db.execAndGet("SELECT glove FROM participants").getString(), "nitrile");
     EXPECT_EQ(db.execAndGet("SELECT count(*) FROM gloves").getInt(), 0)
-        << "step 3 is not for version 3";
+        << "the last step is not asked for";
     EXPECT_EQ(db.execAndGet("SELECT count(*) FROM attempts").getInt(), 2);
-    EXPECT_EQ(checked_version(db, path_, 3), 3);
+    EXPECT_EQ(checked_version(db, path_, kNow + 2), kNow + 2);
   }
-  EXPECT_EQ(copy, path_ + ".v1.backup");
+  EXPECT_EQ(copy, copy_);
   struct stat found {};
   ASSERT_EQ(::stat(copy.c_str(), &found), 0);
   EXPECT_EQ(found.st_mode & 0777, 0600u);
-  EXPECT_EQ(version_of(copy), 1);
+  EXPECT_EQ(version_of(copy), kNow);
   EXPECT_EQ(Store::open(copy, Store::Mode::read_only).counts().completed, 2);
   EXPECT_THROW(Store::open(path_, Store::Mode::write_or_create), StoreRefused)
       << "now from the future";
 }
 
 TEST_F(Migrating, AnEarlierCopyIsKept) {
-  write_file(path_ + ".v1.backup", "an earlier copy");
+  write_file(copy_, "an earlier copy");
   SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-  EXPECT_EQ(migrate(db, path_, 1, 2, kSteps), path_ + ".v1-2.backup");
-  EXPECT_EQ(contents_of(path_ + ".v1.backup"), "an earlier copy");
+  EXPECT_EQ(migrate(db, path_, kNow, kNow + 1, kSteps),
+            path_ + ".v" + std::to_string(kNow) + "-2.backup");
+  EXPECT_EQ(contents_of(copy_), "an earlier copy");
 }
 
 TEST_F(Migrating, AStepThatFailsLeavesTheDatabaseAsItWas) {
-  constexpr Migration kBroken[] = {{1, "DELETE FROM attempts"}, {2, "DELETE FROM nowhere"}};
+  constexpr Migration kBroken[] = {{kNow, "DELETE FROM attempts"},
+                                   {kNow + 1, "DELETE FROM nowhere"}};
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-    EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, 1, 3, kBroken); }), path_));
+    EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, kNow, kNow + 2, kBroken); }), path_));
   }
   expect_untouched();
 }
@@ -85,18 +90,18 @@ TEST_F(Migrating, AStepThatFailsLeavesTheDatabaseAsItWas) {
 TEST_F(Migrating, AMissingStepLeavesTheDatabaseAsItWas) {
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-    EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, 1, 9, kSteps); }),
-                         "from schema version 4 to 9"));
+    EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, kNow, kNow + 9, kSteps); }),
+                         "from schema version " + std::to_string(kNow + 3) + " to "));
   }
   expect_untouched();
 }
 
 TEST_F(Migrating, RowsLeftAloneAreSeenBeforeTheCommit) {
-  constexpr Migration kCruel[] = {{1, "DELETE FROM sessions"}};
+  constexpr Migration kCruel[] = {{kNow, "DELETE FROM sessions"}};
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-    EXPECT_TRUE(
-        contains(error_of([&] { migrate(db, path_, 1, 2, kCruel); }), "stays at version 1"));
+    EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, kNow, kNow + 1, kCruel); }),
+                         "stays at version " + std::to_string(kNow)));
   }
   expect_untouched();
 }
@@ -105,6 +110,55 @@ TEST_F(Migrating, TheRealStepsLeadToThisVersion) {
   int version = 1;
   for (const auto& step : migrations()) EXPECT_EQ(step.from, version++);
   EXPECT_EQ(version, kSchemaVersion);
+}
+
+/// As the first palpate made it, with two trials.
+void make_version_1(const std::string& path) {
+  SQLite::Database db(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  db.exec("PRAGMA page_size = 4096; PRAGMA journal_mode = WAL");
+  db.exec(contents_of(PALPATE_SOURCE_DIR "/tests/data/schema_v1.sql"));
+  db.exec("PRAGMA application_id = " + std::to_string(kApplicationId) +
+          "; PRAGMA user_version = 1");
+  db.exec(
+      "INSERT INTO protocols VALUES (1, '" + a_protocol().sha256 + "', 'ho2000', '" +
+      a_protocol().text +
+      "');"
+      "INSERT INTO participants VALUES (1, 1, 'P1', 1, 0, NULL);"
+      "INSERT INTO sessions VALUES (1, 1, 1, '');"
+      "INSERT INTO runs VALUES (1, 1, 5, 5, '0.1.0', '', 'falcon', '', '', NULL, '', NULL, 'left', "
+      "'done', 9);");
+  for (const char* trial : {"1", "2"}) {
+    db.exec(std::string("INSERT INTO attempts VALUES (") + trial + ", 1, 1, " + trial +
+            ", 1, 1, 'ray', 'cube', 0, 1, 0, 0, 0, 6, 'completed', NULL, 'cube', 1, 0, 1.5, 0.5, "
+            "7, 8, 0, 0, 0, 0, 0, 0, 1500, 0, 1000000, 0, 0, 2.5)");
+  }
+}
+
+TEST(VersionOne, IsReadAsItIs) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "old.db";
+  make_version_1(path);
+  const std::string before = contents_of(path);
+  EXPECT_EQ(Store::open(path, Store::Mode::read_only).counts().completed, 2);
+  EXPECT_EQ(contents_of(path), before);
+}
+
+TEST(VersionOne, BecomesThisVersionWhenItIsWrittenTo) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "old.db";
+  make_version_1(path);
+  for (int again = 0; again < 2; ++again) {
+    Store store = Store::open(path, Store::Mode::write_or_create);
+    EXPECT_EQ(store.counts().completed, 2);
+    store.enrol(a_protocol(), "P2");
+  }
+  SQLite::Database db(path, SQLite::OPEN_READWRITE);
+  EXPECT_EQ(checked_version(db, path), kNow);
+  EXPECT_NO_THROW(require_our_schema(db, path, kNow)) << "as if it had been made today";
+  SQLite::Database backup(path + ".v1.backup", SQLite::OPEN_READWRITE);
+  EXPECT_EQ(checked_version(backup, path), 1);
+  EXPECT_NO_THROW(require_our_schema(backup, path, 1));
+  EXPECT_EQ(backup.execAndGet("SELECT count(*) FROM attempts").getInt(), 2);
 }
 
 }  // namespace

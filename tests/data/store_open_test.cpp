@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "data/schema.h"
 #include "data/store.h"
 #include "tests/data/child_process.h"
 #include "tests/data/store_fixture.h"
@@ -76,7 +77,7 @@ TEST_F(StoreOpen, IsWhatTheSchemaSays) {
   make_study();
   SQLite::Database db(path_, SQLite::OPEN_READWRITE);
   EXPECT_EQ(db.execAndGet("PRAGMA application_id").getInt(), 0x504C5054);
-  EXPECT_EQ(db.execAndGet("PRAGMA user_version").getInt(), 1);
+  EXPECT_EQ(db.execAndGet("PRAGMA user_version").getInt(), kSchemaVersion);
   EXPECT_EQ(db.execAndGet("PRAGMA journal_mode").getString(), "wal");
   EXPECT_EQ(db.execAndGet("PRAGMA integrity_check").getString(), "ok");
   EXPECT_EQ(
@@ -112,12 +113,13 @@ TEST_F(StoreOpen, OtherFilesAreRefusedAndLeftAlone) {
 
 TEST_F(StoreOpen, OtherVersionsAreRefusedNeverGuessed) {
   make_study();
-  for (const int version : {0, 2, 1000, -1}) {
+  for (const int version : {0, kSchemaVersion + 1, 1000, -1}) {
     SQLite::Database(path_, SQLite::OPEN_READWRITE)
         .exec("PRAGMA user_version = " + std::to_string(version));
     expect_refused("schema version " + std::to_string(version));
   }
-  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 1");
+  SQLite::Database(path_, SQLite::OPEN_READWRITE)
+      .exec("PRAGMA user_version = " + std::to_string(kSchemaVersion));
   EXPECT_EQ(read(path_).counts().completed, 300);
 }
 
