@@ -4,7 +4,8 @@ set -euo pipefail
 
 build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libglm-dev libsqlite3-dev
   libsqlitecpp-dev nlohmann-json3-dev zlib1g-dev)
-tests=(libbenchmark-dev libgtest-dev librsvg2-bin libxml2-utils python3 python3-jsonschema)
+tests=(libbenchmark-dev libbullet-dev libfcl-dev libgtest-dev librsvg2-bin libxml2-utils pkg-config
+  python3 python3-jsonschema)
 quality=(clang clang-format clang-tidy)
 
 case "${1:-}" in
