@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "data/export_log.h"
 #include "data/record.h"
 
 namespace palpate {
@@ -73,6 +74,21 @@ struct StoredRun {
   RunEnd end = RunEnd::running;
 };
 
+/// What a database holds of one code, in all its protocols.
+struct Holdings {
+  bool withdrawn_before = false;  ///< the code has a tombstone
+  std::int64_t protocols = 0;     ///< it is enrolled in
+  std::int64_t sessions = 0, trials = 0, cut_off = 0;
+  std::int64_t mentions = 0;          ///< notes on others that say the code
+  std::vector<ExportRecord> exports;  ///< that hold it, also those of before a withdrawal
+};
+
+/// What was done about backups when a participant was forgotten.
+struct Withdrawal {
+  std::vector<std::string> backups_removed;
+  std::vector<std::string> backups_left;  ///< could not be read, or not removed
+};
+
 struct StoreCounts {
   std::int64_t protocols = 0, participants = 0, sessions = 0, runs = 0, completed = 0, cut_off = 0,
                interrupted_runs = 0;
@@ -103,8 +119,8 @@ class Store {
 
   /// Finds `code` in this protocol or adds it, with `wanted_number` or the smallest unused number.
   /// Protocols are told apart by SHA-256. \throws StoreRefused: a code that is not 1 to 32 letters
-  /// and digits, a number below 1 or another code's, a code with another number, a code that is
-  /// simulated here and real there, or with another seed.
+  /// and digits, one that was withdrawn, a number below 1 or another code's, a code with another
+  /// number, a code that is simulated here and real there, or with another seed.
   Participant enrol(const ProtocolInfo& protocol, const std::string& code,
                     std::optional<int> wanted_number = std::nullopt, bool simulated = false,
                     std::optional<std::uint64_t> seed = std::nullopt);
@@ -140,6 +156,14 @@ class Store {
   /// has ended, or reason is `running` or `interrupted`.
   void end_run(const Run& run, RunEnd reason, std::int64_t ended_ns);
 
+  /// Removes everything of a participant, in all protocols: rows with secure_delete, then the log
+  /// is emptied and the file rebuilt, and backups beside it that hold the participant are deleted.
+  /// A salted hash of the code stays: enrol and merge refuse it for good. Stopped at any moment,
+  /// all is as before or the same call finishes it. \throws StoreRefused: no such participant;
+  /// StoreError: another program reads (the rows are gone, but not yet from the log), the disk
+  /// fails.
+  Withdrawal forget(const std::string& code);
+
   // --- reading -------------------------------------------------------------------------------
 
   /// What the session holds; empty where it was never begun.
@@ -150,6 +174,7 @@ class Store {
   std::vector<StoredRun> runs();    ///< by protocol, participant number, session, start
   std::vector<StoredNote> notes();  ///< same order
   StoreCounts counts();
+  Holdings holdings(const std::string& code);
 
   /// Completed trials by protocol, participant number, session and trial, one at a time: they need
   /// not fit into memory. `visit` must not write to this store.

@@ -4,12 +4,14 @@
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
+#include <sqlite3.h>
 #include <sys/types.h>
 
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "data/sqlite_errors.h"
 #include "data/store.h"
@@ -50,6 +52,9 @@ struct Store::Impl {
   /// Of attempts in this state, in the order of the header.
   void for_each_attempt(const char* state, bool with_samples,
                         const std::function<void(const StoredTrial&)>& visit);
+
+  /// Empties the log and rebuilds the file, so that nothing of removed rows is in either.
+  void clear_traces();
 
   void require_writer() const;
   void require_running(const Run& run);
@@ -120,7 +125,12 @@ class Row {
  private:
   template <class T>
   Row& integer(T& value) {
-    value = static_cast<T>(statement_.getColumn(index_++).getInt64());
+    const std::int64_t stored = statement_.getColumn(index_++).getInt64();
+    if (!std::in_range<T>(stored)) {
+      throw SQLite::Exception("a number is out of its range: " + std::to_string(stored),
+                              SQLITE_CORRUPT);
+    }
+    value = static_cast<T>(stored);
     return *this;
   }
   SQLite::Statement& statement_;

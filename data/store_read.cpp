@@ -3,6 +3,7 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <charconv>
 
 #include "data/samples_codec.h"
 #include "data/store_impl.h"
@@ -36,7 +37,14 @@ constexpr const char* kFromProtocolDown =
 Row& operator>>(Row& row, Participant& person) {
   std::optional<std::string> seed;
   row >> person.id >> person.code >> person.number >> person.simulated >> seed;
-  person.seed = seed ? std::optional(std::stoull(*seed)) : std::nullopt;
+  person.seed.reset();
+  if (!seed) return row;
+  const char* const end = seed->data() + seed->size();
+  const auto [at, error] = std::from_chars(seed->data(), end, person.seed.emplace());
+  if (error != std::errc{} || at != end) {
+    throw SQLite::Exception("the seed of participant " + person.code + " is no number",
+                            SQLITE_CORRUPT);
+  }
   return row;
 }
 

@@ -6,6 +6,7 @@
 
 #include "data/checks.h"
 #include "data/store_impl.h"
+#include "data/tombstones.h"
 
 namespace palpate {
 namespace {
@@ -89,6 +90,10 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
       return person;
     }
 
+    if (Tombstones::read(db, impl_->path).holds(code)) {
+      impl_->refuse("the participant with code " + code +
+                    " has withdrawn; the code is not given again, choose another");
+    }
     SQLite::Statement numbers(
         db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
     Binder(numbers) << protocol_id;

@@ -2,6 +2,7 @@
 //
 //   store_child hold DB                    holds the writer's lock until it is killed
 //   store_child session DB TRIALS SEED     a live session, resumed where it stands
+//   store_child forget DB CODE             a withdrawal
 //   store_child simulate DB TRIALS SEED    a simulated one, in small batches
 
 #include <unistd.h>
@@ -91,6 +92,11 @@ int main(int argc, char** argv) {
     if (words[0] == "hold") {
       say("held");
       ::pause();
+      return 0;
+    }
+    if (words[0] == "forget") {
+      say("open");
+      store.forget(words.at(2));
       return 0;
     }
     const int trials = std::stoi(words.at(2));

@@ -1,0 +1,92 @@
+#include <unistd.h>
+
+#include <filesystem>
+#include <iostream>
+#include <string>
+
+#include "data/store.h"
+#include "data/utc.h"
+#include "runner/commands/command.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+void list_exports(const Holdings& holdings, std::ostream& out) {
+  if (holdings.exports.empty()) return;
+  out << "These exports hold the participant; delete them and their copies, or export again:\n";
+  for (const ExportRecord& one : holdings.exports) {
+    std::error_code error;
+    out << "  " << one.path << " (" << one.format << ", " << format_utc(one.made_utc_ns)
+        << (std::filesystem::exists(one.path, error) ? ")" : "; not there any more)") << "\n";
+  }
+}
+
+bool confirmed(const std::string& code) {
+  std::cerr << "This cannot be undone. Type the code again to remove it, anything else to leave "
+               "all as it is: "
+            << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == code;
+}
+
+}  // namespace
+
+int forget_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate forget --db FILE --participant CODE [--yes]";
+  line.summary =
+      "Withdrawal: removes everything of a participant from a database, from its log and from the\n"
+      "backups beside it, and lists the exports that hold the participant. What stays is a salted\n"
+      "hash of the code, so that run and merge never take the participant in again. Stopped half\n"
+      "way, the same command finishes it. Copies and merged databases need the same command.";
+  line.example =
+      "  palpate forget --db study.db --participant P07         shows what there is, and asks\n"
+      "  palpate forget --db study.db --participant P07 --yes   does not ask";
+  std::string database, code;
+  auto add = line.options.add_options();
+  add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
+  add("participant", po::value(&code)->required()->value_name("CODE"), "who has withdrawn");
+  add("yes", po::bool_switch(), "remove without asking");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const bool ask = !(*values)["yes"].as<bool>();
+  if (ask && isatty(STDIN_FILENO) != 1) {
+    throw UsageError("expected --yes, as there is no terminal to ask on\nUsage: " + line.usage);
+  }
+  if (!std::filesystem::exists(database)) throw UsageError(database + ": there is no such file");
+
+  Store store = Store::open(database, Store::Mode::write_or_create);
+  const Holdings holdings = store.holdings(code);
+  if (holdings.protocols == 0 && !holdings.withdrawn_before) {
+    throw UsageError(database + ": there is no participant " + code + " here");
+  }
+  if (holdings.protocols > 0) {
+    std::cout << code << ": " << holdings.sessions << " sessions, " << holdings.trials
+              << " trials and " << holdings.cut_off << " attempts that were cut off\n";
+  } else {
+    std::cout << code << " has withdrawn before; what may be left is cleared\n";
+  }
+  list_exports(holdings, std::cout);
+  if (holdings.mentions > 0) {
+    std::cout << "Notes on other participants that say " << code << ": " << holdings.mentions
+              << "; they are left as they are\n";
+  }
+  std::cout << std::flush;
+  if (ask && holdings.protocols > 0 && !confirmed(code)) {
+    std::cerr << "nothing was removed\n";
+    return 1;
+  }
+  const Withdrawal done = store.forget(code);
+  std::cout << "Removed from " << database << "\n";
+  for (const std::string& backup : done.backups_removed) std::cout << "Deleted " << backup << "\n";
+  for (const std::string& backup : done.backups_left) {
+    std::cerr << backup << ": could not be read or deleted; delete it, it may hold " << code
+              << "\n";
+  }
+  return done.backups_left.empty() ? 0 : 1;
+}
+
+}  // namespace palpate

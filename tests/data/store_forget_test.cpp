@@ -1,0 +1,253 @@
+// Withdrawal: after it, nothing of the participant is in any byte of the database or its backups.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <bit>
+#include <chrono>
+#include <random>
+#include <thread>
+
+#include "data/export_log.h"
+#include "data/schema.h"
+#include "data/store.h"
+#include "tests/data/child_process.h"
+#include "tests/data/store_fixture.h"
+
+namespace palpate {
+namespace {
+
+using namespace palpate::testing;
+namespace fs = std::filesystem;
+
+constexpr const char* kGone = "WITHDRAWNPARTICIPANT7";
+constexpr const char* kStays = "REMAININGPARTICIPANT2";
+constexpr double kPose = 0.12345678901234567;
+
+/// As SQLite stores a number.
+std::string bytes_of(double number) {
+  const auto pattern = std::bit_cast<std::uint64_t>(number);
+  std::string bytes;
+  for (int shift = 56; shift >= 0; shift -= 8) bytes += static_cast<char>(pattern >> shift);
+  return bytes;
+}
+
+void show_session(Store& store, const std::string& code, double pose, int trials) {
+  const Participant person = store.enrol(a_protocol(), code);
+  RunInfo info = a_run();
+  info.device_calibration = "calibrated by " + code;
+  const palpate::Run run = store.begin_run(person, info);
+  for (int trial = 1; trial <= trials; ++trial) {
+    TrialRecord record = a_record(trial);
+    record.orientation_wxyz[1] = pose;
+    record.samples.resize(200);
+    for (std::uint32_t i = 0; i < 200; ++i) record.samples[i].tip[0] = pose * i;
+    record.attempt = store.begin_attempt(run, record, 1);
+    store.finish_attempt(run, record);
+  }
+  store.begin_attempt(run, a_plan(trials + 1), 1);
+  store.cut_off_attempt(run, "fault while " + code + " was there");
+  store.add_note(run, 1, code + " felt fine");
+  store.end_run(run, RunEnd::done, 1);
+}
+
+class Forgetting : public ::testing::Test {
+ protected:
+  Forgetting() {
+    Store store = open();
+    show_session(store, kGone, kPose, 30);
+    show_session(store, kStays, 0.5, 30);
+  }
+  Store open() { return Store::open(path_, Store::Mode::write_or_create); }
+  /// Files of the folder that hold these bytes.
+  std::string holders_of(const std::string& bytes) {
+    std::string all;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.path())) {
+      if (contains(contents_of(entry.path()), bytes)) all += entry.path().filename().string() + " ";
+    }
+    return all;
+  }
+  void expect_gone() {
+    EXPECT_EQ(holders_of(kGone), "");
+    EXPECT_EQ(holders_of(bytes_of(kPose)), "");
+    EXPECT_EQ(holders_of(kStays), "study.db ");
+  }
+  /// With the log and the shared memory of a store that is open.
+  void expect_gone_while_open() {
+    EXPECT_EQ(holders_of(kGone), "");
+    EXPECT_EQ(holders_of(bytes_of(kPose)), "");
+  }
+  const TemporaryFolder folder_;
+  const std::string path_ = folder_ / "study.db";
+};
+
+TEST_F(Forgetting, LeavesNoByteBehindAndTheOthersAsTheyWere) {
+  ASSERT_EQ(holders_of(kGone), "study.db ");
+  ASSERT_EQ(holders_of(bytes_of(kPose)), "study.db ");
+  {
+    Store store = open();
+    const Holdings before = store.holdings(kGone);
+    EXPECT_EQ(before.protocols, 1);
+    EXPECT_EQ(before.sessions, 1);
+    EXPECT_EQ(before.trials, 30);
+    EXPECT_EQ(before.cut_off, 1);
+    EXPECT_FALSE(before.withdrawn_before);
+    store.forget(kGone);
+    expect_gone_while_open();
+    const Holdings after = store.holdings(kGone);
+    EXPECT_TRUE(after.withdrawn_before);
+    EXPECT_EQ(after.protocols, 0);
+    EXPECT_EQ(store.counts().participants, 1);
+    EXPECT_EQ(store.counts().completed, 30);
+    EXPECT_EQ(store.counts().cut_off, 1);
+    EXPECT_EQ(store.notes().size(), 1u);
+    std::size_t samples = 0;
+    store.for_each_trial([&](const StoredTrial& trial) { samples += trial.record.samples.size(); },
+                         true);
+    EXPECT_EQ(samples, 6000u);
+  }
+  expect_gone();
+}
+
+TEST_F(Forgetting, TheCodeIsNotGivenAgain) {
+  Store store = open();
+  store.forget(kGone);
+  EXPECT_TRUE(contains(error_of([&] { store.enrol(a_protocol(), kGone); }), "has withdrawn"));
+  EXPECT_TRUE(contains(error_of([&] { store.enrol(a_protocol('b'), kGone); }), "has withdrawn"))
+      << "nor in another protocol";
+  EXPECT_EQ(store.enrol(a_protocol(), "WITHDRAWNPARTICIPANT8").number, 1)
+      << "the number is free: the counterbalancing has no gap";
+  store.forget("WITHDRAWNPARTICIPANT8");
+  EXPECT_TRUE(contains(error_of([&] { store.enrol(a_protocol(), kGone); }), "has withdrawn"));
+  EXPECT_TRUE(
+      contains(error_of([&] { store.enrol(a_protocol(), "WITHDRAWNPARTICIPANT8"); }), "withdrawn"));
+}
+
+TEST_F(Forgetting, WhoIsNotThereIsRefused) {
+  Store store = open();
+  EXPECT_TRUE(contains(error_of([&] { store.forget("P99"); }), "no participant P99"));
+  EXPECT_TRUE(contains(error_of([&] { store.forget("P' OR 1"); }), "no participant's code"));
+  EXPECT_EQ(store.counts().participants, 2);
+  Store reader = Store::open(path_, Store::Mode::read_only);
+  EXPECT_TRUE(contains(error_of([&] { reader.forget(kGone); }), "for reading only"));
+}
+
+TEST_F(Forgetting, DeletesTheBackupsThatHoldTheParticipant) {
+  fs::copy_file(path_, path_ + ".v1.backup");
+  fs::copy_file(path_, path_ + ".v1-2.backup");
+  write_file(folder_ / "other.db.v1.backup", "another study's");
+  {
+    Store other = Store::open(path_ + ".v1-3.backup", Store::Mode::write_or_create);
+    other.enrol(a_protocol(), "SOMEBODYELSE");
+  }
+  {
+    Store store = open();
+    const Withdrawal done = store.forget(kGone);
+    EXPECT_EQ(done.backups_removed,
+              (std::vector<std::string>{path_ + ".v1-2.backup", path_ + ".v1.backup"}));
+    EXPECT_TRUE(done.backups_left.empty());
+  }
+  EXPECT_TRUE(fs::exists(path_ + ".v1-3.backup"));
+  EXPECT_TRUE(fs::exists(folder_ / "other.db.v1.backup"));
+  expect_gone();
+}
+
+TEST_F(Forgetting, ABackupThatCannotBeReadIsNamed) {
+  write_file(path_ + ".v1.backup", "not a database");
+  Store store = open();
+  EXPECT_EQ(store.forget(kGone).backups_left, std::vector<std::string>{path_ + ".v1.backup"});
+  EXPECT_TRUE(fs::exists(path_ + ".v1.backup"));
+  fs::remove(path_ + ".v1.backup");
+  EXPECT_TRUE(store.forget(kGone).backups_left.empty());
+}
+
+TEST_F(Forgetting, ListsTheExportsThatHoldTheParticipantAlsoAfterwards) {
+  Store store = open();
+  const auto people = store.participants(a_protocol().sha256);
+  ASSERT_EQ(people[0].code, kGone);
+  log_export(path_, {folder_ / "both.csv", "csv", 1}, {people[0].id, people[1].id});
+  log_export(path_, {folder_ / "one", "bids", 2}, {people[1].id});
+  log_export(path_, {folder_ / (std::string(kGone) + ".csv"), "csv", 3}, {people[0].id});
+  ASSERT_EQ(store.holdings(kGone).exports.size(), 2u);
+  EXPECT_EQ(store.holdings(kGone).exports[0].path, folder_ / "both.csv");
+  EXPECT_EQ(store.holdings(kGone).exports[0].format, "csv");
+  EXPECT_EQ(store.holdings(kGone).exports[0].made_utc_ns, 1);
+  EXPECT_EQ(store.holdings(kStays).exports.size(), 2u);
+  store.forget(kGone);
+  const auto exports = store.holdings(kGone).exports;
+  ASSERT_EQ(exports.size(), 2u);
+  EXPECT_EQ(exports[0].path, folder_ / "both.csv");
+  EXPECT_EQ(exports[1].path, folder_ / "....csv (export 3)") << "the path said the code";
+  expect_gone_while_open();
+  log_export(path_, {folder_ / "both.csv", "csv", 4}, {people[1].id});
+  EXPECT_EQ(store.holdings(kGone).exports.size(), 1u) << "it was made anew without the participant";
+}
+
+TEST_F(Forgetting, AnExportMadeMeanwhileIsRefused) {
+  Store store = open();
+  const auto people = store.participants(a_protocol().sha256);
+  store.forget(kGone);
+  EXPECT_TRUE(
+      contains(error_of([&] {
+                 log_export(path_, {folder_ / "late.csv", "csv", 1}, {people[1].id, people[0].id});
+               }),
+               "was withdrawn while"));
+  EXPECT_TRUE(store.holdings(kStays).exports.empty());
+}
+
+TEST_F(Forgetting, CountsNotesOnOthersThatSayTheCode) {
+  Store store = open();
+  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
+  for (const char* text : {"came with P7", "P7x", "xP7", "(P7)", "P77"}) {
+    store.add_note(run, 1, text);
+  }
+  EXPECT_EQ(store.holdings("P7").mentions, 2);
+}
+
+TEST_F(Forgetting, AReaderThatHoldsTheLogIsNamedAndTheSameCallFinishes) {
+  {
+    Store store = open();
+    Store reader = Store::open(path_, Store::Mode::read_only);
+    store.add_note(store.begin_run(store.enrol(a_protocol(), "P3"), a_run()), 1, "log");
+    EXPECT_TRUE(contains(error_of([&] { store.forget(kGone); }), "another program that reads"));
+  }
+  open().forget(kGone);
+  expect_gone();
+}
+
+TEST_F(Forgetting, KilledAtAnyMomentItIsAllThereOrTheSameCallFinishes) {
+  const std::string original = contents_of(path_);
+  std::mt19937 random(7);
+  int all_there = 0, finished = 0;
+  for (int round = 0; round < 40; ++round) {
+    for (const auto& entry : fs::directory_iterator(folder_.path())) fs::remove(entry.path());
+    write_file(path_, original);
+    write_file(path_ + ".v1.backup", original);
+    {
+      ChildProcess child({"forget", path_, kGone});
+      ASSERT_EQ(child.read_line(), "open");
+      std::this_thread::sleep_for(std::chrono::microseconds(random() % 45'000));
+      child.kill();
+    }
+    Store store = open();
+    const Holdings now = store.holdings(kGone);
+    if (now.protocols == 1) {
+      ++all_there;
+      EXPECT_FALSE(now.withdrawn_before);
+      EXPECT_EQ(now.trials, 30);
+      EXPECT_EQ(store.counts().completed, 60);
+    } else {
+      ++finished;
+      EXPECT_TRUE(now.withdrawn_before);
+      EXPECT_EQ(store.counts().completed, 30);
+    }
+    store.forget(kGone);
+    EXPECT_EQ(holders_of(kGone), "");
+    EXPECT_EQ(holders_of(bytes_of(kPose)), "");
+  }
+  EXPECT_GT(all_there, 0);
+  EXPECT_GT(finished, 0);
+}
+
+}  // namespace
+}  // namespace palpate
