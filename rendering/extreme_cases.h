@@ -1,0 +1,29 @@
+#pragma once
+// Extreme geometry and extreme hands: named cases, each with what it measures and what it may be.
+// Tests run them, `palpate accuracy` lists them. For checks, not for the servo.
+
+#include <span>
+#include <string>
+
+#include "rendering/renderer.h"
+
+namespace palpate {
+
+struct ExtremeResult {
+  bool passed = false;
+  double worst = 0;    ///< the measure, in the case's unit
+  double limit = 0;    ///< what it may be at most
+  std::string detail;  ///< what is wrong, with numbers; empty when it passed
+};
+
+struct ExtremeCase {
+  const char* name;     ///< "sliver"; letters, digits and -
+  const char* title;    ///< what is done, in a line
+  const char* measure;  ///< what `worst` is, with its unit: "ideal probe off the surface, sizes"
+  ExtremeResult (*run)(const Renderer& renderer);
+};
+
+/// All of them. Each takes well below a second, but for those whose name begins with "million".
+std::span<const ExtremeCase> extreme_cases();
+
+}  // namespace palpate

@@ -1,0 +1,30 @@
+#pragma once
+// Random ways of a probe over one convex mesh, in the mesh's frame, meant to be hard. For searches.
+
+#include <vector>
+
+#include "rendering/probe.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+
+enum class PathKind {
+  smooth,   ///< a hand that wanders in and out, 1e-4 to 0.03 sizes a tick
+  sliding,  ///< near the surface all the time, from just outside to beyond the middle
+  fast,     ///< straight past and through, 5 m/s or 0.01 to 3 sizes a tick, turning on the way
+  plunges,  ///< from outside, by 1e-16 to 1 sizes, straight in and out again
+  jumps,    ///< every tick somewhere else
+  aligned,  ///< along edges, in planes of facets, through corners: exactly or off by next to
+            ///< nothing
+};
+inline constexpr int kPathKinds = 6;
+const char* to_string(PathKind kind);
+
+/// Starts far outside (its first pose); 1 kHz.
+/// \param length  m, of the probe
+/// \param side    false: it is the tip that is led over the surface
+std::vector<LineProbe> random_path(Random& random, PathKind kind, const ConvexMesh& mesh,
+                                   double length, bool side, std::size_t ticks);
+
+}  // namespace palpate

@@ -1,0 +1,271 @@
+#include "rendering/search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "rendering/first_contact.h"
+#include "rendering/random_paths.h"
+#include "rendering/random_solids.h"
+#include "rendering/reference.h"
+#include "rendering/tick_audit.h"
+#include "stimuli/orientation.h"
+
+namespace palpate {
+namespace {
+
+constexpr int kFineSteps = 100;  // of a tick, by brute force
+
+LineProbe mixed(const LineProbe& a, const LineProbe& b, double t) {
+  return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
+}
+
+LineProbe moved(const LineProbe& probe, const Vec3& by) {
+  return {probe.tip + by, probe.tail + by};
+}
+
+/// Some facet's plane has both poses on its outer side, hence all poses between them.
+bool plane_between(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
+  return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const Facet& facet) {
+    return std::min({glm::dot(facet.normal, before.tip), glm::dot(facet.normal, before.tail),
+                     glm::dot(facet.normal, after.tip), glm::dot(facet.normal, after.tail)}) >
+           facet.offset;
+  });
+}
+
+/// Outward normal and depth of one facet of M (a facet of the mesh with the deeper end, or an edge)
+/// for a probe; edges that are no silhouette edges have none. Mesh frame.
+std::optional<ReferenceDepth> facet_of_sum(const ConvexMesh& mesh, bool is_edge, std::uint32_t i,
+                                           const LineProbe& probe) {
+  if (!is_edge) {
+    const Facet& facet = mesh.facets()[i];
+    return ReferenceDepth{facet.offset - std::min(glm::dot(facet.normal, probe.tip),
+                                                  glm::dot(facet.normal, probe.tail)),
+                          facet.normal};
+  }
+  const Edge& edge = mesh.edges()[i];
+  const Vec3 &left = mesh.facets()[edge.left].normal, &right = mesh.facets()[edge.right].normal;
+  const Vec3 d = probe.tail - probe.tip;
+  const double left_slope = glm::dot(left, d), right_slope = glm::dot(right, d);
+  if ((left_slope >= 0) == (right_slope >= 0)) return std::nullopt;
+  const Vec3 normal = glm::normalize(std::abs(right_slope) * left + std::abs(left_slope) * right);
+  return ReferenceDepth{glm::dot(normal, mesh.vertices()[edge.v0] - probe.tip), normal};
+}
+
+/// The one facet of M that the probe comes in by, where it is plain which one.
+struct Entry {
+  bool is_edge = false;
+  std::uint32_t index = 0;
+};
+std::optional<Entry> entry_at(const ConvexMesh& mesh, const LineProbe& probe) {
+  std::optional<Entry> best;
+  double least = std::numeric_limits<double>::infinity(), second = least;
+  const auto look = [&](bool is_edge, std::uint32_t i) {
+    const auto at = facet_of_sum(mesh, is_edge, i, probe);
+    if (!at) return;
+    second = std::min(second, std::max(at->depth, least));
+    if (at->depth < least) {
+      second = least;
+      least = at->depth;
+      best = Entry{is_edge, i};
+    }
+  };
+  for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) look(false, i);
+  for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) look(true, i);
+  if (second - least < 1e-7 * mesh.size()) return std::nullopt;
+  return best;
+}
+
+/// One walk under way.
+class Walk {
+ public:
+  Walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk)
+      : renderer_(renderer),
+        random_(seed, {walk}),
+        mesh_(std::make_shared<const ConvexMesh>(random_solid(random_))),
+        pose_(random_pose()),
+        length_(random_length()),
+        kind_(static_cast<PathKind>(random_.below(kPathKinds))),
+        scene_({{mesh_, pose_, Material{}, 0, nullptr}}, renderer.side_contact()),
+        state_(scene_.initial_state()) {
+    counts_.walks = 1;
+    fault_.seed = seed;
+    fault_.walk = walk;
+  }
+
+  SearchCounts run() {
+    const auto path =
+        random_path(random_, kind_, *mesh_, length_, renderer_.side_contact(), kTicksPerWalk);
+    for (const LineProbe& local : path) tick({to_world(local.tip), to_world(local.tail)});
+    return std::move(counts_);
+  }
+
+ private:
+  Pose random_pose() {
+    if (random_.below(2)) return {};
+    const double reach = random_.below(2) ? 1 : 10 * mesh_->size();
+    return {reach * (uniform_rotation(random_) * Vec3(0, 0, 1)), uniform_rotation(random_)};
+  }
+
+  double random_length() {
+    if (random_.below(8) == 0) return 0.12;
+    const double shares[] = {0, 1e-6, 0.05, 0.5, 1, 3, 10};
+    return shares[random_.below(7)] * (0.7 + 0.6 * random_.unit()) * mesh_->size();
+  }
+
+  Vec3 to_world(const Vec3& local) const { return pose_.orientation * local + pose_.position; }
+
+  void tick(const LineProbe& probe) {
+    const bool was_free = has_last_ && !last_held_;
+    const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
+    const LineProbe felt = felt_probe(scene_, renderer_, probe);
+    const TickAudit audit = audit_tick(scene_, renderer_, probe, r);
+    fault_.tick = counts_.ticks++;
+    const bool held = audit.finite && r.contacts > 0;
+    counts_.in_contact += held;
+    counts_.worst_penetration =
+        std::max(counts_.worst_penetration, audit.penetrates / mesh_->size());
+    const auto wrong = [&](bool is, std::uint64_t& count, const char* what, double value) {
+      if (is) report(++count, what, value, felt);
+    };
+    wrong(!audit.finite, counts_.not_finite, "not finite", 0);
+    wrong(audit.missed > audit.tolerance, counts_.missed, "missed, depth", audit.missed);
+    wrong(audit.penetrates > audit.tolerance, counts_.penetrating, "ideal probe inside by",
+          audit.penetrates);
+    wrong(audit.floats > audit.tolerance, counts_.floating, "ideal probe off by", audit.floats);
+    wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
+    wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
+    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless, "walk without end", 0);
+    wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
+    if (was_free && audit.finite) from_free_space(felt, r, held, audit.tolerance);
+    last_ = felt;
+    has_last_ = true;
+    last_held_ = held;
+  }
+
+  /// The tick began in free space: what a hundredth of it shows, by brute force.
+  void from_free_space(const LineProbe& felt, const Rendering& r, bool held, double tolerance) {
+    counts_.entries += held;
+    if (held) count_fallback(felt);
+    if (!held && plane_between(*mesh_, last_, felt)) return;
+    ++counts_.walked_finely;
+    const auto time = reference_first_contact(*mesh_, last_, felt, kFineSteps);
+    if (!time) {
+      if (held) expect_touch(felt, tolerance);
+      return;
+    }
+    // It came in. Where the facet that it came in by still holds it, it must be felt there.
+    const auto entry = entry_at(*mesh_, mixed(last_, felt, *time));
+    if (!entry) return;
+    const auto at_end = facet_of_sum(*mesh_, entry->is_edge, entry->index, felt);
+    if (!at_end || at_end->depth <= tolerance) return;
+    const LineProbe ideal = moved(felt, at_end->depth * at_end->normal);
+    if (reference_gap(*mesh_, ideal) > 0.01 * tolerance ||
+        reference_depth(*mesh_, ideal).depth > 0.01 * tolerance) {
+      return;
+    }
+    ++counts_.passages;
+    if (!held || std::abs(r.deepest.depth - at_end->depth) > tolerance) {
+      report(++counts_.passed_through, held ? "held elsewhere, by" : "passed through, by",
+             held ? r.deepest.depth - at_end->depth : at_end->depth, felt);
+    }
+  }
+
+  /// A contact that began although no step shows the probe inside: it must at least come as near as
+  /// it moves in a step.
+  void expect_touch(const LineProbe& felt, double tolerance) {
+    const double step =
+        std::max(glm::length(felt.tip - last_.tip), glm::length(felt.tail - last_.tail)) /
+        kFineSteps;
+    double gap = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= kFineSteps && gap > step; ++i) {
+      gap = std::min(gap, reference_gap(*mesh_, mixed(last_, felt, i / double{kFineSteps})));
+    }
+    if (gap > step + tolerance) report(++counts_.phantom, "contact without touch, gap", gap, felt);
+  }
+
+  void count_fallback(const LineProbe& felt) {
+    const ScenePart& part = scene_.parts()[0];
+    const FirstContact first =
+        renderer_.side_contact()
+            ? first_contact_segment(*mesh_, *part.trees, last_, felt, part.tolerance)
+            : first_contact_point(*mesh_, *part.trees, last_.tip, felt.tip, part.tolerance);
+    counts_.fallbacks += first.facet.kind == MinkowskiFacet::Kind::none;
+  }
+
+  void report(std::uint64_t, const char* what, double value, const LineProbe& felt) {
+    if (counts_.faults.size() >= SearchCounts::kFaultsKept) return;
+    std::ostringstream out;
+    out.precision(17);
+    out << renderer_.name() << ", " << to_string(kind_) << " path, " << mesh_->facets().size()
+        << " facets, size " << mesh_->size() << " m, probe " << length_ << " m: " << what << " "
+        << value << " (" << value / mesh_->size() << " sizes), at (" << felt.tip.x << " "
+        << felt.tip.y << " " << felt.tip.z << ") (" << felt.tail.x << " " << felt.tail.y << " "
+        << felt.tail.z << ")";
+    fault_.what = out.str();
+    counts_.faults.push_back(fault_);
+  }
+
+  const Renderer& renderer_;
+  Random random_;
+  std::shared_ptr<const ConvexMesh> mesh_;
+  Pose pose_;
+  double length_;
+  PathKind kind_;
+  Scene scene_;
+  RenderState state_;
+  LineProbe last_;  // as felt, mesh frame
+  bool has_last_ = false, last_held_ = false;
+  SearchFault fault_;
+  SearchCounts counts_;
+};
+
+}  // namespace
+
+SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
+  walks += other.walks;
+  ticks += other.ticks;
+  in_contact += other.in_contact;
+  entries += other.entries;
+  walked_finely += other.walked_finely;
+  passages += other.passages;
+  missed += other.missed;
+  passed_through += other.passed_through;
+  phantom += other.phantom;
+  penetrating += other.penetrating;
+  floating += other.floating;
+  shallow += other.shallow;
+  wrong_force += other.wrong_force;
+  not_finite += other.not_finite;
+  endless += other.endless;
+  faulted += other.faulted;
+  fallbacks += other.fallbacks;
+  worst_penetration = std::max(worst_penetration, other.worst_penetration);
+  for (const SearchFault& fault : other.faults) {
+    if (faults.size() < kFaultsKept) faults.push_back(fault);
+  }
+  return *this;
+}
+
+SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
+  return Walk(renderer, seed, walk).run();
+}
+
+SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uint64_t walks) {
+  SearchCounts counts;
+  for (std::uint64_t walk = first_walk; walk < first_walk + walks; ++walk) {
+    counts += search_walk(walk % 4 == 0 ? point_renderer() : ray_renderer(), seed, walk);
+  }
+  return counts;
+}
+
+SearchCounts search(std::uint64_t ticks, std::uint64_t seed) {
+  return search_walks(seed, 0, (ticks + kTicksPerWalk - 1) / kTicksPerWalk);
+}
+
+}  // namespace palpate

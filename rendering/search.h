@@ -1,0 +1,72 @@
+#pragma once
+// The search for ticks that are wrong: random convex solids of all sizes, random hand paths and
+// fast ones, every tick held against the brute-force reference. For checks, not for the servo.
+// Deterministic: walk w of seed s is the same on every machine, whoever walks it.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rendering/renderer.h"
+
+namespace palpate {
+
+/// Ticks of one walk: one object, one probe, one path.
+inline constexpr std::uint64_t kTicksPerWalk = 500;
+
+/// A tick that is wrong. `palpate accuracy --search` prints it; search_walk(seed, walk) goes there
+/// again.
+struct SearchFault {
+  std::uint64_t seed = 0, walk = 0, tick = 0;
+  std::string what;  ///< renderer, object, and what is wrong, with numbers
+};
+
+/// What a search saw, and what it found wrong.
+struct SearchCounts {
+  std::uint64_t walks = 0, ticks = 0;
+  std::uint64_t in_contact = 0;  ///< ticks in contact
+  std::uint64_t entries = 0;     ///< contacts that began
+  /// Ticks from free space that were walked again in a hundred steps by brute force.
+  std::uint64_t walked_finely = 0;
+  std::uint64_t passages = 0;  ///< of those: came in by a facet that still holds at the tick's end
+
+  // Wrong ticks; all of these must be 0.
+  std::uint64_t missed = 0;  ///< inside by more than 1e-9 of the size and not felt
+  /// A hundredth of the tick shows a way in, by a facet that holds the probe at the tick's end (a
+  /// thin plate, crossed), and it is not felt on that side.
+  std::uint64_t passed_through = 0;
+  std::uint64_t phantom = 0;      ///< a contact began where a hundredth of the tick shows no touch
+  std::uint64_t penetrating = 0;  ///< ideal probe inside by more than 1e-9 of the size
+  std::uint64_t floating = 0;     ///< ideal probe off the surface by more than 1e-9 of the size
+  std::uint64_t shallow = 0;      ///< shallower than the least depth that separates
+  std::uint64_t wrong_force = 0;  ///< force, torque or devices' forces are not those of the contact
+  std::uint64_t not_finite = 0;
+  std::uint64_t endless = 0;  ///< walks that met their limit of steps
+  std::uint64_t faulted = 0;  ///< other fault bits
+
+  /// Not wrong, but counted: entries that no crossing explained, so that all facets were looked at.
+  std::uint64_t fallbacks = 0;
+  double worst_penetration = 0;  ///< of the ideal probe, in sizes of the object
+
+  std::vector<SearchFault> faults;  ///< the first ones, at most kFaultsKept
+
+  static constexpr std::size_t kFaultsKept = 10;
+  std::uint64_t wrong() const {
+    return missed + passed_through + phantom + penetrating + floating + shallow + wrong_force +
+           not_finite + endless + faulted;
+  }
+  /// Adds another's. Sums in the order of walks are the same whoever walked them.
+  SearchCounts& operator+=(const SearchCounts& other);
+};
+
+/// One walk by one renderer.
+SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk);
+
+/// Walks first_walk, first_walk + 1, ...: every fourth with the point renderer, the others with the
+/// ray. Independent of each other: share them out among threads as you like.
+SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uint64_t walks);
+
+/// At least `ticks` ticks, from walk 0 on.
+SearchCounts search(std::uint64_t ticks, std::uint64_t seed);
+
+}  // namespace palpate
