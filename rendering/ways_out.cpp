@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <numbers>
 #include <stdexcept>
 
@@ -62,7 +63,7 @@ class Search {
 };
 
 Vec3 radial(const Vec3& p) {
-  const double out = std::hypot(p.x, p.y);
+  const double out = std::sqrt(p.x * p.x + p.y * p.y);
   return out > 0 ? Vec3(p.x / out, p.y / out, 0) : Vec3(1, 0, 0);
 }
 
@@ -89,33 +90,44 @@ void cross_line(Search& s, const Vec3& normal, const Vec3& start, const Vec3& li
   s.side(normal, depth, glm::dot(glm::cross(w, line), c) / c2, angle_to_line(s.u, line));
 }
 
+/// Directions around a circle, off the axes, where a rate may be exactly zero.
+class Turns {
+ public:
+  static constexpr int kParts = 360;
+  static double angle(int i) { return 2 * std::numbers::pi * (i + 0.123) / kParts; }
+  Turns() {
+    for (int i = 0; i <= kParts; ++i) all_.push_back({std::cos(angle(i)), std::sin(angle(i))});
+  }
+  glm::dvec2 at(int i) const { return all_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<glm::dvec2> all_;
+};
+
 /// The probe's side against a rim, the circle of the shape's radius at height z: n at right angles
 /// to the probe, within `belongs` (the normals that the rim has). Along the circle of those n,
 /// phi' = (x - tip).n' with x the rim's point farthest along n: its roots from below, each halved
 /// down to rounding, are the minima.
 template <class Belongs>
 void cross_rim(Search& s, double z, Belongs belongs) {
-  constexpr int kParts = 360;
+  static const Turns turns;
   const Vec3 across = std::abs(s.u.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
   const Vec3 e1 = glm::normalize(glm::cross(s.u, across)), e2 = glm::cross(s.u, e1);
-  const auto normal = [&](double turn) { return std::cos(turn) * e1 + std::sin(turn) * e2; };
+  const auto normal = [&](glm::dvec2 turn) { return turn.x * e1 + turn.y * e2; };
   const auto touched = [&](const Vec3& n) { return s.shape.radius * radial(n) + Vec3(0, 0, z); };
-  const auto rate = [&](double turn) {
-    const Vec3 n = normal(turn);
-    return glm::dot(touched(n) - s.probe.tip, glm::cross(s.u, n));
+  const auto rate = [&](glm::dvec2 turn) {  // n' is e2 cos - e1 sin
+    return glm::dot(touched(normal(turn)) - s.probe.tip, turn.x * e2 - turn.y * e1);
   };
-  // Starts off the axes, where a rate may be exactly zero.
-  const auto at = [](int i) { return 2 * std::numbers::pi * (i + 0.123) / kParts; };
-  double last = rate(at(0));
-  for (int i = 0; i < kParts; ++i) {
-    const double next = rate(at(i + 1));
+  double last = rate(turns.at(0));
+  for (int i = 0; i < Turns::kParts; ++i) {
+    const double next = rate(turns.at(i + 1));
     if (last < 0 && next >= 0) {
-      double low = at(i), high = at(i + 1);
+      double low = Turns::angle(i), high = Turns::angle(i + 1);
       for (double middle = (low + high) / 2; middle > low && middle < high;
            middle = (low + high) / 2) {
-        (rate(middle) < 0 ? low : high) = middle;
+        (rate({std::cos(middle), std::sin(middle)}) < 0 ? low : high) = middle;
       }
-      const Vec3 n = normal(high);
+      const Vec3 n = normal({std::cos(high), std::sin(high)});
       if (belongs(n)) {
         const Vec3 x = touched(n);
         const double place = glm::dot(x - s.probe.tip, s.d) / (s.length * s.length);
