@@ -7,9 +7,7 @@
 #include "data/store.h"
 
 namespace palpate {
-namespace {
-
-/// Well-formed UTF-8 by table 3-7 of the Unicode standard, and no NUL.
+// Table 3-7 of the Unicode standard.
 bool is_clean_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto lead = static_cast<unsigned char>(text[i++]);
@@ -33,8 +31,6 @@ bool is_clean_utf8(std::string_view text) {
   }
   return true;
 }
-
-}  // namespace
 
 void Checks::expect(bool holds, const std::string& expectation) {
   if (!holds) faults_.push_back(expectation);

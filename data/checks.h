@@ -26,6 +26,7 @@ class Checks {
   std::vector<std::string> faults_;
 };
 
+bool is_clean_utf8(std::string_view text);        ///< well-formed, and no NUL
 bool is_participant_code(std::string_view code);  ///< 1 to 32 ASCII letters and digits
 
 void check(Checks& checks, const RunInfo& info, bool simulated);

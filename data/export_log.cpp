@@ -3,6 +3,8 @@
 #include <SQLiteCpp/Transaction.h>
 #include <sqlite3.h>
 
+#include <algorithm>
+#include <chrono>
 #include <filesystem>
 
 #include "data/schema.h"
@@ -55,6 +57,29 @@ void log_export(const std::string& database, const ExportRecord& made,
     }
     transaction.commit();
   });
+}
+
+void ExportedPeople::add(const Participant& participant) {
+  if (!ids_.empty() && ids_.back() == participant.id) return;
+  if (std::find(ids_.begin(), ids_.end(), participant.id) == ids_.end()) {
+    ids_.push_back(participant.id);
+  }
+  (participant.simulated ? any_simulated_ : any_real_) = true;
+}
+
+std::string ExportedPeople::record(const std::string& database, const std::string& path,
+                                   const std::string& format) const {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  const ExportRecord made{std::filesystem::absolute(path).lexically_normal().string(), format,
+                          std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+  try {
+    log_export(database, made, ids_);
+  } catch (const StoreRefused&) {
+    throw;
+  } catch (const StoreError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 }  // namespace palpate

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "data/record.h"
+
 namespace palpate {
 
 struct ExportRecord {
@@ -19,5 +21,22 @@ struct ExportRecord {
 /// database may not be written to.
 void log_export(const std::string& database, const ExportRecord& made,
                 const std::vector<std::int64_t>& participants);
+
+/// Gathers who is in an export while it is written, and records it before it gets its name.
+class ExportedPeople {
+ public:
+  void add(const Participant& participant);
+  bool any_simulated() const { return any_simulated_; }
+  bool all_simulated() const { return any_simulated_ && !any_real_; }
+
+  /// \return why it cannot be recorded (a read-only disk), "" when it is. \throws StoreRefused: one
+  /// of them was withdrawn meanwhile.
+  std::string record(const std::string& database, const std::string& path,
+                     const std::string& format) const;
+
+ private:
+  std::vector<std::int64_t> ids_;  // each once: the rows of a participant follow each other
+  bool any_simulated_ = false, any_real_ = false;
+};
 
 }  // namespace palpate

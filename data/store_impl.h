@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "data/sqlite_errors.h"
 #include "data/store.h"
@@ -91,50 +92,68 @@ class Binder {
   int index_ = 0;
 };
 
+/// The columns of a statement, made once for all its rows. Valid after the first step.
+std::vector<SQLite::Column> columns_of(SQLite::Statement& statement);
+
 /// Reads the columns of a row one after the other, whatever their types.
 class Row {
  public:
   explicit Row(SQLite::Statement& statement, int first = 0)
-      : statement_(statement), index_(first) {}
+      : statement_(&statement), index_(first) {}
+  explicit Row(const std::vector<SQLite::Column>& columns) : columns_(&columns) {}
+
   Row& operator>>(std::string& value) {
-    value = statement_.getColumn(index_++).getString();
-    return *this;
+    return next([&](const SQLite::Column& column) {
+      const void* const text = column.getBlob();  // before its length
+      value.assign(static_cast<const char*>(text), static_cast<std::size_t>(column.getBytes()));
+    });
   }
   Row& operator>>(double& value) {
-    value = statement_.getColumn(index_++).getDouble();
-    return *this;
+    return next([&](const SQLite::Column& column) { value = column.getDouble(); });
   }
   Row& operator>>(int& value) { return integer(value); }
   Row& operator>>(std::uint32_t& value) { return integer(value); }
   Row& operator>>(std::int64_t& value) { return integer(value); }
   Row& operator>>(std::uint64_t& value) { return integer(value); }
   Row& operator>>(bool& value) {
-    value = statement_.getColumn(index_++).getInt64() != 0;
-    return *this;
+    return next([&](const SQLite::Column& column) { value = column.getInt64() != 0; });
   }
   template <class T>
   Row& operator>>(std::optional<T>& value) {
-    if (statement_.getColumn(index_).isNull()) {
+    bool null = false;
+    next([&](const SQLite::Column& column) { null = column.isNull(); });
+    if (null) {
       value.reset();
-      ++index_;
       return *this;
     }
+    --index_;
     return *this >> value.emplace();
   }
 
  private:
-  template <class T>
-  Row& integer(T& value) {
-    const std::int64_t stored = statement_.getColumn(index_++).getInt64();
-    if (!std::in_range<T>(stored)) {
-      throw SQLite::Exception("a number is out of its range: " + std::to_string(stored),
-                              SQLITE_CORRUPT);
+  template <class Read>
+  Row& next(const Read& read) {
+    if (columns_ != nullptr) {
+      read((*columns_)[static_cast<std::size_t>(index_++)]);
+    } else {
+      read(statement_->getColumn(index_++));
     }
-    value = static_cast<T>(stored);
     return *this;
   }
-  SQLite::Statement& statement_;
-  int index_;
+  template <class T>
+  Row& integer(T& value) {
+    return next([&](const SQLite::Column& column) {
+      const std::int64_t stored = column.getInt64();
+      if (!std::in_range<T>(stored)) {
+        throw SQLite::Exception("a number is out of its range: " + std::to_string(stored),
+                                SQLITE_CORRUPT);
+      }
+      value = static_cast<T>(stored);
+    });
+  }
+  SQLite::Statement* statement_ = nullptr;
+  const std::vector<SQLite::Column>* columns_ = nullptr;
+  int index_ = 0;
 };
 
 RunEnd run_end_of(const std::string& text);

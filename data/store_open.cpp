@@ -18,6 +18,9 @@ namespace {
 constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";
 
 constexpr int kBusyTimeoutMs = 5000;
+// A store belongs to one thread at a time: SQLite need not lock every look at a column.
+constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
+constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 /// The one writer is us: whatever else is still running in the file is dead.
 void mark_dead_runs(SQLite::Database& db) {
@@ -66,7 +69,7 @@ std::string immutable_uri(const std::string& file) {
 /// Another program's file is left alone: this look takes no locks and writes nothing, where an
 /// ordinary one could roll back or checkpoint it.
 void require_ours(const std::string& file, const std::string& path) {
-  SQLite::Database probe(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+  SQLite::Database probe(immutable_uri(file), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
   try {
     require_application_id(probe, path);
   } catch (const SQLite::Exception& error) {
@@ -97,12 +100,12 @@ bool may_write(const std::string& file) {
 /// write-ahead log removes it. On a read-only disk a file without a log is taken as it is.
 void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file) {
   if (may_write(file)) {
-    db.emplace(file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+    db.emplace(file, kOpenWrite, kBusyTimeoutMs);
     db->exec("PRAGMA query_only = ON");
   } else if (std::filesystem::exists(file + "-wal")) {
-    db.emplace(file, SQLite::OPEN_READONLY, kBusyTimeoutMs);
+    db.emplace(file, kOpenRead, kBusyTimeoutMs);
   } else {
-    db.emplace(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeoutMs);
+    db.emplace(immutable_uri(file), kOpenRead | SQLITE_OPEN_URI, kBusyTimeoutMs);
   }
 }
 
@@ -184,7 +187,7 @@ Store Store::open(const std::string& path, Mode mode) {
     require_ours(impl->file, path);
     require_whole_pages(impl->file);
     if (writes) {
-      impl->db.emplace(impl->file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+      impl->db.emplace(impl->file, kOpenWrite, kBusyTimeoutMs);
     } else {
       open_for_reading(impl->db, impl->file);
     }

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
+#include "data/checks.h"
 #include "data/samples_codec.h"
 #include "data/store_impl.h"
 #include "data/utc.h"
@@ -92,7 +94,67 @@ std::vector<SampleRecord> read_samples(SQLite::Statement& find, std::int64_t att
   }
 }
 
+/// What no trial of ours holds, and no export could hold. Thrown as damage.
+class Sound {
+ public:
+  Sound(const StoredTrial& trial) : trial_(trial) {}
+  void text(const char* field, const std::string& value) const {
+    if (!is_clean_utf8(value)) fail(field, "is not UTF-8 text");
+  }
+  void number(const char* field, double value) const {
+    if (!std::isfinite(value)) fail(field, "is not a finite number");
+  }
+  void run() const {
+    if (!is_participant_code(trial_.participant.code)) {
+      throw SQLite::Exception("a participant's code is not 1 to 32 letters and digits",
+                              SQLITE_CORRUPT);
+    }
+    text("device", trial_.run.device);
+    text("program version", trial_.run.program_version);
+    text("observer's checksum", trial_.run.observer_sha256);
+  }
+  void record() const {
+    const TrialRecord& record = trial_.record;
+    text("renderer", record.renderer);
+    text("shape", record.shape);
+    text("response", record.response);
+    text("reason", trial_.cut_off_reason);
+    for (const double q : record.orientation_wxyz) number("orientation", q);
+    number("response_time", record.response_time);
+    number("first_contact_time", record.first_contact_time.value_or(0));
+    number("max_force", record.max_force);
+  }
+
+ private:
+  [[noreturn]] void fail(const char* field, const char* what) const {
+    const TrialRecord& record = trial_.record;
+    throw SQLite::Exception("participant " + trial_.participant.code + ", session " +
+                                std::to_string(record.session) + ", trial " +
+                                std::to_string(record.trial) + ": " + field + " " + what,
+                            SQLITE_CORRUPT);
+  }
+  const StoredTrial& trial_;
+};
+
+/// A damaged index hides rows: they are counted without it.
+void require_all_seen(SQLite::Database& db, const char* state, std::int64_t seen) {
+  SQLite::Statement count(db, "SELECT count(*) FROM attempts NOT INDEXED WHERE state = ?");
+  count.bind(1, state);
+  count.executeStep();
+  const std::int64_t stored = count.getColumn(0).getInt64();
+  if (stored == seen) return;
+  throw SQLite::Exception("of " + std::to_string(stored) + " attempts " + std::to_string(seen) +
+                              " are to be found: an index is damaged",
+                          SQLITE_CORRUPT);
+}
+
 }  // namespace
+
+std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
+  std::vector<SQLite::Column> columns;
+  for (int i = 0; i < statement.getColumnCount(); ++i) columns.push_back(statement.getColumn(i));
+  return columns;
+}
 
 SessionProgress Store::progress(const Participant& participant, int session) {
   return guarded(impl_->path, [&] {
@@ -235,12 +297,15 @@ void Store::Impl::for_each_attempt(const char* state, bool with_samples,
     SQLite::Statement samples(*db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?");
     Binder(find) << state;
     StoredTrial trial;
-    std::int64_t known_run = 0;
+    std::int64_t known_run = 0, seen = 0;
+    std::vector<SQLite::Column> columns;
+    const Sound sound(trial);
     while (find.executeStep()) {
+      if (++seen == 1) columns = columns_of(find);
       TrialRecord& record = trial.record;
       record = {};
       std::optional<std::string> reason;
-      Row row(find);
+      Row row(columns);
       const std::int64_t id = read_plan(row, record);
       const std::int64_t began_ns = record.onset_ns;
       row >> reason;
@@ -254,14 +319,17 @@ void Store::Impl::for_each_attempt(const char* state, bool with_samples,
         find_run.bind(1, run);
         if (!find_run.executeStep())
           throw SQLite::Exception("an attempt without a run", SQLITE_CORRUPT);
-        Row columns(find_run);
-        columns >> trial.participant >> trial.run;
+        Row details(find_run);
+        details >> trial.participant >> trial.run;
+        sound.run();
         known_run = run;
       }
       record.onset_utc = format_utc(to_unix_ns(trial.run.clock, record.onset_ns));
       if (with_samples) record.samples = read_samples(samples, id, path);
+      sound.record();
       visit(trial);
     }
+    require_all_seen(*db, state, seen);
   });
 }
 

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <chrono>
-#include <cstdio>
 #include <limits>
 
 namespace palpate {
@@ -15,13 +14,20 @@ std::string format_utc(std::int64_t unix_ns) {
   const year_month_day date{day};
   const hh_mm_ss<microseconds> time{cut - day};
   std::array<char, 40> text{};
-  const int length = std::snprintf(
-      text.data(), text.size(), "%04d-%02u-%02uT%02d:%02d:%02d.%06dZ",
-      static_cast<int>(date.year()), static_cast<unsigned>(date.month()),
-      static_cast<unsigned>(date.day()), static_cast<int>(time.hours().count()),
-      static_cast<int>(time.minutes().count()), static_cast<int>(time.seconds().count()),
-      static_cast<int>(time.subseconds().count()));
-  return {text.data(), static_cast<std::size_t>(length)};
+  char* at = text.data();
+  const auto put = [&at](std::int64_t value, int digits, char after) {
+    for (int i = digits - 1; i >= 0; --i, value /= 10) at[i] = static_cast<char>('0' + value % 10);
+    at[digits] = after;
+    at += digits + 1;
+  };
+  put(static_cast<int>(date.year()), 4, '-');  // 1677 to 2262: what 64 bits of nanoseconds reach
+  put(static_cast<unsigned>(date.month()), 2, '-');
+  put(static_cast<unsigned>(date.day()), 2, 'T');
+  put(time.hours().count(), 2, ':');
+  put(time.minutes().count(), 2, ':');
+  put(time.seconds().count(), 2, '.');
+  put(time.subseconds().count(), 6, 'Z');
+  return {text.data(), at};
 }
 
 std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns) {

@@ -35,7 +35,7 @@ int export_command(const std::vector<std::string>& args) {
   }
   try {
     Store store = Store::open(database, Store::Mode::read_only);
-    const CsvExport done = export_csv(store, out, (*values)["force"].as<bool>());
+    const ExportDone done = export_csv(store, out, (*values)["force"].as<bool>());
     std::cerr << out << ": " << done.trials << " trials\n";
     if (done.attempts > 0) {
       std::cerr << done.attempts_path << ": " << done.attempts << " attempts that were cut off\n";

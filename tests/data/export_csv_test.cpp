@@ -201,7 +201,7 @@ TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {
   TrialRecord record = a_record(1);
   record.attempt = store_.begin_attempt(run_, record, 2);
   store_.finish_attempt(run_, record);
-  const CsvExport done = export_csv(store_, out_, false);
+  const ExportDone done = export_csv(store_, out_, false);
   EXPECT_EQ(done.trials, 1);
   EXPECT_EQ(done.attempts, 1);
   EXPECT_EQ(done.attempts_path, out_folder_ / "attempts.csv");

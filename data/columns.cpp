@@ -1,0 +1,152 @@
+#include "data/columns.h"
+
+namespace palpate {
+namespace {
+
+const Column kParticipant{"participant_id", "Pseudonym of the participant"};
+const Column kSession{"session", "Session of the participant, from 1"};
+const Column kBlock{"block", "Block, from 1 through all sessions of the participant"};
+const Column kTrial{"trial", "Trial within the session, from 1"};
+const Column kAttempt{
+    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off"};
+const Column kRenderer{"renderer",
+                       "How the stylus was felt",
+                       "",
+                       {{"point", "only its tip"}, {"ray", "tip and side, as force and torque"}}};
+const Column kShape{"shape", "Name of the stimulus that was shown"};
+const Column kPractice{
+    "practice",
+    "Practice or warm-up",
+    "",
+    {{"0", "a trial that counts"}, {"1", "practice or warm-up, not to be analysed"}}};
+const Column kDevice{"device", "Force-feedback device"};
+const Column kSimulated{"simulated",
+                        "Who took part",
+                        "",
+                        {{"0", "a person"}, {"1", "a SIMULATED participant: no person"}}};
+const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
+const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
+const Column kNumber{"participant_number", "Orders the counterbalancing, unique within a protocol"};
+const Column kOrientation[] = {
+    {"orientation_w", "Orientation of the stimulus, unit quaternion, w"},
+    {"orientation_x", "Orientation of the stimulus, unit quaternion, x"},
+    {"orientation_y", "Orientation of the stimulus, unit quaternion, y"},
+    {"orientation_z", "Orientation of the stimulus, unit quaternion, z"},
+};
+
+std::vector<Column> make_trials() {
+  return {
+      kParticipant,
+      kSession,
+      kBlock,
+      kTrial,
+      kRenderer,
+      kShape,
+      {"response", "Name of the stimulus that was answered; missing where there was no answer"},
+      {"correct",
+       "Whether response is shape",
+       "",
+       {{"0", "wrong, or no answer in time"}, {"1", "correct"}}},
+      {"response_time",
+       "From the first tick with forces on to the response; the limit for a time-out. The latency "
+       "of the response device is not subtracted",
+       "s"},
+      kOrientation[0],
+      kOrientation[1],
+      kOrientation[2],
+      kOrientation[3],
+      kPractice,
+      {"timed_out",
+       "Whether the time for an answer ran out",
+       "",
+       {{"0", "answered"}, {"1", "no answer in time"}}},
+      {"first_contact_time",
+       "From the first tick with forces on to the first contact; missing where there was none",
+       "s"},
+      {"onset_utc", "First tick with forces on, ISO 8601, UTC"},
+      kDevice,
+      kSimulated,
+      {"missed_ticks", "Servo ticks that came too late"},
+      kAttempt,
+      kProtocol,
+      kVersion,
+      kNumber,
+      {"started_inside",
+       "Whether the stylus was inside an object when forces went on",
+       "",
+       {{"0", "outside"}, {"1", "inside: that object gave no force until it was left"}}},
+      {"ticks", "Servo ticks of the trial"},
+      {"longest_period", "Longest time between two servo ticks", "s"},
+      {"faults", "Fault bits of all ticks, or-ed; 0 for none"},
+      {"max_force", "Largest force on the hand", "N"},
+      {"observer_sha256",
+       "SHA-256 of the settings of a simulated participant; missing for a person"},
+  };
+}
+
+std::vector<Column> make_attempts() {
+  return {kParticipant,
+          kSession,
+          kBlock,
+          kTrial,
+          kAttempt,
+          kRenderer,
+          kShape,
+          kOrientation[0],
+          kOrientation[1],
+          kOrientation[2],
+          kOrientation[3],
+          kPractice,
+          {"began_utc", "When the attempt was begun, ISO 8601, UTC"},
+          {"reason", "Why the attempt was cut off; its trial was shown again"},
+          kDevice,
+          kSimulated,
+          kProtocol,
+          kVersion,
+          kNumber};
+}
+
+std::vector<Column> make_samples() {
+  return {
+      {"tick", "Servo tick, from the first one with forces on (0)"},
+      {"tip_x", "Tip of the stylus, world frame, x", "m"},
+      {"tip_y", "Tip of the stylus, world frame, y", "m"},
+      {"tip_z", "Tip of the stylus, world frame, z", "m"},
+      {"tail_x", "Tail of the stylus, world frame, x", "m"},
+      {"tail_y", "Tail of the stylus, world frame, y", "m"},
+      {"tail_z", "Tail of the stylus, world frame, z", "m"},
+      {"force_x", "Force on the hand, world frame, x", "N"},
+      {"force_y", "Force on the hand, world frame, y", "N"},
+      {"force_z", "Force on the hand, world frame, z", "N"},
+      {"torque_x", "Torque about the virtual tip, world frame, x", "N m"},
+      {"torque_y", "Torque about the virtual tip, world frame, y", "N m"},
+      {"torque_z", "Torque about the virtual tip, world frame, z", "N m"},
+      {"depth", "Depth of the deepest contact, 0 in free space", "m"},
+      {"contacts", "Contacts of the stylus"},
+      {"contact_type",
+       "Type of the deepest contact",
+       "",
+       {{"0", "none"}, {"1", "point-polygon"}, {"2", "segment-edge"}, {"3", "segment-face"}}},
+      {"buttons", "Buttons of the device, one bit each"},
+      {"faults", "Fault bits of the tick; 0 for none"},
+  };
+}
+
+}  // namespace
+
+std::span<const Column> trial_columns() {
+  static const std::vector<Column> all = make_trials();
+  return all;
+}
+
+std::span<const Column> attempt_columns() {
+  static const std::vector<Column> all = make_attempts();
+  return all;
+}
+
+std::span<const Column> sample_columns() {
+  static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+}  // namespace palpate

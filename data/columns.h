@@ -1,0 +1,24 @@
+#pragma once
+// Internal to data/: what every column of an export is. One table for CSV headers, BIDS sidecars
+// and Psych-DS's variableMeasured.
+
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+
+struct Column {
+  const char* name;
+  const char* description;
+  const char* unit = "";  ///< "" for none
+  /// Value -> meaning; empty where the values are no codes.
+  std::vector<std::pair<const char*, const char*>> levels = {};
+};
+
+std::span<const Column> trial_columns();    ///< of trials.csv, in order
+std::span<const Column> attempt_columns();  ///< of attempts.csv, in order
+std::span<const Column> sample_columns();   ///< of a servo tick, in order
+
+}  // namespace palpate

@@ -1,0 +1,37 @@
+#include "data/table_fields.h"
+
+namespace palpate {
+
+void put_trial(TableRow& row, const StoredTrial& trial) {
+  const TrialRecord& record = trial.record;
+  row << trial.participant.code << record.session << record.block << record.trial << record.renderer
+      << record.shape << record.response << record.correct << record.response_time;
+  for (const double q : record.orientation_wxyz) row << q;
+  row << record.practice << record.timed_out << record.first_contact_time << record.onset_utc
+      << trial.run.device << trial.participant.simulated << record.missed_ticks << record.attempt
+      << trial.protocol_sha256 << trial.run.program_version << trial.participant.number
+      << record.started_inside << record.ticks
+      << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
+      << trial.run.observer_sha256;
+}
+
+void put_attempt(TableRow& row, const StoredTrial& attempt) {
+  const TrialRecord& record = attempt.record;
+  row << attempt.participant.code << record.session << record.block << record.trial
+      << record.attempt << record.renderer << record.shape;
+  for (const double q : record.orientation_wxyz) row << q;
+  row << record.practice << record.onset_utc << attempt.cut_off_reason << attempt.run.device
+      << attempt.participant.simulated << attempt.protocol_sha256 << attempt.run.program_version
+      << attempt.participant.number;
+}
+
+void put_sample(TableRow& row, const SampleRecord& sample) {
+  row << sample.tick;
+  for (const auto& vector : {sample.tip, sample.tail, sample.force, sample.torque}) {
+    for (const double x : vector) row << x;
+  }
+  row << sample.depth << unsigned{sample.contacts} << unsigned{sample.contact_type}
+      << unsigned{sample.buttons} << unsigned{sample.faults};
+}
+
+}  // namespace palpate
