@@ -2,8 +2,8 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
 namespace palpate {
@@ -26,16 +26,16 @@ class BoundingTree {
   BoundingTree() = default;
   explicit BoundingTree(std::span<const Box> boxes);
 
-  const std::vector<Node>& nodes() const {
+  const LargeArray<Node>& nodes() const {
     return nodes_;
   }  ///< root first; empty without primitives
-  const std::vector<std::uint32_t>& order() const { return order_; }
+  const LargeArray<std::uint32_t>& order() const { return order_; }
 
  private:
   void build(std::span<const Box> boxes, std::uint32_t begin, std::uint32_t end);
 
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> order_;
+  LargeArray<Node> nodes_;
+  LargeArray<std::uint32_t> order_;
 };
 
 }  // namespace palpate

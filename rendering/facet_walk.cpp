@@ -78,7 +78,9 @@ Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p
 
 /// One facet of M measured against the probe.
 struct Measured {
-  MinkowskiFacet facet;
+  bool edge = false;        ///< else a face
+  bool left_ahead = false;  ///< edge only
+  std::uint32_t index = 0;
   Vec3 normal;
   double depth = 0;
   double place = 0;       ///< along the probe, 0 tip to 1 tail
@@ -89,7 +91,7 @@ template <bool kSegment>
 Measured measure_face(const ConvexMesh& mesh, std::uint32_t index, const Vec3& tip, const Vec3& d) {
   const Facet& facet = mesh.facets()[index];
   Measured m;
-  m.facet = {Kind::face, false, index};
+  m.index = index;
   m.normal = facet.normal;
   const double height = facet.offset - glm::dot(facet.normal, tip);
   if constexpr (kSegment) {
@@ -122,9 +124,11 @@ bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, 
   const double c2 = glm::dot(c, c);
   if (c2 <= kParallel * kParallel * glm::dot(e, e) * glm::dot(d, d)) return false;
   const double inverse = 1 / c2;
-  const double scale = (left_ahead ? inverse : -inverse) * std::sqrt(c2);
+  const double scale = std::copysign(inverse, left_ahead - 0.5) * std::sqrt(c2);
   const Vec3 w = tip - v0;
-  m.facet = {Kind::edge, left_ahead, index};
+  m.edge = true;
+  m.left_ahead = left_ahead;
+  m.index = index;
   m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
   m.depth = -glm::dot(m.normal, w);
   // w + depth n + place d = along_edge e, crossed with e and with d
@@ -178,13 +182,16 @@ SilhouetteEdge search_fan(const ConvexMesh& mesh, std::uint32_t from, bool about
 /// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
 /// face.
 template <bool kSegment>
-Measured step_from_face(const ConvexMesh& mesh, const Neighbour& side, const Vec3& tip,
-                        const Vec3& d) {
+Measured step_from_face(const ConvexMesh& mesh, std::uint32_t from, const Neighbour& side,
+                        const Vec3& tip, const Vec3& d) {
   if constexpr (kSegment) {
-    const Slopes slopes = slopes_at(mesh, mesh.edges()[side.edge], d);
-    Measured next;
-    if (slopes.silhouette() && measure_edge(mesh, side.edge, slopes.left >= 0, tip, d, next))
-      return next;
+    const bool here = glm::dot(mesh.facets()[from].normal, d) >= 0;
+    const bool there = glm::dot(mesh.facets()[side.across].normal, d) >= 0;
+    if (here != there) {
+      const bool left_ahead = (mesh.edges()[side.edge].left == from) == here;
+      Measured next;
+      if (measure_edge(mesh, side.edge, left_ahead, tip, d, next)) return next;
+    }
   }
   return measure_face<kSegment>(mesh, side.across, tip, d);
 }
@@ -193,16 +200,16 @@ Measured step_from_face(const ConvexMesh& mesh, const Neighbour& side, const Vec
 /// (to the next silhouette edge). False when the probe is within both.
 bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d,
                     Measured& next) {
-  const Edge& edge = mesh.edges()[at.facet.index];
+  const Edge& edge = mesh.edges()[at.index];
   if (at.place < 0 || at.place > 1) {
-    const bool to_left = (at.place < 0) == at.facet.left_ahead;
+    const bool to_left = (at.place < 0) == at.left_ahead;
     next = measure_face<true>(mesh, to_left ? edge.left : edge.right, tip, d);
     return true;
   }
   if (at.along_edge < 0 || at.along_edge > 1) {
     const bool about_v1 = at.along_edge > 1;
-    SilhouetteEdge other = turn_about(mesh, at.facet.index, about_v1, at.facet.left_ahead, d);
-    if (other.edge == kNone) other = search_fan(mesh, at.facet.index, about_v1, d);
+    SilhouetteEdge other = turn_about(mesh, at.index, about_v1, at.left_ahead, d);
+    if (other.edge == kNone) other = search_fan(mesh, at.index, about_v1, d);
     if (other.edge == kNone) return false;
     if (measure_edge(mesh, other.edge, other.left_ahead, tip, d, next)) return true;
     // Parallel to the probe: its two faces meet there with the same depth.
@@ -232,13 +239,22 @@ Measured resume(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
   return measure_face<kSegment>(mesh, start.index, tip, d);
 }
 
+// gcc takes a function that only prefetches for one that does nothing: it must be inlined.
+template <bool kEdges>
+[[gnu::always_inline]] inline void fetch_beyond(const ConvexMesh& mesh, std::uint32_t facet) {
+  for (const Neighbour& next : mesh.facets()[facet].triangle) {
+    __builtin_prefetch(&mesh.facets()[next.across]);
+    if constexpr (kEdges) __builtin_prefetch(&mesh.edges()[next.edge]);
+  }
+}
+
 WalkResult to_result(const Measured& at, bool capped) {
   WalkResult result;
   result.normal = at.normal;
   result.depth = at.depth;
   result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
   result.capped = capped;
-  if (at.depth >= 0) result.facet = at.facet;
+  if (at.depth >= 0) result.facet = {at.edge ? Kind::edge : Kind::face, at.left_ahead, at.index};
   return result;
 }
 
@@ -250,13 +266,13 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
   int steps = 0;
   while (at.depth >= 0) {
     Measured next;
-    if (kSegment && at.facet.kind == Kind::edge) {
+    if (kSegment && at.edge) {
       if (!step_from_edge(mesh, at, tip, d, next)) break;
     } else {
       const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
-      const Neighbour side = beyond_side(mesh, at.facet.index, end + at.depth * at.normal);
+      const Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
       if (side.edge == kNone) break;
-      next = step_from_face<kSegment>(mesh, side, tip, d);
+      next = step_from_face<kSegment>(mesh, at.index, side, tip, d);
     }
     if (!(next.depth < at.depth - gain)) break;
     at = next;
@@ -298,6 +314,29 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
   return walk<false>(mesh, start, tip, Vec3(0));
+}
+
+void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at, int tick) {
+  if (at.kind == Kind::face) {
+    // A face's neighbours are at hand: the walk has just asked them.
+    if (tick > 0) return;
+    for (const Neighbour& next : mesh.facets()[at.index].triangle)
+      fetch_beyond<false>(mesh, next.across);
+    return;
+  }
+  if (tick == 1) return;  // what was asked for at tick 0 is on its way
+  for (const std::uint32_t facet : {mesh.edges()[at.index].left, mesh.edges()[at.index].right}) {
+    if (tick == 0) {
+      fetch_beyond<true>(mesh, facet);
+      continue;
+    }
+    for (const Neighbour& next : mesh.facets()[facet].triangle) {
+      if (next.edge == at.index) continue;
+      __builtin_prefetch(&mesh.vertices()[mesh.edges()[next.edge].v0]);
+      __builtin_prefetch(&mesh.vertices()[mesh.edges()[next.edge].v1]);
+      fetch_beyond<true>(mesh, next.across);
+    }
+  }
 }
 
 WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,

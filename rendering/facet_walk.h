@@ -2,6 +2,7 @@
 // Neighbourhood watch: the next contact is looked for among the neighbours of the last one, so a
 // tick costs the same whatever the number of polygons.
 
+#include <bit>
 #include <cstdint>
 
 #include "stimuli/convex_mesh.h"
@@ -14,13 +15,19 @@ namespace palpate {
 struct MinkowskiFacet {
   enum class Kind : std::uint32_t { none, face, edge };
   MinkowskiFacet() = default;
-  MinkowskiFacet(Kind k, bool ahead, std::uint32_t i) : kind(k), left_ahead(ahead), index(i) {}
+  MinkowskiFacet(Kind k, bool ahead, std::uint32_t i)
+      : MinkowskiFacet(std::bit_cast<MinkowskiFacet>(static_cast<std::uint32_t>(k) |
+                                                     std::uint32_t{ahead} << 2 | i << 3)) {}
 
   Kind kind : 2 = Kind::none;
   /// Edge only: which of its two faces turned towards the tail (dot(normal, d) >= 0) at the last
   /// tick.
   bool left_ahead : 1 = false;
   std::uint32_t index : 29 = 0;  ///< of the facet or edge in the mesh
+
+  friend bool operator==(MinkowskiFacet a, MinkowskiFacet b) {
+    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
+  }
 };
 
 /// Where a walk ended. Mesh frame.
@@ -40,6 +47,12 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 
 /// The same walk with the probe shrunk to its tip: faces only.
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+
+/// Asks for the memory that later walks from this facet may touch, so that a step need not wait for
+/// it; changes nothing. Neighbours of triangles only: other facets are few.
+/// \param tick  since the walk came to the facet, from 0: farther memory is asked for later, when
+/// the nearer, which says where it is, has had time to arrive
+void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at, int tick);
 
 /// The facet of M of least depth, by looking at all of them: where there is no history to walk
 /// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.

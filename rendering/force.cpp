@@ -9,7 +9,7 @@ namespace {
 
 /// The shortest translation x with dot(n_i, x) >= depth_i for all contacts, as x = sum of share_i
 /// n_i with share_i >= 0. Hildreth 1957: one contact at a time is satisfied, until none moves.
-void share_depths(std::span<LoadedContact> contacts) {
+void satisfy(std::span<LoadedContact> contacts) {
   constexpr int kRounds = 60;
   Vec3 x(0);
   for (int round = 0; round < kRounds; ++round) {
@@ -26,18 +26,17 @@ void share_depths(std::span<LoadedContact> contacts) {
 
 }  // namespace
 
-void load(std::span<LoadedContact> contacts) {
+void share_depths(std::span<LoadedContact> contacts) {
   for (std::size_t begin = 0; begin < contacts.size();) {
     std::size_t end = begin + 1;
     while (end < contacts.size() && contacts[end].object == contacts[begin].object) ++end;
     if (end - begin == 1) {
       contacts[begin].share = contacts[begin].contact.depth;
     } else {
-      share_depths(contacts.subspan(begin, end - begin));
+      satisfy(contacts.subspan(begin, end - begin));
     }
     begin = end;
   }
-  for (auto& c : contacts) c.force = c.stiffness * c.share;
 }
 
 double layered_force(const Material& material, double share) {
@@ -61,18 +60,6 @@ void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& g
   if (grip.sliding) lag *= material.friction_dynamic * c.force / pull;
   grip.lag = c.lag = lag;
   grip.held = true;
-}
-
-Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe) {
-  Loads loads;
-  for (const auto& c : contacts) {
-    const Vec3 force = c.force * c.contact.normal + c.stiffness * c.lag;
-    loads.force += force;
-    loads.torque += glm::cross(c.contact.point - probe.tip, force);
-    loads.device2 += c.place * force;
-  }
-  loads.device1 = loads.force - loads.device2;
-  return loads;
 }
 
 }  // namespace palpate

@@ -1,7 +1,9 @@
 #pragma once
 // From contacts to what the hand and the devices get. Pure functions.
 
+#include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <span>
 
 #include "rendering/contact.h"
@@ -22,11 +24,21 @@ struct LoadedContact {
   std::uint32_t part = 0;  ///< index of the part in the scene
 };
 
-/// Sets the share and the force of each contact: k share. A contact that is alone has its whole
-/// depth; contacts with parts of one compound share the shortest translation that satisfies them
-/// all, so that a seam between two parts neither doubles the force nor lets it drop. Contacts of
-/// one object stand side by side.
-void load(std::span<LoadedContact> contacts);
+/// The share of each contact: a contact that is alone has its whole depth; contacts with parts of
+/// one compound share the shortest translation that satisfies them all, so that a seam between two
+/// parts neither doubles the force nor lets it drop. Contacts of one object stand side by side.
+void share_depths(std::span<LoadedContact> contacts);
+
+/// Sets the share and the force of each contact: k share.
+template <std::size_t kCount>
+void load(std::span<LoadedContact, kCount> contacts) {
+  if constexpr (kCount == 1) {
+    contacts[0].share = contacts[0].contact.depth;
+  } else {
+    share_depths(contacts);
+  }
+  for (auto& c : contacts) c.force = c.stiffness * c.share;
+}
 
 /// The force, N, of a material with layers at `share` m below its surface: the sum of each layer's
 /// stiffness times the part of the way that lies in it.
@@ -58,6 +70,18 @@ struct Loads {
 /// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
 /// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, L1/L the contact's place on the probe. A probe of zero
 /// length is touched at place 0: device 1 takes all.
-Loads sum_loads(std::span<const LoadedContact> contacts, const LineProbe& probe);
+template <bool kPlainSprings, std::size_t kCount>
+Loads sum_loads(std::span<LoadedContact, kCount> contacts, const LineProbe& probe) {
+  Loads loads;
+  for (const auto& c : contacts) {
+    Vec3 force = c.force * c.contact.normal;
+    if constexpr (!kPlainSprings) force += c.stiffness * c.lag;
+    loads.force += force;
+    loads.torque += glm::cross(c.contact.point - probe.tip, force);
+    loads.device2 += c.place * force;
+  }
+  loads.device1 = loads.force - loads.device2;
+  return loads;
+}
 
 }  // namespace palpate

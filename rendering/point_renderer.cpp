@@ -26,8 +26,7 @@ class PointRenderer final : public Renderer {
   bool side_contact() const override { return false; }
   Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
                  double dt) const noexcept override {
-    return scene.plain_springs() ? tick::render<PointProbe, true>(scene, state, probe, dt)
-                                 : tick::render<PointProbe, false>(scene, state, probe, dt);
+    return tick::render<PointProbe>(scene, state, probe, dt);
   }
 };
 

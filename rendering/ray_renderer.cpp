@@ -21,15 +21,16 @@ double small_asin(double x) {
 struct Portion {
   double enter = 0, leave = 1;
 
-  /// Keeps what has height + t slope >= 0.
+  /// Keeps what has height + t slope >= 0. Written as selections: on a fine mesh the signs change
+  /// from tick to tick, and a branch that is guessed wrong costs more than the whole clip.
   void clip(double height, double slope) {
-    if (slope > 0) {
-      enter = std::max(enter, -height / slope);
-    } else if (slope < 0) {
-      leave = std::min(leave, height / -slope);
-    } else if (height < 0) {
-      leave = -1;
-    }
+    const double t = -height / slope;  // of a slope of 0 infinite or undefined, and not selected
+    const double from = slope > 0 ? t : 0.0;
+    const double to = slope < 0 ? t : 1.0;
+    enter = from > enter ? from : enter;
+    leave = to < leave ? to : leave;
+    const double all = (slope == 0) & (height < 0) ? -1.0 : 1.0;
+    leave = all < leave ? all : leave;
   }
 };
 
@@ -100,8 +101,7 @@ class RayRenderer final : public Renderer {
   bool side_contact() const override { return true; }
   Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
                  double dt) const noexcept override {
-    return scene.plain_springs() ? tick::render<SegmentProbe, true>(scene, state, probe, dt)
-                                 : tick::render<SegmentProbe, false>(scene, state, probe, dt);
+    return tick::render<SegmentProbe>(scene, state, probe, dt);
   }
 };
 

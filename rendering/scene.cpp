@@ -43,6 +43,7 @@ RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
+  if (parts_.size() == 1) state.near_parts.push_back(0);  // and stays: one part is not surveyed
   state.contacts.reserve(std::min(parts_.size(), kMaxContacts));
   return state;
 }

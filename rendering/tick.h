@@ -15,13 +15,9 @@ namespace palpate::tick {
 // squares below it are exact enough to separate objects.
 constexpr double kFarthest = 1e6;
 
-inline bool plausible(const Vec3& v) {
-  return std::abs(v.x) <= kFarthest && std::abs(v.y) <= kFarthest && std::abs(v.z) <= kFarthest;
-}
+constexpr std::uint8_t kFetches = 3;  // ticks on a facet that ask for the memory around it
 
-inline bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
+inline bool plausible(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
 template <class Probe>
 WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
@@ -54,8 +50,12 @@ bool track(const ScenePart& part, PartState& state, const LineProbe* before, con
   if (state.facet.kind != Kind::none) {
     hit = walk<Probe>(mesh, state.facet, tip, d);
     if (hit.capped) faults |= render_fault::kWalkCapped;
+    if (!(hit.facet == state.facet)) state.fetched = 0;
     state.facet = hit.facet;
-    if (hit.facet.kind != Kind::none) return true;
+    if (hit.facet.kind != Kind::none) {
+      if (state.fetched < kFetches) fetch_ahead(mesh, state.facet, state.fetched++);
+      return true;
+    }
     // The plane that the probe left by separates them from now on.
     state.plane = {hit.normal,
                    std::min(glm::dot(hit.normal, tip), glm::dot(hit.normal, tail)) + hit.depth,
@@ -95,9 +95,9 @@ struct Tick {
 
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
-  /// Follows one part and adds its contact, if there is one, to the tick's.
+  /// Follows one part. True when it is in contact; then that is filled in.
   /// \param shift  m, world: what the part's siblings move the ideal probe by
-  void touch(std::uint32_t index, const Vec3& shift) {
+  bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
     const LineProbe local = to_local<Probe>(part, probe, shift);
@@ -105,18 +105,25 @@ struct Tick {
     const bool touching = track<Probe>(part, memory, last(), local, hit, faults);
     memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
-    if (!touching) return;
-    if (state.contacts.size() == kMaxContacts) {
-      faults |= render_fault::kContactsDropped;
-      return;
-    }
-    LoadedContact& c = state.contacts.emplace_back();
+    if (!touching) return false;
     c.part = index;
     Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c);
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth + glm::dot(c.contact.normal, shift);
     c.stiffness = part.material.stiffness;
     c.object = part.object;
+    return true;
+  }
+
+  /// Follows one part and adds its contact, if there is one, to the tick's.
+  void touch(std::uint32_t index, const Vec3& shift) {
+    LoadedContact found;
+    if (!contact(index, shift, found)) return;
+    if (state.contacts.size() == kMaxContacts) {
+      faults |= render_fault::kContactsDropped;
+      return;
+    }
+    state.contacts.push_back(found);
   }
 };
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
 namespace palpate {
@@ -73,15 +74,15 @@ class ConvexMesh {
   /// \throws MeshError naming every kind of fault.
   explicit ConvexMesh(const PolygonSoup& soup);
 
-  const std::vector<Vec3>& vertices() const { return vertices_; }
-  const std::vector<Facet>& facets() const { return facets_; }
-  const std::vector<Side>& sides() const { return sides_; }
-  const std::vector<Edge>& edges() const { return edges_; }
+  const LargeArray<Vec3>& vertices() const { return vertices_; }
+  const LargeArray<Facet>& facets() const { return facets_; }
+  const LargeArray<Side>& sides() const { return sides_; }
+  const LargeArray<Edge>& edges() const { return edges_; }
 
   /// Edges around vertex v, counter-clockwise seen from outside:
   /// fan_edges()[fan_first()[v] .. fan_first()[v + 1]).
-  const std::vector<std::uint32_t>& fan_first() const { return fan_first_; }
-  const std::vector<std::uint32_t>& fan_edges() const { return fan_edges_; }
+  const LargeArray<std::uint32_t>& fan_first() const { return fan_first_; }
+  const LargeArray<std::uint32_t>& fan_edges() const { return fan_edges_; }
 
   Vec3 centre() const { return centre_; }      ///< of the bounding sphere, m
   double radius() const { return radius_; }    ///< of the bounding sphere, m
@@ -90,11 +91,11 @@ class ConvexMesh {
  private:
   class Builder;
 
-  std::vector<Vec3> vertices_;
-  std::vector<Facet> facets_;
-  std::vector<Side> sides_;
-  std::vector<Edge> edges_;
-  std::vector<std::uint32_t> fan_first_, fan_edges_;
+  LargeArray<Vec3> vertices_;
+  LargeArray<Facet> facets_;
+  LargeArray<Side> sides_;
+  LargeArray<Edge> edges_;
+  LargeArray<std::uint32_t> fan_first_, fan_edges_;
   Vec3 centre_;
   double radius_ = 0;
 };

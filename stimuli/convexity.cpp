@@ -76,7 +76,7 @@ class Checker {
   }
 
   void check_vertex(Index vertex) {
-    const std::vector<Index>& fan = mesh_.fan_edges();
+    const auto& fan = mesh_.fan_edges();
     const Index first = mesh_.fan_first()[vertex], end = mesh_.fan_first()[vertex + 1];
     Vec3 inside;
     for (Index k = first; k < end; ++k) inside -= leaving_facet(fan[k], vertex).normal;
