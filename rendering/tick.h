@@ -33,36 +33,21 @@ WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d)
 
 /// The probe, translated by `shift` in the world, in the frame of the part's mesh.
 template <class Probe>
-LineProbe to_local(const ScenePart& part, const LineProbe& probe, const Vec3& shift) {
+[[gnu::always_inline]] inline LineProbe to_local(const ScenePart& part, const LineProbe& probe,
+                                                 const Vec3& shift) {
   const Vec3 tip = part.local_point(probe.tip + shift);
   return {tip, Probe::kSegment ? part.local_point(probe.tail + shift) : tip};
 }
 
-/// Contact of one part, found or followed. True when in contact. Frame of the part's mesh.
+/// A part that was not in contact at the last tick: whether it is now. Frame of the part's mesh.
 /// \param before  the probe at the last tick; null at the first tick of all
 template <class Probe>
-bool track(const ScenePart& part, PartState& state, const LineProbe* before, const LineProbe& probe,
-           WalkResult& hit, std::uint32_t& faults) {
+bool meet(const ScenePart& part, PartState& state, const LineProbe* before, const LineProbe& probe,
+          WalkResult& hit) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
   const Vec3 &tip = probe.tip, &tail = probe.tail;
   const Vec3 d = tail - tip;
-  if (state.facet.kind != Kind::none) {
-    hit = walk<Probe>(mesh, state.facet, tip, d);
-    if (hit.capped) faults |= render_fault::kWalkCapped;
-    if (!(hit.facet == state.facet)) state.fetched = 0;
-    state.facet = hit.facet;
-    if (hit.facet.kind != Kind::none) {
-      if (state.fetched < kFetches) fetch_ahead(mesh, state.facet, state.fetched++);
-      return true;
-    }
-    // The plane that the probe left by separates them from now on.
-    state.plane = {hit.normal,
-                   std::min(glm::dot(hit.normal, tip), glm::dot(hit.normal, tail)) + hit.depth,
-                   true};
-    return false;
-  }
-  if (state.plane.separates(tip, tail)) return false;  // the common case in free space
   find_separating_plane(mesh, tip, tail, part.tolerance, state.plane, state.support);
   if (state.blocked || !before) {
     state.blocked = !state.plane.valid &&
@@ -80,8 +65,36 @@ bool track(const ScenePart& part, PartState& state, const LineProbe* before, con
     if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return false;
   }
   state.facet = hit.facet;
+  state.fetched = 0;
   state.plane.valid = false;
   return true;
+}
+
+/// Contact of one part, found or followed. True when in contact. Frame of the part's mesh.
+/// \param before  the probe at the last tick; null at the first tick of all
+template <class Probe>
+[[gnu::always_inline]] inline bool track(const ScenePart& part, PartState& state,
+                                         const LineProbe* before, const LineProbe& probe,
+                                         WalkResult& hit, std::uint32_t& faults) {
+  using Kind = MinkowskiFacet::Kind;
+  const ConvexMesh& mesh = *part.mesh;
+  const Vec3 &tip = probe.tip, &tail = probe.tail;
+  if (state.facet.kind == Kind::none) {
+    // In free space the plane of an earlier tick mostly still stands between them.
+    return !state.plane.separates(tip, tail) && meet<Probe>(part, state, before, probe, hit);
+  }
+  hit = walk<Probe>(mesh, state.facet, tip, tail - tip);
+  if (hit.capped) faults |= render_fault::kWalkCapped;
+  if (!(hit.facet == state.facet)) state.fetched = 0;
+  state.facet = hit.facet;
+  if (hit.facet.kind != Kind::none) {
+    if (state.fetched < kFetches) fetch_ahead(mesh, state.facet, state.fetched++);
+    return true;
+  }
+  // The plane that the probe left by separates them from now on.
+  state.plane = {hit.normal,
+                 std::min(glm::dot(hit.normal, tip), glm::dot(hit.normal, tail)) + hit.depth, true};
+  return false;
 }
 
 /// One tick under way: the contacts found so far.
@@ -97,7 +110,7 @@ struct Tick {
 
   /// Follows one part. True when it is in contact; then that is filled in.
   /// \param shift  m, world: what the part's siblings move the ideal probe by
-  bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
+  [[gnu::always_inline]] bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
     const LineProbe local = to_local<Probe>(part, probe, shift);
