@@ -4,11 +4,11 @@ namespace palpate {
 namespace {
 
 const Column kParticipant{"participant_id", "Pseudonym of the participant"};
-const Column kSession{"session", "Session of the participant, from 1"};
-const Column kBlock{"block", "Block, from 1 through all sessions of the participant"};
-const Column kTrial{"trial", "Trial within the session, from 1"};
+const Column kSession{"session", "Session of the participant, from 1", "1"};
+const Column kBlock{"block", "Block, from 1 through all sessions of the participant", "1"};
+const Column kTrial{"trial", "Trial within the session, from 1", "1"};
 const Column kAttempt{
-    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off"};
+    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off", "1"};
 const Column kRenderer{"renderer",
                        "How the stylus was felt",
                        "",
@@ -26,12 +26,13 @@ const Column kSimulated{"simulated",
                         {{"0", "a person"}, {"1", "a SIMULATED participant: no person"}}};
 const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
 const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
-const Column kNumber{"participant_number", "Orders the counterbalancing, unique within a protocol"};
+const Column kNumber{"participant_number", "Orders the counterbalancing, unique within a protocol",
+                     "1"};
 const Column kOrientation[] = {
-    {"orientation_w", "Orientation of the stimulus, unit quaternion, w"},
-    {"orientation_x", "Orientation of the stimulus, unit quaternion, x"},
-    {"orientation_y", "Orientation of the stimulus, unit quaternion, y"},
-    {"orientation_z", "Orientation of the stimulus, unit quaternion, z"},
+    {"orientation_w", "Orientation of the stimulus, unit quaternion, w", "1"},
+    {"orientation_x", "Orientation of the stimulus, unit quaternion, x", "1"},
+    {"orientation_y", "Orientation of the stimulus, unit quaternion, y", "1"},
+    {"orientation_z", "Orientation of the stimulus, unit quaternion, z", "1"},
 };
 
 std::vector<Column> make_trials() {
@@ -63,10 +64,10 @@ std::vector<Column> make_trials() {
       {"first_contact_time",
        "From the first tick with forces on to the first contact; missing where there was none",
        "s"},
-      {"onset_utc", "First tick with forces on, ISO 8601, UTC"},
+      {"onset_utc", "First tick with forces on, ISO 8601, UTC", "ISO 8601"},
       kDevice,
       kSimulated,
-      {"missed_ticks", "Servo ticks that came too late"},
+      {"missed_ticks", "Servo ticks that came too late", "1"},
       kAttempt,
       kProtocol,
       kVersion,
@@ -75,9 +76,9 @@ std::vector<Column> make_trials() {
        "Whether the stylus was inside an object when forces went on",
        "",
        {{"0", "outside"}, {"1", "inside: that object gave no force until it was left"}}},
-      {"ticks", "Servo ticks of the trial"},
+      {"ticks", "Servo ticks of the trial", "1"},
       {"longest_period", "Longest time between two servo ticks", "s"},
-      {"faults", "Fault bits of all ticks, or-ed; 0 for none"},
+      {"faults", "Fault bits of all ticks, or-ed; 0 for none", "1"},
       {"max_force", "Largest force on the hand", "N"},
       {"observer_sha256",
        "SHA-256 of the settings of a simulated participant; missing for a person"},
@@ -97,7 +98,7 @@ std::vector<Column> make_attempts() {
           kOrientation[2],
           kOrientation[3],
           kPractice,
-          {"began_utc", "When the attempt was begun, ISO 8601, UTC"},
+          {"began_utc", "When the attempt was begun, ISO 8601, UTC", "ISO 8601"},
           {"reason", "Why the attempt was cut off; its trial was shown again"},
           kDevice,
           kSimulated,
@@ -108,7 +109,7 @@ std::vector<Column> make_attempts() {
 
 std::vector<Column> make_samples() {
   return {
-      {"tick", "Servo tick, from the first one with forces on (0)"},
+      {"tick", "Servo tick, from the first one with forces on (0)", "1"},
       {"tip_x", "Tip of the stylus, world frame, x", "m"},
       {"tip_y", "Tip of the stylus, world frame, y", "m"},
       {"tip_z", "Tip of the stylus, world frame, z", "m"},
@@ -122,13 +123,13 @@ std::vector<Column> make_samples() {
       {"torque_y", "Torque about the virtual tip, world frame, y", "N m"},
       {"torque_z", "Torque about the virtual tip, world frame, z", "N m"},
       {"depth", "Depth of the deepest contact, 0 in free space", "m"},
-      {"contacts", "Contacts of the stylus"},
+      {"contacts", "Contacts of the stylus", "1"},
       {"contact_type",
        "Type of the deepest contact",
        "",
        {{"0", "none"}, {"1", "point-polygon"}, {"2", "segment-edge"}, {"3", "segment-face"}}},
-      {"buttons", "Buttons of the device, one bit each"},
-      {"faults", "Fault bits of the tick; 0 for none"},
+      {"buttons", "Buttons of the device, one bit each", "1"},
+      {"faults", "Fault bits of the tick; 0 for none", "1"},
   };
 }
 

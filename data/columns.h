@@ -12,7 +12,7 @@ namespace palpate {
 struct Column {
   const char* name;
   const char* description;
-  const char* unit = "";  ///< "" for none
+  const char* unit = "";  ///< "1": a pure number; "": a text or a code
   /// Value -> meaning; empty where the values are no codes.
   std::vector<std::pair<const char*, const char*>> levels = {};
 };

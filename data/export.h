@@ -12,9 +12,9 @@ namespace palpate {
 
 /// What an export needs to know of a protocol beyond its text.
 struct ProtocolFacts {
-  std::string title;                 ///< "" for none
-  double servo_rate = 1000;          ///< Hz
-  std::vector<std::string> stimuli;  ///< names
+  std::string title = {};                 ///< "" for none
+  double servo_rate = 1000;               ///< Hz
+  std::vector<std::string> stimuli = {};  ///< names
 };
 
 struct ExportSettings {

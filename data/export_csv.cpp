@@ -11,6 +11,7 @@
 #include <optional>
 #include <system_error>
 
+#include "data/attempts_file.h"
 #include "data/export_log.h"
 #include "data/table_fields.h"
 #include "data/text_sink.h"
@@ -106,15 +107,7 @@ ExportDone export_csv(Store& store, const std::string& path, const ExportSetting
   std::optional<NewFile> attempts;
   if (with_attempts) {
     attempts.emplace(attempts_path);
-    row << attempt_columns();
-    attempts->sink().write(row.end());
-    store.for_each_cut_off([&](const StoredTrial& trial) {
-      put_attempt(row, trial);
-      attempts->sink().write(row.end());
-      people.add(trial.participant);
-      ++done.attempts;
-      counter.next();
-    });
+    done.attempts = write_attempts(store, attempts->sink(), people, counter);
     attempts->sink().close(true);
     done.attempts_path = attempts_path.string();
   }

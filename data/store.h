@@ -91,7 +91,7 @@ struct Withdrawal {
 
 struct StoreCounts {
   std::int64_t protocols = 0, participants = 0, sessions = 0, runs = 0, completed = 0, cut_off = 0,
-               interrupted_runs = 0;
+               interrupted_runs = 0, sampled = 0;  ///< sampled: attempts with servo samples
 };
 
 class Store {
@@ -175,6 +175,7 @@ class Store {
   std::vector<StoredNote> notes();  ///< same order
   StoreCounts counts();
   Holdings holdings(const std::string& code);
+  bool has_samples(const Participant& participant, int session);
 
   /// Completed trials by protocol, participant number, session and trial, one at a time: they need
   /// not fit into memory. `visit` must not write to this store.

@@ -273,12 +273,25 @@ StoreCounts Store::counts() {
         "FROM sessions), (SELECT count(*) FROM runs), (SELECT count(*) FROM attempts WHERE state = "
         "'completed'), (SELECT count(*) FROM attempts WHERE state = 'cut_off'), (SELECT count(*) "
         "FROM "
-        "runs WHERE end_reason = 'interrupted')");
+        "runs WHERE end_reason = 'interrupted'), (SELECT count(*) FROM samples)");
     count.executeStep();
     StoreCounts counts;
     Row(count) >> counts.protocols >> counts.participants >> counts.sessions >> counts.runs >>
-        counts.completed >> counts.cut_off >> counts.interrupted_runs;
+        counts.completed >> counts.cut_off >> counts.interrupted_runs >> counts.sampled;
     return counts;
+  });
+}
+
+bool Store::has_samples(const Participant& participant, int session) {
+  return guarded(impl_->path, [&] {
+    SQLite::Statement any(*impl_->db, "SELECT 1 FROM samples LIMIT 1");
+    if (!any.executeStep()) return false;
+    SQLite::Statement find(
+        *impl_->db,
+        "SELECT 1 FROM sessions s JOIN attempts a ON a.session_id = s.id JOIN samples x ON "
+        "x.attempt_id = a.id WHERE s.participant_id = ? AND s.number = ? LIMIT 1");
+    Binder(find) << participant.id << session;
+    return find.executeStep();
   });
 }
 

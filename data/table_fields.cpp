@@ -3,9 +3,14 @@
 namespace palpate {
 
 void put_trial(TableRow& row, const StoredTrial& trial) {
+  row << trial.participant.code;
+  put_trial_but_who(row, trial);
+}
+
+void put_trial_but_who(TableRow& row, const StoredTrial& trial) {
   const TrialRecord& record = trial.record;
-  row << trial.participant.code << record.session << record.block << record.trial << record.renderer
-      << record.shape << record.response << record.correct << record.response_time;
+  row << record.session << record.block << record.trial << record.renderer << record.shape
+      << record.response << record.correct << record.response_time;
   for (const double q : record.orientation_wxyz) row << q;
   row << record.practice << record.timed_out << record.first_contact_time << record.onset_utc
       << trial.run.device << trial.participant.simulated << record.missed_ticks << record.attempt

@@ -1,44 +1,142 @@
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
 #include <iostream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 
+#include "data/export_bids.h"
 #include "data/export_csv.h"
+#include "data/export_psychds.h"
 #include "data/store.h"
+#include "protocols/protocol.h"
 #include "runner/commands/command.h"
 
 namespace palpate {
+namespace {
 
 namespace po = boost::program_options;
 
+std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
+
+void ask_to_stop(int) { stop_asked = true; }
+
+/// Ctrl-C leaves nothing behind; a second one ends the program as usual.
+void watch_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+/// Shows how far the export is, on a terminal, and ends it when that was asked for.
+class Progress {
+ public:
+  explicit Progress(std::int64_t all) : all_(all), on_terminal_(isatty(STDERR_FILENO) == 1) {}
+  ~Progress() {
+    if (on_terminal_) std::fprintf(stderr, "\r\x1b[K");
+  }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void show(std::int64_t done) {
+    if (stop_asked) throw std::runtime_error("stopped; nothing was exported");
+    const std::int64_t percent = all_ > 0 ? 100 * done / all_ : 100;
+    if (!on_terminal_ || percent == shown_) return;
+    shown_ = percent;
+    std::fprintf(stderr, "\r%lld of %lld trials (%lld %%)\x1b[K", static_cast<long long>(done),
+                 static_cast<long long>(all_), static_cast<long long>(percent));
+  }
+
+ private:
+  std::int64_t all_, shown_ = -1;
+  bool on_terminal_;
+};
+
+/// Reads what is needed and no more: the text is a record, and exports must work years after the
+/// protocol's rules have changed.
+ProtocolFacts facts_of(const ProtocolInfo& info) {
+  const auto json = nlohmann::json::parse(info.text, nullptr, false);
+  if (!json.is_object()) throw StoreRefused("the text of protocol " + info.name + " is damaged");
+  ProtocolFacts facts{.servo_rate = Protocol{}.servo_rate};
+  if (json.contains("title") && json["title"].is_string()) facts.title = json["title"];
+  if (json.contains("servo") && json["servo"].is_object() && json["servo"].contains("rate_hz") &&
+      json["servo"]["rate_hz"].is_number()) {
+    facts.servo_rate = json["servo"]["rate_hz"];
+  }
+  if (!(facts.servo_rate > 0)) throw StoreRefused("protocol " + info.name + " has no servo rate");
+  if (!json.contains("stimuli") || !json["stimuli"].is_array()) return facts;
+  for (const auto& stimulus : json["stimuli"]) {
+    if (!stimulus.is_object() || !stimulus.contains("name") || !stimulus["name"].is_string())
+      continue;
+    facts.stimuli.push_back(stimulus["name"]);
+  }
+  return facts;
+}
+
+ExportDone export_as(const std::string& format, Store& store, const std::string& out,
+                     const ExportSettings& settings) {
+  if (format == "bids") return export_bids(store, out, settings);
+  if (format == "psych-ds") return export_psychds(store, out, settings);
+  return export_csv(store, out, settings);
+}
+
+}  // namespace
+
 int export_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate export --db FILE --format csv --out PATH [--force]";
+  line.usage = "palpate export --db FILE --format csv|bids|psych-ds --out PATH [--force]";
   line.summary =
-      "Writes the trials of a database for others: every completed trial as a row of PATH, and "
-      "the\n"
-      "attempts that were cut off, where there are any, to attempts.csv in the same folder. Can "
-      "be\n"
-      "used while a session runs.";
+      "Writes the trials of a database for others, whole or not at all. Can be used while a\n"
+      "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
+      "off, where there are any, to attempts.csv in the same folder. bids, psych-ds: a folder\n"
+      "that describes itself, with the servo-rate samples where they were kept.";
   line.example =
       "  palpate export --db study.db --format csv --out trials.csv\n"
-      "  palpate export --db study.db --format csv --out trials.csv --force   (replaces both "
-      "files)";
+      "  palpate export --db study.db --format bids --out study-bids\n"
+      "  palpate export --db study.db --format psych-ds --out study-psychds --force   (replaces "
+      "an\n"
+      "      earlier export; a folder that palpate did not make is never replaced)";
   std::string database, format, out;
   auto add = line.options.add_options();
   add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
-  add("format", po::value(&format)->required()->value_name("NAME"), "csv");
-  add("out", po::value(&out)->required()->value_name("PATH"), "the file to write");
-  add("force", po::bool_switch(), "replace files that are there already");
+  add("format", po::value(&format)->required()->value_name("NAME"), "csv, bids or psych-ds");
+  add("out", po::value(&out)->required()->value_name("PATH"),
+      "the file (csv) or folder (others) to write");
+  add("force", po::bool_switch(), "replace an export that is there already");
   const auto values = line.parse(args);
   if (!values) return 0;
-  if (format != "csv") {
-    throw UsageError("no format '" + format + "'; there is: csv\nUsage: " + line.usage);
+  if (format != "csv" && format != "bids" && format != "psych-ds") {
+    throw UsageError("no format '" + format +
+                     "'; there are: csv, bids, psych-ds\nUsage: " + line.usage);
   }
   try {
     Store store = Store::open(database, Store::Mode::read_only);
-    const ExportDone done = export_csv(store, out, (*values)["force"].as<bool>());
-    std::cerr << out << ": " << done.trials << " trials\n";
-    if (done.attempts > 0) {
+    ExportSettings settings;
+    settings.force = (*values)["force"].as<bool>();
+    settings.program_version = PALPATE_VERSION;
+    settings.facts = facts_of;
+    watch_signals();
+    ExportDone done;
+    {
+      const StoreCounts counts = store.counts();
+      Progress progress(counts.completed + counts.cut_off);
+      settings.progress = [&](std::int64_t trials) { progress.show(trials); };
+      done = export_as(format, store, out, settings);
+    }
+    std::cerr << out << ": " << done.trials << " trials";
+    if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
+    std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
+    if (!done.attempts_path.empty()) {
       std::cerr << done.attempts_path << ": " << done.attempts << " attempts that were cut off\n";
+    }
+    if (!done.not_recorded.empty()) {
+      std::cerr << "warning: 'palpate forget' will not list this export: " << done.not_recorded
+                << "\n";
     }
   } catch (const StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2

@@ -48,8 +48,8 @@ TEST_F(ExportCommand, OverwritesOnlyWithForce) {
 }
 
 TEST_F(ExportCommand, WrongUsageAndWrongFilesAreBadInput) {
-  EXPECT_TRUE(contains(usage_error({"--db", database_, "--format", "bids", "--out", out_}),
-                       "no format 'bids'; there is: csv"));
+  EXPECT_TRUE(contains(usage_error({"--db", database_, "--format", "xls", "--out", out_}),
+                       "no format 'xls'; there are: csv, bids, psych-ds"));
   EXPECT_TRUE(contains(usage_error({"--db", database_, "--out", out_}), "format"));
   EXPECT_TRUE(contains(usage_error({"--db", folder_ / "none.db", "--format", "csv", "--out", out_}),
                        "no such file"));

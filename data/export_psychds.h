@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include "data/export.h"
+#include "data/store.h"
+
+namespace palpate {
+
+/// Writes the completed trials as a Psych-DS dataset (https://psych-ds.github.io):
+///
+///   dataset_description.json, README.md
+///   data/subject-CODE/study-T_subject-CODE_data.csv      all sessions, the columns of trials.csv
+///   data/subject-CODE/study-T_subject-CODE_session-S_trial-N_description-haptic_data.csv
+///                                                        servo samples, where they are stored
+///   data/study-T_description-attempts_data.csv           attempts that were cut off
+///   materials/T_protocol.json                            the protocol's text, byte for byte
+///
+/// T is the protocol's name without '-'. variableMeasured describes exactly the columns that are
+/// there. Experimenter's notes are not exported. The folder is made whole or not at all.
+/// \throws StoreRefused: `path` is taken (see require_replaceable), there are no trials;
+/// StoreError: it could not be written.
+ExportDone export_psychds(Store& store, const std::string& path, const ExportSettings& settings);
+
+}  // namespace palpate
