@@ -9,13 +9,6 @@
 
 namespace palpate::tick {
 
-template <class Probe>
-WalkResult same_facet(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
-                      const Vec3& d) {
-  if constexpr (Probe::kSegment) return same_facet_segment(mesh, start, tip, d);
-  return same_facet_point(mesh, start, tip);
-}
-
 /// Each part is met where the others let the ideal probe be, so that the probe slides over a seam
 /// instead of running into the inner wall behind it.
 template <class Probe>

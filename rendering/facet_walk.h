@@ -32,10 +32,11 @@ struct MinkowskiFacet {
 
 /// Where a walk ended. Mesh frame.
 struct WalkResult {
-  MinkowskiFacet facet;  ///< kind none: the probe has left the object
-  Vec3 normal;           ///< unit, outward, of `facet`; when left: of the plane that separates
-  double depth = 0;      ///< m, along normal; negative when left
-  double place = 0;      ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  MinkowskiFacet facet;      ///< kind none: the probe has left the object
+  MinkowskiFacet separates;  ///< where it has left: the facet of M whose plane is between
+  Vec3 normal;               ///< unit, outward, of `facet`; when left: of the plane that separates
+  double depth = 0;          ///< m, along normal; negative when left
+  double place = 0;     ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
   bool capped = false;  ///< the limit of steps was met; the facet is valid but perhaps not the last
 };
 

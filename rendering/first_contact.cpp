@@ -135,7 +135,7 @@ void meet_polygons(const ConvexMesh& mesh, const ContactTrees& trees, const Vec3
 
 }  // namespace
 
-ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges) {
+ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges) : support_map_(mesh) {
   if (mesh.facets().size() > kScan) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());

@@ -6,6 +6,7 @@
 #include "rendering/bounding_tree.h"
 #include "rendering/facet_walk.h"
 #include "rendering/probe.h"
+#include "rendering/support_map.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate {
@@ -18,9 +19,11 @@ class ContactTrees {
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
+  const SupportMap* support_map() const { return support_map_.empty() ? nullptr : &support_map_; }
 
  private:
   BoundingTree polygons_, edges_;
+  SupportMap support_map_;
 };
 
 /// Where and when the probe came in.

@@ -8,6 +8,11 @@ namespace {
 struct PointProbe {
   static constexpr bool kSegment = false;
 
+  static Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
+                           const LineProbe& after) {
+    return approach_point(mesh, start, before, after);
+  }
+
   static FirstContact first_contact(const ConvexMesh& mesh, const ContactTrees& trees,
                                     const LineProbe& before, const LineProbe& after,
                                     double tolerance) {

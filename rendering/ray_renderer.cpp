@@ -61,6 +61,11 @@ Portion touching_portion(const ConvexMesh& mesh, std::uint32_t index, const Vec3
 struct SegmentProbe {
   static constexpr bool kSegment = true;
 
+  static Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
+                           const LineProbe& after) {
+    return approach_segment(mesh, start, before, after);
+  }
+
   static FirstContact first_contact(const ConvexMesh& mesh, const ContactTrees& trees,
                                     const LineProbe& before, const LineProbe& after,
                                     double tolerance) {

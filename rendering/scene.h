@@ -47,6 +47,7 @@ struct ScenePart {
 struct PartState {
   MinkowskiFacet facet;       ///< kind none: not in contact
   SeparatingPlane plane;      ///< mesh frame; where valid, the last pose was beyond it
+  MinkowskiFacet watch;       ///< not in contact: of a plane that lately separated, if any
   std::uint32_t support = 0;  ///< vertex that the last search for a plane ended on
   std::uint8_t fetched = 0;   ///< times that memory around `facet` has been asked for
   bool blocked = false;       ///< the trial began inside: no force until it has been left once

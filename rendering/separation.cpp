@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "rendering/support_map.h"
+
 namespace palpate {
 namespace {
 
@@ -107,7 +109,8 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
 }
 
 void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
-                           double tolerance, SeparatingPlane& plane, std::uint32_t& support) {
+                           double tolerance, SeparatingPlane& plane, std::uint32_t& support,
+                           const SupportMap* map) {
   constexpr int kIterations = 40;
   Vec3 direction = plane.normal;
   if (!(glm::dot(direction, direction) > 0.5)) direction = 0.5 * (tip + tail) - mesh.centre();
@@ -120,6 +123,11 @@ void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& 
   for (int i = 0; i < kIterations; ++i) {
     const double length = glm::length(direction);
     const Vec3 n = direction / length;
+    if (map != nullptr) {
+      const std::uint32_t near = map->near_support(n);
+      const auto& vertices = mesh.vertices();
+      if (glm::dot(n, vertices[near]) > glm::dot(n, vertices[support])) support = near;
+    }
     support = support_vertex(mesh, n, support);
     const Vec3& lowest = glm::dot(n, tip) <= glm::dot(n, tail) ? tip : tail;
     const Vec3 w = lowest - mesh.vertices()[support];

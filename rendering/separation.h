@@ -8,6 +8,8 @@
 
 namespace palpate {
 
+class SupportMap;
+
 /// The object lies within dot(normal, p) <= offset; mesh frame.
 struct SeparatingPlane {
   Vec3 normal;        ///< unit, from the object to the probe
@@ -27,8 +29,10 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
 /// where there is none) and the vertex `support`; both are updated. Gilbert, Johnson & Keerthi
 /// 1988, stopped at the first direction that shows at least half of the distance. plane.valid says
 /// whether one was found. \param tolerance  m; a probe that is no deeper than this is at the
-/// surface: the plane it touches counts, although it does not separate strictly
+/// surface: the plane it touches counts, although it does not separate strictly \param map  of the
+/// mesh, or null: where to begin to climb
 void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
-                           double tolerance, SeparatingPlane& plane, std::uint32_t& support);
+                           double tolerance, SeparatingPlane& plane, std::uint32_t& support,
+                           const SupportMap* map = nullptr);
 
 }  // namespace palpate

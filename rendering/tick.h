@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <span>
 
+#include "rendering/approach.h"
 #include "rendering/force.h"
 #include "rendering/renderer.h"
 
@@ -31,12 +32,48 @@ WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d)
   return nearest_facet_point(mesh, tip);
 }
 
+template <class Probe>
+WalkResult same_facet(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                      const Vec3& d) {
+  if constexpr (Probe::kSegment) return same_facet_segment(mesh, start, tip, d);
+  return same_facet_point(mesh, start, tip);
+}
+
 /// The probe, translated by `shift` in the world, in the frame of the part's mesh.
 template <class Probe>
 [[gnu::always_inline]] inline LineProbe to_local(const ScenePart& part, const LineProbe& probe,
                                                  const Vec3& shift) {
   const Vec3 tip = part.local_point(probe.tip + shift);
   return {tip, Probe::kSegment ? part.local_point(probe.tail + shift) : tip};
+}
+
+/// A facet of M near the probe to watch it from, outside of the object: the one of an earlier tick,
+/// or one under the part of the probe that is nearest to the middle. Kind none: none is known.
+template <class Probe>
+MinkowskiFacet facet_near(const ScenePart& part, MinkowskiFacet known, const LineProbe& probe) {
+  using Kind = MinkowskiFacet::Kind;
+  const ConvexMesh& mesh = *part.mesh;
+  const SupportMap* const map = part.trees->support_map();
+  if (map == nullptr) return known;
+  const Vec3 d = probe.tail - probe.tip, to_tip = probe.tip - mesh.centre();
+  const double d2 = glm::dot(d, d);
+  const double place = d2 > 0 ? std::clamp(-glm::dot(to_tip, d) / d2, 0.0, 1.0) : 0;
+  const std::uint32_t vertex = map->near_support(to_tip + place * d);
+  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[vertex]];
+  const MinkowskiFacet under(Kind::face, false, mesh.edges()[edge].left);
+  if (known.kind == Kind::none) return under;
+  return same_facet<Probe>(mesh, known, probe.tip, d).depth <=
+                 same_facet<Probe>(mesh, under, probe.tip, d).depth
+             ? known
+             : under;
+}
+
+/// Where the probe has left the part: from now on the facet that it left by separates them.
+inline void leave(PartState& state, const WalkResult& left, const LineProbe& probe) {
+  const double lower =
+      std::min(glm::dot(left.normal, probe.tip), glm::dot(left.normal, probe.tail));
+  state.plane = {left.normal, lower + left.depth, true};
+  state.watch = left.separates;
 }
 
 /// A part that was not in contact at the last tick: whether it is now. Frame of the part's mesh.
@@ -46,22 +83,50 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
           WalkResult& hit) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
-  const Vec3 &tip = probe.tip, &tail = probe.tail;
-  const Vec3 d = tail - tip;
-  find_separating_plane(mesh, tip, tail, part.tolerance, state.plane, state.support);
-  if (state.blocked || !before) {
-    state.blocked = !state.plane.valid &&
-                    (state.blocked || nearest_facet<Probe>(mesh, tip, d).depth > part.tolerance);
-    return false;
+  const Vec3 d = probe.tail - probe.tip;
+  LineProbe from = probe;
+  FirstContact first;
+  bool decided = false;
+  if (before && !state.blocked) {
+    from = to_local<Probe>(part, *before, state.yielded);
+    const MinkowskiFacet near = facet_near<Probe>(part, state.watch, from);
+    if (near.kind != Kind::none) {
+      const WalkResult was = walk<Probe>(mesh, near, from.tip, from.tail - from.tip);
+      if (was.facet.kind == Kind::none) {
+        const Approach way = Probe::approach(mesh, was.separates, from, probe);
+        if (way.end == Approach::End::separated) {
+          state.plane = way.plane;
+          state.watch = way.facet;
+          return false;
+        }
+        decided = way.end == Approach::End::entered;
+        if (decided) first = {way.facet, way.time};
+      }
+    }
   }
-  const LineProbe from = to_local<Probe>(part, *before, state.yielded);
-  if (state.plane.separates(from.tip, from.tail)) return false;  // so was the whole way between
-  const FirstContact first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
-  if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, tip, d);
+  if (!decided) {
+    find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
+                          part.trees->support_map());
+    const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
+    state.watch = {Kind::face, false, mesh.edges()[edge].left};
+    if (state.blocked || !before) {
+      state.blocked =
+          !state.plane.valid &&
+          (state.blocked || nearest_facet<Probe>(mesh, probe.tip, d).depth > part.tolerance);
+      return false;
+    }
+    if (state.plane.separates(from.tip, from.tail)) return false;  // so was the whole way between
+    first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
+  }
+  if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, probe.tip, d);
   if (hit.facet.kind == Kind::none) {
+    if (decided) {  // in and out again
+      leave(state, hit, probe);
+      return false;
+    }
     if (state.plane.valid) return false;
     // Neither a plane nor a crossing: rounding hid the way in, so the nearest way out it is. Rare.
-    hit = nearest_facet<Probe>(mesh, tip, d);
+    hit = nearest_facet<Probe>(mesh, probe.tip, d);
     if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return false;
   }
   state.facet = hit.facet;
@@ -91,9 +156,7 @@ template <class Probe>
     if (state.fetched < kFetches) fetch_ahead(mesh, state.facet, state.fetched++);
     return true;
   }
-  // The plane that the probe left by separates them from now on.
-  state.plane = {hit.normal,
-                 std::min(glm::dot(hit.normal, tip), glm::dot(hit.normal, tail)) + hit.depth, true};
+  leave(state, hit, probe);
   return false;
 }
 

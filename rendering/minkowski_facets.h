@@ -1,0 +1,190 @@
+#pragma once
+// The facets of M, the Minkowski sum of the object and the mirrored probe, measured against a
+// probe, and what adjoins them. Internal to the walks: facet_walk.cpp and approach.cpp.
+
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+
+#include "rendering/facet_walk.h"
+#include "stimuli/convex_mesh.h"
+
+namespace palpate::minkowski {
+
+using Kind = MinkowskiFacet::Kind;
+
+inline constexpr std::uint32_t kNone = ~0u;
+inline constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by halving
+inline constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below this: no contact edge
+
+inline std::uint32_t corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
+  const Edge& edge = mesh.edges()[side.edge];
+  return edge.left == facet ? edge.v0 : edge.v1;
+}
+
+inline bool outside(const Side& side, const Vec3& p) {
+  return glm::dot(side.inward, p) < side.offset;
+}
+
+/// What p, a point of the plane of a polygon with many sides, lies over: halving over the fan of
+/// triangles at corner 0, so that a cap of a thousand sides costs ten comparisons.
+inline Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+  const Facet& facet = mesh.facets()[index];
+  const Side* sides = &mesh.sides()[facet.first_side];
+  const std::uint32_t count = facet.side_count;
+  const auto beyond = [&](std::uint32_t i) { return Neighbour{sides[i].edge, sides[i].across}; };
+  if (outside(sides[0], p)) return beyond(0);
+  if (outside(sides[count - 1], p)) return beyond(count - 1);
+  const Vec3 apex = mesh.vertices()[corner(mesh, index, sides[0])];
+  const Vec3 turn = glm::cross(facet.normal, p - apex);  // in-plane, a quarter turn ahead of p
+  std::uint32_t low = 1, high = count - 1;  // p lies between the rays to corner low and corner high
+  while (high - low > 1) {
+    const std::uint32_t middle = (low + high) / 2;
+    const Vec3 ray = mesh.vertices()[corner(mesh, index, sides[middle])] - apex;
+    (glm::dot(ray, turn) <= 0 ? low : high) = middle;
+  }
+  return outside(sides[low], p) ? beyond(low) : Neighbour{kNone, kNone};
+}
+
+/// What p, a point of the facet's plane, lies over when it is past a side; edge kNone when it is
+/// inside.
+inline Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
+  const Facet& facet = mesh.facets()[index];
+  if (facet.side_count > kScanSides) return beyond_many(mesh, index, p);
+  Neighbour beyond{kNone, kNone};
+  double worst = 0;
+  if (facet.side_count == 3) {
+    // Past a side is above the plane of the facet there, which a step reads next anyway.
+    for (const Neighbour& next : facet.triangle) {
+      const Facet& across = mesh.facets()[next.across];
+      const double height = glm::dot(across.normal, p) - across.offset;
+      if (height > worst) {
+        worst = height;
+        beyond = next;
+      }
+    }
+    return beyond;
+  }
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const Side& side = mesh.sides()[i];
+    const double distance = side.offset - glm::dot(side.inward, p);
+    if (distance > worst) {
+      worst = distance;
+      beyond = {side.edge, side.across};
+    }
+  }
+  return beyond;
+}
+
+/// One facet of M measured against the probe.
+struct Measured {
+  bool edge = false;        ///< else a face
+  bool left_ahead = false;  ///< edge only
+  std::uint32_t index = 0;
+  Vec3 normal;
+  double depth = 0;
+  double place = 0;       ///< along the probe, 0 tip to 1 tail
+  double along_edge = 0;  ///< edge only: 0 at v0 to 1 at v1
+};
+
+template <bool kSegment>
+Measured measure_face(const ConvexMesh& mesh, std::uint32_t index, const Vec3& tip, const Vec3& d) {
+  const Facet& facet = mesh.facets()[index];
+  Measured m;
+  m.index = index;
+  m.normal = facet.normal;
+  const double height = facet.offset - glm::dot(facet.normal, tip);
+  if constexpr (kSegment) {
+    const double slope = glm::dot(facet.normal, d);
+    m.place = slope >= 0 ? 0.0 : 1.0;
+    m.depth = slope >= 0 ? height : height - slope;
+  } else {
+    m.depth = height;
+  }
+  return m;
+}
+
+struct Slopes {
+  double left, right;  ///< dot(normal, d) of the edge's two faces
+  bool silhouette() const { return (left >= 0) != (right >= 0); }
+};
+
+inline Slopes slopes_at(const ConvexMesh& mesh, const Edge& edge, const Vec3& d) {
+  return {glm::dot(mesh.facets()[edge.left].normal, d),
+          glm::dot(mesh.facets()[edge.right].normal, d)};
+}
+
+/// False where the edge and the probe are parallel: then it is no contact edge.
+inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
+                         const Vec3& tip, const Vec3& d, Measured& m) {
+  const Edge& edge = mesh.edges()[index];
+  const Vec3& v0 = mesh.vertices()[edge.v0];
+  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3 c = glm::cross(e, d);
+  const double c2 = glm::dot(c, c);
+  if (c2 <= kParallel * kParallel * glm::dot(e, e) * glm::dot(d, d)) return false;
+  const double inverse = 1 / c2;
+  const double scale = std::copysign(inverse, left_ahead - 0.5) * std::sqrt(c2);
+  const Vec3 w = tip - v0;
+  m.edge = true;
+  m.left_ahead = left_ahead;
+  m.index = index;
+  m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
+  m.depth = -glm::dot(m.normal, w);
+  // w + depth n + place d = along_edge e, crossed with e and with d
+  m.place = glm::dot(glm::cross(w, e), c) * inverse;
+  m.along_edge = glm::dot(glm::cross(w, d), c) * inverse;
+  return true;
+}
+
+/// A silhouette edge and its face ahead.
+struct SilhouetteEdge {
+  std::uint32_t edge = kNone;
+  bool left_ahead = false;
+};
+
+/// The other silhouette edge at one end of `from`, which is one; the faces around a vertex change
+/// sides exactly twice. Turns about the vertex counter-clockwise, from face to face, until they do.
+/// Edge kNone when rounding hides the second one, or where not all faces are triangles.
+inline SilhouetteEdge turn_about(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+                                 bool left_ahead, const Vec3& d) {
+  // Out of the face on the left the next side starts at v1, out of the one on the right at v0.
+  const bool ahead = about_v1 == left_ahead;
+  std::uint32_t edge = from;
+  const Facet* face = &mesh.facets()[about_v1 ? mesh.edges()[from].left : mesh.edges()[from].right];
+  while (face->side_count == 3) {
+    const auto& sides = face->triangle;
+    const Neighbour& next = sides[edge == sides[0].edge ? 1 : edge == sides[1].edge ? 2 : 0];
+    edge = next.edge;
+    if (edge == from) return {};
+    const Facet* across = &mesh.facets()[next.across];
+    if ((glm::dot(across->normal, d) >= 0) != ahead) {
+      const bool face_is_left = face == &mesh.facets()[mesh.edges()[edge].left];
+      return {edge, face_is_left == ahead};
+    }
+    face = across;
+  }
+  return {};
+}
+
+/// The same by looking through the vertex' fan.
+inline SilhouetteEdge search_fan(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+                                 const Vec3& d) {
+  const std::uint32_t vertex = about_v1 ? mesh.edges()[from].v1 : mesh.edges()[from].v0;
+  for (std::uint32_t i = mesh.fan_first()[vertex]; i < mesh.fan_first()[vertex + 1]; ++i) {
+    const std::uint32_t candidate = mesh.fan_edges()[i];
+    const Slopes slopes = slopes_at(mesh, mesh.edges()[candidate], d);
+    if (candidate != from && slopes.silhouette()) return {candidate, slopes.left >= 0};
+  }
+  return {};
+}
+
+/// The other silhouette edge at one end of the silhouette edge `from`: the faces around a vertex
+/// change sides exactly twice. Edge kNone where rounding hides it.
+inline SilhouetteEdge other_silhouette(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+                                       bool left_ahead, const Vec3& d) {
+  const SilhouetteEdge other = turn_about(mesh, from, about_v1, left_ahead, d);
+  return other.edge != kNone ? other : search_fan(mesh, from, about_v1, d);
+}
+
+}  // namespace palpate::minkowski

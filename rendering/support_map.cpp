@@ -1,0 +1,57 @@
+#include "rendering/support_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "rendering/separation.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t kClimbed = 2048;  // vertices; fewer are climbed as they are
+constexpr double kVerticesPerCell = 8;
+
+/// The cell of coordinate c in [-1, 1].
+int cell_of(double c, int resolution) {
+  return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution), 0, resolution - 1);
+}
+
+}  // namespace
+
+SupportMap::SupportMap(const ConvexMesh& mesh) {
+  const std::size_t vertices = mesh.vertices().size();
+  if (vertices <= kClimbed) return;
+  resolution_ = static_cast<int>(std::sqrt(static_cast<double>(vertices) / (6 * kVerticesPerCell)));
+  const auto side = static_cast<std::size_t>(resolution_);
+  cells_.resize(6 * side * side);
+  std::uint32_t vertex = 0;
+  for (std::size_t face = 0; face < 6; ++face) {
+    for (std::size_t row = 0; row < side; ++row) {
+      for (std::size_t k = 0; k < side; ++k) {
+        const std::size_t column = row % 2 == 0 ? k : side - 1 - k;  // the next cell is a neighbour
+        Vec3 direction;
+        const auto axis = static_cast<int>(face / 2);
+        direction[axis] = face % 2 == 0 ? 1 : -1;
+        direction[(axis + 1) % 3] = (2.0 * static_cast<double>(row) + 1) / resolution_ - 1;
+        direction[(axis + 2) % 3] = (2.0 * static_cast<double>(column) + 1) / resolution_ - 1;
+        vertex = support_vertex(mesh, direction, vertex);
+        cells_[(face * side + row) * side + column] = vertex;
+      }
+    }
+  }
+}
+
+std::uint32_t SupportMap::near_support(const Vec3& direction) const {
+  int axis = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (std::abs(direction[k]) > std::abs(direction[axis])) axis = k;
+  }
+  const double scale = 1 / std::abs(direction[axis]);
+  const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
+  const int row = cell_of(scale * direction[(axis + 1) % 3], resolution_);
+  const int column = cell_of(scale * direction[(axis + 2) % 3], resolution_);
+  return cells_[static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column)];
+}
+
+}  // namespace palpate

@@ -1,0 +1,127 @@
+// The neighbourhood watch before the contact says the same as looking at every facet and edge.
+
+#include "rendering/approach.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "stimuli/primitives.h"
+#include "tests/shared/probe_paths.h"
+#include "tests/shared/random_mesh.h"
+
+namespace palpate {
+namespace {
+
+using testing::uniform;
+using Kind = MinkowskiFacet::Kind;
+
+struct Counts {
+  int entered = 0, separated = 0, undecided = 0;
+};
+
+/// One random motion near the mesh, from wherever a walk finds the probe outside. `turn`: rad.
+void check_motion(const ConvexMesh& mesh, const ContactTrees& trees, Random& random, bool segment,
+                  double way, double turn, Counts& counts) {
+  const double size = mesh.size();
+  const double length = segment ? size * uniform(random, 0.01, 3) : 0;
+  const Vec3 near = testing::middle_of(mesh) + 0.6 * size * testing::random_direction(random);
+  const double share = random.unit();
+  const Vec3 axis = testing::random_direction(random);
+  const LineProbe before = testing::probe_at(near, axis, length, share);
+  const Vec3 turned = glm::normalize(axis + turn * testing::random_direction(random));
+  // Towards the inside, the outside, or along.
+  const Vec3 to = near + way * size *
+                             glm::normalize(testing::middle_of(mesh) - near +
+                                            size * testing::random_direction(random));
+  const LineProbe after = testing::probe_at(to, turned, length, share);
+  const MinkowskiFacet any(Kind::face, false,
+                           static_cast<std::uint32_t>(random.below(mesh.facets().size())));
+  const WalkResult was = segment ? walk_segment(mesh, any, before.tip, before.tail - before.tip)
+                                 : walk_point(mesh, any, before.tip);
+  if (was.facet.kind != Kind::none || was.depth > -1e-9 * size) return;  // inside, or all but
+  const Approach way_in = segment ? approach_segment(mesh, was.separates, before, after)
+                                  : approach_point(mesh, was.separates, before, after);
+  const double tolerance = 1e-12 * size;
+  const FirstContact first =
+      segment ? first_contact_segment(mesh, trees, before, after, tolerance)
+              : first_contact_point(mesh, trees, before.tip, after.tip, tolerance);
+  switch (way_in.end) {
+    case Approach::End::undecided:
+      ++counts.undecided;
+      return;
+    case Approach::End::separated:
+      ++counts.separated;
+      EXPECT_GE(std::min(glm::dot(way_in.plane.normal, after.tip),
+                         glm::dot(way_in.plane.normal, segment ? after.tail : after.tip)),
+                way_in.plane.offset - tolerance);
+      for (const Vec3& vertex : mesh.vertices())
+        ASSERT_LE(glm::dot(way_in.plane.normal, vertex), way_in.plane.offset + tolerance);
+      EXPECT_EQ(first.facet.kind, Kind::none);
+      return;
+    case Approach::End::entered:
+      ++counts.entered;
+      ASSERT_NE(first.facet.kind, Kind::none);
+      EXPECT_NEAR(way_in.time, first.time, 1e-7);
+  }
+}
+
+Counts check_motions(bool segment, double way, double turn, std::uint64_t stream) {
+  Counts counts;
+  for (std::uint64_t seed = 0; seed < 1500; ++seed) {
+    Random random(seed, {77, stream});
+    const ConvexMesh mesh = testing::random_convex_mesh(random);
+    const ContactTrees trees(mesh, true);
+    for (int i = 0; i < 10; ++i) check_motion(mesh, trees, random, segment, way, turn, counts);
+    if (::testing::Test::HasFailure()) {
+      ADD_FAILURE() << "seed " << seed;
+      break;
+    }
+  }
+  return counts;
+}
+
+TEST(Approach, OfATipEndsAsLookingEverywhereDoes) {
+  const Counts counts = check_motions(false, 0.5, 0, 1);
+  EXPECT_GT(counts.entered, 300);
+  EXPECT_GT(counts.separated, 300);
+  EXPECT_EQ(counts.undecided, 0);
+}
+
+TEST(Approach, OfAStylusThatTurnsLittleEndsAsLookingEverywhereDoes) {
+  const Counts counts = check_motions(true, 0.3, 0.05, 2);
+  EXPECT_GT(counts.entered, 300);
+  EXPECT_GT(counts.separated, 300);
+  EXPECT_LE(counts.undecided, (counts.entered + counts.separated) / 100);
+}
+
+TEST(Approach, OfAStylusThatIsWhirledEndsAsLookingEverywhereDoes) {
+  const Counts counts = check_motions(true, 1, 2, 3);
+  EXPECT_GT(counts.entered, 300);
+  EXPECT_GT(counts.separated, 300);
+  EXPECT_LE(counts.undecided, (counts.entered + counts.separated) / 20);
+}
+
+TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
+  const ConvexMesh mesh(icosphere(0.03, 6));
+  const SupportMap map(mesh);
+  ASSERT_FALSE(map.empty());
+  Random random(5);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 direction = 3.0 * testing::random_direction(random);
+    const Vec3& near = mesh.vertices()[map.near_support(direction)];
+    double best = -1;
+    for (const Vec3& vertex : mesh.vertices()) best = std::max(best, glm::dot(vertex, direction));
+    EXPECT_EQ(
+        glm::dot(mesh.vertices()[support_vertex(mesh, direction, map.near_support(direction))],
+                 direction),
+        best);
+    EXPECT_GT(glm::dot(near, direction), 3 * 0.03 * std::cos(0.06));  // a cell: some 0.06 rad
+  }
+  EXPECT_TRUE(SupportMap(ConvexMesh(cube(0.1))).empty());
+}
+
+}  // namespace
+}  // namespace palpate
