@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "data/file_checks.h"
 #include "data/schema.h"
 #include "data/sqlite_errors.h"
 #include "data/store_impl.h"
@@ -34,61 +35,6 @@ void mark_dead_runs(SQLite::Database& db) {
   update.exec();
   db.exec("UPDATE runs SET end_reason = 'interrupted' WHERE end_reason = 'running'");
   transaction.commit();
-}
-
-/// Cheap damage is found before a participant sits down. Not the samples: they may be gigabytes,
-/// and carry their own checksums.
-void quick_check(SQLite::Database& db, const std::string& path) {
-  for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
-                            "exports", "export_participants", "tombstones", "tombstone_exports"}) {
-    if (!db.tableExists(table)) continue;  // of a later version
-    SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
-    if (!check.executeStep()) continue;
-    const std::string found = check.getColumn(0).getString();
-    if (found != "ok") throw SQLite::Exception(table + (": " + found), SQLITE_CORRUPT);
-  }
-  if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
-    throw StoreRefused(path + ": is damaged: rows refer to others that are gone; restore a backup");
-  }
-}
-
-/// SQLite's name for a file that nobody writes to: no locks, no log.
-std::string immutable_uri(const std::string& file) {
-  std::string uri = "file:";
-  for (const char c : file) {
-    if (c == '?' || c == '#' || c == '%') {
-      constexpr const char* kDigits = "0123456789ABCDEF";
-      uri += {'%', kDigits[c >> 4], kDigits[c & 15]};
-    } else {
-      uri += c;
-    }
-  }
-  return uri + "?immutable=1";
-}
-
-/// Another program's file is left alone: this look takes no locks and writes nothing, where an
-/// ordinary one could roll back or checkpoint it.
-void require_ours(const std::string& file, const std::string& path) {
-  SQLite::Database probe(immutable_uri(file), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
-  try {
-    require_application_id(probe, path);
-  } catch (const SQLite::Exception& error) {
-    // Beside a writer the size in the header may run ahead of the file: a proper look will tell.
-    if (error.getErrorCode() != SQLITE_CORRUPT) throw;
-  }
-}
-
-/// SQLite fills a last page that is cut short with zeros. Beside a log that is right: the log has
-/// the page.
-void require_whole_pages(const std::string& file) {
-  std::error_code error;
-  const auto log = std::filesystem::file_size(file + "-wal", error);
-  if (!error && log > 0) return;
-  const auto size = std::filesystem::file_size(file, error);
-  if (!error && size % kPageSize != 0) {
-    throw SQLite::Exception("it has " + std::to_string(size) + " bytes, no whole number of pages",
-                            SQLITE_CORRUPT);
-  }
 }
 
 bool may_write(const std::string& file) {

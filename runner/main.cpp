@@ -26,6 +26,7 @@ constexpr Command kCommands[] = {
      palpate::analyze_command},
     {"export", "the trials of a database as files for others", palpate::export_command},
     {"forget", "remove a participant who has withdrawn", palpate::forget_command},
+    {"merge", "stations' databases into one", palpate::merge_command},
     {"render", "forces along a recorded path, offline", palpate::render_command},
     {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
     {"simulate", "the whole study with simulated participants", palpate::simulate_command},

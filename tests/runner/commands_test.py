@@ -16,7 +16,7 @@ import time
 import unittest
 
 PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
-COMMANDS = ["analyze", "export", "forget", "render", "schedule", "simulate", "validate"]
+COMMANDS = ["analyze", "export", "forget", "merge", "render", "schedule", "simulate", "validate"]
 
 
 class FromOutside(unittest.TestCase):

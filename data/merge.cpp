@@ -1,0 +1,125 @@
+#include "data/merge.h"
+
+#include <fcntl.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <deque>
+#include <filesystem>
+#include <system_error>
+
+#include "data/draft_folder.h"
+#include "data/merge_plan.h"
+#include "data/schema.h"
+#include "data/session_content.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+void require_free(const std::string& out) {
+  std::error_code error;
+  if (out.empty()) throw StoreRefused("'' is no path of a database");
+  for (const char* end : {"", "-wal", "-shm", "-journal"}) {
+    if (!fs::exists(fs::symlink_status(out + end, error))) continue;
+    throw StoreRefused(out + end +
+                       ": is there already; a merge makes a new database and replaces none, give "
+                       "another name or move it away");
+  }
+}
+
+/// Opens every file once, however often and under whatever name it was given.
+std::deque<Station> open_stations(const std::vector<std::string>& inputs,
+                                  const DraftFolder& scratch) {
+  std::deque<Station> stations;
+  std::vector<FileIdentity> seen;
+  for (const std::string& input : inputs) {
+    const FileIdentity identity = identity_of(input);
+    if (std::find(seen.begin(), seen.end(), identity) != seen.end()) continue;
+    if (identity != FileIdentity{}) seen.push_back(identity);
+    stations.emplace_back(input, scratch / ("station-" + std::to_string(stations.size()) + ".db"));
+  }
+  return stations;
+}
+
+/// Fills a new database in the order of the plan, so that it does not depend on that of the inputs.
+void fill(SQLite::Database& db, const MergePlan& plan,
+          const std::function<void(std::int64_t, std::int64_t)>& progress) {
+  std::int64_t sessions = 0;
+  for (const PlannedProtocol& protocol : plan.protocols) {
+    SQLite::Statement add(db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?)");
+    Binder(add) << protocol.sha256 << protocol.name << protocol.text;
+    add.exec();
+    const std::int64_t protocol_id = db.getLastInsertRowid();
+    for (const auto& [number, person] : protocol.participants) {
+      SQLite::Statement enrol(db,
+                              "INSERT INTO participants (protocol_id, code, number, simulated, "
+                              "seed) VALUES (?, ?, ?, ?, ?)");
+      Binder(enrol) << protocol_id << person.code << number << person.simulated << person.seed;
+      enrol.exec();
+      const std::int64_t participant = db.getLastInsertRowid();
+      for (const auto& [session_number, session] : person.sessions) {
+        guarded(session.station->path(),
+                [&] { copy_session(session.station->db(), session.id, db, participant); });
+        if (progress) progress(++sessions, plan.sessions);
+      }
+    }
+  }
+  // Nothing of theirs was ever in this file: there is nothing to clear.
+  SQLite::Statement bury(db, "INSERT INTO tombstones (code_hash, cleared) VALUES (?, 1)");
+  for (const std::string& hash : plan.tombstones.hashes()) {
+    bury.reset();
+    Binder(bury) << hash;
+    bury.exec();
+  }
+}
+
+void sync_file(const std::string& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool done = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!done)
+    throw StoreError(file + ": cannot be written: " + std::generic_category().message(error));
+}
+
+void give_name(const std::string& draft, const std::string& out) {
+  int status = ::renameat2(AT_FDCWD, draft.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE);
+  if (status != 0 && errno == EINVAL) status = std::rename(draft.c_str(), out.c_str());
+  if (status == 0) return;
+  const int error = errno;
+  throw StoreError(out + ": cannot be given its name: " + std::generic_category().message(error) +
+                   "; nothing was written");
+}
+
+}  // namespace
+
+Merged merge(const std::string& out, const std::vector<std::string>& inputs,
+             const std::function<void(std::int64_t, std::int64_t)>& progress) {
+  require_free(out);
+  const DraftFolder folder(out);
+  std::deque<Station> stations = open_stations(inputs, folder);
+  const MergePlan plan = plan_merge(stations);
+  const std::string draft = folder / "merged.db";
+  create_database(draft);
+  guarded(out, [&] {
+    SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+    // It is thrown away if anything fails: no journal is needed.
+    db.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA foreign_keys = ON");
+    SQLite::Transaction transaction(db);
+    fill(db, plan, progress);
+    transaction.commit();
+    db.exec("PRAGMA journal_mode = WAL");
+  });
+  for (const Station& station : stations) station.require_unchanged();
+  const Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out};
+  sync_file(draft);
+  give_name(draft, out);
+  return done;
+}
+
+}  // namespace palpate

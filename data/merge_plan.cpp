@@ -1,0 +1,219 @@
+#include "data/merge_plan.h"
+
+#include <algorithm>
+#include <set>
+
+#include "data/checks.h"
+#include "data/session_content.h"
+
+namespace palpate {
+namespace {
+
+struct FoundParticipant {
+  std::int64_t id = 0;
+  int number = 0;
+  PlannedParticipant person;
+};
+
+std::vector<FoundParticipant> participants_of(Station& station, std::int64_t protocol_id) {
+  std::vector<FoundParticipant> all;
+  SQLite::Statement find(
+      station.db(),
+      "SELECT id, number, code, simulated, seed FROM participants WHERE protocol_id = ? ORDER BY "
+      "number");
+  Binder(find) << protocol_id;
+  while (find.executeStep()) {
+    FoundParticipant& one = all.emplace_back();
+    one.person.station = &station;
+    Row(find) >> one.id >> one.number >> one.person.code >> one.person.simulated >> one.person.seed;
+  }
+  SQLite::Statement sessions(station.db(),
+                             "SELECT number, id FROM sessions WHERE participant_id = ?");
+  for (FoundParticipant& one : all) {
+    sessions.reset();
+    Binder(sessions) << one.id;
+    while (sessions.executeStep()) {
+      int number = 0;
+      std::int64_t id = 0;
+      Row(sessions) >> number >> id;
+      one.person.sessions[number] = {&station, id};
+    }
+  }
+  return all;
+}
+
+struct Span {
+  double begin = 0, end = 0;  // s since 1970
+};
+
+/// From the first start to the last that happened in a session.
+Span span_of(const PlannedSession& session) {
+  SQLite::Statement find(
+      session.station->db(),
+      "SELECT min(r.started_utc_ns / 1e9), max(r.started_utc_ns / 1e9 + (max(coalesce(r.ended_ns, "
+      "r.started_ns), coalesce((SELECT max(max(a.began_ns, coalesce(a.response_ns, a.began_ns))) "
+      "FROM attempts a WHERE a.run_id = r.id), r.started_ns)) - r.started_ns) / 1e9) FROM runs r "
+      "WHERE r.session_id = ?");
+  Binder(find) << session.id;
+  find.executeStep();
+  Span span;
+  Row(find) >> span.begin >> span.end;
+  return span;
+}
+
+class Planner {
+ public:
+  MergePlan plan(std::deque<Station>& stations);
+
+ private:
+  void add_protocols(Station& station);
+  void add_participant(PlannedProtocol& protocol, FoundParticipant found);
+  void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
+  void require_one_meaning_per_name(const std::deque<Station>& stations);
+
+  MergePlan plan_;
+  std::map<std::string, PlannedProtocol> protocols_;                              // by checksum
+  std::map<std::string, std::map<const Station*, std::set<std::string>>> names_;  // -> checksums
+  std::map<std::string, bool> withdrawn_;  // codes that were looked up
+  std::vector<std::string> conflicts_;
+};
+
+MergePlan Planner::plan(std::deque<Station>& stations) {
+  for (Station& station : stations) {
+    guarded(station.path(),
+            [&] { plan_.tombstones.add(Tombstones::read(station.db(), station.path())); });
+  }
+  for (Station& station : stations) guarded(station.path(), [&] { add_protocols(station); });
+  require_one_meaning_per_name(stations);
+  if (!conflicts_.empty()) {
+    std::string message = "these databases cannot be merged; nothing was written:";
+    for (const std::string& one : conflicts_) message += "\n  " + one;
+    throw StoreRefused(message +
+                       "\nLeave one of the databases out, or remove a participant who is in the "
+                       "wrong place from a copy of it with palpate forget");
+  }
+  for (auto& [sha256, protocol] : protocols_) {
+    for (const auto& [number, person] : protocol.participants) {
+      plan_.sessions += static_cast<std::int64_t>(person.sessions.size());
+    }
+    plan_.protocols.push_back(std::move(protocol));
+  }
+  std::sort(plan_.protocols.begin(), plan_.protocols.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.name, a.sha256) < std::pair(b.name, b.sha256);
+  });
+  return std::move(plan_);
+}
+
+void Planner::add_protocols(Station& station) {
+  SQLite::Statement find(station.db(), "SELECT id, name, sha256, text FROM protocols ORDER BY id");
+  while (find.executeStep()) {
+    std::int64_t id = 0;
+    PlannedProtocol found;
+    Row(find) >> id >> found.name >> found.sha256 >> found.text;
+    names_[found.name][&station].insert(found.sha256);
+    PlannedProtocol& protocol = protocols_.try_emplace(found.sha256, found).first->second;
+    if (protocol.text != found.text || protocol.name != found.name) {
+      conflicts_.push_back(station.path() + ": protocol " + found.name +
+                           " has the checksum of another protocol: the file is damaged");
+      continue;
+    }
+    for (FoundParticipant& one : participants_of(station, id)) {
+      const std::string code = one.person.code;
+      if (!is_participant_code(code)) {
+        throw SQLite::Exception("a participant's code is not 1 to 32 letters and digits",
+                                SQLITE_CORRUPT);
+      }
+      auto [at, unknown] = withdrawn_.try_emplace(code, false);
+      if (unknown) at->second = plan_.tombstones.holds(code);
+      if (at->second) {
+        plan_.left_out.push_back({code, station.path()});
+      } else {
+        add_participant(protocol, std::move(one));
+      }
+    }
+  }
+}
+
+void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found) {
+  const std::string& code = found.person.code;
+  for (auto& [number, known] : protocol.participants) {
+    const std::string where = " (" + known.station->path() + ", " + found.person.station->path() +
+                              ", protocol " + protocol.name + ")";
+    if (number == found.number && known.code != code) {
+      conflicts_.push_back("number " + std::to_string(number) + " is that of participant " +
+                           known.code + " and of participant " + code + where);
+      return;
+    }
+    if (known.code != code) continue;
+    if (number != found.number) {
+      conflicts_.push_back("participant " + code + " has number " + std::to_string(number) +
+                           " and number " + std::to_string(found.number) + where);
+    } else if (known.simulated != found.person.simulated || known.seed != found.person.seed) {
+      conflicts_.push_back("participant " + code +
+                           " is simulated at one station and a person at the other, or simulated "
+                           "with another seed" +
+                           where);
+    } else {
+      add_sessions(known, found.person);
+    }
+    return;
+  }
+  protocol.participants.emplace(found.number, std::move(found.person));
+}
+
+void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& found) {
+  const auto conflict = [&](const PlannedSession& other, const std::string& what) {
+    conflicts_.push_back("participant " + known.code + ": " + what + " (" + other.station->path() +
+                         ", " + found.station->path() + ")");
+  };
+  const auto before = known.sessions;
+  for (const auto& [number, session] : found.sessions) {
+    const auto same = before.find(number);
+    if (same != before.end()) {
+      const PlannedSession& other = same->second;
+      if (!same_session(other.station->db(), other.id, session.station->db(), session.id)) {
+        conflict(other, "session " + std::to_string(number) +
+                            " is not the same: two people under one code, or one database is an "
+                            "older copy of the other");
+      }
+      continue;
+    }
+    const Span now = span_of(session);
+    for (const auto& [other_number, other] : before) {
+      if (known.simulated || found.sessions.contains(other_number)) continue;
+      const Span then = span_of(other);
+      if (now.begin > then.end || then.begin > now.end) continue;
+      conflict(other, "sessions " + std::to_string(other_number) + " and " +
+                          std::to_string(number) + " were at the same time: two people");
+    }
+    known.sessions[number] = session;
+  }
+}
+
+/// Names of a protocol may have several checksums within a station: it was changed there. Two
+/// stations that know different ones ran different studies.
+void Planner::require_one_meaning_per_name(const std::deque<Station>& stations) {
+  for (const auto& [name, by_station] : names_) {
+    for (std::size_t i = 0; i < stations.size(); ++i) {
+      for (std::size_t k = i + 1; k < stations.size(); ++k) {
+        const Station &a = stations[i], &b = stations[k];
+        const auto of_a = by_station.find(&a), of_b = by_station.find(&b);
+        if (of_a == by_station.end() || of_b == by_station.end()) continue;
+        const auto &one = of_a->second, &other = of_b->second;
+        if (std::includes(one.begin(), one.end(), other.begin(), other.end()) ||
+            std::includes(other.begin(), other.end(), one.begin(), one.end())) {
+          continue;
+        }
+        conflicts_.push_back("protocol " + name + " is not the same in " + a.path() + " (SHA-256 " +
+                             one.begin()->substr(0, 12) + "...) and " + b.path() + " (" +
+                             other.begin()->substr(0, 12) + "...)");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+MergePlan plan_merge(std::deque<Station>& stations) { return Planner().plan(stations); }
+
+}  // namespace palpate

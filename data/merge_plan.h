@@ -1,0 +1,45 @@
+#pragma once
+// Internal to data/: what of the stations goes into one study, and what speaks against it.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/merge.h"
+#include "data/station.h"
+#include "data/tombstones.h"
+
+namespace palpate {
+
+struct PlannedSession {
+  Station* station = nullptr;  ///< that it is copied from
+  std::int64_t id = 0;         ///< there
+};
+
+struct PlannedParticipant {
+  Station* station = nullptr;  ///< where it was found first
+  std::string code;
+  bool simulated = false;
+  std::optional<std::string> seed;
+  std::map<int, PlannedSession> sessions;  ///< by number
+};
+
+struct PlannedProtocol {
+  std::string name, sha256, text;
+  std::map<int, PlannedParticipant> participants;  ///< by number
+};
+
+struct MergePlan {
+  std::vector<PlannedProtocol> protocols;  ///< by name, then checksum
+  Tombstones tombstones;
+  std::vector<LeftOut> left_out;
+  std::int64_t sessions = 0;
+};
+
+/// \throws StoreRefused with every conflict, a line each.
+MergePlan plan_merge(std::deque<Station>& stations);
+
+}  // namespace palpate

@@ -1,0 +1,82 @@
+#include "data/merge.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "runner/commands/command.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
+
+void ask_to_stop(int) { stop_asked = true; }
+
+/// Ctrl-C leaves nothing behind; a second one ends the program as usual.
+void watch_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+}  // namespace
+
+int merge_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate merge --out ALL.db A.db B.db ...";
+  line.summary =
+      "Makes one new database of several stations' databases, which are only read. Refuses, with\n"
+      "every reason, what cannot be one study: a participant with different content, one number\n"
+      "for two codes, different protocols under one name. Who has withdrawn at one station is "
+      "left\n"
+      "out from all. Merging a merged database again with its parts changes nothing.";
+  line.example =
+      "  palpate merge --out all.db station1.db station2.db\n"
+      "  palpate merge --out all2.db all.db station3.db";
+  std::string out;
+  std::vector<std::string> inputs;
+  auto add = line.options.add_options();
+  add("out", po::value(&out)->required()->value_name("FILE"), "the new database");
+  add("input", po::value(&inputs)->value_name("FILE"),
+      "a station's database; --input itself may be left out");
+  line.positional.add("input", -1);
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  if (inputs.empty()) {
+    throw UsageError("missing the databases to merge\nUsage: " + line.usage + "\nMore: add --help");
+  }
+  watch_signals();
+  const bool on_terminal = isatty(STDERR_FILENO) == 1;
+  try {
+    const Merged done = merge(out, inputs, [&](std::int64_t session, std::int64_t all) {
+      if (stop_asked) throw std::runtime_error("stopped; nothing was written");
+      if (!on_terminal) return;
+      std::fprintf(stderr, session < all ? "\r%lld of %lld sessions\x1b[K" : "\r\x1b[K",
+                   static_cast<long long>(session), static_cast<long long>(all));
+    });
+    std::cout << out << ": " << done.counts.participants << " participants, "
+              << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
+              << done.counts.cut_off << " attempts that were cut off\n";
+    for (const LeftOut& one : done.left_out) {
+      std::cerr << one.code << " has withdrawn and is left out, but is still in " << one.path
+                << "; remove with: palpate forget --db '" << one.path << "' --participant "
+                << one.code << "\n";
+    }
+  } catch (const StoreRefused& error) {
+    throw UsageError(error.what());  // the files named are bad input: status 2
+  }
+  return 0;
+}
+
+}  // namespace palpate
