@@ -6,8 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "analysis/anova.h"
 #include "analysis/describe.h"
+#include "analysis/mixed_model.h"
 #include "analysis/paired.h"
+#include "analysis/practice.h"
+#include "analysis/speed_accuracy.h"
 #include "analysis/trials.h"
 
 namespace palpate {
@@ -28,7 +32,11 @@ struct Analysis {
   std::string program_version;  ///< of the program that analyses
   TrialTable table;
   Description description;
-  std::vector<PairedShape> shapes;     ///< one for each of table.shapes
+  std::vector<PairedShape> shapes;  ///< one for each of table.shapes
+  RmAnova rm_anova;
+  MixedModel mixed_model;
+  std::vector<SpeedAccuracy> speed_accuracy;  ///< one for each of table.shapes
+  Practice practice;
   std::vector<Exclusions> exclusions;  ///< one for each of table.renderers
   std::vector<std::string> warnings;   ///< the table's, and what limits the conclusions
 };

@@ -42,14 +42,18 @@ Buckets sort_times(const TrialTable& table, double too_fast) {
   return buckets;
 }
 
+/// Turns the times into their logs.
 void describe_person(std::vector<double>& times, ParticipantCell& cell) {
   cell.n_used = times.size();
   if (times.empty()) return;
   cell.mean = mean(times);
-  double logs = 0;
-  for (const double time : times) logs += std::log(time);
-  cell.mean_log = logs / static_cast<double>(times.size());
   cell.median = median(times);
+  double logs = 0;
+  for (double& time : times) logs += time = std::log(time);
+  cell.mean_log = logs / static_cast<double>(times.size());
+  for (const double log : times) {
+    cell.squares_log += (log - cell.mean_log) * (log - cell.mean_log);
+  }
 }
 
 TimesCell describe_times(const std::vector<ParticipantCell>& people) {

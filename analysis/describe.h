@@ -41,7 +41,11 @@ struct ParticipantCell {
   std::size_t n_trials = 0, n_correct = 0, n_used = 0;
   double mean = 0, median = 0;  ///< s; good where n_used > 0
   double mean_log = 0;          ///< of natural logs of s; good where n_used > 0
+  double squares_log = 0;       ///< sum of squared deviations of the logs from mean_log
 };
+
+/// [renderer][shape][participant]
+using People = std::vector<std::vector<std::vector<ParticipantCell>>>;
 
 struct Description {
   Counts counts;
@@ -49,8 +53,7 @@ struct Description {
   std::vector<std::vector<TimesCell>> times;        ///< [renderer][shape]
   /// [renderer][shape][answer]; the last one is "no response".
   std::vector<std::vector<std::vector<std::size_t>>> confusion;
-  std::vector<std::vector<std::vector<ParticipantCell>>>
-      people;  ///< [renderer][shape][participant]
+  People people;
 };
 
 /// \param too_fast s, > 0: correct answers before it are left out of the times; exactly it is kept

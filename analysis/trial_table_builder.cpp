@@ -59,8 +59,22 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   rows_.push_back(row);
 }
 
-void TrialTableBuilder::check_places(TrialTable& table) {
+void TrialTableBuilder::number_places() {
   std::sort(places_.begin(), places_.end());
+  std::uint32_t position = 0;
+  std::vector<std::uint32_t> exposures(renderers_.names().size());
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (i == 0 || places_[i].participant != places_[i - 1].participant) {
+      position = 0;
+      std::fill(exposures.begin(), exposures.end(), 0U);
+    }
+    TrialRow& row = rows_[places_[i].row];
+    row.position = ++position;
+    row.exposure = ++exposures[row.renderer];
+  }
+}
+
+void TrialTableBuilder::check_places(TrialTable& table) {
   std::size_t repeated = 0, doubled = 0;
   for (std::size_t i = 1; i < places_.size(); ++i) {
     const Place &a = places_[i - 1], &b = places_[i];
@@ -89,6 +103,7 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
                                      const std::vector<std::string>& listed) {
   if (rows_.empty()) throw std::runtime_error("expected at least one trial that is not practice");
   TrialTable table;
+  number_places();
   check_places(table);
   table.provenance = std::move(provenance);
   table.participants.assign(participants_.names().begin(), participants_.names().end());

@@ -54,6 +54,8 @@ class TrialTableBuilder {
              std::tie(other.participant, other.session, other.block, other.trial, other.row);
     }
   };
+  /// Sorts the places and numbers the rows by them.
+  void number_places();
   void check_places(TrialTable& table);
 
   Interner participants_, renderers_, stimuli_;

@@ -18,6 +18,9 @@ struct TrialRow {
   bool correct = false;           ///< never for a time-out
   bool timed_out = false;
   double response_time = 0;  ///< s, from time zero; the limit for a time-out
+  /// Place in the order of session, block and trial, from 1: among all of the participant's trials,
+  /// and among those with this renderer.
+  std::uint32_t position = 0, exposure = 0;
 };
 
 enum class Simulated { no, yes, mixed };

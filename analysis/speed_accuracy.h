@@ -1,0 +1,30 @@
+#pragma once
+// Is speed bought with errors?
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/describe.h"
+#include "analysis/paired.h"
+#include "analysis/trials.h"
+
+namespace palpate {
+
+/// Change of accuracy beside the change of time, ray minus point. Shares, 0 to 1.
+struct SpeedAccuracy {
+  std::optional<double> percent_change_time;           ///< of the geometric mean; negative: faster
+  std::optional<double> accuracy_point, accuracy_ray;  ///< means of participants' accuracies
+  std::optional<double> accuracy_change;  ///< mean over participants with trials of both
+  std::size_t n_pairs = 0;                ///< of them
+  TTest test;                             ///< of the changes; log_ratio_ci95 is of accuracy_change
+  /// "trade-off possible", "no trade-off", or empty where it cannot be said.
+  std::string reading;
+};
+
+/// One for each of table.shapes.
+std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Description& description,
+                                          const std::vector<PairedShape>& shapes);
+
+}  // namespace palpate
