@@ -22,6 +22,8 @@ struct Command {
 };
 
 constexpr Command kCommands[] = {
+    {"accuracy", "error of the renderers against run time; which tessellation to choose",
+     palpate::accuracy_command},
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
      palpate::analyze_command},
     {"export", "the trials of a database as files for others", palpate::export_command},

@@ -35,6 +35,7 @@ struct CommandLine {
 /// regular file (a pipe, a terminal) is written to as it is. \throws std::runtime_error.
 void write_whole(const std::string& path, const std::string& text);
 
+int accuracy_command(const std::vector<std::string>& args);
 int analyze_command(const std::vector<std::string>& args);
 int export_command(const std::vector<std::string>& args);
 int forget_command(const std::vector<std::string>& args);

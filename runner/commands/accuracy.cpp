@@ -1,0 +1,239 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "rendering/first_contact.h"
+#include "runner/commands/accuracy_report.h"
+#include "runner/commands/command.h"
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+double now_ns() {
+  return std::chrono::duration<double, std::nano>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+/// One line on a terminal: what is done, and how long the rest will take.
+class ProgressLine {
+ public:
+  explicit ProgressLine(std::string what)
+      : what_(std::move(what)), on_terminal_(isatty(STDERR_FILENO) == 1), start_(now_ns()) {}
+  ~ProgressLine() {
+    if (shown_ > 0) std::cerr << "\r\033[K";
+  }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+
+  void show(double done) {
+    const double now = now_ns();
+    if (!on_terminal_ || now - shown_ < 2e8) return;
+    shown_ = now;
+    const double gone = (now - start_) / 1e9;
+    std::cerr << "\r\033[K" << what_ << ": " << std::lround(100 * done) << " %";
+    if (done > 0.02) std::cerr << ", about " << std::lround(gone / done - gone) << " s left";
+    std::cerr << std::flush;
+  }
+
+ private:
+  std::string what_;
+  bool on_terminal_;
+  double start_, shown_ = 0;
+};
+
+void study_first_contacts(AccuracyReport& report, int entries) {
+  struct Shape {
+    const char* name;
+    PolygonSoup soup;
+  };
+  const Shape shapes[] = {{"sphere of 1,280 triangles", icosphere(0.03, 3)},
+                          {"cone of 64 segments", cone(0.03, 0.06, 64)},
+                          {"cylinder of 64 segments", cylinder(0.03, 0.06, 64)},
+                          {"cube", cube(0.06)},
+                          {"plate of 60 x 60 x 1 mm", [] {
+                             PolygonSoup plate = cube(0.06);
+                             for (Vec3& v : plate.vertices) v.z /= 60;
+                             return plate;
+                           }()}};
+  ProgressLine progress("first contacts");
+  constexpr double kSpeeds[] = {0.1, 0.5, 1, 5};
+  const double steps = static_cast<double>(std::size(shapes) * std::size(kSpeeds));
+  double done = 0;
+  for (const Shape& shape : shapes) {
+    const ConvexMesh mesh(shape.soup);
+    FirstContactStudy study{shape.name, {}};
+    for (const double speed : kSpeeds) {
+      progress.show(done / steps);
+      study.speeds.push_back(first_contact_loss(mesh, speed, 2, entries, 1));
+      done += 1;
+    }
+    report.first_contacts.push_back(std::move(study));
+  }
+}
+
+/// What one look costs where neither has a tree: 6 facets and 12 edges, a motion that stays off.
+void time_first_contact(AccuracyReport& report) {
+  const ConvexMesh mesh(cube(0.06));
+  const ContactTrees trees(mesh, true);
+  const auto pose = [](int i) {
+    const double height = 0.031 + 1e-5 * (i % 7);
+    return LineProbe{Vec3(-0.02, 0.01, height), Vec3(0.1, 0.02, height + 0.01)};
+  };
+  constexpr int kLooks = 20000;
+  int found = 0;
+  const auto time = [&](const std::function<bool(const LineProbe&, const LineProbe&)>& look) {
+    double fastest = HUGE_VAL;
+    for (int round = 0; round < 5; ++round) {
+      const double start = now_ns();
+      for (int i = 0; i < kLooks; ++i) found += look(pose(i), pose(i + 1)) ? 1 : 0;
+      fastest = std::min(fastest, (now_ns() - start) / kLooks);
+    }
+    return fastest;
+  };
+  report.paper_test_ns = time([&](const LineProbe& before, const LineProbe& after) {
+    return paper_first_contact(mesh, before, after);
+  });
+  report.exact_test_ns = time([&](const LineProbe& before, const LineProbe& after) {
+    return first_contact_segment(mesh, trees, before, after, 1e-12 * mesh.size()).facet.kind !=
+           MinkowskiFacet::Kind::none;
+  });
+  if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
+}
+
+/// The walks shared out among threads; the sums do not depend on how.
+SearchCounts search_all(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  const std::uint64_t walks = (ticks + kTicksPerWalk - 1) / kTicksPerWalk;
+  constexpr std::uint64_t kShare = 20;  // walks a thread takes at a time
+  SearchCounts all;
+  ProgressLine progress("search");
+  for (std::uint64_t first = 0; first < walks;) {
+    progress.show(static_cast<double>(first) / static_cast<double>(walks));
+    std::vector<SearchCounts> parts(static_cast<std::size_t>(jobs));
+    std::vector<std::thread> threads;
+    for (SearchCounts& part : parts) {
+      const std::uint64_t count = std::min(kShare, walks - first);
+      threads.emplace_back(
+          [&part, seed, first, count] { part = search_walks(seed, first, count); });
+      first += count;
+      if (first == walks) break;
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (const SearchCounts& part : parts) all += part;
+  }
+  return all;
+}
+
+void study(AccuracyReport& report) {
+  {
+    ProgressLine progress("errors and times");
+    report.rows =
+        accuracy_study(report.settings, now_ns, [&](double done) { progress.show(done); });
+  }
+  // In step with the rest: 2000 of each by default.
+  study_first_contacts(report,
+                       std::max(10, report.settings.paths * report.settings.contact_ticks / 2));
+  time_first_contact(report);
+}
+
+AccuracySettings quick_settings() {
+  AccuracySettings quick;
+  quick.paths = 2;
+  quick.contact_ticks = 500;
+  quick.most_triangles = 20480;
+  quick.visits = 1e7;
+  return quick;
+}
+
+void check_range(const char* option, int value, int low, int high) {
+  if (value >= low && value <= high) return;
+  throw UsageError(std::string("--") + option + ": expected " + std::to_string(low) + " to " +
+                   std::to_string(high) + ", not " + std::to_string(value));
+}
+
+void check_ticks(std::uint64_t ticks, bool searching) {
+  constexpr std::uint64_t kMost = 1'000'000'000'000;
+  if (searching && (ticks == 0 || ticks > kMost)) {
+    throw UsageError("--search: expected 1 to " + std::to_string(kMost) + " ticks");
+  }
+}
+
+}  // namespace
+
+int accuracy_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate accuracy [--quick | --search TICKS] [--json FILE] [--figure FILE.vg.json]";
+  line.summary =
+      "How far the rendered forces are from the exact ones, and at what cost: every method over\n"
+      "every tessellation of the four shapes, and which tessellation a lab should choose.\n"
+      "Takes two minutes, with --quick ten seconds. Status 1 when a search finds a wrong tick.";
+  line.example =
+      "  palpate accuracy --quick\n"
+      "  palpate accuracy --json accuracy.json --figure accuracy.vg.json\n"
+      "  palpate accuracy --search 10000000   (random solids and paths against brute force)";
+  std::string json, figure;
+  std::uint64_t search_ticks = 0, seed = 1;
+  AccuracySettings settings;
+  int jobs = 0;
+  auto add = line.options.add_options();
+  namespace po = boost::program_options;
+  add("quick", "fewer and shorter paths, at most 20,480 triangles");
+  add("paths", po::value<int>()->value_name("N"), "paths for each shape and probe; default 4");
+  add("ticks", po::value<int>()->value_name("N"), "ticks of contact of each path; default 1000");
+  add("most-triangles", po::value<int>()->value_name("N"),
+      "of the finest tessellation; default 327680");
+  add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
+  add("figure", po::value(&figure)->value_name("FILE"),
+      "write the figure of error over time as a Vega specification");
+  add("search", po::value(&search_ticks)->value_name("TICKS"),
+      "instead of all that: search so many random ticks for wrong ones");
+  add("seed", po::value(&seed)->value_name("N")->default_value(1), "of the search");
+  add("jobs", po::value(&jobs)->value_name("J"), "threads of the search; default: one a core");
+  add("force", "replace files that are there");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const bool searching = values->count("search") > 0;
+  check_ticks(search_ticks, searching);
+  if (values->count("quick")) settings = quick_settings();
+  const auto take = [&](const char* option, int& setting, int low, int high) {
+    if (!values->count(option)) return;
+    setting = (*values)[option].as<int>();
+    check_range(option, setting, low, high);
+  };
+  take("paths", settings.paths, 1, 10000);
+  take("ticks", settings.contact_ticks, 1, 1000000);
+  take("most-triangles", settings.most_triangles, 20, 1310720);
+  if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
+  if (searching && !figure.empty()) throw UsageError("--figure: a search draws nothing");
+  for (const std::string& path : {json, figure}) {
+    if (!path.empty() && !values->count("force") && std::filesystem::exists(path)) {
+      throw UsageError(path + ": is there already; --force replaces it");
+    }
+  }
+
+  AccuracyReport report;
+  if (searching) {
+    if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    report.search_seed = seed;
+    report.search = search_all(search_ticks, seed, jobs);
+  } else {
+    report.settings = settings;
+    study(report);
+  }
+  if (!json.empty()) write_whole(json, accuracy_json(report).dump(1) + "\n");
+  if (!figure.empty()) write_whole(figure, accuracy_figure(report).dump(1) + "\n");
+  std::cout << accuracy_text(report);
+  return report.search && report.search->wrong() > 0 ? 1 : 0;
+}
+
+}  // namespace palpate

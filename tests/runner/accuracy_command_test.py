@@ -1,0 +1,95 @@
+"""palpate accuracy from outside. Usage: accuracy_command_test.py PALPATE"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE = sys.argv[1]
+SMALL = ["--paths", "1", "--ticks", "40", "--most-triangles", "80"]
+
+
+class Accuracy(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def accuracy(self, *args, status=0):
+        done = subprocess.run([PALPATE, "accuracy", *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def test_measures_every_shape_and_says_which_tessellation(self):
+        numbers, figure = self.dir / "a.json", self.dir / "a.vg.json"
+        done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure)
+        self.assertEqual(done.stderr, "")
+        for shape in ["sphere", "cone", "cylinder", "cube"]:
+            self.assertRegex(done.stdout, rf"(?m)^  {shape}: .*\.$")
+        result = json.loads(numbers.read_text())
+        self.assertEqual([r["shape"] for r in result["recommended"]], ["sphere", "cone", "cylinder", "cube"])
+        # 80 triangles are too few for a sphere and enough for a cube.
+        self.assertIsNone(result["recommended"][0]["triangles_for_device"])
+        self.assertEqual(result["recommended"][3]["triangles_for_device"], 12)
+        methods = {m["name"] for m in result["methods"]}
+        self.assertLessEqual({"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"}, methods)
+        self.assertEqual(methods - {"bullet", "fcl"}, {"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"})
+        self.assertEqual({p["name"] for p in result["peers"] if p["present"]}, methods & {"bullet", "fcl"})
+        for peer in result["peers"]:
+            if not peer["present"]:
+                self.assertIn(f"{peer['name']:<12}absent", done.stdout)
+        seen = {(r["shape"], r["triangles"], r["probe"], r["method"]) for r in result["rows"]}
+        self.assertEqual(len(seen), len(result["rows"]))
+        self.assertEqual(len(seen), 8 * 2 * len(methods))
+        for row in result["rows"]:
+            self.assertGreater(row["ns_per_tick"], 0)
+            if row["method"] == "tick":
+                exact = row["against_polyhedron"]
+                self.assertEqual((exact["lost"], exact["phantom"]), (0, 0), row)
+                self.assertLess(exact["depth"]["worst_m"], 1e-15)
+                self.assertLess(exact["force"]["worst_n"], 1e-12)
+        self.assertTrue(all(r["exact_missed"] == 0 for r in result["first_contact"]["rows"]))
+        drawn = json.loads(figure.read_text())
+        self.assertEqual(drawn["$schema"], "https://vega.github.io/schema/vega/v5.json")
+        self.assertEqual(len(drawn["marks"]), 8)
+        self.assertEqual(len(drawn["data"][0]["values"]), len(seen) / 2)
+
+    def test_the_search_counts_the_same_with_any_number_of_threads(self):
+        one, three = self.dir / "1.json", self.dir / "3.json"
+        # Status 1 where it finds something; here the counts are what is tested.
+        for jobs, path in ((1, one), (3, three)):
+            done = subprocess.run([PALPATE, "accuracy", "--search", "31000", "--jobs", str(jobs), "--json", path],
+                                  capture_output=True, text=True, timeout=300)
+            wrong = json.loads(path.read_text())["search"]["wrong"]
+            self.assertEqual(done.returncode, 1 if wrong else 0, done.stderr)
+            self.assertIn("31,000 ticks in 62 walks", done.stdout)
+        self.assertEqual(one.read_text(), three.read_text())
+        other = self.dir / "s.json"
+        subprocess.run([PALPATE, "accuracy", "--search", "31000", "--seed", "2", "--json", other],
+                       capture_output=True, timeout=300)
+        self.assertNotEqual(json.loads(one.read_text())["search"]["in_contact"],
+                            json.loads(other.read_text())["search"]["in_contact"])
+
+    def test_does_not_replace_files_unasked(self):
+        there = self.dir / "there.json"
+        there.write_text("mine")
+        done = self.accuracy("--search", "500", "--json", there, status=2)
+        self.assertIn("--force", done.stderr)
+        self.assertEqual(there.read_text(), "mine")
+        self.accuracy("--search", "500", "--json", there, "--force")
+        self.assertIn("search", json.loads(there.read_text()))
+
+    def test_wrong_usage_is_status_2(self):
+        for args in (["--search", "0"], ["--search", "-5"], ["--search", "x"], ["--paths", "0"], ["--ticks", "0"],
+                     ["--most-triangles", "19"], ["--jobs", "0", "--search", "500"], ["extra"],
+                     ["--search", "500", "--figure", self.dir / "f.json"], ["--json", self.dir]):
+            done = self.accuracy(*args, status=2)
+            self.assertEqual(done.stdout, "")
+            self.assertTrue(done.stderr)
+        self.assertEqual(list(self.dir.iterdir()), [])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
