@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "tests/rendering/allocation_count.h"
+#include "runner/allocation_count.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
@@ -55,11 +55,11 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
 };
 
 TEST_P(Tick, AllocatesNothing) {
-  if (!testing::counts_allocations()) GTEST_SKIP() << "sanitizers bring their own operator new";
-  const std::uint64_t probe_count = testing::allocations();
+  if (!counts_allocations()) GTEST_SKIP() << "sanitizers bring their own operator new";
+  const std::uint64_t probe_count = allocations();
   int* volatile kept = new int(1);  // volatile: else the compiler may leave the pair out
   delete kept;
-  ASSERT_EQ(testing::allocations(), probe_count + 1) << "the counter does not count";
+  ASSERT_EQ(allocations(), probe_count + 1) << "the counter does not count";
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Random random(seed, {21});
@@ -67,11 +67,11 @@ TEST_P(Tick, AllocatesNothing) {
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
     RenderState state = scene.initial_state();
-    const std::uint64_t before = testing::allocations();
+    const std::uint64_t before = allocations();
     for (const LineProbe& probe : path) {
       in_contact += GetParam()->tick(scene, state, probe, kTick).contacts > 0;
     }
-    EXPECT_EQ(testing::allocations(), before) << "seed " << seed;
+    EXPECT_EQ(allocations(), before) << "seed " << seed;
   }
   EXPECT_GT(in_contact, 500);
 }

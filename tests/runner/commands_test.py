@@ -16,7 +16,7 @@ import time
 import unittest
 
 PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
-COMMANDS = ["analyze", "export", "forget", "merge", "render", "schedule", "simulate", "validate"]
+COMMANDS = ["accuracy", "analyze", "bench", "export", "forget", "merge", "render", "schedule", "simulate", "validate"]
 
 
 class FromOutside(unittest.TestCase):
@@ -205,6 +205,30 @@ class Simulate(FromOutside):
         db = self.dir / "one.db"
         self.simulate(db)
         self.assertEqual(os.stat(db).st_mode & 0o777, 0o600)
+
+
+class Bench(FromOutside):
+    def test_rows_are_those_of_the_contract(self):
+        path = self.dir / "bench.json"
+        shown = self.palpate("bench", "--ticks", 1000, "--json", path).stdout
+        self.assertIn("327680", shown)
+        rows = json.loads(path.read_text())["rows"]
+        seen = {(r["mesh"], r["triangles"], r["renderer"], r["state"]) for r in rows}
+        for triangles in (20, 1280, 20480, 327680):
+            for renderer in ("point", "ray"):
+                for state in ("contact", "free", "first_contact"):
+                    self.assertIn(("icosphere", triangles, renderer, state), seen)
+        for r in rows:
+            self.assertGreaterEqual(r["ticks"], 50, r)
+            self.assertEqual(r["allocations"], 0, r)
+            self.assertGreater(r["median_ns"], 0)
+            self.assertLessEqual(r["median_ns"], r["p99_ns"])
+            self.assertLessEqual(r["p99_ns"], r["max_ns"])
+            self.assertGreater(r["empty_loop_ns"], 0)
+
+    def test_wrong_numbers_of_ticks_are_refused(self):
+        for ticks in (0, -5, "many"):
+            self.assertIn("ticks", self.palpate("bench", "--ticks", ticks, status=2).stderr)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-#include "tests/rendering/allocation_count.h"
+#include "runner/allocation_count.h"
 
 #include <cstdlib>
 #include <new>
@@ -13,12 +13,12 @@ namespace {
 thread_local std::uint64_t count = 0;
 }  // namespace
 
-namespace palpate::testing {
+namespace palpate {
 
 std::uint64_t allocations() { return count; }
 bool counts_allocations() { return PALPATE_COUNT_ALLOCATIONS; }
 
-}  // namespace palpate::testing
+}  // namespace palpate
 
 #if PALPATE_COUNT_ALLOCATIONS
 
