@@ -1,5 +1,5 @@
 #pragma once
-// Extreme geometry and extreme hands: named cases, each with what it measures and what it may be.
+// Extreme geometry and extreme hands: named cases, each with what it measures and what that may be.
 // Tests run them, `palpate accuracy` lists them. For checks, not for the servo.
 
 #include <span>
@@ -11,19 +11,22 @@ namespace palpate {
 
 struct ExtremeResult {
   bool passed = false;
-  double worst = 0;    ///< the measure, in the case's unit
-  double limit = 0;    ///< what it may be at most
+  double worst = 0;         ///< the measure, in the case's unit
+  double limit = 0;         ///< what it may be at most
+  std::uint64_t ticks = 0;  ///< that were held against the reference
+  std::uint64_t in_contact = 0;
   std::string detail;  ///< what is wrong, with numbers; empty when it passed
 };
 
 struct ExtremeCase {
   const char* name;     ///< "sliver"; letters, digits and -
   const char* title;    ///< what is done, in a line
-  const char* measure;  ///< what `worst` is, with its unit: "ideal probe off the surface, sizes"
+  const char* measure;  ///< what `worst` is, with its unit
   ExtremeResult (*run)(const Renderer& renderer);
 };
 
-/// All of them. Each takes well below a second, but for those whose name begins with "million".
+/// All of them. Each takes well below a second, but for "million-triangles" (some seconds, most of
+/// them to build the mesh).
 std::span<const ExtremeCase> extreme_cases();
 
 }  // namespace palpate

@@ -131,9 +131,12 @@ struct Way {
 
   void plunges() {
     while (!full()) {
-      const LineProbe inside =
-          probe(mesh.centre() + mesh.radius() * random.unit() * random_direction(random),
-                random_direction(random), some_share());
+      // Through a mixture of corners, which is inside.
+      Vec3 at = mesh.vertices()[0];
+      for (int i = 1; i < 5; ++i) {
+        at = glm::mix(at, mesh.vertices()[random.below(mesh.vertices().size())], random.unit());
+      }
+      const LineProbe inside = probe(at, random_direction(random), some_share());
       const LineProbe felt{inside.tip, side ? inside.tail : inside.tip};
       const ReferenceDepth way_out = reference_depth(mesh, felt);
       if (way_out.depth <= 0) continue;

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -19,7 +20,10 @@
 namespace palpate {
 namespace {
 
-constexpr int kFineSteps = 100;  // of a tick, by brute force
+constexpr int kFineSteps = 100;      // of a tick, by brute force
+constexpr double kNoHand = 0.1;      // rad a tick: 100 rad/s
+constexpr double kCoplanar = 1e-4;   // sizes; depths this near may be those of neighbours
+constexpr double kAtSurface = 1e-6;  // sizes
 
 LineProbe mixed(const LineProbe& a, const LineProbe& b, double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
@@ -77,7 +81,8 @@ std::optional<Entry> entry_at(const ConvexMesh& mesh, const LineProbe& probe) {
   };
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) look(false, i);
   for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) look(true, i);
-  if (second - least < 1e-7 * mesh.size()) return std::nullopt;
+  // Where another is as near as this, rounding decides.
+  if (second - least < kCoplanar * mesh.size()) return std::nullopt;
   return best;
 }
 
@@ -126,18 +131,22 @@ class Walk {
     const LineProbe felt = felt_probe(scene_, renderer_, probe);
     const TickAudit audit = audit_tick(scene_, renderer_, probe, r);
     fault_.tick = counts_.ticks++;
+    depth_ = r.deepest.depth;
     const bool held = audit.finite && r.contacts > 0;
     counts_.in_contact += held;
     counts_.worst_penetration =
         std::max(counts_.worst_penetration, audit.penetrates / mesh_->size());
     const auto wrong = [&](bool is, std::uint64_t& count, const char* what, double value) {
-      if (is) report(++count, what, value, felt);
+      if (!is) return;
+      ++count;
+      report(what, value, felt);
     };
     wrong(!audit.finite, counts_.not_finite, "not finite", 0);
     wrong(audit.missed > audit.tolerance, counts_.missed, "missed, depth", audit.missed);
     wrong(audit.penetrates > audit.tolerance, counts_.penetrating, "ideal probe inside by",
           audit.penetrates);
-    wrong(audit.floats > audit.tolerance, counts_.floating, "ideal probe off by", audit.floats);
+    wrong(audit.floats > audit.tolerance + 1e-9 * length_, counts_.floating, "ideal probe off by",
+          audit.floats);
     wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
     wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
     wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless, "walk without end", 0);
@@ -159,21 +168,51 @@ class Walk {
       if (held) expect_touch(felt, tolerance);
       return;
     }
-    // It came in. Where the facet that it came in by still holds it, it must be felt there.
+    // A start at the surface is within rounding of any facet there.
+    if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
+    // It came in. Where the facet that it came in by holds it at every step, it must be felt there.
     const auto entry = entry_at(*mesh_, mixed(last_, felt, *time));
     if (!entry) return;
-    const auto at_end = facet_of_sum(*mesh_, entry->is_edge, entry->index, felt);
-    if (!at_end || at_end->depth <= tolerance) return;
-    const LineProbe ideal = moved(felt, at_end->depth * at_end->normal);
-    if (reference_gap(*mesh_, ideal) > 0.01 * tolerance ||
-        reference_depth(*mesh_, ideal).depth > 0.01 * tolerance) {
+    ReferenceDepth at_end;
+    for (int step = static_cast<int>(std::ceil(*time * kFineSteps)); step <= kFineSteps; ++step) {
+      const LineProbe there = mixed(last_, felt, step / double{kFineSteps});
+      const auto on = facet_of_sum(*mesh_, entry->is_edge, entry->index, there);
+      if (!on || on->depth <= (step < kFineSteps ? -tolerance : tolerance)) return;
+      const LineProbe ideal = moved(there, on->depth * on->normal);
+      if (reference_depth(*mesh_, ideal).depth > tolerance) return;
+      if (step < kFineSteps ? reference_gap(*mesh_, ideal) > tolerance
+                            : !firmly_on(ideal, on->normal, tolerance)) {
+        return;
+      }
+      at_end = *on;
+    }
+    const bool elsewhere = !held || std::abs(r.deepest.depth - at_end.depth) >
+                                        kCoplanar * (mesh_->size() + at_end.depth);
+    if (turned(felt) > kNoHand) {
+      counts_.turned_elsewhere += elsewhere;
       return;
     }
     ++counts_.passages;
-    if (!held || std::abs(r.deepest.depth - at_end->depth) > tolerance) {
-      report(++counts_.passed_through, held ? "held elsewhere, by" : "passed through, by",
-             held ? r.deepest.depth - at_end->depth : at_end->depth, felt);
+    if (elsewhere) {
+      ++counts_.passed_through;
+      report(held ? "held elsewhere, by" : "passed through, by",
+             held ? r.deepest.depth - at_end.depth : at_end.depth, felt);
     }
+  }
+
+  /// Whether the probe lies on a facet of M with some room on all sides: at its rim rounding
+  /// decides who holds it.
+  bool firmly_on(const LineProbe& ideal, const Vec3& normal, double tolerance) const {
+    constexpr int kWays = 8;
+    const Vec3 u = glm::normalize(std::abs(normal.x) < 0.5 ? glm::cross(normal, Vec3(1, 0, 0))
+                                                           : glm::cross(normal, Vec3(0, 1, 0)));
+    const Vec3 v = glm::cross(normal, u);
+    for (int i = 0; i < kWays; ++i) {
+      const double turn = 2 * std::numbers::pi * i / kWays;
+      const Vec3 aside = kAtSurface * mesh_->size() * (std::cos(turn) * u + std::sin(turn) * v);
+      if (reference_gap(*mesh_, moved(ideal, aside)) > tolerance) return false;
+    }
+    return true;
   }
 
   /// A contact that began although no step shows the probe inside: it must at least come as near as
@@ -186,7 +225,9 @@ class Walk {
     for (int i = 0; i <= kFineSteps && gap > step; ++i) {
       gap = std::min(gap, reference_gap(*mesh_, mixed(last_, felt, i / double{kFineSteps})));
     }
-    if (gap > step + tolerance) report(++counts_.phantom, "contact without touch, gap", gap, felt);
+    if (gap <= step + tolerance) return;
+    ++counts_.phantom;
+    report("contact without touch, gap", gap, felt);
   }
 
   void count_fallback(const LineProbe& felt) {
@@ -198,15 +239,23 @@ class Walk {
     counts_.fallbacks += first.facet.kind == MinkowskiFacet::Kind::none;
   }
 
-  void report(std::uint64_t, const char* what, double value, const LineProbe& felt) {
+  /// How far the probe has turned in the tick, rad.
+  double turned(const LineProbe& felt) const {
+    const Vec3 a = last_.tail - last_.tip, b = felt.tail - felt.tip;
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  }
+
+  void report(const char* what, double value, const LineProbe& felt) {
     if (counts_.faults.size() >= SearchCounts::kFaultsKept) return;
     std::ostringstream out;
     out.precision(17);
     out << renderer_.name() << ", " << to_string(kind_) << " path, " << mesh_->facets().size()
         << " facets, size " << mesh_->size() << " m, probe " << length_ << " m: " << what << " "
-        << value << " (" << value / mesh_->size() << " sizes), at (" << felt.tip.x << " "
-        << felt.tip.y << " " << felt.tip.z << ") (" << felt.tail.x << " " << felt.tail.y << " "
-        << felt.tail.z << ")";
+        << value << " (" << value / mesh_->size() << " sizes), contact depth " << depth_
+        << " m, at (" << felt.tip.x << " " << felt.tip.y << " " << felt.tip.z << ") ("
+        << felt.tail.x << " " << felt.tail.y << " " << felt.tail.z << "), from (" << last_.tip.x
+        << " " << last_.tip.y << " " << last_.tip.z << ") (" << last_.tail.x << " " << last_.tail.y
+        << " " << last_.tail.z << "), turned by " << turned(felt) << " rad";
     fault_.what = out.str();
     counts_.faults.push_back(fault_);
   }
@@ -221,6 +270,7 @@ class Walk {
   RenderState state_;
   LineProbe last_;  // as felt, mesh frame
   bool has_last_ = false, last_held_ = false;
+  double depth_ = 0;  // m, of the contact under audit
   SearchFault fault_;
   SearchCounts counts_;
 };
@@ -245,6 +295,7 @@ SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
   endless += other.endless;
   faulted += other.faulted;
   fallbacks += other.fallbacks;
+  turned_elsewhere += other.turned_elsewhere;
   worst_penetration = std::max(worst_penetration, other.worst_penetration);
   for (const SearchFault& fault : other.faults) {
     if (faults.size() < kFaultsKept) faults.push_back(fault);

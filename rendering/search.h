@@ -28,16 +28,17 @@ struct SearchCounts {
   std::uint64_t entries = 0;     ///< contacts that began
   /// Ticks from free space that were walked again in a hundred steps by brute force.
   std::uint64_t walked_finely = 0;
-  std::uint64_t passages = 0;  ///< of those: came in by a facet that still holds at the tick's end
+  /// Of those: the probe came in by a facet that holds it at all further steps.
+  std::uint64_t passages = 0;
 
   // Wrong ticks; all of these must be 0.
   std::uint64_t missed = 0;  ///< inside by more than 1e-9 of the size and not felt
-  /// A hundredth of the tick shows a way in, by a facet that holds the probe at the tick's end (a
-  /// thin plate, crossed), and it is not felt on that side.
+  /// Passages that are not felt on the side by which they came in: a thin plate, crossed.
   std::uint64_t passed_through = 0;
   std::uint64_t phantom = 0;      ///< a contact began where a hundredth of the tick shows no touch
   std::uint64_t penetrating = 0;  ///< ideal probe inside by more than 1e-9 of the size
-  std::uint64_t floating = 0;     ///< ideal probe off the surface by more than 1e-9 of the size
+  std::uint64_t floating = 0;     ///< ideal probe off the surface by more than 1e-9 of size and
+                                  ///< probe
   std::uint64_t shallow = 0;      ///< shallower than the least depth that separates
   std::uint64_t wrong_force = 0;  ///< force, torque or devices' forces are not those of the contact
   std::uint64_t not_finite = 0;
@@ -46,6 +47,9 @@ struct SearchCounts {
 
   /// Not wrong, but counted: entries that no crossing explained, so that all facets were looked at.
   std::uint64_t fallbacks = 0;
+  /// Not wrong, but counted: passages of a probe that turned by more than 0.1 rad within the tick
+  /// (100 rad/s, no hand), held by another side or lost. It may come in, leave and come in again.
+  std::uint64_t turned_elsewhere = 0;
   double worst_penetration = 0;  ///< of the ideal probe, in sizes of the object
 
   std::vector<SearchFault> faults;  ///< the first ones, at most kFaultsKept
