@@ -13,6 +13,7 @@ namespace palpate {
 /// One servo tick of a trial, as it is kept when the protocol asks for samples.
 struct SampleRecord {
   std::uint32_t tick = 0;               ///< from time zero of the trial
+  std::int64_t period_ns = 0;           ///< since the tick before; 0: not known (older records)
   std::array<double, 3> tip{}, tail{};  ///< m, world frame
   std::array<double, 3> force{};        ///< N, on the hand
   std::array<double, 3> torque{};       ///< N m, about the virtual tip

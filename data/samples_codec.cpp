@@ -10,16 +10,18 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t kSampleBytes = 4 + 13 * 8 + 4;
+constexpr std::size_t bytes_a_sample(int packing) { return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4; }
 constexpr std::int64_t kMostSamples = 100'000'000;  // more than a day at 1 kHz: a damaged count
+constexpr std::size_t kMostShrunk = 1032;           // zlib makes nothing smaller than this part
 // A trial of 10 s packs in some 50 ms at this level, and higher ones save little: the low bytes of
 // a measured signal are noise.
 constexpr int kLevel = 3;
 
 // One visit for both directions: `column(get)` where get(sample) is a reference to the field.
 template <class Visitor>
-void visit_columns(Visitor&& column) {
+void visit_columns(int packing, Visitor&& column) {
   column([](auto& s) -> auto& { return s.tick; });
+  if (packing > 1) column([](auto& s) -> auto& { return s.period_ns; });
   for (int i = 0; i < 3; ++i) column([i](auto& s) -> auto& { return s.tip[i]; });
   for (int i = 0; i < 3; ++i) column([i](auto& s) -> auto& { return s.tail[i]; });
   for (int i = 0; i < 3; ++i) column([i](auto& s) -> auto& { return s.force[i]; });
@@ -32,15 +34,15 @@ void visit_columns(Visitor&& column) {
 }
 
 template <class Field>
-using Bits = std::conditional_t<std::is_same_v<Field, double>, std::uint64_t, Field>;
+using Bits = std::conditional_t<sizeof(Field) == 8, std::uint64_t, Field>;
 
 }  // namespace
 
 std::string pack_samples(const std::vector<SampleRecord>& samples) {
   const std::size_t count = samples.size();
-  std::vector<unsigned char> planes(count * kSampleBytes);
+  std::vector<unsigned char> planes(count * bytes_a_sample(kSamplesPacking));
   std::size_t offset = 0;
-  visit_columns([&](auto get) {
+  visit_columns(kSamplesPacking, [&](auto get) {
     using Field = std::remove_cvref_t<decltype(get(samples[0]))>;
     using Pattern = Bits<Field>;
     Pattern before = 0;
@@ -64,19 +66,22 @@ std::string pack_samples(const std::vector<SampleRecord>& samples) {
   return packed;
 }
 
-std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count) {
+std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count,
+                                         int packing) {
   if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
   const auto rows = static_cast<std::size_t>(count);
-  std::vector<unsigned char> planes(rows * kSampleBytes + 1);  // one more: a longer stream shows
+  const std::size_t expected = rows * bytes_a_sample(packing);
+  if (expected / kMostShrunk > size) throw StoreError("the number of samples is damaged");
+  std::vector<unsigned char> planes(expected + 1);  // one more: a longer stream shows
   uLongf length = planes.size();
   uLong used = size;
   const int status = uncompress2(planes.data(), &length, static_cast<const Bytef*>(data), &used);
-  if (status != Z_OK || length != rows * kSampleBytes || used != size) {
+  if (status != Z_OK || length != expected || used != size) {
     throw StoreError("the samples are damaged");
   }
   std::vector<SampleRecord> samples(rows);
   std::size_t offset = 0;
-  visit_columns([&](auto get) {
+  visit_columns(packing, [&](auto get) {
     using Field = std::remove_cvref_t<decltype(get(samples[0]))>;
     using Pattern = Bits<Field>;
     Pattern before = 0;

@@ -9,16 +9,19 @@
 
 namespace palpate {
 
-/// Packing 1: the fields of SampleRecord in order of declaration, each as a column of `count`
+/// Packing 2: the fields of SampleRecord in order of declaration, each as a column of `count`
 /// values (vectors as three columns); a value is its bit pattern minus the one before it (modulo
 /// 2^32 or 2^64; 8-bit fields as they are); each column is stored byte plane by byte plane, most
 /// significant first; the whole is one zlib stream. Neighbouring samples are alike in their upper
-/// bytes, which is what makes them small.
-inline constexpr int kSamplesPacking = 1;
+/// bytes, which is what makes them small. Packing 1 is the same without period_ns, which reads as
+/// 0.
+inline constexpr int kSamplesPacking = 2;
 
 std::string pack_samples(const std::vector<SampleRecord>& samples);
 
+/// \param packing  1 to kSamplesPacking
 /// \throws StoreError: the bytes are no packing of `count` samples. what() does not know the file.
-std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count);
+std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count,
+                                         int packing = kSamplesPacking);
 
 }  // namespace palpate

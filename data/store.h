@@ -60,6 +60,12 @@ struct StoredTrial {
   std::string cut_off_reason;  ///< "" when completed
 };
 
+/// Which trial, in whatever protocols the code is enrolled in.
+struct TrialName {
+  std::string code;
+  int session = 1, trial = 1;
+};
+
 struct StoredNote {
   Participant participant;
   int session = 1;
@@ -183,6 +189,9 @@ class Store {
                       bool with_samples = false);
   /// Attempts that were cut off, same order, then by attempt.
   void for_each_cut_off(const std::function<void(const StoredTrial&)>& visit);
+  /// What is on record of one trial: the attempts that were cut off, then the completed one with
+  /// its samples, each by protocol.
+  std::vector<StoredTrial> attempts(const TrialName& name);
 
  private:
   struct Impl;

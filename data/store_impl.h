@@ -52,7 +52,8 @@ struct Store::Impl {
 
   /// Of attempts in this state, in the order of the header.
   void for_each_attempt(const char* state, bool with_samples,
-                        const std::function<void(const StoredTrial&)>& visit);
+                        const std::function<void(const StoredTrial&)>& visit,
+                        const TrialName* only = nullptr);
 
   /// Empties the log and rebuilds the file, so that nothing of removed rows is in either.
   void clear_traces();

@@ -81,14 +81,15 @@ std::vector<SampleRecord> read_samples(SQLite::Statement& find, std::int64_t att
   find.reset();
   find.bind(1, attempt);
   if (!find.executeStep()) return {};
-  if (find.getColumn(0).getInt() != kSamplesPacking) {
+  const int packing = find.getColumn(0).getInt();
+  if (packing < 1 || packing > kSamplesPacking) {
     throw StoreRefused(
         path + ": holds samples in a packing that this palpate does not know; use a newer one");
   }
   const SQLite::Column data = find.getColumn(2);
   try {
     return unpack_samples(data.getBlob(), static_cast<std::size_t>(data.getBytes()),
-                          find.getColumn(1).getInt64());
+                          find.getColumn(1).getInt64(), packing);
   } catch (const StoreError& error) {
     throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
   }
@@ -296,19 +297,23 @@ bool Store::has_samples(const Participant& participant, int session) {
 }
 
 void Store::Impl::for_each_attempt(const char* state, bool with_samples,
-                                   const std::function<void(const StoredTrial&)>& visit) {
+                                   const std::function<void(const StoredTrial&)>& visit,
+                                   const TrialName* only) {
   guarded(path, [&] {
-    SQLite::Statement find(
-        *db, std::string("SELECT ") + kPlan + ", a.cut_off_reason, " + kOutcome +
-                 ", a.run_id, pr.name, pr.sha256" + kFromProtocolDown +
-                 "CROSS JOIN attempts a ON a.session_id = s.id WHERE a.state = ? ORDER "
-                 "BY pr.id, pa.number, s.number, a.trial, a.attempt");
+    SQLite::Statement find(*db,
+                           std::string("SELECT ") + kPlan + ", a.cut_off_reason, " + kOutcome +
+                               ", a.run_id, pr.name, pr.sha256" + kFromProtocolDown +
+                               "CROSS JOIN attempts a ON a.session_id = s.id WHERE a.state = ?" +
+                               (only ? " AND pa.code = ? AND s.number = ? AND a.trial = ?" : "") +
+                               " ORDER BY pr.id, pa.number, s.number, a.trial, a.attempt");
     SQLite::Statement find_run(*db,
                                std::string("SELECT ") + kPerson + ", " + kRun +
                                    " FROM runs r JOIN sessions s ON s.id = r.session_id JOIN "
                                    "participants pa ON pa.id = s.participant_id WHERE r.id = ?");
     SQLite::Statement samples(*db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?");
-    Binder(find) << state;
+    Binder which(find);
+    which << state;
+    if (only) which << only->code << only->session << only->trial;
     StoredTrial trial;
     std::int64_t known_run = 0, seen = 0;
     std::vector<SQLite::Column> columns;
@@ -342,7 +347,7 @@ void Store::Impl::for_each_attempt(const char* state, bool with_samples,
       sound.record();
       visit(trial);
     }
-    require_all_seen(*db, state, seen);
+    if (!only) require_all_seen(*db, state, seen);
   });
 }
 
@@ -353,6 +358,14 @@ void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
 
 void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visit) {
   impl_->for_each_attempt("cut_off", false, visit);
+}
+
+std::vector<StoredTrial> Store::attempts(const TrialName& name) {
+  std::vector<StoredTrial> all;
+  const auto keep = [&all](const StoredTrial& trial) { all.push_back(trial); };
+  impl_->for_each_attempt("cut_off", false, keep, &name);
+  impl_->for_each_attempt("completed", true, keep, &name);
+  return all;
 }
 
 }  // namespace palpate

@@ -138,6 +138,7 @@ void Session::note(const Sample& sample) {
   if (!parts_.protocol.samples) return;
   SampleRecord kept;
   kept.tick = sample.tick;
+  kept.period_ns = sample.period_ns;
   kept.tip = values(sample.probe.tip);
   kept.tail = values(sample.probe.tail);
   kept.force = values(rendering.force);
