@@ -1,0 +1,55 @@
+#pragma once
+// Where the Falcon's grip is, and which torques push it how. Lengths in m, angles in rad, all in
+// the Falcon's own frame: x right, y up, z out of the device towards the user, z = 0 at its base.
+// Pure functions.
+//
+// A leg is a two-link arm in its plane (Clavel 1991; Stamper 1997). The Jacobian departs from
+// libnifalcon's, whose third column is wrong (up to 66 %); ours is held against differences.
+
+#include <array>
+#include <optional>
+
+#include "stimuli/vec.h"
+
+namespace palpate::falcon {
+
+/// What the joints of a leg stand at, rad.
+struct LegAngles {
+  double thigh = 0;  ///< theta 1, the one with motor and encoder
+  double shin = 0;   ///< theta 2, of the shin in the leg's plane
+  double tilt = 0;   ///< theta 3, of the shin out of the plane
+};
+using Legs = std::array<LegAngles, 3>;
+
+/// Rows are d(thigh angle of leg i) / d(position), rad/m.
+using Jacobian = std::array<Vec3, 3>;
+
+/// Encoder counts to thigh angles (rad) and back (not rounded).
+Vec3 thigh_angles(const Vec3& counts);
+Vec3 encoder_counts(const Vec3& thighs);
+
+/// The joints that put the grip there; nullopt where no leg reaches.
+std::optional<Legs> inverse(const Vec3& position) noexcept;
+
+Jacobian jacobian(const Legs& legs) noexcept;
+
+struct ForwardResult {
+  Vec3 position;
+  int iterations = 0;
+};
+
+/// Where the grip is when the thighs stand at these angles: Newton's method with its step limited
+/// to 20 mm and halved while the residual does not fall. A warm start takes at most 4 steps.
+/// Nothing where it does not converge or converges outside of what the device can reach.
+std::optional<ForwardResult> forward(const Vec3& thighs, const Vec3& start) noexcept;
+
+/// Torques at the thighs, N m, that push the hand with `force` (N); nothing at a singularity.
+std::optional<Vec3> torque_for(const Jacobian& j, const Vec3& force) noexcept;
+/// The force (N) of torques (N m).
+Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
+
+/// The force (N) that can be shown in every direction there when no torque exceeds `max_torque`
+/// (N m); 0 out of reach.
+double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
+
+}  // namespace palpate::falcon

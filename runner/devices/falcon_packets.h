@@ -1,0 +1,52 @@
+#pragma once
+// The 16-byte packets of the Falcon's normal mode, both ways: '<', three signed 16-bit numbers of
+// four nibbles each (least significant first), a byte of bits, an unknown byte, '>'. No checksum.
+// Pure functions over bytes: whatever comes in, nothing but a count of bad packets happens.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+namespace palpate::falcon {
+
+using Packet = std::array<std::uint8_t, 16>;
+
+/// Host to device. LED colours as libnifalcon's code uses them.
+struct Command {
+  std::array<int, 3> motors{};  ///< -4095 to 4095; what is beyond is cut
+  bool homing = true;           ///< must be asked for in every packet to get and keep it
+  bool green = false, blue = false, red = false;
+};
+
+/// Device to host.
+struct Reply {
+  std::array<int, 3> counts{};  ///< of the encoders, -32768 to 32767
+  std::uint8_t buttons = 0;     ///< bit 0 far right, 1 front, 2 centre, 3 far left
+  std::uint8_t homed = 0;       ///< a bit for each axis; 7: all have passed their index
+
+  bool all_homed() const { return homed == 7; }
+};
+
+Packet encode(const Command& command) noexcept;
+std::optional<Command> decode_command(const Packet& packet) noexcept;
+Packet encode(const Reply& reply) noexcept;
+std::optional<Reply> decode_reply(const Packet& packet) noexcept;
+
+/// Finds packets in a stream that may be split, joined, cut short or littered.
+class PacketStream {
+ public:
+  /// Takes one byte; a whole packet with its brackets in place when this byte ends it.
+  std::optional<Packet> take(std::uint8_t byte) noexcept;
+  /// Packets begun and thrown away.
+  std::uint64_t dropped() const noexcept { return dropped_; }
+  void count_bad() noexcept { ++dropped_; }
+  /// Forgets what was begun.
+  void reset() noexcept { size_ = 0; }
+
+ private:
+  Packet packet_{};
+  std::size_t size_ = 0;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace palpate::falcon
