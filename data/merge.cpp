@@ -63,8 +63,9 @@ void fill(SQLite::Database& db, const MergePlan& plan,
       enrol.exec();
       const std::int64_t participant = db.getLastInsertRowid();
       for (const auto& [session_number, session] : person.sessions) {
-        guarded(session.station->path(),
-                [&] { copy_session(session.station->db(), session.id, db, participant); });
+        guarded(session.station->path(), [&, &theirs = session] {
+          copy_session(theirs.station->db(), theirs.id, db, participant);
+        });
         if (progress) progress(++sessions, plan.sessions);
       }
     }
@@ -116,7 +117,7 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
     db.exec("PRAGMA journal_mode = WAL");
   });
   for (const Station& station : stations) station.require_unchanged();
-  const Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out};
+  Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out};
   sync_file(draft);
   give_name(draft, out);
   return done;

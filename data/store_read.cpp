@@ -153,6 +153,7 @@ void require_all_seen(SQLite::Database& db, const char* state, std::int64_t seen
 
 std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
   std::vector<SQLite::Column> columns;
+  columns.reserve(static_cast<std::size_t>(statement.getColumnCount()));
   for (int i = 0; i < statement.getColumnCount(); ++i) columns.push_back(statement.getColumn(i));
   return columns;
 }

@@ -64,7 +64,7 @@ Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
 
 std::string Tombstones::find(const std::string& code) const {
   for (const auto& [salt, hashes] : by_salt_) {
-    const std::string hash = hash_with(code, salt);
+    std::string hash = hash_with(code, salt);
     if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return hash;
   }
   return "";

@@ -43,7 +43,7 @@ class Watch {
   /// A tick that must be right; the object's frame.
   Rendering audited(const LineProbe& local) {
     const LineProbe world = to_world(local);
-    const Rendering r = tick(world);
+    Rendering r = tick(world);
     const TickAudit audit = audit_tick(scene_, renderer_, world, r, kShare);
     ++result_.ticks;
     result_.in_contact += r.contacts > 0;

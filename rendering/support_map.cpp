@@ -51,7 +51,8 @@ std::uint32_t SupportMap::near_support(const Vec3& direction) const {
   const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
   const int row = cell_of(scale * direction[(axis + 1) % 3], resolution_);
   const int column = cell_of(scale * direction[(axis + 2) % 3], resolution_);
-  return cells_[static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column)];
+  const int cell = (face * resolution_ + row) * resolution_ + column;
+  return cells_[static_cast<std::size_t>(cell)];
 }
 
 }  // namespace palpate

@@ -113,9 +113,9 @@ void cross_rim(Search& s, double z, Belongs belongs) {
   static const Turns turns;
   const Vec3 across = std::abs(s.u.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
   const Vec3 e1 = glm::normalize(glm::cross(s.u, across)), e2 = glm::cross(s.u, e1);
-  const auto normal = [&](glm::dvec2 turn) { return turn.x * e1 + turn.y * e2; };
+  const auto normal = [&](const glm::dvec2& turn) { return turn.x * e1 + turn.y * e2; };
   const auto touched = [&](const Vec3& n) { return s.shape.radius * radial(n) + Vec3(0, 0, z); };
-  const auto rate = [&](glm::dvec2 turn) {  // n' is e2 cos - e1 sin
+  const auto rate = [&](const glm::dvec2& turn) {  // n' is e2 cos - e1 sin
     return glm::dot(touched(normal(turn)) - s.probe.tip, turn.x * e2 - turn.y * e1);
   };
   double last = rate(turns.at(0));

@@ -73,7 +73,7 @@ class Timer {
                  const LineProbe& probe, bool touching_wanted) {
     const std::uint64_t allocated = allocations();
     const std::uint64_t start = begin_count();
-    const Rendering rendering = renderer.tick(scene, state, probe, kTick);
+    Rendering rendering = renderer.tick(scene, state, probe, kTick);
     const std::uint64_t count = end_count() - start;
     allocations_ += allocations() - allocated;
     if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
@@ -243,7 +243,7 @@ Scene thousand(const std::shared_ptr<const ConvexMesh>& mesh) {
 std::vector<Bench> benches() {
   std::vector<Bench> all;
   const auto add = [&](std::string name, const PolygonSoup& soup) {
-    const auto mesh = std::make_shared<const ConvexMesh>(soup);
+    auto mesh = std::make_shared<const ConvexMesh>(soup);
     all.push_back({std::move(name), soup.faces.size(), one(mesh), kContactTarget});
     return mesh;
   };
