@@ -1,5 +1,7 @@
 #include "rendering/facet_walk.h"
 
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "rendering/minkowski_facets.h"
@@ -15,6 +17,8 @@ namespace {
 
 using namespace minkowski;
 
+constexpr double kFlat = 1e-14;  // sine of the angle between probe and face
+constexpr double kOff = 1e-11;   // of the size; an ideal probe that is farther off is on no facet
 constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is rounding, not a step
 
 /// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
@@ -47,7 +51,10 @@ bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip,
   if (at.along_edge < 0 || at.along_edge > 1) {
     const bool about_v1 = at.along_edge > 1;
     const SilhouetteEdge other = other_silhouette(mesh, at.index, about_v1, at.left_ahead, d);
-    if (other.edge == kNone) return false;
+    if (other.edge == kNone) {
+      next = at;  // no step
+      return true;
+    }
     if (measure_edge(mesh, other.edge, other.left_ahead, tip, d, next)) return true;
     // Parallel to the probe: its two faces meet there with the same depth.
     next = measure_face<true>(mesh, mesh.edges()[other.edge].left, tip, d);
@@ -96,11 +103,62 @@ WalkResult to_result(const Measured& at, bool capped) {
   return result;
 }
 
+double distance_to(const Vec3& p, const Vec3& a, const Vec3& along) {
+  const double share = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
+  return glm::length(a + share * along - p);
+}
+
+/// How far the ideal probe is off a polygon that it should lie on, m.
+template <bool kSegment>
+double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  const Facet& facet = mesh.facets()[at.index];
+  const bool tail = kSegment && at.place > 0;
+  const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
+  const Vec3 along = tail ? -d : d;
+  double past = 0, enter = 0, leave = 1;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const Side& side = mesh.sides()[i];
+    const double inside = glm::dot(side.inward, end) - side.offset;
+    const double slope = glm::dot(side.inward, along);
+    past = std::max(past, -inside);
+    if (slope > 0) enter = std::max(enter, -inside / slope);
+    if (slope < 0) leave = std::min(leave, inside / -slope);
+    if (slope == 0 && inside < 0) leave = -1;
+  }
+  // A probe that lies flat on the face may touch it where its end is past a side.
+  if (enter <= leave) past = std::min(past, enter * std::abs(glm::dot(facet.normal, along)));
+  return past;
+}
+
+/// How far the ideal probe is off an edge that it should cross, m.
+double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  const Edge& edge = mesh.edges()[at.index];
+  const Vec3& v0 = mesh.vertices()[edge.v0];
+  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3 ideal = tip + at.depth * at.normal;
+  return std::min(distance_to(ideal + std::clamp(at.place, 0.0, 1.0) * d, v0, e),
+                  distance_to(v0 + std::clamp(at.along_edge, 0.0, 1.0) * e, ideal, d));
+}
+
+template <bool kSegment>
+[[gnu::cold, gnu::noinline]] bool is_off(const ConvexMesh& mesh, const Measured& at,
+                                         const Vec3& tip, const Vec3& d) {
+  const double off =
+      kSegment && at.edge ? off_edge(mesh, at, tip, d) : off_face<kSegment>(mesh, at, tip, d);
+  return off > kOff * (mesh.size() + glm::length(d));
+}
+
+/// Then which of its ends is the deeper one is rounding, and either may be past the face.
+bool lies_flat(const Vec3& normal, const Vec3& d) {
+  const double rise = glm::dot(normal, d);
+  return rise * rise <= kFlat * kFlat * glm::dot(d, d);
+}
+
 template <bool kSegment>
 WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
   const double gain = kDepthRounding * mesh.size();
   Measured at = resume<kSegment>(mesh, start, tip, d);
-  bool capped = false;
+  bool capped = false, helpless = false;
   int steps = 0;
   while (at.depth >= 0) {
     Measured next;
@@ -110,9 +168,13 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
       const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
       const Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
       if (side.edge == kNone) break;
+      if (kSegment && lies_flat(at.normal, d) && !is_off<kSegment>(mesh, at, tip, d)) break;
       next = step_from_face<kSegment>(mesh, at.index, side, tip, d);
     }
-    if (!(next.depth < at.depth - gain)) break;
+    if (!(next.depth < at.depth - gain)) {
+      helpless = true;
+      break;
+    }
     at = next;
     // A path straight across the object visits some sqrt(facets) of them.
     if (++steps > static_cast<int>(mesh.facets().size() + mesh.edges().size())) {
@@ -120,7 +182,11 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
       break;
     }
   }
-  return to_result(at, capped);
+  WalkResult result = to_result(at, capped);
+  if (helpless || at.slender) [[unlikely]] {
+    result.unsure = at.depth >= 0 && is_off<kSegment>(mesh, at, tip, d);
+  }
+  return result;
 }
 
 template <bool kSegment>
@@ -143,7 +209,41 @@ WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d)
   return to_result(nearest, false);
 }
 
+template <bool kSegment>
+WalkResult holding_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                         const Vec3& shift) {
+  WalkResult best;
+  double nearest = HUGE_VAL;
+  const auto look = [&](const Measured& m) {
+    if (!(m.depth >= 0) || is_off<kSegment>(mesh, m, tip, d)) return;
+    const Vec3 beside = m.depth * m.normal - shift;
+    if (!(glm::dot(beside, beside) < nearest)) return;
+    nearest = glm::dot(beside, beside);
+    best = to_result(m, false);
+  };
+  for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) {
+    look(measure_face<kSegment>(mesh, i, tip, d));
+  }
+  if constexpr (kSegment) {
+    for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) {
+      const Slopes slopes = slopes_at(mesh, mesh.edges()[i], d);
+      Measured m;
+      if (slopes.silhouette() && measure_edge(mesh, i, slopes.left >= 0, tip, d, m)) look(m);
+    }
+  }
+  return best;
+}
+
 }  // namespace
+
+WalkResult holding_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                                 const Vec3& shift) {
+  return holding_facet<true>(mesh, tip, d, shift);
+}
+
+WalkResult holding_facet_point(const ConvexMesh& mesh, const Vec3& tip, const Vec3& shift) {
+  return holding_facet<false>(mesh, tip, Vec3(0), shift);
+}
 
 WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
                         const Vec3& d) {

@@ -36,7 +36,10 @@ struct WalkResult {
   MinkowskiFacet separates;  ///< where it has left: the facet of M whose plane is between
   Vec3 normal;               ///< unit, outward, of `facet`; when left: of the plane that separates
   double depth = 0;          ///< m, along normal; negative when left
-  double place = 0;     ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  double place = 0;  ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  /// No step helped, yet the ideal probe is off the facet: the probe has left the object, or edges
+  /// nearly parallel to it hide the way. Look at all facets.
+  bool unsure = false;
   bool capped = false;  ///< the limit of steps was met; the facet is valid but perhaps not the last
 };
 
@@ -59,6 +62,13 @@ void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at, int tick);
 /// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.
 WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
 WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip);
+
+/// Of the facets of M that hold the probe (with the ideal probe on them), the one whose ideal probe
+/// is nearest to the virtual probe moved by `shift`; kind none: there is none. For walks that are
+/// unsure. Costs O(facets + edges).
+WalkResult holding_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                                 const Vec3& shift);
+WalkResult holding_facet_point(const ConvexMesh& mesh, const Vec3& tip, const Vec3& shift);
 
 /// The plane of the facet of the last tick, wherever on it the probe is now: a walk of no steps.
 WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,

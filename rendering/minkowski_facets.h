@@ -16,6 +16,8 @@ using Kind = MinkowskiFacet::Kind;
 inline constexpr std::uint32_t kNone = ~0u;
 inline constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by halving
 inline constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below this: no contact edge
+inline constexpr double kNearlyParallel =
+    1e-3;  // below this the direction of e x d has lost digits
 
 inline std::uint32_t corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
   const Edge& edge = mesh.edges()[side.edge];
@@ -80,6 +82,7 @@ inline Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const 
 struct Measured {
   bool edge = false;        ///< else a face
   bool left_ahead = false;  ///< edge only
+  bool slender = false;     ///< edge only: nearly parallel to the probe
   std::uint32_t index = 0;
   Vec3 normal;
   double depth = 0;
@@ -114,6 +117,15 @@ inline Slopes slopes_at(const ConvexMesh& mesh, const Edge& edge, const Vec3& d)
           glm::dot(mesh.facets()[edge.right].normal, d)};
 }
 
+/// The normal of an edge as the mixture of its faces' normals that is at right angles to d: however
+/// small e x d is, it stays between the two.
+[[gnu::cold, gnu::noinline]] inline Vec3 mixed_normal(const ConvexMesh& mesh, const Edge& edge,
+                                                      const Vec3& d) {
+  const Slopes slopes = slopes_at(mesh, edge, d);
+  return glm::normalize(std::abs(slopes.right) * mesh.facets()[edge.left].normal +
+                        std::abs(slopes.left) * mesh.facets()[edge.right].normal);
+}
+
 /// False where the edge and the probe are parallel: then it is no contact edge.
 inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
                          const Vec3& tip, const Vec3& d, Measured& m) {
@@ -122,7 +134,8 @@ inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_
   const Vec3 e = mesh.vertices()[edge.v1] - v0;
   const Vec3 c = glm::cross(e, d);
   const double c2 = glm::dot(c, c);
-  if (c2 <= kParallel * kParallel * glm::dot(e, e) * glm::dot(d, d)) return false;
+  const double right_angle2 = glm::dot(e, e) * glm::dot(d, d);
+  if (c2 <= kParallel * kParallel * right_angle2) return false;
   const double inverse = 1 / c2;
   const double scale = std::copysign(inverse, left_ahead - 0.5) * std::sqrt(c2);
   const Vec3 w = tip - v0;
@@ -130,6 +143,10 @@ inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_
   m.left_ahead = left_ahead;
   m.index = index;
   m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
+  if (c2 < kNearlyParallel * kNearlyParallel * right_angle2) [[unlikely]] {
+    m.slender = true;
+    m.normal = mixed_normal(mesh, edge, d);
+  }
   m.depth = -glm::dot(m.normal, w);
   // w + depth n + place d = along_edge e, crossed with e and with d
   m.place = glm::dot(glm::cross(w, e), c) * inverse;

@@ -76,6 +76,38 @@ inline void leave(PartState& state, const WalkResult& left, const LineProbe& pro
   state.watch = left.separates;
 }
 
+template <class Probe>
+WalkResult holding_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                         const Vec3& shift) {
+  if constexpr (Probe::kSegment) return holding_facet_segment(mesh, tip, d, shift);
+  return holding_facet_point(mesh, tip, shift);
+}
+
+/// A walk that was unsure, where no plane was found between object and probe: all facets are looked
+/// at. False when the probe touches the surface at most; else `hit` becomes the facet that holds
+/// it, of several the nearest to where the walk ended. Rare.
+template <class Probe>
+[[gnu::cold, gnu::noinline]] bool make_sure(const ScenePart& part, const Vec3& tip, const Vec3& d,
+                                            WalkResult& hit) {
+  const WalkResult nearest = nearest_facet<Probe>(*part.mesh, tip, d);
+  if (nearest.facet.kind == MinkowskiFacet::Kind::none || nearest.depth <= part.tolerance) {
+    return false;
+  }
+  const WalkResult holding = holding_facet<Probe>(*part.mesh, tip, d, hit.depth * hit.normal);
+  hit = holding.facet.kind != MinkowskiFacet::Kind::none ? holding : nearest;
+  return true;
+}
+
+/// Looks for a plane between the part and the probe, with no history; state.plane says whether
+/// there is one.
+inline void separate(const ScenePart& part, PartState& state, const LineProbe& probe) {
+  const ConvexMesh& mesh = *part.mesh;
+  find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
+                        part.trees->support_map());
+  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
+  state.watch = {MinkowskiFacet::Kind::face, false, mesh.edges()[edge].left};
+}
+
 /// A part that was not in contact at the last tick: whether it is now. Frame of the part's mesh.
 /// \param before  the probe at the last tick; null at the first tick of all
 template <class Probe>
@@ -105,10 +137,7 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
     }
   }
   if (!decided) {
-    find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
-                          part.trees->support_map());
-    const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
-    state.watch = {Kind::face, false, mesh.edges()[edge].left};
+    separate(part, state, probe);
     if (state.blocked || !before) {
       state.blocked =
           !state.plane.valid &&
@@ -119,6 +148,10 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
     first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
   }
   if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, probe.tip, d);
+  if (hit.unsure) [[unlikely]] {
+    if (decided) separate(part, state, probe);
+    if (state.plane.valid || !make_sure<Probe>(part, probe.tip, d, hit)) return false;
+  }
   if (hit.facet.kind == Kind::none) {
     if (decided) {  // in and out again
       leave(state, hit, probe);
@@ -150,6 +183,13 @@ template <class Probe>
   }
   hit = walk<Probe>(mesh, state.facet, tip, tail - tip);
   if (hit.capped) faults |= render_fault::kWalkCapped;
+  if (hit.unsure) [[unlikely]] {
+    separate(part, state, probe);
+    if (state.plane.valid || !make_sure<Probe>(part, tip, tail - tip, hit)) {
+      state.facet = {};
+      return false;
+    }
+  }
   if (!(hit.facet == state.facet)) state.fetched = 0;
   state.facet = hit.facet;
   if (hit.facet.kind != Kind::none) {
