@@ -14,6 +14,7 @@ using namespace minkowski;
 
 constexpr int kSteps = 400;         // a longer way round is left to the trees
 constexpr double kSameTime = 1e-9;  // of a tick; closer times differ by rounding
+constexpr double kOff = 1e-9;       // of the size; a probe that is farther off does not touch
 constexpr double kNever = HUGE_VAL;
 
 /// Both ends move linearly; t from 0 to 1.
@@ -163,6 +164,23 @@ Stage over_edge(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
   return entered(at, time);
 }
 
+/// An entry, if the probe is on the facet then; undecided where rounding put it beside or below:
+/// edges nearly parallel to the probe.
+template <bool kSegment>
+Approach checked(const ConvexMesh& mesh, const Approach& entry, const Motion& m) {
+  const Vec3 tip = m.tip_at(entry.time), d = m.d_at(entry.time);
+  Measured at;
+  if (!kSegment || entry.facet.kind == Kind::face) {
+    at = measure_face<kSegment>(mesh, entry.facet.index, tip, d);
+  } else if (!measure_edge(mesh, entry.facet.index, entry.facet.left_ahead, tip, d, at)) {
+    return {};
+  }
+  const double way = glm::length(m.tip_motion) + glm::length(m.d_motion);
+  const double most = kOff * (mesh.size() + glm::length(d)) + kSameTime * way;
+  const bool on = std::abs(at.depth) <= most && off_facet<kSegment>(mesh, at, tip, d) <= most;
+  return on ? entry : Approach{};
+}
+
 template <bool kSegment>
 Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
                   const LineProbe& after) {
@@ -172,11 +190,12 @@ Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe&
     const Stage stage = kSegment && at.facet.kind == Kind::edge
                             ? over_edge(mesh, at, motion)
                             : over_face<kSegment>(mesh, at, motion);
-    if (stage.end.end != Approach::End::undecided) return stage.end;
+    if (stage.end.end == Approach::End::entered) return checked<kSegment>(mesh, stage.end, motion);
+    if (stage.end.end == Approach::End::separated) return stage.end;
     if (stage.next.facet.kind == Kind::none) return {};
     // To and fro between two facets at one time: the probe is on the edge where they meet.
     if (stage.next.facet == last.facet && stage.next.since - last.since <= kSameTime) {
-      return entered(at, stage.next.since).end;
+      return checked<kSegment>(mesh, entered(at, stage.next.since).end, motion);
     }
     last = at;
     at = stage.next;

@@ -1,6 +1,5 @@
 #include "rendering/facet_walk.h"
 
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -103,49 +102,9 @@ WalkResult to_result(const Measured& at, bool capped) {
   return result;
 }
 
-double distance_to(const Vec3& p, const Vec3& a, const Vec3& along) {
-  const double share = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
-  return glm::length(a + share * along - p);
-}
-
-/// How far the ideal probe is off a polygon that it should lie on, m.
 template <bool kSegment>
-double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
-  const Facet& facet = mesh.facets()[at.index];
-  const bool tail = kSegment && at.place > 0;
-  const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
-  const Vec3 along = tail ? -d : d;
-  double past = 0, enter = 0, leave = 1;
-  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const Side& side = mesh.sides()[i];
-    const double inside = glm::dot(side.inward, end) - side.offset;
-    const double slope = glm::dot(side.inward, along);
-    past = std::max(past, -inside);
-    if (slope > 0) enter = std::max(enter, -inside / slope);
-    if (slope < 0) leave = std::min(leave, inside / -slope);
-    if (slope == 0 && inside < 0) leave = -1;
-  }
-  // A probe that lies flat on the face may touch it where its end is past a side.
-  if (enter <= leave) past = std::min(past, enter * std::abs(glm::dot(facet.normal, along)));
-  return past;
-}
-
-/// How far the ideal probe is off an edge that it should cross, m.
-double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
-  const Edge& edge = mesh.edges()[at.index];
-  const Vec3& v0 = mesh.vertices()[edge.v0];
-  const Vec3 e = mesh.vertices()[edge.v1] - v0;
-  const Vec3 ideal = tip + at.depth * at.normal;
-  return std::min(distance_to(ideal + std::clamp(at.place, 0.0, 1.0) * d, v0, e),
-                  distance_to(v0 + std::clamp(at.along_edge, 0.0, 1.0) * e, ideal, d));
-}
-
-template <bool kSegment>
-[[gnu::cold, gnu::noinline]] bool is_off(const ConvexMesh& mesh, const Measured& at,
-                                         const Vec3& tip, const Vec3& d) {
-  const double off =
-      kSegment && at.edge ? off_edge(mesh, at, tip, d) : off_face<kSegment>(mesh, at, tip, d);
-  return off > kOff * (mesh.size() + glm::length(d));
+bool is_off(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  return off_facet<kSegment>(mesh, at, tip, d) > kOff * (mesh.size() + glm::length(d));
 }
 
 /// Then which of its ends is the deeper one is rounding, and either may be past the face.

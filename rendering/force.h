@@ -70,15 +70,19 @@ struct Loads {
 /// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
 /// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, L1/L the contact's place on the probe. A probe of zero
 /// length is touched at place 0: device 1 takes all.
-template <bool kPlainSprings, std::size_t kCount>
+/// \tparam kSegment   false: a point, which has no lever; torque and device 2 are left at zero
+/// \tparam kFriction  false: no contact lags
+template <bool kSegment, bool kFriction, std::size_t kCount>
 Loads sum_loads(std::span<LoadedContact, kCount> contacts, const LineProbe& probe) {
   Loads loads;
   for (const auto& c : contacts) {
     Vec3 force = c.force * c.contact.normal;
-    if constexpr (!kPlainSprings) force += c.stiffness * c.lag;
+    if constexpr (kFriction) force += c.stiffness * c.lag;
     loads.force += force;
-    loads.torque += glm::cross(c.contact.point - probe.tip, force);
-    loads.device2 += c.place * force;
+    if constexpr (kSegment) {
+      loads.torque += glm::cross(c.contact.point - probe.tip, force);
+      loads.device2 += c.place * force;
+    }
   }
   loads.device1 = loads.force - loads.device2;
   return loads;

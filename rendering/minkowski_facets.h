@@ -2,6 +2,7 @@
 // The facets of M, the Minkowski sum of the object and the mirrored probe, measured against a
 // probe, and what adjoins them. Internal to the walks: facet_walk.cpp and approach.cpp.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -202,6 +203,52 @@ inline SilhouetteEdge other_silhouette(const ConvexMesh& mesh, std::uint32_t fro
                                        bool left_ahead, const Vec3& d) {
   const SilhouetteEdge other = turn_about(mesh, from, about_v1, left_ahead, d);
   return other.edge != kNone ? other : search_fan(mesh, from, about_v1, d);
+}
+
+/// From p to the segment from a, m.
+inline double distance_to(const Vec3& p, const Vec3& a, const Vec3& along) {
+  const double share = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
+  return glm::length(a + share * along - p);
+}
+
+/// How far the ideal probe is off a polygon that it should lie on, m.
+template <bool kSegment>
+double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  const Facet& facet = mesh.facets()[at.index];
+  const bool tail = kSegment && at.place > 0;
+  const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
+  const Vec3 along = tail ? -d : d;
+  double past = 0, enter = 0, leave = 1;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const Side& side = mesh.sides()[i];
+    const double inside = glm::dot(side.inward, end) - side.offset;
+    const double slope = glm::dot(side.inward, along);
+    past = std::max(past, -inside);
+    if (slope > 0) enter = std::max(enter, -inside / slope);
+    if (slope < 0) leave = std::min(leave, inside / -slope);
+    if (slope == 0 && inside < 0) leave = -1;
+  }
+  // A probe that lies flat on the face may touch it where its end is past a side.
+  if (enter <= leave) past = std::min(past, enter * std::abs(glm::dot(facet.normal, along)));
+  return past;
+}
+
+/// How far the ideal probe is off an edge that it should cross, m.
+inline double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  const Edge& edge = mesh.edges()[at.index];
+  const Vec3& v0 = mesh.vertices()[edge.v0];
+  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3 ideal = tip + at.depth * at.normal;
+  return std::min(distance_to(ideal + std::clamp(at.place, 0.0, 1.0) * d, v0, e),
+                  distance_to(v0 + std::clamp(at.along_edge, 0.0, 1.0) * e, ideal, d));
+}
+
+/// How far the ideal probe is off the facet of M that it should be on, m.
+template <bool kSegment>
+[[gnu::cold, gnu::noinline]] double off_facet(const ConvexMesh& mesh, const Measured& at,
+                                              const Vec3& tip, const Vec3& d) {
+  if (kSegment && at.edge) return off_edge(mesh, at, tip, d);
+  return off_face<kSegment>(mesh, at, tip, d);
 }
 
 }  // namespace palpate::minkowski

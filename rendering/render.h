@@ -3,8 +3,11 @@
 // where along the probe a contact stands. Included by point_renderer.cpp and ray_renderer.cpp
 // alone.
 
+#include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <span>
+#include <utility>
 
 #include "rendering/compound.h"
 #include "rendering/tick.h"
@@ -13,42 +16,48 @@ namespace palpate::tick {
 
 /// What materials add to plain springs: layers, damping, friction.
 /// \param rate  1/s, ticks; 0 when unknown
-template <class Probe>
-void feel(const Tick<Probe>& tick, std::span<LoadedContact> contacts, double rate) {
-  const auto& parts = tick.scene.parts();
-  RenderState& state = tick.state;
-  const auto sibling_grip = [&](const LoadedContact& c) {
-    for (const std::uint32_t i : state.near_parts) {
-      if (parts[i].object == c.object && state.parts[i].grip.held) return state.parts[i].grip;
+template <Needs kNeeds>
+void feel(const Scene& scene, RenderState& state, const LineProbe& probe,
+          std::span<LoadedContact> contacts, double rate) {
+  const auto& parts = scene.parts();
+  if constexpr (kNeeds.friction) {
+    const auto sibling_grip = [&](const LoadedContact& c) {
+      for (const std::uint32_t i : state.near_parts) {
+        if (parts[i].object == c.object && state.parts[i].grip.held) return state.parts[i].grip;
+      }
+      return Grip{};
+    };
+    // A part that takes over from its sibling at a seam takes over the lag as well.
+    for (const auto& c : contacts) {
+      Grip& grip = state.parts[c.part].grip;
+      if (!grip.held) grip = sibling_grip(c);
     }
-    return Grip{};
-  };
-  // A part that takes over from its sibling at a seam takes over the lag as well.
-  for (const auto& c : contacts) {
-    Grip& grip = state.parts[c.part].grip;
-    if (!grip.held) grip = sibling_grip(c);
+    for (const std::uint32_t i : state.near_parts) state.parts[i].grip.held = false;
   }
-  for (const std::uint32_t i : state.near_parts) state.parts[i].grip.held = false;
   for (auto& c : contacts) {
     const Material& material = parts[c.part].material;
-    const LineProbe& last = state.has_last ? state.last : tick.probe;
-    const Vec3 motion =
-        (1 - c.place) * (tick.probe.tip - last.tip) + c.place * (tick.probe.tail - last.tail);
-    if (!material.layers.empty()) c.force = layered_force(material, c.share);
-    if (material.damping > 0 && c.share > 0) {
-      const double closing_speed = -glm::dot(motion, c.contact.normal) * rate;
-      c.force = std::max(0.0, c.force + material.damping * closing_speed);
+    if constexpr (kNeeds.layers) {
+      if (!material.layers.empty()) c.force = layered_force(material, c.share);
     }
-    if (material.has_friction()) rub(c, material, motion, state.parts[c.part].grip);
+    if constexpr (kNeeds.damping || kNeeds.friction) {
+      const LineProbe& last = state.has_last ? state.last : probe;
+      const Vec3 motion =
+          (1 - c.place) * (probe.tip - last.tip) + c.place * (probe.tail - last.tail);
+      if (kNeeds.damping && material.damping > 0 && c.share > 0) {
+        const double closing_speed = -glm::dot(motion, c.contact.normal) * rate;
+        c.force = std::max(0.0, c.force + material.damping * closing_speed);
+      }
+      if (kNeeds.friction && material.has_friction())
+        rub(c, material, motion, state.parts[c.part].grip);
+    }
   }
 }
 
 /// Where the ideal probe is, and the sum of all forces.
 /// \tparam kCount  how many contacts, where that is known beforehand: then no loop remains
-template <class Probe, bool kPlainSprings, std::size_t kCount>
+template <class Probe, bool kFriction, std::size_t kCount>
 Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> contacts) {
   const LineProbe& probe = tick.probe;
-  const Vec3 d = probe.tail - probe.tip;
   std::size_t deepest = 0;
   Vec3 deepest_shift(0);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -60,9 +69,13 @@ Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> conta
     Contact& contact = contacts[i].contact;
     if constexpr (kCount != 1)
       tick.state.parts[contacts[i].part].share = contacts[i].share * contact.normal;
-    contact.along = contacts[i].place * tick.length;
-    contact.point = probe.tip + contacts[i].place * d + shift;
-    if constexpr (!kPlainSprings) {
+    contact.point = probe.tip;
+    if constexpr (Probe::kSegment) {
+      contact.along = contacts[i].place * tick.length;
+      contact.point += contacts[i].place * (probe.tail - probe.tip);
+    }
+    contact.point += shift;
+    if constexpr (kFriction) {
       shift += contacts[i].lag;
       contact.point += contacts[i].lag;
     }
@@ -71,7 +84,7 @@ Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> conta
       deepest_shift = shift;
     }
   }
-  const Loads loads = sum_loads<kPlainSprings>(contacts, probe);
+  const Loads loads = sum_loads<Probe::kSegment, kFriction>(contacts, probe);
   const Vec3 all = loads.force + loads.torque;
   if (!std::isfinite(all.x + all.y + all.z)) {
     Rendering none;
@@ -80,7 +93,7 @@ Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> conta
     return none;
   }
   return {.force = loads.force,
-          .torque = Probe::kSegment ? loads.torque : Vec3(0),
+          .torque = loads.torque,
           .device1 = loads.device1,
           .device2 = loads.device2,
           .deepest = contacts[deepest].contact,
@@ -108,9 +121,8 @@ void touch_parts(Tick<Probe>& tick) {
   }
 }
 
-/// \tparam kPlainSprings  no material of the scene asks for more
-/// \tparam kOnePart  the scene is one convex part: no survey, no sums, no list of contacts
-template <class Probe, bool kPlainSprings, bool kOnePart>
+/// A tick that does what kNeeds says and no more.
+template <class Probe, Needs kNeeds>
 Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe, double dt) {
   Rendering none;
   if (!plausible(probe.tip) || !plausible(probe.tail)) {
@@ -121,24 +133,25 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
   Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
   const auto feel_all = [&](auto contacts) {
     load(contacts);
-    if constexpr (!kPlainSprings) feel(tick, contacts, dt > 0 ? 1 / dt : 0);
+    if constexpr (!kNeeds.plain_springs())
+      feel<kNeeds>(scene, state, probe, contacts, dt > 0 ? 1 / dt : 0);
     state.last = probe;
     state.has_last = true;
   };
-  if constexpr (kOnePart) {
+  if constexpr (kNeeds.several_parts) {
+    touch_parts(tick);
+    const std::span<LoadedContact> contacts(state.contacts);
+    feel_all(contacts);
+    if (!contacts.empty()) return add_up<Probe, kNeeds.friction>(tick, contacts);
+  } else {
     LoadedContact contact;
     const bool touching = tick.contact(0, Vec3(0), contact);
     const std::span<LoadedContact, 1> contacts(&contact, 1);
     if (touching) {
       feel_all(contacts);
-      return add_up<Probe, kPlainSprings>(tick, contacts);
+      return add_up<Probe, kNeeds.friction>(tick, contacts);
     }
     feel_all(std::span<LoadedContact, 0>());
-  } else {
-    touch_parts(tick);
-    const std::span<LoadedContact> contacts(state.contacts);
-    feel_all(contacts);
-    if (!contacts.empty()) return add_up<Probe, kPlainSprings>(tick, contacts);
   }
   none.ideal = probe;
   none.faults = tick.faults;
@@ -148,12 +161,12 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
 /// The least tick that shows the scene.
 template <class Probe>
 Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe, double dt) {
-  if (scene.parts().size() == 1) {
-    return scene.plain_springs() ? render<Probe, true, true>(scene, state, probe, dt)
-                                 : render<Probe, false, true>(scene, state, probe, dt);
+  using Run = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double);
+  static constexpr auto kTicks = []<std::size_t... i>(std::index_sequence<i...>) {
+    return std::array<Run, Needs::kCount>{&render<Probe, Needs::of(i)>...};
   }
-  return scene.plain_springs() ? render<Probe, true, false>(scene, state, probe, dt)
-                               : render<Probe, false, false>(scene, state, probe, dt);
+  (std::make_index_sequence<Needs::kCount>());
+  return kTicks[scene.needs().index()](scene, state, probe, dt);
 }
 
 }  // namespace palpate::tick

@@ -33,17 +33,20 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
     part.tolerance = 1e-12 * part.mesh->size() +
                      8 * std::numeric_limits<double>::epsilon() * glm::length(part.sphere_centre);
     part.material = object.material;
-    plain_springs_ = plain_springs_ && part.material.plain_spring();
+    needs_.damping |= part.material.damping != 0;
+    needs_.friction |= part.material.has_friction();
+    needs_.layers |= !part.material.layers.empty();
     part.object = object.object;
     parts_.push_back(std::move(part));
   }
+  needs_.several_parts = parts_.size() != 1;
 }
 
 RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
-  if (parts_.size() == 1) state.near_parts.push_back(0);  // and stays: one part is not surveyed
+  if (!needs_.several_parts) state.near_parts.push_back(0);  // and stays: one part is not surveyed
   state.contacts.reserve(std::min(parts_.size(), kMaxContacts));
   return state;
 }

@@ -43,6 +43,25 @@ struct ScenePart {
   Vec3 world_vector(const Vec3& local) const { return to_world * local; }
 };
 
+/// What a tick over a scene must do beyond one convex part that is a plain spring. A tick is
+/// compiled for each combination, so that what is not needed costs nothing.
+struct Needs {
+  bool several_parts = false;  ///< a survey of what is in reach, a list of contacts, sums over it
+  bool damping = false;        ///< of some material
+  bool friction = false;
+  bool layers = false;
+
+  static constexpr std::size_t kCount = 16;  ///< combinations
+  static constexpr Needs of(std::size_t index) {
+    return {(index & 1) != 0, (index & 2) != 0, (index & 4) != 0, (index & 8) != 0};
+  }
+  constexpr std::size_t index() const {
+    return std::size_t{several_parts} | std::size_t{damping} << 1 | std::size_t{friction} << 2 |
+           std::size_t{layers} << 3;
+  }
+  constexpr bool plain_springs() const { return !damping && !friction && !layers; }
+};
+
 /// What is remembered of one part from tick to tick.
 struct PartState {
   MinkowskiFacet facet;       ///< kind none: not in contact
@@ -74,13 +93,13 @@ class Scene {
   explicit Scene(std::vector<SceneObject> objects, bool side_contact = true);
 
   const std::vector<ScenePart>& parts() const { return parts_; }
-  /// Whether all contacts are plain springs: then damping, friction and layers are left out.
-  bool plain_springs() const { return plain_springs_; }
+  /// Chooses the tick that both renderers run.
+  const Needs& needs() const { return needs_; }
   RenderState initial_state() const;
 
  private:
   std::vector<ScenePart> parts_;
-  bool plain_springs_ = true;
+  Needs needs_;
 };
 
 /// Lists the parts that the probe can reach soon, unless the last list still holds. No allocation.
