@@ -1,7 +1,7 @@
 #pragma once
 // The tick that both renderers share; they differ in what touches (a point or a segment) and in
-// where along the probe a contact stands. Included by point_renderer.cpp and ray_renderer.cpp
-// alone.
+// where along the probe a contact stands (point_probe.h, segment_probe.h). Included by what
+// instantiates ticks.
 
 #include <array>
 #include <cmath>
