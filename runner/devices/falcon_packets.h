@@ -40,8 +40,11 @@ class PacketStream {
   /// Packets begun and thrown away.
   std::uint64_t dropped() const noexcept { return dropped_; }
   void count_bad() noexcept { ++dropped_; }
-  /// Forgets what was begun.
-  void reset() noexcept { size_ = 0; }
+  /// Throws away what was begun: its end will not come.
+  void reset() noexcept {
+    if (size_ > 0) ++dropped_;
+    size_ = 0;
+  }
 
  private:
   Packet packet_{};

@@ -1,0 +1,29 @@
+#include "runner/devices/falcon.h"
+
+#include <utility>
+
+namespace palpate::falcon {
+
+FalconDevice::FalconDevice(std::unique_ptr<Transport> transport, const ArmSettings& settings)
+    : arm_(std::move(transport), settings) {
+  capabilities_ = {"falcon",
+                   3,
+                   3,
+                   sure_force(settings.counts_per_torque),
+                   kMaxStiffness,
+                   kMaxRate,
+                   kWorkspaceRadius,
+                   kResolution,
+                   false};
+}
+
+DeviceReading FalconDevice::read() noexcept {
+  const ArmReading& at = arm_.update();
+  return {{at.position, at.position}, at.buttons, at.trouble != ArmTrouble::none};
+}
+
+void FalconDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
+  arm_.push(device1 + device2);
+}
+
+}  // namespace palpate::falcon

@@ -1,0 +1,28 @@
+#pragma once
+// A Novint Falcon: position and force of one point, no rotation. Needs one thread.
+
+#include <memory>
+
+#include "runner/device.h"
+#include "runner/devices/falcon_arm.h"
+
+namespace palpate::falcon {
+
+class FalconDevice final : public Device {
+ public:
+  FalconDevice(std::unique_ptr<Transport> transport, const ArmSettings& settings);
+
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  /// Tip and tail are both the grip: the device senses no axis.
+  DeviceReading read() noexcept override;
+  /// Both forces pull at the one grip.
+  void write(const Vec3& device1, const Vec3& device2) noexcept override;
+
+  FalconArm& arm() { return arm_; }
+
+ private:
+  FalconArm arm_;
+  DeviceCapabilities capabilities_;
+};
+
+}  // namespace palpate::falcon
