@@ -1,0 +1,97 @@
+#include "runner/devices/mouse.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+#include <thread>
+
+namespace palpate {
+namespace {
+
+constexpr double kLength = 0.12;
+
+double length_of(const LineProbe& stylus) { return glm::length(stylus.tail - stylus.tip); }
+
+TEST(MouseStylus, RestsOutsideOfTheHomeZoneUntilItIsMoved) {
+  MouseStylus device(kLength, 1000);
+  const LineProbe start = device.read().stylus;
+  for (int i = 0; i < 1000; ++i) {
+    const DeviceReading reading = device.read();
+    EXPECT_EQ(reading.stylus.tip, start.tip);
+    EXPECT_FALSE(reading.lost);
+  }
+  // The nearest point of the segment to the origin.
+  const Vec3 axis = start.tail - start.tip;
+  const double along = std::clamp(-glm::dot(start.tip, axis) / glm::dot(axis, axis), 0.0, 1.0);
+  EXPECT_GT(glm::length(start.tip + along * axis), 0.08);
+}
+
+TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
+  for (const double rate : {1000.0, 4000.0}) {
+    MouseStylus device(kLength, rate);
+    MouseHand hand = device.resting_hand();
+    LineProbe before = device.read().stylus;
+    hand.move(-0.12, -0.08, -0.04);
+    hand.turn(M_PI - 0.1, -1.4);
+    device.aim(hand.stylus());
+    for (int i = 0; i < static_cast<int>(rate); ++i) {
+      const LineProbe now = device.read().stylus;
+      ASSERT_LE(glm::length(now.tip - before.tip), 1.0001 / rate);
+      ASSERT_LE(glm::length(now.tail - before.tail), 6 / rate);
+      ASSERT_NEAR(length_of(now), kLength, 1e-12);
+      before = now;
+    }
+    EXPECT_LT(glm::length(before.tip - hand.tip), 1e-6);
+    EXPECT_LT(glm::length(before.tail - hand.stylus().tail), 1e-6);
+  }
+}
+
+TEST(MouseStylus, NoAimMakesAPoseThatIsNotFinite) {
+  MouseStylus device(kLength, 1000);
+  std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
+  std::uniform_real_distribution<double> far(-10, 10);
+  MouseHand hand = device.resting_hand();
+  for (int i = 0; i < 20000; ++i) {
+    hand.move(far(random), far(random), far(random));
+    hand.turn(far(random), far(random));
+    device.aim(hand.stylus());
+    const LineProbe now = device.read().stylus;
+    ASSERT_NEAR(length_of(now), kLength, 1e-9);
+    ASSERT_LT(glm::length(now.tip), 1);
+  }
+  // The tail straight through the tip: the axis has nowhere to go but must not be lost.
+  const LineProbe at = device.read().stylus;
+  device.aim({at.tail, at.tip});
+  for (int i = 0; i < 2000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
+}
+
+TEST(MouseStylus, AimedFromAnotherThread) {
+  MouseStylus device(kLength, 1000);
+  std::thread window([&device] {
+    MouseHand hand = device.resting_hand();
+    for (int i = 0; i < 20000; ++i) {
+      hand.move(-1e-5, 0, 0);
+      device.aim(hand.stylus());
+    }
+  });
+  for (int i = 0; i < 20000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
+  window.join();
+  for (int i = 0; i < 2000; ++i) device.read();
+  EXPECT_NEAR(device.read().stylus.tip.x, device.resting_hand().tip.x - 0.2, 1e-6);
+}
+
+TEST(MouseHand, StaysInReachAndTurnsFiveDegreesOfFreedom) {
+  MouseHand hand{{}, kLength, 0, 0};
+  EXPECT_NEAR(glm::length(hand.axis() - Vec3(0, 0, 1)), 0, 1e-12);
+  hand.turn(M_PI / 2, 0);
+  EXPECT_NEAR(glm::length(hand.axis() - Vec3(1, 0, 0)), 0, 1e-12);
+  hand.turn(0, 100);
+  EXPECT_GT(hand.axis().y, 0.99);
+  hand.move(5, -5, 0.1);
+  EXPECT_EQ(hand.tip, Vec3(0.25, -0.25, 0.1));
+}
+
+}  // namespace
+}  // namespace palpate

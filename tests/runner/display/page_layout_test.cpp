@@ -1,0 +1,153 @@
+#include "runner/display/page_layout.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+
+#include "runner/display/window.h"
+
+namespace palpate {
+namespace {
+
+Page trial_page() {
+  Page page;
+  page.kind = Page::Kind::neutral;
+  page.keys = {{"1", "sphere"}, {"2", "cone"}, {"3", "cylinder"}, {"4", "cube"}};
+  return page;
+}
+
+/// Rows that hold anything but the ground.
+int inked_rows(const Image& image) {
+  int rows = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const auto row = image.pixels.begin() + static_cast<std::ptrdiff_t>(y) * image.width;
+    rows += std::any_of(row, row + image.width, [](auto p) { return p != ground_colour(); });
+  }
+  return rows;
+}
+
+/// Where key map and space bar are.
+std::vector<std::uint32_t> lower_part(const Image& image) {
+  const std::ptrdiff_t rows = image.height * 2 / 3;
+  return {image.pixels.begin() + rows * image.width, image.pixels.end()};
+}
+
+bool border_is_clear(const Image& image) {
+  const auto ground = [&](int x, int y) {
+    return image.pixels[static_cast<std::size_t>(y) * image.width + x] == ground_colour();
+  };
+  for (int x = 0; x < image.width; ++x) {
+    if (!ground(x, 0) || !ground(x, image.height - 1)) return false;
+  }
+  for (int y = 0; y < image.height; ++y) {
+    if (!ground(0, y) || !ground(image.width - 1, y)) return false;
+  }
+  return true;
+}
+
+/// For looking at: PALPATE_PAGES=folder keeps what was drawn.
+void keep(const Image& image, const std::string& name) {
+  const char* const folder = std::getenv("PALPATE_PAGES");
+  if (folder == nullptr) return;
+  std::ofstream out(std::string(folder) + "/" + name + ".ppm", std::ios::binary);
+  out << "P6 " << image.width << ' ' << image.height << " 255\n";
+  for (const std::uint32_t pixel : image.pixels) {
+    for (const int shift : {16, 8, 0}) out.put(static_cast<char>(pixel >> shift & 255U));
+  }
+}
+
+TEST(PageLayout, TheSamePageGivesTheSamePixels) {
+  const Image a = draw_page(trial_page(), 1280, 800), b = draw_page(trial_page(), 1280, 800);
+  keep(a, "neutral");
+  EXPECT_EQ(a.pixels, b.pixels);
+  EXPECT_GT(inked_rows(a), 30);
+}
+
+TEST(PageLayout, ATrialShowsNothingButTheKeyMapWhateverTextComesWithIt) {
+  Page page = trial_page();
+  const Image without = draw_page(page, 1280, 800);
+  page.text = "cube";
+  EXPECT_EQ(draw_page(page, 1280, 800).pixels, without.pixels);
+  page.keys.clear();
+  EXPECT_EQ(inked_rows(draw_page(page, 1280, 800)), 0);
+}
+
+TEST(PageLayout, EveryScriptFindsItsPlace) {
+  Page page;
+  page.kind = Page::Kind::text;
+  page.keys = trial_page().keys;
+  const std::vector<std::pair<const char*, const char*>> texts = {
+      {"english",
+       "Hold the stylus like a pen and touch the object. Four shapes may stand before you.\n\nAs "
+       "soon "
+       "as you know which one it is, press its key. Be accurate first, then quick.\n\nBetween "
+       "trials, "
+       "take the stylus away from the middle and keep it still for a moment."},
+      {"german", "Halten Sie den Griffel wie einen Stift. Größe und Schärfe: äöüß ÄÖÜ."},
+      {"greek", "Κρατήστε τη γραφίδα σαν στυλό."},
+      {"russian", "Держите щуп как ручку."},
+      {"turkish", "Kalemi tutun: ığüşöç İĞÜŞÖÇ."},
+      {"arabic", "امسك القلم كما تمسك قلم الكتابة."},
+      {"hebrew", "החזיקו את העט כמו עט כתיבה."},
+      {"hindi", "स्टाइलस को कलम की तरह पकड़ें।"},
+      {"thai", "จับปากกาเหมือนดินสอ"},
+      {"japanese", "ペンのように持って、物体に触れてください。"},
+  };
+  std::vector<std::vector<std::uint32_t>> seen;
+  for (const auto& [name, text] : texts) {
+    page.text = text;
+    const Image image = draw_page(page, 1280, 800);
+    keep(image, name);
+    EXPECT_TRUE(border_is_clear(image)) << name;
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), image.pixels), 0) << name;
+    seen.push_back(image.pixels);
+  }
+}
+
+TEST(PageLayout, HostileTextStaysOnTheScreen) {
+  Page page;
+  page.kind = Page::Kind::text;
+  page.keys = trial_page().keys;
+  page.text = "short";
+  const auto keys_and_bar = lower_part(draw_page(page, 1280, 800));
+  std::string endless;
+  for (int i = 0; i < 3000; ++i) endless += "feel ";
+  for (const std::string& text :
+       {endless, std::string(5000, 'w'), std::string("\xff\xfe broken \xc3"),
+        std::string("nul\0inside", 10), std::string(400, '\n')}) {
+    page.text = text;
+    const Image image = draw_page(page, 1280, 800);
+    keep(image, "hostile" + std::to_string(text.size()));
+    EXPECT_EQ(lower_part(image), keys_and_bar) << text.substr(0, 20);
+    EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);
+  }
+  for (int i = 0; i < 40; ++i) page.keys.emplace_back("k", "a shape with quite a long name indeed");
+  for (const auto& [width, height] : {std::pair{1, 1}, {40, 30}, {200, 2000}, {3840, 200}}) {
+    const Image image = draw_page(page, width, height);
+    EXPECT_EQ(image.pixels.size(), static_cast<std::size_t>(width) * height);
+  }
+}
+
+TEST(PageLayout, OtherKindsOfPages) {
+  Page page;
+  page.kind = Page::Kind::feedback;
+  page.text = "Right";
+  keep(draw_page(page, 1280, 800), "feedback");
+  page.kind = Page::Kind::message;
+  page.text = "A short break. The experimenter will go on with you.";
+  const Image message = draw_page(page, 1280, 800);
+  keep(message, "message");
+  EXPECT_GT(inked_rows(message), 10);
+}
+
+TEST(MissingLetters, NamesWhatNoFontCanShow) {
+  EXPECT_EQ(missing_letters({"sphere", "Kugel", "σφαίρα"}), "");
+  // A private-use letter: in no font that a test may count on.
+  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 letters"), std::string::npos);
+  EXPECT_NO_THROW(missing_letters({"\xff\xc3"}));
+}
+
+}  // namespace
+}  // namespace palpate
