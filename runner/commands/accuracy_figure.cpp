@@ -2,181 +2,116 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "analysis/axes.h"
+#include "analysis/svg.h"
 #include "runner/commands/accuracy_report.h"
+#include "runner/commands/log_panel.h"
 
 namespace palpate {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-constexpr std::array kShapes = {"sphere", "cone", "cylinder", "cube"};
 // m; a logarithm must have something for an error of 0, and nobody needs to tell such errors apart.
-constexpr double kLeastOfShape = 1e-11, kLeastOfPolyhedron = 1e-18;
+constexpr double kLeastOfShape = 1e-10, kLeastOfPolyhedron = 1e-18;
 
 struct Colour {
-  const char* method;
-  const char* colour;
+  std::string_view method, colour;
 };
-// Okabe & Ito's colours, to be told apart by everyone; the product is black.
-constexpr std::array kColours = {Colour{"tick", "#000000"},       Colour{"walk", "#0072B2"},
-                                 Colour{"walk-float", "#56B4E9"}, Colour{"walk-cold", "#8C8C8C"},
-                                 Colour{"scan", "#009E73"},       Colour{"brute-force", "#E69F00"},
-                                 Colour{"bullet", "#D55E00"},     Colour{"fcl", "#CC79A7"}};
+// Okabe & Ito's colours, to be told apart by everyone; the product is dark.
+constexpr std::array kColours = {
+    Colour{"tick", kInk},           Colour{"walk", "#0072B2"}, Colour{"walk-float", "#56B4E9"},
+    Colour{"walk-cold", "#8C8C8C"}, Colour{"scan", "#009E73"}, Colour{"brute-force", "#E69F00"},
+    Colour{"bullet", "#D55E00"},    Colour{"fcl", "#CC79A7"}};
 
-Json rows_of(const AccuracyReport& report) {
-  Json values = Json::array();
-  for (const AccuracyRow& row : report.rows) {
-    if (row.probe != "ray") continue;
-    values.push_back(
-        {{"shape", row.shape},
-         {"method", row.method},
-         {"triangles", row.triangles},
-         {"ns", row.ns_per_tick},
-         {"of_shape_m", std::max(kLeastOfShape, row.shape_errors.depth.rms)},
-         {"of_polyhedron_m", std::max(kLeastOfPolyhedron, row.polyhedron_errors.depth.worst)}});
+double of_shape(const AccuracyRow& row) {
+  return std::max(kLeastOfShape, row.shape_errors.depth.rms);
+}
+double of_polyhedron(const AccuracyRow& row) {
+  return std::max(kLeastOfPolyhedron, row.polyhedron_errors.depth.worst);
+}
+
+/// One shape's panel: a line for each method from its coarsest tessellation to its finest.
+void draw_methods(Svg& svg, const LogPanel& panel, const AccuracyReport& report,
+                  std::string_view shape, double (*error)(const AccuracyRow&)) {
+  for (auto c = kColours.rbegin(); c != kColours.rend(); ++c) {  // the product is on top
+    std::vector<std::pair<double, double>> points;
+    for (const AccuracyRow& row : report.rows) {
+      if (row.probe == "ray" && row.shape == shape && row.method == c->method) {
+        points.emplace_back(row.ns_per_tick, error(row));
+      }
+    }
+    const bool ours = c->method == "tick";
+    draw_path(svg, panel, points, c->colour, ours ? 2.5 : 1.2);
+    for (const auto& [ns, e] : points) {
+      svg.circle(panel.x(ns), panel.y(e), ours ? 3.5 : 2.5, c->colour);
+    }
   }
-  return values;
 }
 
-Json axis(const char* scale, const char* orient, const std::string& title, const char* format) {
-  Json a = {{"scale", scale},  {"orient", orient}, {"grid", true},         {"gridColor", "#e3e6ea"},
-            {"domain", false}, {"format", format}, {"labelOverlap", true}, {"tickCount", 5}};
-  if (!title.empty()) a["title"] = title;
-  a["titleFontSize"] = 11;
-  return a;
-}
-
-/// A level that matters, across a panel.
-void put_level(Json& marks, double metres, const char* text, bool named) {
-  const Json y = {{"scale", "of_shape_m"}, {"value", metres}};
-  marks.push_back({{"type", "rule"},
-                   {"encode",
-                    {{"enter",
-                      {{"x", {{"value", 0}}},
-                       {"x2", {{"signal", "panel_width"}}},
-                       {"y", y},
-                       {"stroke", {{"value", "#59636e"}}},
-                       {"strokeDash", {{"value", {4, 3}}}}}}}}});
-  if (!named) return;
-  marks.push_back({{"type", "text"},
-                   {"encode",
-                    {{"enter",
-                      {{"x", {{"signal", "panel_width"}, {"offset", -3}}},
-                       {"y", y},
-                       {"dy", {{"value", -4}}},
-                       {"align", {{"value", "right"}}},
-                       {"fill", {{"value", "#59636e"}}},
-                       {"fontSize", {{"value", 10}}},
-                       {"text", {{"value", text}}}}}}}});
-}
-
-Json panel(const std::string& shape, const char* field, bool first, const std::string& title,
-           bool levels) {
-  const Json place = {{"x", {{"scale", "ns"}, {"field", "ns"}}},
-                      {"y", {{"scale", field}, {"field", field}}},
-                      {"stroke", {{"scale", "method"}, {"field", "method"}}}};
-  Json line = place;
-  line["strokeWidth"] = {{"signal", "datum.method == 'tick' ? 3 : 1.5"}};
-  line["defined"] = {{"signal", "isValid(datum.ns)"}};
-  Json dot = {{"x", place["x"]},
-              {"y", place["y"]},
-              {"fill", place["stroke"]},
-              {"size", {{"signal", "datum.method == 'tick' ? 45 : 25"}}},
-              {"tooltip", {{"signal", "datum"}}}};
-  Json marks = Json::array();
-  if (levels) {
-    // Named where no line is in the way: a cube has one tessellation.
-    put_level(marks, kHand.position, "a hand feels 1 mm", shape == "cube");
-    put_level(marks, kDevice.position, "a device resolves 0.03 mm", shape == "cube");
-  }
-  marks.push_back(
-      {{"type", "group"},
-       {"from", {{"facet", {{"name", "of_method"}, {"data", "here"}, {"groupby", "method"}}}}},
-       {"marks",
-        {{{"type", "line"},
-          {"from", {{"data", "of_method"}}},
-          {"sort", {{"field", "datum.triangles"}}},
-          {"encode", {{"enter", line}}}},
-         {{"type", "symbol"}, {"from", {{"data", "of_method"}}}, {"encode", {{"enter", dot}}}}}}});
-  return {
-      {"type", "group"},
-      {"title", {{"text", shape}, {"frame", "group"}, {"anchor", "start"}}},
-      {"encode",
-       {{"enter",
-         {{"width", {{"signal", "panel_width"}}},
-          {"height", {{"signal", "panel_height"}}},
-          {"stroke", {{"value", "#d6dbe1"}}}}}}},
-      {"data",
-       {{{"name", "here"},
-         {"source", "rows"},
-         {"transform",
-          {{{"type", "filter"}, {"expr", "datum.shape == '" + shape + "'"}},
-           {{"type", "collect"}, {"sort", {{"field", "triangles"}}}}}}}}},
-      {"axes",
-       {axis("ns", "bottom", "ns a tick", "~s"), axis(field, "left", first ? title : "", ".0e")}},
-      {"marks", marks}};
-}
-
-Json scale(const char* name, const Json& range, const Json& domain) {
-  return {{"name", name}, {"type", "log"}, {"range", range}, {"domain", domain}, {"nice", true}};
-}
-
-}  // namespace
-
-Json accuracy_figure(const AccuracyReport& report) {
-  Json methods = Json::array(), colours = Json::array();
+void draw_legend(Svg& svg, const AccuracyReport& report, double x, double y) {
   for (const Colour& colour : kColours) {
     const bool there = std::any_of(report.rows.begin(), report.rows.end(),
                                    [&](const AccuracyRow& r) { return r.method == colour.method; });
     if (!there) continue;
-    methods.push_back(colour.method);
-    colours.push_back(colour.colour);
+    svg.line(x, y - 4, x + 18, y - 4, colour.colour, colour.method == "tick" ? 2.5 : 1.5);
+    svg.circle(x + 9, y - 4, 3, colour.colour);
+    svg.text(x + 24, y, colour.method, {12, kInk, Svg::Anchor::start, false, 0});
+    x += 24 + text_width(colour.method, 12) + 22;
   }
-  const auto of = [](const char* field) { return Json{{"data", "rows"}, {"field", field}}; };
-  const Json across = {0, {{"signal", "panel_width"}}}, up = {{{"signal", "panel_height"}}, 0};
-  Json marks = Json::array();
-  for (const char* shape : kShapes) {
-    marks.push_back(
-        panel(shape, "of_shape_m", marks.empty(), "rms error against the shape, m", true));
+}
+
+}  // namespace
+
+std::string accuracy_figure(const AccuracyReport& report) {
+  constexpr double kWidth = 1176, kPanel = 230, kHeight = 230, kLeft = 62, kGap = 58, kTop = 112;
+  constexpr double kBetween = 84;
+  Svg svg;
+  svg.rect(0, 0, kWidth, kTop + 2 * kHeight + kBetween + 52, "#ffffff");
+  svg.text(16, 30, "Tessellation decides the error, the method decides the time",
+           {18, kInk, Svg::Anchor::start, true, 0});
+  svg.text(16, 52,
+           "Each line runs from the coarsest to the finest tessellation; a stylus felt as a ray, "
+           "a hand at 0.1 m/s, 1 to 2 mm deep.",
+           {13, kSoft, Svg::Anchor::start, false, 0});
+  draw_legend(svg, report, 16, 78);
+  LogPanel shape_errors{0, kTop, kPanel, kHeight, 1e9, 1, 1e9, kLeastOfShape};
+  LogPanel exact_errors{0,   kTop + kHeight + kBetween, kPanel, kHeight, 1e9, 1,
+                        1e9, kLeastOfPolyhedron};
+  for (const AccuracyRow& row : report.rows) {
+    if (row.probe != "ray") continue;
+    for (auto [panel, error] :
+         {std::pair{&shape_errors, of_shape(row)}, std::pair{&exact_errors, of_polyhedron(row)}}) {
+      panel->x_low = std::min(panel->x_low, row.ns_per_tick);
+      panel->x_high = std::max(panel->x_high, row.ns_per_tick);
+      panel->y_low = std::min(panel->y_low, error);
+      panel->y_high = std::max(panel->y_high, error);
+    }
   }
-  for (const char* shape : kShapes) {
-    marks.push_back(panel(shape, "of_polyhedron_m", marks.size() == kShapes.size(),
-                          "worst against the polyhedron, m", false));
+  shape_errors.y_high = std::max(shape_errors.y_high, kHand.position);
+  shape_errors.round_ends();
+  exact_errors.round_ends();
+  for (std::size_t i = 0; i < std::size(kAccuracyShapes); ++i) {
+    const double left = kLeft + static_cast<double>(i) * (kPanel + kGap);
+    shape_errors.left = exact_errors.left = left;
+    const std::string name = kAccuracyShapes[i];
+    draw_panel(svg, shape_errors,
+               {name, "ns a tick", i == 0 ? "rms depth error against the shape, m" : ""});
+    // Named where no line is in the way: a cube has one tessellation.
+    const bool named = name == "cube";
+    draw_level(svg, shape_errors, kHand.position, named ? "a hand feels 1 mm" : "");
+    draw_level(svg, shape_errors, kDevice.position, named ? "a device resolves 0.03 mm" : "");
+    draw_methods(svg, shape_errors, report, name, of_shape);
+    draw_panel(svg, exact_errors,
+               {name, "ns a tick", i == 0 ? "worst against the polyhedron, m" : ""});
+    draw_methods(svg, exact_errors, report, name, of_polyhedron);
   }
-  return {
-      {"$schema", "https://vega.github.io/schema/vega/v5.json"},
-      {"description",
-       "Error over time for each method of finding contact; one panel for each shape, one "
-       "symbol for each tessellation; logarithmic both ways."},
-      {"title",
-       {{"text",
-         "Precision over time of a tick: tessellation decides the error, the method the "
-         "time"},
-        {"subtitle",
-         "Top: against the analytic shape. Bottom: against the exact polyhedron. Each line runs "
-         "from the coarsest to the finest tessellation; ray, hand at 0.1 m/s."},
-        {"anchor", "start"},
-        {"fontSize", 15},
-        {"offset", 12}}},
-      {"background", "white"},
-      {"padding", 8},
-      {"signals",
-       {{{"name", "panel_width"}, {"value", 230}}, {{"name", "panel_height"}, {"value", 230}}}},
-      {"layout", {{"columns", 4}, {"padding", {{"row", 76}, {"column", 62}}}, {"bounds", "flush"}}},
-      {"data", {{{"name", "rows"}, {"values", rows_of(report)}}}},
-      {"scales",
-       {scale("ns", across, of("ns")),
-        scale("of_shape_m", up, of("of_shape_m")),
-        scale("of_polyhedron_m", up, of("of_polyhedron_m")),
-        {{"name", "method"}, {"type", "ordinal"}, {"domain", methods}, {"range", colours}}}},
-      {"legends",
-       {{{"stroke", "method"},
-         {"fill", "method"},
-         {"title", "method"},
-         {"orient", "right"},
-         {"symbolType", "circle"}}}},
-      {"marks", marks}};
+  return svg.document(kWidth, kTop + 2 * kHeight + kBetween + 52,
+                      "Error over time for each method of finding contact",
+                      "One panel for each shape, both axes logarithmic. Top: error of depth "
+                      "against the analytic shape. Bottom: against the exact polyhedron.");
 }
 
 }  // namespace palpate

@@ -1,12 +1,14 @@
 #pragma once
-// What `palpate accuracy` found, as text, JSON, a Vega figure and a page.
+// What `palpate accuracy` found, as text, JSON, a figure and a page.
 
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/tables.h"
 #include "rendering/accuracy_study.h"
+#include "rendering/extreme_cases.h"
 #include "rendering/paper_first_contact.h"
 #include "rendering/search.h"
 
@@ -18,11 +20,18 @@ struct FirstContactStudy {
   std::vector<FirstContactLoss> speeds;
 };
 
+/// An extreme case by one of the renderers.
+struct ExtremeRow {
+  std::string name, title, measure, probe;
+  ExtremeResult result;
+};
+
 struct AccuracyReport {
   AccuracySettings settings;
   std::vector<AccuracyRow> rows;
   std::vector<FirstContactStudy> first_contacts;
   double paper_test_ns = 0, exact_test_ns = 0;  ///< of a first contact with a cube, all tried
+  std::vector<ExtremeRow> extremes;
   std::optional<SearchCounts> search;
   std::uint64_t search_seed = 0;
 };
@@ -31,13 +40,24 @@ struct AccuracyReport {
 constexpr Demand kHand{1e-3, 0.17453292519943295};  ///< 1 mm, 10 degrees
 constexpr Demand kDevice{3e-5, kNoDemand};          ///< 0.03 mm
 
-/// "sphere: ...", the tessellation a lab should choose, a sentence for each shape.
+constexpr const char* kAccuracyShapes[] = {"sphere", "cone", "cylinder", "cube"};
+
+/// Three significant figures, plain where that is short: "0.0345", "1.2e-17".
+std::string significant(double value);
+/// "327,680"
+std::string thousands(long long n);
+
+/// "sphere: ...", the tessellation a lab should choose.
+std::string recommendation(const AccuracyReport& report, const std::string& shape);
 std::vector<std::string> recommendations(const AccuracyReport& report);
+/// All of what was measured, in the order of display.
+std::vector<Table> accuracy_tables(const AccuracyReport& report);
 
 std::string accuracy_text(const AccuracyReport& report);
-std::string search_text(const SearchCounts& counts, std::uint64_t seed);
 nlohmann::ordered_json accuracy_json(const AccuracyReport& report);
-/// The work-precision figure: error over nanoseconds a tick, a panel for each shape; Vega 5.
-nlohmann::ordered_json accuracy_figure(const AccuracyReport& report);
+/// The work-precision figure as SVG: error over nanoseconds a tick, two panels for each shape.
+std::string accuracy_figure(const AccuracyReport& report);
+/// All of it as one page without scripts.
+std::string accuracy_page(const AccuracyReport& report);
 
 }  // namespace palpate

@@ -2,13 +2,15 @@
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
 
 PALPATE = sys.argv[1]
-SMALL = ["--paths", "1", "--ticks", "40", "--most-triangles", "80"]
+SMALL = ["--quick", "--paths", "1", "--ticks", "40", "--most-triangles", "80"]
 
 
 class Accuracy(unittest.TestCase):
@@ -23,8 +25,8 @@ class Accuracy(unittest.TestCase):
         return done
 
     def test_measures_every_shape_and_says_which_tessellation(self):
-        numbers, figure = self.dir / "a.json", self.dir / "a.vg.json"
-        done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure)
+        numbers, figure, page = self.dir / "a.json", self.dir / "a.svg", self.dir / "a.html"
+        done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure, "--report", page)
         self.assertEqual(done.stderr, "")
         for shape in ["sphere", "cone", "cylinder", "cube"]:
             self.assertRegex(done.stdout, rf"(?m)^  {shape}: .*\.$")
@@ -51,10 +53,21 @@ class Accuracy(unittest.TestCase):
                 self.assertLess(exact["depth"]["worst_m"], 1e-15)
                 self.assertLess(exact["force"]["worst_n"], 1e-12)
         self.assertTrue(all(r["exact_missed"] == 0 for r in result["first_contact"]["rows"]))
-        drawn = json.loads(figure.read_text())
-        self.assertEqual(drawn["$schema"], "https://vega.github.io/schema/vega/v5.json")
-        self.assertEqual(len(drawn["marks"]), 8)
-        self.assertEqual(len(drawn["data"][0]["values"]), len(seen) / 2)
+        # A dot for each tessellation and method in both panels of its shape, and one in the legend.
+        drawn = xml.etree.ElementTree.parse(figure).getroot()
+        dots = drawn.findall("{http://www.w3.org/2000/svg}circle")
+        self.assertEqual(len(dots), len(seen) + len(methods))
+        # The page is well-formed, holds the figure and every table, and asks for nothing.
+        root = xml.etree.ElementTree.fromstring(page.read_text().replace("<!DOCTYPE html>", ""))
+        self.assertEqual(len(root.findall(".//{http://www.w3.org/2000/svg}svg")), 1)
+        self.assertEqual(len(root.findall(".//table")), len(re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", done.stdout)))
+        self.assertNotRegex(page.read_text(), r"<script|src=|href=")
+        # Both probes hold every extreme case; nothing is wrong in the search.
+        self.assertTrue(all(e["holds"] for e in result["extremes"]))
+        self.assertEqual(len(result["extremes"]) % 2, 0)
+        self.assertGreaterEqual(len(result["extremes"]), 30)
+        self.assertEqual(result["search"]["wrong"], 0)
+        self.assertEqual(result["search"]["ticks"], 100000)
 
     def test_the_search_counts_the_same_with_any_number_of_threads(self):
         one, three = self.dir / "1.json", self.dir / "3.json"
