@@ -2,10 +2,10 @@
 # Installs the Debian packages that are missing. Usage: install_packages.sh build|tests|quality
 set -euo pipefail
 
-build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libglm-dev libsqlite3-dev
-  libsqlitecpp-dev nlohmann-json3-dev zlib1g-dev)
-tests=(libbenchmark-dev libbullet-dev libfcl-dev libgtest-dev librsvg2-bin libxml2-utils pkg-config
-  python3 python3-jsonschema)
+build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libsqlite3-dev
+  libsqlitecpp-dev libusb-1.0-0-dev nlohmann-json3-dev pkg-config zlib1g-dev)
+tests=(libbenchmark-dev libbullet-dev libfcl-dev libgtest-dev librsvg2-bin libumockdev-dev libxml2-utils
+  python3 python3-jsonschema umockdev)
 quality=(clang clang-format clang-tidy)
 
 case "${1:-}" in
