@@ -30,29 +30,40 @@ Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limit
       workspace_(workspace) {}
 
 void Servo::prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) {
-  scene_ = scene;
-  renderer_ = &renderer;
-  state_ = scene_->initial_state();
-  home_ = home;
+  own_ = std::make_unique<Stage>(scene, renderer, home);
+  begin(*own_);
+  due_ns_ = clock_.now_ns();
+  sample_.time_ns = 0;  // the first period is the nominal one
+}
+
+void Servo::begin(Stage& stage) noexcept {
+  stage_ = &stage;
   rested_ = 0;
   quality_ = {};
   limiter_.release();
+  const std::int64_t last_ns = sample_.time_ns;
   sample_ = {};
+  sample_.time_ns = last_ns;
   sample_.phase = Phase::homing;
-  due_ns_ = clock_.now_ns();
+}
+
+void Servo::clear_fault() noexcept {
+  emergency_.store(false);  // first: a request that comes from now on is kept
+  clear_.store(true);
 }
 
 bool Servo::at_home(const LineProbe& probe) noexcept {
-  const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home_.stillness;
+  const HomeZone& home = stage_->home;
+  const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home.stillness;
   if (!still) {
     rested_ = 0;
     rest_tip_ = probe.tip;
   }
-  if (!(distance_of_segment(probe) >= home_.radius)) {
+  if (!(distance_of_segment(probe) >= home.radius)) {
     rested_ = 0;
     return false;
   }
-  return ++rested_ >= home_.rest / period_;
+  return ++rested_ >= home.rest / period_;
 }
 
 void Servo::keep_time() noexcept {
@@ -61,6 +72,7 @@ void Servo::keep_time() noexcept {
   const std::int64_t late = (now - due_ns_) / period_ns_;  // whole ticks that were missed
   sample_.period_ns = sample_.time_ns > 0 ? now - sample_.time_ns : period_ns_;
   sample_.time_ns = now;
+  sample_.lateness_ns = now - due_ns_;
   due_ns_ += (late + 1) * period_ns_;
   late_in_a_row_ =
       late > 0 ? late_in_a_row_ + static_cast<int>(std::min<std::int64_t>(late, kMissedInARow)) : 0;
@@ -69,10 +81,9 @@ void Servo::keep_time() noexcept {
   quality_.longest_period_ns = std::max(quality_.longest_period_ns, sample_.period_ns);
 }
 
-const Sample& Servo::tick() noexcept {
-  keep_time();
+void Servo::check(const DeviceReading& reading) noexcept {
   sample_.faults = 0;
-  const DeviceReading reading = device_.read();
+  if (clear_.load(std::memory_order_relaxed) && clear_.exchange(false)) limiter_.clear();
   if (reading.lost) {
     sample_.faults |= servo_fault::kDeviceLost;
     limiter_.trip();
@@ -81,10 +92,31 @@ const Sample& Servo::tick() noexcept {
                      workspace_.to_virtual(reading.stylus.tail)};
   }
   sample_.buttons = reading.buttons;
-  if (late_in_a_row_ >= kMissedInARow) {
+  if (sample_.phase == Phase::feeling && late_in_a_row_ >= kMissedInARow) {
     sample_.faults |= servo_fault::kMissedTicks;
     limiter_.trip();
   }
+}
+
+void Servo::command(const Vec3& device1, const Vec3& device2) noexcept {
+  if (emergency_.load()) {
+    sample_.faults |= servo_fault::kEmergency;
+    limiter_.trip();
+  }
+  const DeviceForces forces = limiter_.apply(device1, device2);
+  sample_.compute_ns = clock_.now_ns() - read_ns_;
+  device_.write(forces.device1, forces.device2);
+  sample_.device1 = forces.device1;
+  sample_.device2 = forces.device2;
+  sample_.faults |= (forces.limited ? servo_fault::kForceLimited : 0) |
+                    (limiter_.tripped() ? servo_fault::kTripped : 0);
+}
+
+const Sample& Servo::tick() noexcept {
+  keep_time();
+  const DeviceReading reading = device_.read();
+  read_ns_ = clock_.now_ns();
+  check(reading);
   if (sample_.phase == Phase::homing && !reading.lost && at_home(sample_.probe)) {
     sample_.phase = Phase::feeling;
     sample_.tick = 0;
@@ -92,21 +124,19 @@ const Sample& Servo::tick() noexcept {
     ++sample_.tick;
   }
   if (sample_.phase != Phase::feeling) {
-    device_.write(Vec3(0), Vec3(0));
+    command(Vec3(0), Vec3(0));
+    limiter_.release();  // the ramp begins with the forces
     return sample_;
   }
-  sample_.rendering = renderer_->tick(*scene_, state_, sample_.probe,
-                                      static_cast<double>(sample_.period_ns) * 1e-9);
+  sample_.rendering = stage_->renderer->tick(stage_->scene, stage_->state, sample_.probe,
+                                             static_cast<double>(sample_.period_ns) * 1e-9);
+  sample_.faults |= sample_.rendering.faults;
   if (sample_.rendering.faults & render_fault::kNonFinite) limiter_.trip();
-  const DeviceForces forces = limiter_.apply(sample_.rendering.device1, sample_.rendering.device2);
-  device_.write(forces.device1, forces.device2);
-  sample_.device1 = forces.device1;
-  sample_.device2 = forces.device2;
-  sample_.faults |= sample_.rendering.faults | (forces.limited ? servo_fault::kForceLimited : 0) |
-                    (limiter_.tripped() ? servo_fault::kTripped : 0);
+  command(sample_.rendering.device1, sample_.rendering.device2);
   ++quality_.ticks;
   quality_.faults |= sample_.faults;
-  quality_.max_force = std::max(quality_.max_force, glm::length(forces.device1 + forces.device2));
+  quality_.longest_compute_ns = std::max(quality_.longest_compute_ns, sample_.compute_ns);
+  quality_.max_force = std::max(quality_.max_force, glm::length(sample_.device1 + sample_.device2));
   return sample_;
 }
 
@@ -114,6 +144,9 @@ ServoQuality Servo::stop() noexcept {
   limiter_.release();
   device_.write(Vec3(0), Vec3(0));
   sample_.phase = Phase::idle;
+  sample_.device1 = sample_.device2 = Vec3(0);
+  sample_.rendering = {};
+  stage_ = nullptr;
   return std::exchange(quality_, {});
 }
 

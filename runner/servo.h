@@ -2,48 +2,17 @@
 // The servo tick: device.read -> renderer -> force limit -> device.write. The same code for a
 // simulated participant (as fast as the processor goes) and a live one (paced by the clock).
 
+#include <atomic>
 #include <cstdint>
-#include <optional>
+#include <memory>
 
 #include "rendering/renderer.h"
 #include "runner/device.h"
 #include "runner/force_limiter.h"
+#include "runner/sample.h"
+#include "runner/tick_source.h"
 
 namespace palpate {
-
-/// Bits of Sample::faults; the renderer's bits are the low ones.
-namespace servo_fault {
-inline constexpr std::uint32_t kForceLimited = 16;  ///< the force was cut in size or change
-inline constexpr std::uint32_t kDeviceLost = 32;    ///< zero force for good
-inline constexpr std::uint32_t kMissedTicks = 64;   ///< too many in a row: zero force for good
-inline constexpr std::uint32_t kTripped = 128;  ///< forces are off until the experimenter clears
-}  // namespace servo_fault
-
-enum class Phase : std::uint8_t {
-  idle,     ///< no forces
-  homing,   ///< no forces; waits for the stylus to rest in the home zone
-  feeling,  ///< forces on
-};
-
-/// What happened in one tick.
-struct Sample {
-  std::int64_t time_ns = 0;    ///< session clock, at the start of the tick
-  std::int64_t period_ns = 0;  ///< since the tick before
-  std::uint32_t tick = 0;      ///< since time zero of the trial; 0 before
-  Phase phase = Phase::idle;
-  LineProbe probe;        ///< virtual probe, m
-  Rendering rendering;    ///< as rendered
-  Vec3 device1, device2;  ///< N, as commanded after the limits
-  std::uint8_t buttons = 0;
-  std::uint32_t faults = 0;
-};
-
-/// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.
-struct HomeZone {
-  double radius = 0.062;     ///< m, bounding sphere and margin
-  double rest = 0.5;         ///< s
-  double stillness = 0.005;  ///< m; the tip stays this near to where it came to rest
-};
 
 /// Where the virtual world stands in the device's frame: virtual = scale * (device - centre).
 struct WorkspaceMap {
@@ -54,32 +23,48 @@ struct WorkspaceMap {
   Vec3 to_device(const Vec3& virtual_point) const { return virtual_point / scale + centre; }
 };
 
-/// Servo-quality figures of one trial, from time zero.
-struct ServoQuality {
-  std::uint64_t ticks = 0, missed_ticks = 0;
-  std::int64_t longest_period_ns = 0;
-  std::uint32_t faults = 0;
-  double max_force = 0;  ///< N, commanded to the hand
+/// What one trial puts before the stylus, with the memory that rendering it needs.
+struct Stage {
+  Stage(const Scene& what, const Renderer& how, const HomeZone& where)
+      : scene(what), renderer(&how), state(scene.initial_state()), home(where) {}
+
+  const Scene scene;
+  const Renderer* renderer;
+  RenderState state;  ///< the servo's alone while it has the stage
+  HomeZone home;
 };
 
-class Servo {
+class Servo final : public TickSource {
  public:
   Servo(Device& device, Clock& clock, double rate, const ForceLimits& limits,
         const WorkspaceMap& workspace = {});
 
-  /// Puts a scene before the stylus and waits for it in the home zone.
-  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home);
+  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) override;
   /// Waits for the tick's time, then does one tick. Never throws, allocates, locks or does I/O but
   /// the device's own transfer.
   const Sample& tick() noexcept;
-  /// Forces off; what the trial was like.
-  ServoQuality stop() noexcept;
+  const Sample& next() noexcept override { return tick(); }
+  ServoQuality stop() noexcept override;
+
+  /// As prepare, but with what was made elsewhere: no allocation, and time runs on. `stage` must
+  /// outlive the next begin(), prepare() or stop().
+  void begin(Stage& stage) noexcept;
+  /// Zero force from the tick under way on, until clear_fault(). From any thread or signal handler.
+  void emergency_zero() noexcept { emergency_.store(true); }
+  /// The experimenter allows forces again. From any thread.
+  void clear_fault() noexcept;
+
+  /// The next tick is due now.
+  void start() noexcept { due_ns_ = clock_.now_ns(); }
 
   double period() const { return period_; }  ///< s
+  std::int64_t period_ns() const { return period_ns_; }
 
  private:
   bool at_home(const LineProbe& probe) noexcept;
   void keep_time() noexcept;
+  void check(const DeviceReading& reading) noexcept;
+  void command(const Vec3& device1, const Vec3& device2) noexcept;
 
   static constexpr int kMissedInARow = 5;  ///< so many and the forces go off
 
@@ -88,17 +73,18 @@ class Servo {
   const double period_;
   const std::int64_t period_ns_;
   std::int64_t due_ns_;
+  std::int64_t read_ns_ = 0;  ///< when the device had been read
   ForceLimiter limiter_;
   WorkspaceMap workspace_;
-  std::optional<Scene> scene_;
-  const Renderer* renderer_ = nullptr;
-  RenderState state_;
-  HomeZone home_;
+  std::unique_ptr<Stage> own_;  ///< of prepare()
+  Stage* stage_ = nullptr;
   Vec3 rest_tip_;
   int rested_ = 0;  ///< ticks
   int late_in_a_row_ = 0;
   Sample sample_;
   ServoQuality quality_;
+  std::atomic<bool> emergency_{false}, clear_{false};
+  static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
 };
 
 }  // namespace palpate

@@ -88,7 +88,7 @@ void Session::run_trial() {
   std::optional<Answer> answer;
   std::uint32_t faults = 0;
   while (!answer && !record_.timed_out && !(faults & servo_fault::kTripped)) {
-    const Sample& sample = parts_.servo.tick();
+    const Sample& sample = parts_.servo.next();
     faults = sample.faults;
     if (sample.phase == Phase::feeling) {
       note(sample);

@@ -7,8 +7,8 @@
 #include "data/record.h"
 #include "runner/participants/respondent.h"
 #include "runner/scene_builder.h"
-#include "runner/servo.h"
 #include "runner/session_plan.h"
+#include "runner/tick_source.h"
 #include "runner/trial_log.h"
 
 namespace palpate {
@@ -35,7 +35,7 @@ class Session {
   struct Parts {
     const Protocol& protocol;
     const StimulusLibrary& library;
-    Servo& servo;
+    TickSource& servo;
     Clock& clock;
     Respondent& participant;
     TrialLog& log;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runner/servo.h"
+#include "runner/sample.h"
 
 namespace palpate {
 

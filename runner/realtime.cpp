@@ -1,0 +1,80 @@
+#include "runner/realtime.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+void add(std::string& list, const std::string& sentence) {
+  list += (list.empty() ? "" : " ") + sentence;
+}
+
+/// Locks what there is; what will be asked for later only where no limit can make that fail.
+bool lock_memory() {
+  rlimit limit{};
+  const bool unlimited = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+  return mlockall(unlimited ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
+}
+
+}  // namespace
+
+std::int64_t RealClock::now_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kSecond_ns + now.tv_nsec;
+}
+
+void RealClock::wait_until(std::int64_t when_ns) noexcept {
+  const timespec when{when_ns / kSecond_ns, when_ns % kSecond_ns};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR) {
+  }
+}
+
+RealtimeRights request_realtime(const RealtimeWish& wish) {
+  RealtimeRights rights;
+  if (wish.priority > 0) {
+    sched_param param{};
+    param.sched_priority = wish.priority;
+    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
+    rights.fifo = error == 0;
+    if (error != 0) {
+      add(rights.missing,
+          std::string("No real-time priority (") + std::strerror(error) +
+              "): other programs can make ticks late; grant CAP_SYS_NICE or a limit 'rtprio' of " +
+              std::to_string(wish.priority) + ".");
+    }
+  }
+  if (wish.lock_memory) {
+    rights.locked_memory = lock_memory();
+    if (!rights.locked_memory) {
+      add(rights.missing,
+          std::string("Memory is not locked (") + std::strerror(errno) +
+              "): a page fetched from disk can make a tick late; grant CAP_IPC_LOCK or raise the "
+              "limit 'memlock'.");
+    }
+  }
+  if (wish.core >= 0) {
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    if (wish.core < CPU_SETSIZE) CPU_SET(wish.core, &set);
+    const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set);
+    if (error == 0) {
+      rights.core = wish.core;
+    } else {
+      add(rights.missing, "Processor " + std::to_string(wish.core) + " was not given (" +
+                              std::strerror(error) + "): the thread may move between processors.");
+    }
+  }
+  return rights;
+}
+
+}  // namespace palpate

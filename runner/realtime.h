@@ -1,0 +1,33 @@
+#pragma once
+// The machine's time, and the rights that make ticks come in time.
+
+#include <string>
+
+#include "runner/device.h"
+
+namespace palpate {
+
+/// CLOCK_MONOTONIC; waits by absolute time (clock_nanosleep).
+class RealClock final : public Clock {
+ public:
+  std::int64_t now_ns() noexcept override;
+  void wait_until(std::int64_t when_ns) noexcept override;
+};
+
+struct RealtimeWish {
+  int priority = 80;        ///< of SCHED_FIFO, 1 to 99; 0: leave the ordinary scheduler
+  bool lock_memory = true;  ///< no page of this program is swapped out or fetched late
+  int core = -1;            ///< run on this processor alone; -1: any
+};
+
+/// What was granted.
+struct RealtimeRights {
+  bool fifo = false, locked_memory = false;
+  int core = -1;
+  std::string missing;  ///< what was asked for and not granted, and what that costs; empty: nothing
+};
+
+/// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.
+RealtimeRights request_realtime(const RealtimeWish& wish);
+
+}  // namespace palpate

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <vector>
+
+namespace palpate {
+
+/// A queue of fixed size from one thread to one other. Neither ever waits.
+template <class T>
+class Ring {
+ public:
+  /// Room for `size` or more; all memory is taken (and touched) here.
+  explicit Ring(std::size_t size) : slots_(std::bit_ceil(size)) {}
+
+  /// By the writer. False where there is no room.
+  bool push(const T& value) noexcept {
+    const std::size_t at = written_.load(std::memory_order_relaxed);
+    if (at - read_.load(std::memory_order_acquire) >= slots_.size()) return false;
+    slots_[at & (slots_.size() - 1)] = value;
+    written_.store(at + 1, std::memory_order_release);
+    return true;
+  }
+  /// By the reader. False where there is nothing.
+  bool pop(T& value) noexcept {
+    const std::size_t at = read_.load(std::memory_order_relaxed);
+    if (at == written_.load(std::memory_order_acquire)) return false;
+    value = slots_[at & (slots_.size() - 1)];
+    read_.store(at + 1, std::memory_order_release);
+    return true;
+  }
+  std::size_t capacity() const noexcept { return slots_.size(); }
+
+ private:
+  static constexpr std::size_t kLine = 64;  // the two counts do not share a line of the cache
+
+  std::vector<T> slots_;
+  alignas(kLine) std::atomic<std::size_t> written_{0};
+  alignas(kLine) std::atomic<std::size_t> read_{0};
+};
+
+}  // namespace palpate

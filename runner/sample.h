@@ -1,0 +1,58 @@
+#pragma once
+// What happens in one servo tick, and what is asked of the servo between ticks. Plain values.
+
+#include <cstdint>
+
+#include "rendering/renderer.h"
+
+namespace palpate {
+
+/// Bits of Sample::faults; the renderer's bits are the low ones.
+namespace servo_fault {
+inline constexpr std::uint32_t kForceLimited = 16;  ///< the force was cut in size or change
+inline constexpr std::uint32_t kDeviceLost = 32;    ///< zero force for good
+inline constexpr std::uint32_t kMissedTicks = 64;   ///< too many in a row: zero force for good
+inline constexpr std::uint32_t kTripped = 128;    ///< forces are off until the experimenter clears
+inline constexpr std::uint32_t kEmergency = 256;  ///< somebody asked for zero force
+inline constexpr std::uint32_t kSamplesLost = 512;  ///< the ring was full: ticks before are missing
+inline constexpr std::uint32_t kStalled = 1024;     ///< the servo's thread gives no more samples
+}  // namespace servo_fault
+
+enum class Phase : std::uint8_t {
+  idle,     ///< no forces
+  homing,   ///< no forces; waits for the stylus to rest in the home zone
+  feeling,  ///< forces on
+};
+
+/// What happened in one tick.
+struct Sample {
+  std::int64_t time_ns = 0;      ///< session clock, at the start of the tick
+  std::int64_t period_ns = 0;    ///< since the tick before
+  std::int64_t lateness_ns = 0;  ///< time_ns less the time at which the tick was due
+  std::int64_t compute_ns = 0;   ///< from the device's reading to the command for it, by the clock
+  std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
+  Phase phase = Phase::idle;
+  LineProbe probe;        ///< virtual probe, m
+  Rendering rendering;    ///< as rendered
+  Vec3 device1, device2;  ///< N, as commanded after the limits
+  std::uint8_t buttons = 0;
+  std::uint32_t faults = 0;
+};
+
+/// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.
+struct HomeZone {
+  double radius = 0.062;     ///< m, bounding sphere and margin
+  double rest = 0.5;         ///< s
+  double stillness = 0.005;  ///< m; the tip stays this near to where it came to rest
+};
+
+/// Servo-quality figures of one trial, from time zero.
+struct ServoQuality {
+  std::uint64_t ticks = 0, missed_ticks = 0;
+  std::int64_t longest_period_ns = 0;
+  std::int64_t longest_compute_ns = 0;
+  std::uint32_t faults = 0;
+  double max_force = 0;  ///< N, commanded to the hand
+};
+
+}  // namespace palpate

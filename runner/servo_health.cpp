@@ -1,0 +1,68 @@
+#include "runner/servo_health.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace palpate {
+namespace {
+
+// One thread writes: a load and a store do, without the locked instruction of an increment.
+template <class T>
+void increase(std::atomic<T>& value, T by) noexcept {
+  value.store(value.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+int TimeHistogram::bin(std::int64_t ns) noexcept {
+  if (ns < kSteps) return static_cast<int>(std::max<std::int64_t>(ns, 0));
+  // The leading bit says the doubling, the next three the step in it.
+  const int shift = std::bit_width(static_cast<std::uint64_t>(ns)) - 4;
+  return std::min(kBins - 1, shift * kSteps + static_cast<int>(ns >> shift));
+}
+
+std::int64_t TimeHistogram::upper_edge(int bin) noexcept {
+  if (bin < 2 * kSteps) return bin;
+  const int shift = bin / kSteps - 1;
+  return (static_cast<std::int64_t>(bin - shift * kSteps + 1) << shift) - 1;
+}
+
+void TimeHistogram::add(std::int64_t ns) noexcept {
+  increase<std::uint64_t>(bins_[static_cast<std::size_t>(bin(ns))], 1);
+  increase<std::uint64_t>(count_, 1);
+  if (ns > longest()) longest_.store(ns, std::memory_order_relaxed);
+}
+
+std::int64_t TimeHistogram::quantile(double p) const noexcept {
+  const double wanted = p * static_cast<double>(count());
+  double so_far = 0;
+  for (int i = 0; i < kBins; ++i) {
+    so_far +=
+        static_cast<double>(bins_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed));
+    if (so_far > 0 && so_far >= wanted) return std::min(upper_edge(i), longest());
+  }
+  return longest();
+}
+
+double TimeHistogram::share_above(std::int64_t ns) const noexcept {
+  std::uint64_t above = 0;
+  for (int i = bin(ns) + 1; i < kBins; ++i)
+    above += bins_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
+  return count() > 0 ? static_cast<double>(above) / static_cast<double>(count()) : 0;
+}
+
+void ServoHealth::add(const Sample& sample, std::int64_t period_ns) noexcept {
+  lateness_.add(sample.lateness_ns);
+  compute_.add(sample.compute_ns);
+  increase(missed_, static_cast<std::uint64_t>(sample.lateness_ns / period_ns));
+  faults_.store(faults() | sample.faults, std::memory_order_relaxed);
+  if (sample.period_ns > longest_period_ns())
+    longest_period_.store(sample.period_ns, std::memory_order_relaxed);
+}
+
+void ServoHealth::add_lost_sample() noexcept {
+  increase<std::uint64_t>(lost_, 1);
+  faults_.store(faults() | servo_fault::kSamplesLost, std::memory_order_relaxed);
+}
+
+}  // namespace palpate

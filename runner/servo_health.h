@@ -1,0 +1,60 @@
+#pragma once
+// How well the servo kept time, tick by tick, cheap enough to be kept always.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "runner/sample.h"
+
+namespace palpate {
+
+/// Counts of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns), from 0
+/// to hours. One thread adds, any may read meanwhile.
+class TimeHistogram {
+ public:
+  void add(std::int64_t ns) noexcept;
+  std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
+  std::int64_t longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
+  /// The time that the share `p` of the counts does not exceed, as the upper edge of its step, ns.
+  std::int64_t quantile(double p) const noexcept;
+  /// Share of counts in steps that lie above `ns`.
+  double share_above(std::int64_t ns) const noexcept;
+
+ private:
+  static constexpr int kSteps = 8;   ///< for each doubling
+  static constexpr int kBins = 352;  ///< up to 2^45 ns
+  static int bin(std::int64_t ns) noexcept;
+  static std::int64_t upper_edge(int bin) noexcept;
+
+  std::array<std::atomic<std::uint64_t>, kBins> bins_{};
+  std::atomic<std::uint64_t> count_{0};
+  std::atomic<std::int64_t> longest_{0};
+};
+
+/// Of all ticks of a servo thread.
+class ServoHealth {
+ public:
+  /// By the servo's thread.
+  void add(const Sample& sample, std::int64_t period_ns) noexcept;
+  void add_lost_sample() noexcept;
+
+  std::uint64_t ticks() const noexcept { return lateness_.count(); }
+  /// Whole periods that passed without a tick.
+  std::uint64_t missed_ticks() const noexcept { return missed_.load(std::memory_order_relaxed); }
+  std::uint64_t lost_samples() const noexcept { return lost_.load(std::memory_order_relaxed); }
+  std::uint32_t faults() const noexcept { return faults_.load(std::memory_order_relaxed); }
+  std::int64_t longest_period_ns() const noexcept {
+    return longest_period_.load(std::memory_order_relaxed);
+  }
+  const TimeHistogram& lateness() const { return lateness_; }
+  const TimeHistogram& compute() const { return compute_; }
+
+ private:
+  TimeHistogram lateness_, compute_;
+  std::atomic<std::uint64_t> missed_{0}, lost_{0};
+  std::atomic<std::uint32_t> faults_{0};
+  std::atomic<std::int64_t> longest_period_{0};
+};
+
+}  // namespace palpate

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace palpate {
+
+/// The newest value from one thread to one other, older ones dropped. Neither ever waits.
+template <class T>
+class TripleBuffer {
+ public:
+  /// By the writer.
+  void write(const T& value) noexcept {
+    slots_[back_] = value;
+    back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex;
+  }
+  /// By the reader. False, and `value` as it was, where nothing is newer than the last one read.
+  bool read(T& value) noexcept {
+    if (!(middle_.load(std::memory_order_relaxed) & kFresh)) return false;
+    front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
+    value = slots_[front_];
+    return true;
+  }
+
+ private:
+  static constexpr std::uint8_t kFresh = 4, kIndex = 3;
+
+  std::array<T, 3> slots_{};
+  std::uint8_t back_ = 0, front_ = 1;    ///< the writer's and the reader's own
+  std::atomic<std::uint8_t> middle_{2};  ///< which lies between them, and whether it is unread
+};
+
+}  // namespace palpate
