@@ -15,8 +15,6 @@ namespace {
 
 using Kind = MinkowskiFacet::Kind;
 
-constexpr std::size_t kScan = 64;  // primitives; fewer are scanned faster than any tree is climbed
-
 /// Whether the segment a -> a + d comes into the box enlarged by low_margin and high_margin.
 bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3& high) {
   double enter = 0, leave = 1;
@@ -135,8 +133,9 @@ void meet_polygons(const ConvexMesh& mesh, const ContactTrees& trees, const Vec3
 
 }  // namespace
 
-ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges) : support_map_(mesh) {
-  if (mesh.facets().size() > kScan) {
+ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t scanned)
+    : support_map_(mesh) {
+  if (mesh.facets().size() > scanned) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
@@ -153,7 +152,7 @@ ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges) : support_ma
     }
     polygons_ = BoundingTree(boxes);
   }
-  if (with_edges && mesh.edges().size() > kScan) {
+  if (with_edges && mesh.edges().size() > scanned) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.edges().size());
     for (const Edge& edge : mesh.edges()) {

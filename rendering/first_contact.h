@@ -15,7 +15,11 @@ namespace palpate {
 /// and where only points are shown there is no tree of edges.
 class ContactTrees {
  public:
-  ContactTrees(const ConvexMesh& mesh, bool with_edges);
+  /// Facets or edges; so few are scanned faster than any tree is climbed.
+  static constexpr std::size_t kScan = 64;
+
+  /// \param scanned  for measurements: so many primitives get no tree
+  ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t scanned = kScan);
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }

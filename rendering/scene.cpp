@@ -65,10 +65,10 @@ void survey(const Scene& scene, RenderState& state, const LineProbe& probe) {
   for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
     const ScenePart& part = scene.parts()[i];
     const double gap = distance_to_segment(part.sphere_centre, probe) - part.sphere_radius;
-    // A quarter of the radius of room to move before the list must be drawn up again. A part that
-    // is held stays: through a thin plate the probe may be far from it and yet in contact.
+    // A part that is held stays: through a thin plate the probe may be far from it and yet in
+    // contact.
     const bool held = state.parts[i].facet.kind != MinkowskiFacet::Kind::none;
-    if (held || gap - step <= 0.25 * part.sphere_radius) {
+    if (held || in_reach(part, gap, step)) {
       state.near_parts.push_back(i);
     } else {
       state.clearance = std::min(state.clearance, gap);

@@ -102,6 +102,14 @@ class Scene {
   Needs needs_;
 };
 
+/// Whether the probe can touch the part soon, or may have passed it on the way here.
+/// \param gap   m, between the probe and the part's bounding sphere
+/// \param step  m, how far the probe came in this tick
+inline bool in_reach(const ScenePart& part, double gap, double step) {
+  // A quarter of the radius of room to move before the list must be drawn up again.
+  return gap - step <= 0.25 * part.sphere_radius;
+}
+
 /// Lists the parts that the probe can reach soon, unless the last list still holds. No allocation.
 void survey(const Scene& scene, RenderState& state, const LineProbe& probe);
 

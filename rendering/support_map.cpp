@@ -9,9 +9,6 @@
 namespace palpate {
 namespace {
 
-constexpr std::size_t kClimbed = 2048;  // vertices; fewer are climbed as they are
-constexpr double kVerticesPerCell = 8;
-
 /// The cell of coordinate c in [-1, 1].
 int cell_of(double c, int resolution) {
   return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution), 0, resolution - 1);
@@ -19,9 +16,9 @@ int cell_of(double c, int resolution) {
 
 }  // namespace
 
-SupportMap::SupportMap(const ConvexMesh& mesh) {
+SupportMap::SupportMap(const ConvexMesh& mesh, std::size_t climbed) {
   const std::size_t vertices = mesh.vertices().size();
-  if (vertices <= kClimbed) return;
+  if (vertices <= climbed) return;
   resolution_ = static_cast<int>(std::sqrt(static_cast<double>(vertices) / (6 * kVerticesPerCell)));
   const auto side = static_cast<std::size_t>(resolution_);
   cells_.resize(6 * side * side);

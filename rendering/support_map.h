@@ -1,6 +1,7 @@
 #pragma once
 // Where to begin climbing for the vertex farthest along a direction.
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,7 +13,11 @@ namespace palpate {
 /// steps whatever the number of vertices. Meshes that are climbed in few steps anyway have none.
 class SupportMap {
  public:
-  explicit SupportMap(const ConvexMesh& mesh);
+  static constexpr std::size_t kClimbed = 2048;  ///< vertices; so few are climbed as they are
+  static constexpr double kVerticesPerCell = 8;
+
+  /// \param climbed  so few vertices get no map
+  explicit SupportMap(const ConvexMesh& mesh, std::size_t climbed = kClimbed);
 
   bool empty() const { return cells_.empty(); }
   /// A vertex near the one farthest along `direction` (any length but 0); not empty.

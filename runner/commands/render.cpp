@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/commands/render_explain.h"
 #include "runner/scene_builder.h"
 
 namespace palpate {
@@ -118,36 +120,22 @@ Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& object
   }
 }
 
-}  // namespace
+/// An option's value; \throws UsageError where it was not given.
+std::string given(const po::variables_map& values, const char* option, const char* because) {
+  if (values.count(option) == 0)
+    throw UsageError("the option '--" + std::string(option) + "' is required " + because);
+  return values[option].as<std::string>();
+}
 
-int render_command(const std::vector<std::string>& args) {
-  CommandLine line;
-  line.usage =
-      "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv";
-  line.summary =
-      "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
-      "in.";
-  line.example =
-      "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n";
-  line.options.add_options()                                                                  //
-      ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
-      ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
-      ("trajectory", po::value<std::string>()->required()->value_name("FILE"),
-       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader + " (s, m)")
-           .c_str())  //
-      ("out", po::value<std::string>()->required()->value_name("FILE"), "forces, CSV; overwritten");
-  const auto values = line.parse(args);
-  if (!values) return 0;
-  const std::string name = (*values)["renderer"].as<std::string>();
-  if (name != "point" && name != "ray") {
-    throw UsageError("--renderer: point or ray was expected, not '" + name + "'");
-  }
-  const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
-  const std::string scene_path = (*values)["scene"].as<std::string>();
-  const std::vector<ObjectSpec> objects = parse_scene(scene_path);
-  const std::vector<TrajectoryRow> rows =
-      read_trajectory((*values)["trajectory"].as<std::string>());
-  const Scene scene = build_scene(scene_path, objects, renderer);
+void explain_scene(const po::variables_map& values, const Scene& scene, const Renderer& renderer) {
+  const Explanation explanation = explain_with_costs(scene, renderer);
+  std::cout << to_text(explanation);
+  if (values.count("json") > 0)
+    write_whole(values["json"].as<std::string>(), to_json(explanation).dump(2) + "\n");
+}
+
+void render_trajectory(const Scene& scene, const Renderer& renderer,
+                       const std::vector<TrajectoryRow>& rows, const std::string& path) {
   RenderState state = scene.initial_state();
   std::string out = std::string(kForceHeader) + '\n';
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -155,7 +143,53 @@ int render_command(const std::vector<std::string>& args) {
     const Rendering rendering = renderer.tick(scene, state, rows[i].probe, dt);
     append_row(out, rows[i].t, rendering);
   }
-  write_whole((*values)["out"].as<std::string>(), out);
+  write_whole(path, out);
+}
+
+}  // namespace
+
+int render_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv\n"
+      "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
+  line.summary =
+      "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
+      "in. Or tells what a tick over the scene consists of, what was left out and why, and what "
+      "each stage costs.";
+  line.example =
+      "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
+      "  palpate render --scene cube.json --renderer ray --explain\n";
+  line.options.add_options()                                                                  //
+      ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
+      ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
+      ("trajectory", po::value<std::string>()->value_name("FILE"),
+       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader + " (s, m)")
+           .c_str())                                                                     //
+      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV; overwritten")  //
+      ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")   //
+      ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const std::string name = (*values)["renderer"].as<std::string>();
+  if (name != "point" && name != "ray") {
+    throw UsageError("--renderer: point or ray was expected, not '" + name + "'");
+  }
+  const bool explains = (*values)["explain"].as<bool>();
+  if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))
+    throw UsageError("--explain renders nothing: leave out --trajectory and --out");
+  if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
+  const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
+  const std::string scene_path = (*values)["scene"].as<std::string>();
+  if (explains) {
+    explain_scene(*values, build_scene(scene_path, parse_scene(scene_path), renderer), renderer);
+    return 0;
+  }
+  const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
+  const std::string out = given(*values, "out", "unless --explain is given");
+  const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+  const std::vector<TrajectoryRow> rows = read_trajectory(trajectory);
+  render_trajectory(build_scene(scene_path, objects, renderer), renderer, rows, out);
   return 0;
 }
 
