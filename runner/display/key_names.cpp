@@ -1,0 +1,80 @@
+#include "runner/display/key_names.h"
+
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+
+namespace palpate {
+namespace {
+
+const char* special(int key) {
+  switch (key) {
+    case GLFW_KEY_SPACE:
+      return "space";
+    case GLFW_KEY_ESCAPE:
+      return "escape";
+    case GLFW_KEY_ENTER:
+    case GLFW_KEY_KP_ENTER:
+      return "enter";
+    case GLFW_KEY_TAB:
+      return "tab";
+    case GLFW_KEY_BACKSPACE:
+      return "backspace";
+    case GLFW_KEY_LEFT:
+      return "left";
+    case GLFW_KEY_RIGHT:
+      return "right";
+    case GLFW_KEY_UP:
+      return "up";
+    case GLFW_KEY_DOWN:
+      return "down";
+    default:
+      return nullptr;
+  }
+}
+
+/// What stands there on a US keyboard; 0: nothing that a protocol would name.
+char on_us_keyboard(int key) {
+  if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) {
+    return static_cast<char>('0' + key - GLFW_KEY_KP_0);
+  }
+  if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) return static_cast<char>('a' + key - GLFW_KEY_A);
+  if (key > GLFW_KEY_SPACE && key <= GLFW_KEY_GRAVE_ACCENT) return static_cast<char>(key);
+  return 0;
+}
+
+}  // namespace
+
+bool on_keypad(int key) { return key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_EQUAL; }
+
+std::vector<std::string> key_names(int key, int scancode) {
+  if (const char* const name = special(key)) return {name};
+  std::vector<std::string> names;
+  const char place = on_us_keyboard(key);
+  if (!on_keypad(key)) {
+    const char* const written = glfwGetKeyName(GLFW_KEY_UNKNOWN, scancode);
+    if (written != nullptr && *written != 0) names.emplace_back(written);
+  }
+  if (place != 0 && (names.empty() || names.front() != std::string(1, place))) {
+    names.emplace_back(1, place);
+  }
+  return names;
+}
+
+std::string meant(const std::vector<std::string>& names,
+                  const std::vector<std::pair<std::string, std::string>>& keys) {
+  const auto same = [](const std::string& a, const std::string& b) {
+    if (a == b) return true;
+    // A protocol may well say "A" where the keyboard says "a".
+    return a.size() == 1 && b.size() == 1 && (a[0] | 0x20) == (b[0] | 0x20) &&
+           (b[0] | 0x20) >= 'a' && (b[0] | 0x20) <= 'z';
+  };
+  for (const std::string& name : names) {
+    const auto found = std::find_if(keys.begin(), keys.end(),
+                                    [&](const auto& entry) { return same(entry.first, name); });
+    if (found != keys.end()) return found->first;
+  }
+  return names.empty() ? std::string() : names.front();
+}
+
+}  // namespace palpate

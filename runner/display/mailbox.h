@@ -1,0 +1,56 @@
+#pragma once
+// Between the session's thread and the display's. The lock is held for a swap of pointers, never
+// while anything is drawn or recorded: a display that stalls keeps nobody waiting.
+
+#include <cstddef>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+
+/// The newest value; older ones that nobody took are dropped.
+template <class T>
+class Mailbox {
+ public:
+  void put(T value) {
+    std::optional<T> old(std::move(value));  // whatever it replaces is freed outside of the lock
+    const std::lock_guard lock(mutex_);
+    newest_.swap(old);
+  }
+  std::optional<T> take() {
+    std::optional<T> out;
+    const std::lock_guard lock(mutex_);
+    out.swap(newest_);
+    return out;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::optional<T> newest_;
+};
+
+/// Every value, in order, up to a bound: a key that is held down must not fill the memory while
+/// nobody listens.
+template <class T>
+class Inbox {
+ public:
+  void add(T value) {
+    const std::lock_guard lock(mutex_);
+    if (values_.size() < kMost) values_.push_back(std::move(value));
+  }
+  std::vector<T> take() {
+    std::vector<T> out;
+    const std::lock_guard lock(mutex_);
+    out.swap(values_);
+    return out;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 10000;
+  std::mutex mutex_;
+  std::vector<T> values_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,77 @@
+#include "runner/display/participant_window.h"
+
+#include <epoxy/gl.h>
+// After epoxy, which replaces the GL headers.
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+
+#include "runner/display/key_names.h"
+#include "runner/display/monitors.h"
+
+namespace palpate {
+
+ParticipantWindow::ParticipantWindow(const WindowSettings& settings)
+    : settings_(settings),
+      window_(make_window(settings.title, monitor(settings.participant_monitor, 2), 1024, 700,
+                          settings.full_screen)) {
+  glfwSetInputMode(window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
+  glGenTextures(1, &texture_);
+  glBindTexture(GL_TEXTURE_2D, texture_);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glGenFramebuffers(1, &frame_);
+}
+
+ParticipantWindow::~ParticipantWindow() {
+  if (window_ != nullptr) glfwDestroyWindow(window_);
+}
+
+void ParticipantWindow::abandon() noexcept {
+  window_ = nullptr;
+  open_.store(false);
+}
+
+bool ParticipantWindow::answers(int key, int scancode) const {
+  const std::string name = meant(key_names(key, scancode), page_.keys);
+  return std::any_of(page_.keys.begin(), page_.keys.end(),
+                     [&](const auto& entry) { return entry.first == name; });
+}
+
+bool ParticipantWindow::press(int key, int scancode) {
+  const std::int64_t now = settings_.clock->now_ns();
+  const std::string name = meant(key_names(key, scancode), page_.keys);
+  if (name.empty()) return false;
+  keys_.add({name, now});
+  return true;
+}
+
+void ParticipantWindow::draw() {
+  if (auto page = pages_.take()) {
+    page_ = std::move(*page);
+    stale_ = true;
+    image_ = {};
+  }
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  if (width <= 0 || height <= 0) return;
+  if (image_.width != width || image_.height != height) {
+    image_ = draw_page(page_, width, height);
+    stale_ = true;
+  }
+  if (stale_) paint(width, height);
+}
+
+void ParticipantWindow::paint(int width, int height) {
+  glfwMakeContextCurrent(window_);
+  glBindTexture(GL_TEXTURE_2D, texture_);
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_BGRA, GL_UNSIGNED_BYTE,
+               image_.pixels.data());
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, frame_);
+  glFramebufferTexture2D(GL_READ_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture_, 0);
+  // Upside down: an image begins at its top, OpenGL at the bottom.
+  glBlitFramebuffer(0, 0, width, height, 0, height, width, 0, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  glfwSwapBuffers(window_);
+  stale_ = false;
+}
+
+}  // namespace palpate

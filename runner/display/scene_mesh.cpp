@@ -1,0 +1,91 @@
+#include "runner/display/scene_mesh.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+constexpr int kSides = 24;
+
+void add(const PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
+  const auto placed = [&](std::uint32_t corner) {
+    return pose.orientation * soup.vertices[corner] + pose.position;
+  };
+  for (const auto& face : soup.faces) {
+    const Vec3 a = placed(face[0]);
+    for (std::size_t i = 2; i < face.size(); ++i) {
+      const Vec3 b = placed(face[i - 1]), c = placed(face[i]);
+      const Vec3 across = glm::cross(b - a, c - a);
+      const double area = glm::length(across);
+      if (!(area > 0)) continue;
+      const glm::vec3 normal(across / area);
+      for (const Vec3& corner : {a, b, c}) out.push_back({glm::vec3(corner), normal});
+    }
+  }
+}
+
+void add(const ObjectSpec& spec, const Pose& parent, DrawnMesh& out) {
+  const Pose pose{parent.orientation * spec.pose.position + parent.position,
+                  parent.orientation * spec.pose.orientation};
+  if (spec.shape == ShapeKind::compound) {
+    for (const ObjectSpec& part : spec.parts) add(part, pose, out);
+  } else {
+    add(polygons_of(spec), pose, out);
+  }
+}
+
+glm::vec3 on_rim(int corner) {
+  const double angle = 2 * M_PI * corner / kSides;
+  return {std::cos(angle), std::sin(angle), 0};
+}
+
+}  // namespace
+
+DrawnMesh drawn(const std::vector<ObjectSpec>& objects) {
+  DrawnMesh out;
+  for (const ObjectSpec& object : objects) add(object, Pose(), out);
+  return out;
+}
+
+DrawnMesh unit_cylinder() {
+  DrawnMesh out;
+  out.reserve(6 * kSides);
+  const glm::vec3 up(0, 0, 1);
+  for (int i = 0; i < kSides; ++i) {
+    const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
+    for (const DrawnCorner& corner :
+         {DrawnCorner{a, a}, {b, b}, {b + up, b}, {a, a}, {b + up, b}, {a + up, a}}) {
+      out.push_back(corner);
+    }
+  }
+  return out;
+}
+
+DrawnMesh unit_cone() {
+  DrawnMesh out;
+  out.reserve(6 * kSides);
+  const glm::vec3 apex(0, 0, 1), down(0, 0, -1);
+  for (int i = 0; i < kSides; ++i) {
+    const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
+    const glm::vec3 normal = glm::normalize(a + b + apex);
+    for (const DrawnCorner& corner : {DrawnCorner{a, normal}, {b, normal}, {apex, normal}}) {
+      out.push_back(corner);
+    }
+    for (const DrawnCorner& corner : {DrawnCorner{b, down}, {a, down}, {glm::vec3(0), down}}) {
+      out.push_back(corner);
+    }
+  }
+  return out;
+}
+
+DrawnMesh unit_ball() {
+  DrawnMesh out;
+  add(icosphere(1, 3), Pose(), out);
+  for (DrawnCorner& corner : out) corner.normal = corner.position;  // smooth
+  return out;
+}
+
+}  // namespace palpate
