@@ -32,6 +32,13 @@ std::span<const ExtremeCase> extreme_cases() {
       {"teleports", "every tick somewhere else, up to 100 km away", kLengthError, teleports},
       {"bad-poses", "NaN, infinities and 1,000 km: no force, the fault bit, recovery",
        "force at or difference after a bad pose, N", bad_poses},
+      {"closed-paths", "round and back within one facet's reach, elastic",
+       "worst work of a cycle, of the energy stored", closed_paths},
+      {"closed-paths-lossy", "the same with friction, with damping, with both",
+       "most work given to the hand in a cycle, of the energy stored", closed_paths_lossy},
+      {"closed-paths-blend",
+       "a stylus that rocks flat on a face, through the blend of equation (2)",
+       "worst work of a cycle, J; allowed: force times rocking", closed_paths_in_the_blend},
   };
   return kCases;
 }

@@ -130,4 +130,9 @@ ExtremeResult starts_inside(const Renderer& renderer);
 ExtremeResult teleports(const Renderer& renderer);
 ExtremeResult bad_poses(const Renderer& renderer);
 
+// By the energy of a way that ends where it began.
+ExtremeResult closed_paths(const Renderer& renderer);
+ExtremeResult closed_paths_lossy(const Renderer& renderer);
+ExtremeResult closed_paths_in_the_blend(const Renderer& renderer);
+
 }  // namespace palpate::extremes
