@@ -19,12 +19,31 @@ struct DeviceCapabilities {
   double workspace_radius = 0;  ///< m about the device's centre, reached in every direction
   double resolution = 0;        ///< m
   bool simulated = false;
+  std::string serial = {};  ///< of the device or devices; empty: none
+  std::string calibration =
+      {};  ///< what is known of its force scale, with its date; empty: nothing
 };
+
+/// What is wrong with a reading.
+enum class DeviceTrouble : std::uint8_t {
+  none,
+  late,  ///< not lost: the last reading again, this tick's did not come in time
+  unplugged,
+  silent,       ///< no reply for too long
+  not_homed,    ///< positions mean nothing
+  implausible,  ///< positions that no hand could have moved to
+  apart,        ///< the ends of the stylus are not its length apart
+  guarded,     ///< the guard process sent zero force: the servo had been silent, or it was asked to
+  guard_lost,  ///< the guard process has ended
+};
+/// In words, with what the experimenter can do; empty for none.
+const char* advice(DeviceTrouble trouble) noexcept;
 
 struct DeviceReading {
   LineProbe stylus;  ///< m, tip and tail
   std::uint8_t buttons = 0;
   bool lost = false;  ///< no reading: unplugged, homing lost
+  DeviceTrouble trouble = DeviceTrouble::none;
 };
 
 class Device {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "rendering/renderer.h"
+#include "runner/device.h"
 
 namespace palpate {
 
@@ -16,6 +17,7 @@ inline constexpr std::uint32_t kTripped = 128;    ///< forces are off until the 
 inline constexpr std::uint32_t kEmergency = 256;  ///< somebody asked for zero force
 inline constexpr std::uint32_t kSamplesLost = 512;  ///< the ring was full: ticks before are missing
 inline constexpr std::uint32_t kStalled = 1024;     ///< the servo's thread gives no more samples
+inline constexpr std::uint32_t kOldReading = 2048;  ///< the device's last reading again
 }  // namespace servo_fault
 
 enum class Phase : std::uint8_t {
@@ -37,6 +39,7 @@ struct Sample {
   Vec3 device1, device2;  ///< N, as commanded after the limits
   std::uint8_t buttons = 0;
   std::uint32_t faults = 0;
+  DeviceTrouble trouble = DeviceTrouble::none;
 };
 
 /// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.

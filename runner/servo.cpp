@@ -91,6 +91,8 @@ void Servo::check(const DeviceReading& reading) noexcept {
     sample_.probe = {workspace_.to_virtual(reading.stylus.tip),
                      workspace_.to_virtual(reading.stylus.tail)};
   }
+  if (reading.trouble == DeviceTrouble::late) sample_.faults |= servo_fault::kOldReading;
+  sample_.trouble = reading.trouble;
   sample_.buttons = reading.buttons;
   if (sample_.phase == Phase::feeling && late_in_a_row_ >= kMissedInARow) {
     sample_.faults |= servo_fault::kMissedTicks;

@@ -1,0 +1,49 @@
+#include "runner/devices/registry.h"
+
+#include <stdexcept>
+
+#include "runner/devices/mouse.h"
+#include "runner/devices/simulated.h"
+
+namespace palpate {
+namespace {
+
+std::vector<ConnectedDevice> always_there() { return {{}}; }
+
+/// Held by a hand that keeps it behind the workspace.
+std::unique_ptr<Device> open_simulated(const DeviceOrder& order) {
+  auto stylus =
+      std::make_unique<SimulatedStylus>(SimulatedDeviceSettings{}, HandImpedance{},
+                                        order.stylus_length, order.stylus_grip, 1 / order.rate);
+  HandTarget target;
+  target.grip = {0, -0.1, order.stylus_grip};
+  stylus->reset(target);
+  return stylus;
+}
+
+std::unique_ptr<Device> open_mouse(const DeviceOrder& order) {
+  return std::make_unique<MouseStylus>(order.stylus_length, order.rate);
+}
+
+constexpr DeviceKind kKinds[] = {
+    {"mouse", "the pointer moves a stylus in the window; contact is seen, nothing is felt", false,
+     always_there, open_mouse},
+    {"simulated", "a stylus held by two simulated devices and a simulated hand", false,
+     always_there, open_simulated},
+};
+
+}  // namespace
+
+std::span<const DeviceKind> device_kinds() { return kKinds; }
+
+const DeviceKind& device_kind(const std::string& name) {
+  std::string known;
+  for (const DeviceKind& kind : kKinds) {
+    if (name == kind.name) return kind;
+    if (!known.empty()) known += ", ";
+    known += kind.name;
+  }
+  throw std::invalid_argument("no device '" + name + "'; there are: " + known);
+}
+
+}  // namespace palpate
