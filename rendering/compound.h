@@ -150,7 +150,7 @@ struct Compound {
       bool let_go = false;
       for (const std::uint32_t index : group) {
         if (!holds(index)) continue;
-        tick.touch(index, shift_of_siblings(index));
+        tick.template touch<true>(index, shift_of_siblings(index));
         let_go |= !holds(index);
       }
       if (!let_go || !meet(&tick.probe)) break;

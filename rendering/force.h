@@ -73,7 +73,8 @@ struct Loads {
 /// \tparam kSegment   false: a point, which has no lever; torque and device 2 are left at zero
 /// \tparam kFriction  false: no contact lags
 template <bool kSegment, bool kFriction, std::size_t kCount>
-Loads sum_loads(std::span<LoadedContact, kCount> contacts, const LineProbe& probe) {
+[[gnu::always_inline]] inline Loads sum_loads(std::span<const LoadedContact, kCount> contacts,
+                                              const LineProbe& probe) {
   Loads loads;
   for (const auto& c : contacts) {
     Vec3 force = c.force * c.contact.normal;

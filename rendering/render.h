@@ -53,11 +53,37 @@ void feel(const Scene& scene, RenderState& state, const LineProbe& probe,
   }
 }
 
+/// No contact.
+inline Rendering nothing(const LineProbe& ideal, std::uint32_t faults) {
+  Rendering none;
+  none.ideal = ideal;
+  none.faults = faults;
+  return none;
+}
+
+/// What goes out, unless it is not finite.
+/// \param shift  m, of the ideal probe, by what moves it at the deepest contact
+template <class Probe>
+[[gnu::always_inline]] inline Rendering give(const Tick<Probe>& tick, const Loads& loads,
+                                             const LoadedContact& deepest, const Vec3& shift,
+                                             std::size_t contacts) {
+  const Vec3 all = loads.force + loads.torque;
+  if (!std::isfinite(all.x + all.y + all.z))
+    return nothing(tick.probe, tick.faults | render_fault::kNonFinite);
+  return {.force = loads.force,
+          .torque = loads.torque,
+          .device1 = loads.device1,
+          .device2 = loads.device2,
+          .deepest = deepest.contact,
+          .ideal = {tick.probe.tip + shift, tick.probe.tail + shift},
+          .contacts = static_cast<int>(contacts),
+          .object = deepest.object,
+          .faults = tick.faults};
+}
+
 /// Where the ideal probe is, and the sum of all forces.
-/// \tparam kCount  how many contacts, where that is known beforehand: then no loop remains
-template <class Probe, bool kFriction, std::size_t kCount>
-Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> contacts) {
-  const LineProbe& probe = tick.probe;
+template <class Probe, bool kFriction>
+Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact> contacts) {
   std::size_t deepest = 0;
   Vec3 deepest_shift(0);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -66,47 +92,31 @@ Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact, kCount> conta
     for (const auto& c : contacts) {
       if (c.object == contacts[i].object) shift += c.share * c.contact.normal;
     }
-    Contact& contact = contacts[i].contact;
-    if constexpr (kCount != 1)
-      tick.state.parts[contacts[i].part].share = contacts[i].share * contact.normal;
-    contact.point = probe.tip;
-    if constexpr (Probe::kSegment) {
-      contact.along = contacts[i].place * tick.length;
-      contact.point += contacts[i].place * (probe.tail - probe.tip);
-    }
-    contact.point += shift;
-    if constexpr (kFriction) {
-      shift += contacts[i].lag;
-      contact.point += contacts[i].lag;
-    }
-    if (i == 0 || contact.depth > contacts[deepest].contact.depth) {
+    tick.state.parts[contacts[i].part].share = contacts[i].share * contacts[i].contact.normal;
+    shift = tick.template place<kFriction>(contacts[i], shift);
+    if (i == 0 || contacts[i].contact.depth > contacts[deepest].contact.depth) {
       deepest = i;
       deepest_shift = shift;
     }
   }
-  const Loads loads = sum_loads<Probe::kSegment, kFriction>(contacts, probe);
-  const Vec3 all = loads.force + loads.torque;
-  if (!std::isfinite(all.x + all.y + all.z)) {
-    Rendering none;
-    none.ideal = probe;
-    none.faults = tick.faults | render_fault::kNonFinite;
-    return none;
-  }
-  return {.force = loads.force,
-          .torque = loads.torque,
-          .device1 = loads.device1,
-          .device2 = loads.device2,
-          .deepest = contacts[deepest].contact,
-          .ideal = {probe.tip + deepest_shift, probe.tail + deepest_shift},
-          .contacts = static_cast<int>(contacts.size()),
-          .object = contacts[deepest].object,
-          .faults = tick.faults};
+  const Loads loads =
+      sum_loads<Probe::kSegment, kFriction>(std::span<const LoadedContact>(contacts), tick.probe);
+  return give(tick, loads, contacts[deepest], deepest_shift, contacts.size());
 }
 
-/// All parts in reach: their contacts into state.contacts.
+/// The same of one contact.
+template <class Probe, bool kFriction>
+[[gnu::always_inline]] inline Rendering add_up(const Tick<Probe>& tick, LoadedContact& contact) {
+  const Vec3 shift =
+      tick.template place<kFriction>(contact, contact.share * contact.contact.normal);
+  const Loads loads = sum_loads<Probe::kSegment, kFriction>(
+      std::span<const LoadedContact, 1>(&contact, 1), tick.probe);
+  return give(tick, loads, contact, shift, 1);
+}
+
+/// All parts on the list of those in reach: their contacts into state.contacts.
 template <class Probe>
-void touch_parts(Tick<Probe>& tick) {
-  survey(tick.scene, tick.state, tick.probe);
+void touch_listed(Tick<Probe>& tick) {
   tick.state.contacts.clear();
   const std::span<const std::uint32_t> near(tick.state.near_parts);
   for (std::size_t begin = 0, end = 0; begin < near.size(); begin = end) {
@@ -114,7 +124,8 @@ void touch_parts(Tick<Probe>& tick) {
     for (end = begin + 1; end < near.size() && tick.scene.parts()[near[end]].object == object;)
       ++end;
     if (end - begin == 1) {
-      tick.touch(near[begin], Vec3(0));
+      tick.state.parts[near[begin]].yielded = Vec3(0);
+      tick.template touch<false>(near[begin], Vec3(0));
     } else {
       Compound<Probe>{tick, near.subspan(begin, end - begin)}.touch();
     }
@@ -123,50 +134,47 @@ void touch_parts(Tick<Probe>& tick) {
 
 /// A tick that does what kNeeds says and no more.
 template <class Probe, Needs kNeeds>
-Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe, double dt) {
-  Rendering none;
-  if (!plausible(probe.tip) || !plausible(probe.tail)) {
-    none.ideal = state.last;
-    none.faults = render_fault::kNonFinite;
-    return none;
-  }
+Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) noexcept {
+  if (!plausible(probe.tip) || !plausible(probe.tail))
+    return nothing(state.last, render_fault::kNonFinite);
   Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
-  const auto feel_all = [&](auto contacts) {
-    load(contacts);
+  const auto feel_all = [&](std::span<LoadedContact> contacts) {
     if constexpr (!kNeeds.plain_springs())
       feel<kNeeds>(scene, state, probe, contacts, dt > 0 ? 1 / dt : 0);
     state.last = probe;
     state.has_last = true;
   };
   if constexpr (kNeeds.several_parts) {
-    touch_parts(tick);
+    survey(scene, state, probe);
+    touch_listed(tick);
     const std::span<LoadedContact> contacts(state.contacts);
+    load(contacts);
     feel_all(contacts);
     if (!contacts.empty()) return add_up<Probe, kNeeds.friction>(tick, contacts);
   } else {
     LoadedContact contact;
-    const bool touching = tick.contact(0, Vec3(0), contact);
-    const std::span<LoadedContact, 1> contacts(&contact, 1);
-    if (touching) {
+    if (tick.template contact<false>(0, Vec3(0), contact)) {
+      const std::span<LoadedContact, 1> contacts(&contact, 1);
+      load(contacts);
       feel_all(contacts);
-      return add_up<Probe, kNeeds.friction>(tick, contacts);
+      return add_up<Probe, kNeeds.friction>(tick, contact);
     }
-    feel_all(std::span<LoadedContact, 0>());
+    feel_all({});
   }
-  none.ideal = probe;
-  none.faults = tick.faults;
-  return none;
+  return nothing(probe, tick.faults);
 }
 
 /// The least tick that shows the scene.
 template <class Probe>
-Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe, double dt) {
-  using Run = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double);
+Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) noexcept {
+  using Run = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
   static constexpr auto kTicks = []<std::size_t... i>(std::index_sequence<i...>) {
     return std::array<Run, Needs::kCount>{&render<Probe, Needs::of(i)>...};
   }
   (std::make_index_sequence<Needs::kCount>());
-  return kTicks[scene.needs().index()](scene, state, probe, dt);
+  return kTicks[scene.needs_index()](scene, state, probe, dt);
 }
 
 }  // namespace palpate::tick

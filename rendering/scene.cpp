@@ -19,6 +19,7 @@ double distance_to_segment(const Vec3& p, const LineProbe& probe) {
 }  // namespace
 
 Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
+  Needs needs;
   parts_.reserve(objects.size());
   for (auto& object : objects) {
     if (!object.mesh) throw std::invalid_argument("a scene's object has no mesh");
@@ -33,28 +34,26 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
     part.tolerance = 1e-12 * part.mesh->size() +
                      8 * std::numeric_limits<double>::epsilon() * glm::length(part.sphere_centre);
     part.material = object.material;
-    needs_.damping |= part.material.damping != 0;
-    needs_.friction |= part.material.has_friction();
-    needs_.layers |= !part.material.layers.empty();
+    needs.damping |= part.material.damping != 0;
+    needs.friction |= part.material.has_friction();
+    needs.layers |= !part.material.layers.empty();
     part.object = object.object;
     parts_.push_back(std::move(part));
   }
-  needs_.several_parts = parts_.size() != 1;
+  needs.several_parts = parts_.size() != 1;
+  needs_index_ = needs.index();
 }
 
 RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
-  if (!needs_.several_parts) state.near_parts.push_back(0);  // and stays: one part is not surveyed
+  if (!needs().several_parts) state.near_parts.push_back(0);  // and stays: one part is not surveyed
   state.contacts.reserve(std::min(parts_.size(), kMaxContacts));
   return state;
 }
 
-void survey(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  const Vec3 tip_way = probe.tip - state.surveyed.tip, tail_way = probe.tail - state.surveyed.tail;
-  const double moved2 = std::max(glm::dot(tip_way, tip_way), glm::dot(tail_way, tail_way));
-  if (moved2 < state.clearance * state.clearance) return;
+void list_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
   // How far the probe came in this tick: what it may have passed on the way counts as near.
   const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
                                                 glm::length(probe.tail - state.last.tail))

@@ -76,8 +76,9 @@ struct SegmentProbe {
   }
 
   /// Type of the contact and its place along the probe. Frame of the mesh.
-  static void describe(const ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
-                       const Vec3& d, double length, LoadedContact& c) {
+  [[gnu::always_inline]] static void describe(const ConvexMesh& mesh, const WalkResult& hit,
+                                              const Vec3& tip, const Vec3& d, double length,
+                                              LoadedContact& c) {
     const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
     c.contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
     c.place = hit.place;

@@ -39,12 +39,17 @@ WalkResult same_facet(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& 
   return same_facet_point(mesh, start, tip);
 }
 
-/// The probe, translated by `shift` in the world, in the frame of the part's mesh.
+/// The probe in the frame of the part's mesh.
 template <class Probe>
-[[gnu::always_inline]] inline LineProbe to_local(const ScenePart& part, const LineProbe& probe,
-                                                 const Vec3& shift) {
-  const Vec3 tip = part.local_point(probe.tip + shift);
-  return {tip, Probe::kSegment ? part.local_point(probe.tail + shift) : tip};
+[[gnu::always_inline]] inline LineProbe to_local(const ScenePart& part, const LineProbe& probe) {
+  const Vec3 tip = part.local_point(probe.tip);
+  return {tip, Probe::kSegment ? part.local_point(probe.tail) : tip};
+}
+
+/// The same, translated by `shift` in the world.
+template <class Probe>
+LineProbe to_local(const ScenePart& part, const LineProbe& probe, const Vec3& shift) {
+  return to_local<Probe>(part, {probe.tip + shift, probe.tail + shift});
 }
 
 /// A facet of M near the probe to watch it from, outside of the object: the one of an earlier tick,
@@ -212,29 +217,50 @@ struct Tick {
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
   /// Follows one part. True when it is in contact; then that is filled in.
-  /// \param shift  m, world: what the part's siblings move the ideal probe by
+  /// \tparam kShares  whether siblings of the part move the ideal probe by `shift` (m, world)
+  template <bool kShares>
   [[gnu::always_inline]] bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
-    const LineProbe local = to_local<Probe>(part, probe, shift);
+    const LineProbe local =
+        kShares ? to_local<Probe>(part, probe, shift) : to_local<Probe>(part, probe);
     WalkResult hit;
     const bool touching = track<Probe>(part, memory, last(), local, hit, faults);
-    memory.yielded = shift;
+    if constexpr (kShares) memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
     if (!touching) return false;
     c.part = index;
     Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c);
     c.contact.normal = part.world_vector(hit.normal);
-    c.contact.depth = hit.depth + glm::dot(c.contact.normal, shift);
+    c.contact.depth = hit.depth;
+    if constexpr (kShares) c.contact.depth += glm::dot(c.contact.normal, shift);
     c.stiffness = part.material.stiffness;
     c.object = part.object;
     return true;
   }
 
+  /// Where a loaded contact stands: on the ideal probe.
+  /// \param shift  m, of the ideal probe, without its lag by friction. \return with it
+  template <bool kFriction>
+  Vec3 place(LoadedContact& c, Vec3 shift) const {
+    c.contact.point = probe.tip;
+    if constexpr (Probe::kSegment) {
+      c.contact.along = c.place * length;
+      c.contact.point += c.place * (probe.tail - probe.tip);
+    }
+    c.contact.point += shift;
+    if constexpr (kFriction) {
+      shift += c.lag;
+      c.contact.point += c.lag;
+    }
+    return shift;
+  }
+
   /// Follows one part and adds its contact, if there is one, to the tick's.
+  template <bool kShares>
   void touch(std::uint32_t index, const Vec3& shift) {
     LoadedContact found;
-    if (!contact(index, shift, found)) return;
+    if (!contact<kShares>(index, shift, found)) return;
     if (state.contacts.size() == kMaxContacts) {
       faults |= render_fault::kContactsDropped;
       return;

@@ -1,0 +1,215 @@
+// One configuration of the tick over a fixed path, for callgrind to count the instructions of.
+// feature_cost.py runs pairs of them.
+//
+// Usage: feature_cost CASE TICKS, or feature_cost --list
+
+#include <charconv>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rendering/point_probe.h"
+#include "rendering/render.h"
+#include "rendering/segment_probe.h"
+#include "rendering/stroking_hand.h"
+#include "stimuli/primitives.h"
+#include "tests/bench/least_tick.h"
+#include "tests/bench/measured_tick.h"
+
+namespace palpate::bench {
+namespace {
+
+using tick::PointProbe;
+using tick::SegmentProbe;
+using Tick = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
+
+/// A renderer that is one given tick and no other.
+class Only final : public Renderer {
+ public:
+  explicit Only(Tick chosen) : tick_(chosen) {}
+  const char* name() const override { return "only"; }
+  bool side_contact() const override { return true; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    return tick_(scene, state, probe, dt);
+  }
+
+ private:
+  Tick tick_;
+};
+
+/// Two parts or more that are all in reach all the time: no survey.
+template <class Probe>
+Rendering without_survey(const Scene& scene, RenderState& state, const LineProbe& probe,
+                         double) noexcept {
+  tick::Tick<Probe> under_way{scene, state, probe,
+                              Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
+  if (!tick::plausible(probe.tip) || !tick::plausible(probe.tail))
+    return tick::nothing(state.last, render_fault::kNonFinite);
+  tick::touch_listed(under_way);
+  const std::span<LoadedContact> contacts(state.contacts);
+  load(contacts);
+  state.last = probe;
+  state.has_last = true;
+  if (!contacts.empty()) return tick::add_up<Probe, false>(under_way, contacts);
+  return tick::nothing(probe, under_way.faults);
+}
+
+/// A scene as a trial would make it.
+struct World {
+  PolygonSoup shape = icosphere(0.03, 0);
+  Material material;
+  int near = 1;         ///< objects side by side, all in reach
+  int far = 0;          ///< objects that are never in reach
+  bool forced = false;  ///< trees and map although the mesh is small
+  bool side_contact = true;
+
+  Scene build() const {
+    const auto mesh = std::make_shared<const ConvexMesh>(shape);
+    const std::size_t scanned = forced ? 0 : ContactTrees::kScan;
+    const auto trees = std::make_shared<const ContactTrees>(*mesh, side_contact, scanned);
+    std::vector<SceneObject> objects;
+    for (int i = 0; i < near + far; ++i) {
+      Pose pose;
+      // Apart from each other: one is touched, the others are near.
+      pose.position.x = i < near ? 0.061 * i : 0.15 + 0.07 * i;
+      objects.push_back({mesh, pose, material, i, trees});
+    }
+    return Scene(std::move(objects), side_contact);
+  }
+};
+
+struct Case {
+  std::string name;
+  World world;
+  bool ray = true;
+  Tick pipeline = nullptr;  ///< null: the renderer as shipped
+};
+
+const Renderer& shipped(bool ray) { return ray ? ray_renderer() : point_renderer(); }
+
+/// A hand that strokes the first object and lifts off a third of the time, as the shipped renderer
+/// leads it: so the path is the same for both cases of a pair.
+std::vector<LineProbe> path_over(const Scene& scene, bool ray, std::size_t ticks) {
+  StrokeSettings settings;
+  settings.centre = scene.parts()[0].sphere_centre;
+  settings.radius = scene.parts()[0].sphere_radius;
+  settings.side = ray;
+  settings.lifted = 0.3;
+  settings.lift_period = 250;
+  StrokingHand hand(settings);
+  RenderState state = scene.initial_state();
+  std::vector<LineProbe> poses;
+  poses.reserve(ticks);
+  double depth = 0;
+  for (std::size_t i = 0; i < ticks; ++i) {
+    poses.push_back(hand.next(depth));
+    depth = shipped(ray).tick(scene, state, poses.back(), 1e-3).deepest.depth;
+  }
+  return poses;
+}
+
+Material with(double damping, double friction, bool layers) {
+  Material material;
+  material.damping = damping;
+  material.friction_static = material.friction_dynamic = friction;
+  if (layers) material.layers = {{0.0005, 400}, {0.001, 1200}};
+  return material;
+}
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const bool ray : {false, true}) {
+    const std::string probe = ray ? "ray" : "point";
+    const auto add = [&](const std::string& name, const World& world, Tick pipeline = nullptr) {
+      all.push_back({probe + '-' + name, world, ray, pipeline});
+      all.back().world.side_contact = ray;
+    };
+    const auto pick = [&](Tick of_ray, Tick of_point) { return ray ? of_ray : of_point; };
+    World plain, near, far, forced, large;
+    near.near = 2;
+    far.near = 2;
+    far.far = 1000;
+    forced.forced = true;
+    large.shape = icosphere(0.03, 4);
+    add("plain", plain);
+    add("plain-least", plain, pick(&least_tick<SegmentProbe>, &least_tick<PointProbe>));
+    add("large", large);
+    add("forced-trees", forced);
+    add("near", near);
+    add("near-without-survey", near,
+        pick(&without_survey<SegmentProbe>, &without_survey<PointProbe>));
+    add("far", far);
+    World damped = plain, rough = plain, layered = plain;
+    damped.material = with(2, 0, false);
+    rough.material = with(0, 0.3, false);
+    layered.material = with(0, 0, true);
+    add("damping", damped);
+    add("friction", rough);
+    add("layers", layered);
+    // All but one, and a tick in which the one is not even compiled.
+    constexpr Needs kNoDamping{.friction = true, .layers = true},
+        kNoFriction{.damping = true, .layers = true}, kNoLayers{.damping = true, .friction = true};
+    World no_damping = plain, no_friction = plain, no_layers = plain;
+    no_damping.material = with(0, 0.3, true);
+    no_friction.material = with(2, 0, true);
+    no_layers.material = with(2, 0.3, false);
+    add("all-but-damping", no_damping);
+    add("all-but-damping-least", no_damping,
+        pick(&tick::render<SegmentProbe, kNoDamping>, &tick::render<PointProbe, kNoDamping>));
+    add("all-but-friction", no_friction);
+    add("all-but-friction-least", no_friction,
+        pick(&tick::render<SegmentProbe, kNoFriction>, &tick::render<PointProbe, kNoFriction>));
+    add("all-but-layers", no_layers);
+    add("all-but-layers-least", no_layers,
+        pick(&tick::render<SegmentProbe, kNoLayers>, &tick::render<PointProbe, kNoLayers>));
+  }
+  return all;
+}
+
+double run(const Case& chosen, std::size_t ticks) {
+  constexpr std::size_t kApproach = 400;  // ticks until the hand has arrived
+  const Scene scene = chosen.world.build();
+  const auto poses = path_over(scene, chosen.ray, kApproach + ticks);
+  const Only only(chosen.pipeline);
+  const Renderer& renderer = chosen.pipeline ? only : shipped(chosen.ray);
+  RenderState state = scene.initial_state();
+  // The trial begins near the first two objects; not all pipelines take a survey later.
+  const LineProbe between{{0.03, 0, 0}, {0.03, 0, 0}};
+  if (scene.needs().several_parts) survey(scene, state, between);
+  for (std::size_t i = 0; i < kApproach; ++i) renderer.tick(scene, state, poses[i], 1e-3);
+  double total = 0;
+  for (std::size_t i = kApproach; i < poses.size(); ++i)
+    total += measured_tick(renderer, scene, state, poses[i]);
+  return total;
+}
+
+int main_with(int argc, char** argv) {
+  const std::vector<Case> all = cases();
+  if (argc == 2 && std::strcmp(argv[1], "--list") == 0) {
+    for (const Case& c : all) std::printf("%s\n", c.name.c_str());
+    return 0;
+  }
+  std::size_t ticks = 0;
+  if (argc != 3 ||
+      std::from_chars(argv[2], argv[2] + std::strlen(argv[2]), ticks).ec != std::errc{}) {
+    std::fprintf(stderr, "usage: feature_cost CASE TICKS | --list\n");
+    return 2;
+  }
+  for (const Case& c : all) {
+    if (c.name != argv[1]) continue;
+    // The forces themselves must be the same in both cases of a pair.
+    std::printf("%.17g\n", run(c, ticks));
+    return 0;
+  }
+  std::fprintf(stderr, "feature_cost: no case '%s'\n", argv[1]);
+  return 2;
+}
+
+}  // namespace
+}  // namespace palpate::bench
+
+int main(int argc, char** argv) { return palpate::bench::main_with(argc, argv); }
