@@ -4,12 +4,11 @@
 
 namespace palpate::falcon {
 
-FalconDevice::FalconDevice(std::unique_ptr<Transport> transport, const ArmSettings& settings)
-    : arm_(std::move(transport), settings) {
+FalconDevice::FalconDevice(std::unique_ptr<FalconArm> arm) : arm_(std::move(arm)) {
   capabilities_ = {"falcon",
                    3,
                    3,
-                   sure_force(settings.counts_per_torque),
+                   sure_force(arm_->counts_per_torque()),
                    kMaxStiffness,
                    kMaxRate,
                    kWorkspaceRadius,
@@ -18,12 +17,12 @@ FalconDevice::FalconDevice(std::unique_ptr<Transport> transport, const ArmSettin
 }
 
 DeviceReading FalconDevice::read() noexcept {
-  const ArmReading& at = arm_.update();
+  const ArmReading& at = arm_->update();
   return {{at.position, at.position}, at.buttons, at.trouble != ArmTrouble::none};
 }
 
 void FalconDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
-  arm_.push(device1 + device2);
+  arm_->push(device1 + device2);
 }
 
 }  // namespace palpate::falcon

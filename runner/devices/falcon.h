@@ -10,7 +10,7 @@ namespace palpate::falcon {
 
 class FalconDevice final : public Device {
  public:
-  FalconDevice(std::unique_ptr<Transport> transport, const ArmSettings& settings);
+  explicit FalconDevice(std::unique_ptr<FalconArm> arm);
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Tip and tail are both the grip: the device senses no axis.
@@ -18,10 +18,10 @@ class FalconDevice final : public Device {
   /// Both forces pull at the one grip.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
-  FalconArm& arm() { return arm_; }
+  FalconArm& arm() { return *arm_; }
 
  private:
-  FalconArm arm_;
+  std::unique_ptr<FalconArm> arm_;
   DeviceCapabilities capabilities_;
 };
 

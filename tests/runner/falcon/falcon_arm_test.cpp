@@ -252,7 +252,7 @@ TEST(FalconDevice, SensesThreeDegreesOfFreedom) {
   auto transport = std::make_unique<FakeTransport>(emulator);
   FakeTransport& line = *transport;
   line.control(request::kLatency, 1);
-  FalconDevice device(std::move(transport), {});
+  FalconDevice device(std::make_unique<FalconArm>(std::move(transport), ArmSettings{}));
   EXPECT_EQ(device.capabilities().name, "falcon");
   EXPECT_EQ(device.capabilities().sensed_freedom, 3);
   EXPECT_GT(device.capabilities().max_force, 2);
