@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "runner/display/window.h"
 
 struct GLFWmonitor;
@@ -7,13 +9,22 @@ struct GLFWwindow;
 
 namespace palpate {
 
-/// \param number  from 1; 0: `otherwise`, or the first where there are not so many
-/// \throws DisplayError for a number that is asked for and not connected
-GLFWmonitor* monitor(int number, int otherwise);
+/// Where a window goes, px of the desktop.
+struct Place {
+  GLFWmonitor* full_screen_on = nullptr;  ///< none: a window with a frame
+  int left = 0, top = 0, width = 0, height = 0;
+};
 
-/// A hidden window with an OpenGL 3.3 context, centred on the monitor. \throws DisplayError
-GLFWwindow* make_window(const std::string& title, GLFWmonitor* on, int width, int height,
-                        bool full_screen);
+struct Places {
+  Place participant, console;
+};
+
+/// Each on its monitor; on one and the same, side by side.
+/// \throws DisplayError for a monitor that is asked for and not connected
+Places place_windows(const WindowSettings& settings);
+
+/// A hidden window with an OpenGL 3.3 context, made current. \throws DisplayError
+GLFWwindow* make_window(const std::string& title, const Place& place);
 
 /// What GLFW says of its latest failure.
 std::string glfw_reason();

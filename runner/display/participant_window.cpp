@@ -7,14 +7,11 @@
 #include <algorithm>
 
 #include "runner/display/key_names.h"
-#include "runner/display/monitors.h"
 
 namespace palpate {
 
-ParticipantWindow::ParticipantWindow(const WindowSettings& settings)
-    : settings_(settings),
-      window_(make_window(settings.title, monitor(settings.participant_monitor, 2), 1024, 700,
-                          settings.full_screen)) {
+ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place& place)
+    : settings_(settings), window_(make_window(settings.title, place)) {
   glfwSetInputMode(window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);

@@ -3,6 +3,7 @@
 #include <atomic>
 
 #include "runner/display/mailbox.h"
+#include "runner/display/monitors.h"
 #include "runner/display/page_layout.h"
 #include "runner/display/window.h"
 
@@ -14,7 +15,7 @@ namespace palpate {
 class ParticipantWindow final : public ParticipantScreen {
  public:
   /// \throws DisplayError
-  explicit ParticipantWindow(const WindowSettings& settings);
+  ParticipantWindow(const WindowSettings& settings, const Place& place);
   ParticipantWindow(const ParticipantWindow&) = delete;
   ParticipantWindow& operator=(const ParticipantWindow&) = delete;
   ~ParticipantWindow() override;

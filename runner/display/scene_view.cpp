@@ -23,10 +23,10 @@ constexpr glm::vec4 kForce{0.97F, 0.78F, 0.26F, 1};
 constexpr glm::vec4 kContact{0.95F, 0.35F, 0.30F, 1};
 constexpr glm::vec4 kGrid{0.20F, 0.23F, 0.26F, 1};
 
-constexpr double kThin = 0.0013;       // m, radius of the stylus
+constexpr double kThin = 0.0018;       // m, radius of the stylus
 constexpr double kGridEdge = 0.15;     // m, from the centre
 constexpr double kGridHeight = -0.08;  // m
-constexpr double kMetresPerNewton = 0.02;
+constexpr double kMetresPerNewton = 0.012;
 constexpr double kLongestArrow = 0.15;  // m
 
 constexpr const char* kVertexShader = R"(#version 330 core
@@ -50,8 +50,8 @@ void main() {
   vec3 n = normalize(outward);
   vec3 to_eye = normalize(eye - at);
   vec3 lamp = normalize(to_eye + vec3(-0.5, 0.9, 0.2));
-  float sky = 0.30 + 0.14 * n.y;
-  float lit = 0.62 * max(dot(n, lamp), 0.0);
+  float sky = 0.38 + 0.14 * n.y;
+  float lit = 0.56 * max(dot(n, lamp), 0.0);
   float shine = 0.16 * pow(max(dot(n, normalize(lamp + to_eye)), 0.0), 30.0);
   result = vec4(colour.rgb * (sky + lit) + vec3(shine), colour.a);
 })";

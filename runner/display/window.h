@@ -27,6 +27,7 @@ struct WindowSettings {
   /// command follows through commands().
   std::function<void()> emergency;
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; may be none
+  WorkspaceMap workspace;        ///< of the servo, for the mouse
   Clock* clock = nullptr;        ///< stamps keys and commands; required; must outlive the windows
 };
 

@@ -1,0 +1,149 @@
+#include "runner/display/console_view.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+
+#include "runner/display/console_panels.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kForceSpan = 10;  // s, shown in the plot
+constexpr double kSilence = 1;     // s without news before the console says so
+
+}  // namespace
+
+ConsoleView::ConsoleView(const WindowSettings& settings) {
+  if (settings.mouse != nullptr) hand_.emplace(*settings.mouse, settings.workspace);
+}
+
+void ConsoleView::take(ConsoleState state, double now) {
+  state_ = std::move(state);
+  came_ = now;
+  any_ = true;
+  const double time = static_cast<double>(state_.sample.time_ns) * 1e-9;
+  const double force = glm::length(state_.sample.device1 + state_.sample.device2);
+  if (!forces_.empty() && time < forces_.back().time) forces_.clear();
+  forces_.push_back({time, std::isfinite(force) ? force : 0});
+  while (forces_.front().time < time - kForceSpan) forces_.pop_front();
+}
+
+std::optional<std::string> ConsoleView::note() {
+  std::optional<std::string> out;
+  out.swap(note_);
+  return out;
+}
+
+std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now) {
+  std::vector<ConsoleCommand::Kind> asked;
+  const ImGuiViewport* const all = ImGui::GetMainViewport();
+  ImGui::SetNextWindowPos(all->WorkPos);
+  ImGui::SetNextWindowSize(all->WorkSize);
+  ImGui::Begin("console", nullptr,
+               ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                   ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
+  const float font = ImGui::GetFontSize();
+  const float gap = ImGui::GetStyle().ItemSpacing.x;
+  const ImVec2 room = ImGui::GetContentRegionAvail();
+  const float side = std::clamp(0.36F * room.x, 22 * font, 30 * font);
+  const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
+
+  ImGui::BeginChild("picture", {room.x - side - gap, 0}, false, ImGuiWindowFlags_NoScrollbar);
+  draw_view();
+  const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
+  draw_forces(forces_, half, plots);
+  ImGui::SameLine();
+  draw_times(state_.times, half, plots);
+  ImGui::EndChild();
+  ImGui::SameLine();
+  ImGui::BeginChild("side", {0, 0});
+  draw_side(now, asked);
+  ImGui::EndChild();
+  ImGui::End();
+  return asked;
+}
+
+void ConsoleView::draw_view() {
+  const float font = ImGui::GetFontSize();
+  const ImVec2 room = ImGui::GetContentRegionAvail();
+  const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
+  const float width = std::max(room.x, 40.0F);
+  const float height = std::max(room.y - plots - ImGui::GetStyle().ItemSpacing.y, 40.0F);
+  camera_.resize(width, height);
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+  const unsigned texture =
+      scene_.draw(state_.objects, state_.sample, camera_, static_cast<int>(width * scale.x),
+                  static_cast<int>(height * scale.y));
+  // OpenGL's pictures begin at the bottom.
+  ImGui::GetWindowDrawList()->AddImageRounded(
+      reinterpret_cast<ImTextureID>(std::uintptr_t{texture}), at, {at.x + width, at.y + height},
+      {0, 1}, {1, 0}, IM_COL32_WHITE, 6);
+  ImGui::InvisibleButton("view", {width, height},
+                         ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  const ImGuiIO& io = ImGui::GetIO();
+  PointerMotion pointer;
+  pointer.over = ImGui::IsItemHovered() || ImGui::IsItemActive();
+  pointer.at = {io.MousePos.x - at.x, io.MousePos.y - at.y};
+  pointer.moved = {io.MouseDelta.x, io.MouseDelta.y};
+  pointer.wheel = ImGui::IsItemHovered() ? io.MouseWheel : 0;
+  pointer.orbit = ImGui::IsItemActive() && (ImGui::IsMouseDown(ImGuiMouseButton_Right) ||
+                                            (!hand_ && ImGui::IsMouseDown(ImGuiMouseButton_Left)));
+  pointer.turn = io.KeyCtrl || (ImGui::IsItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left));
+  pointer.reach = io.KeyShift;
+  if (pointer.orbit) camera_.orbit(-0.008F * pointer.moved.x, 0.008F * pointer.moved.y);
+  if (hand_) hand_->step(pointer, camera_);
+
+  const auto label = [&](float line, const std::string& words, ImU32 colour) {
+    ImGui::GetWindowDrawList()->AddText({at.x + 0.8F * font, at.y + (0.6F + 1.4F * line) * font},
+                                        colour, words.c_str());
+  };
+  if (!scene_.trouble().empty()) label(0, scene_.trouble(), IM_COL32(247, 117, 102, 255));
+  const char* const help =
+      hand_ ? "pointer: move the tip     wheel or Shift: to and fro     Ctrl or left button: turn"
+              "     right button: look around"
+            : "drag: look around";
+  label((height / font - 2.1F) / 1.4F, help, IM_COL32(150, 158, 168, 255));
+}
+
+void ConsoleView::draw_side(double now, std::vector<ConsoleCommand::Kind>& asked) {
+  draw_emergency(state_, asked);
+  draw_status(state_);
+  if (any_ && now - came_ > kSilence) {
+    ImGui::TextColored({0.97F, 0.46F, 0.40F, 1}, "No news from the session for %.0f s",
+                       now - came_);
+  }
+  draw_buttons(state_, asked);
+  ImGui::Dummy({0, 2});
+  draw_health(state_);
+  ImGui::Dummy({0, 2});
+  draw_notes();
+}
+
+void ConsoleView::draw_notes() {
+  const float field = ImGui::GetFrameHeightWithSpacing();
+  const float room = std::max(ImGui::GetContentRegionAvail().y - field, 5 * ImGui::GetFontSize());
+  ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
+  ImGui::BeginChild("messages", {0, room}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
+  ImGui::PushTextWrapPos(0);
+  for (const std::string& message : state_.messages) {
+    ImGui::TextUnformatted(message.c_str(), message.c_str() + message.size());
+  }
+  ImGui::PopTextWrapPos();
+  if (state_.messages.size() != messages_seen_) ImGui::SetScrollHereY(1);
+  messages_seen_ = state_.messages.size();
+  ImGui::EndChild();
+  ImGui::PopStyleColor();
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::InputTextWithHint("##note", "A note, stored with its time; Enter", typed_.data(),
+                               typed_.size(), ImGuiInputTextFlags_EnterReturnsTrue)) {
+    if (typed_[0] != 0) note_ = typed_.data();
+    typed_.fill(0);
+  }
+}
+
+}  // namespace palpate

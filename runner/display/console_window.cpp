@@ -1,0 +1,132 @@
+#include "runner/display/console_window.h"
+
+#include <epoxy/gl.h>
+// After epoxy, which replaces the GL headers.
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+#include <algorithm>
+
+#include "runner/display/console_panels.h"
+#include "runner/display/fonts.h"
+#include "runner/display/key_names.h"
+
+namespace palpate {
+namespace {
+
+constexpr float kLetters = 16, kTitleLetters = 28;  // px at scale 1
+
+/// \param choices  must outlive the atlas' building, which reads the ranges
+void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float size) {
+  ImFontConfig config;
+  for (const FontChoice& choice : choices) {
+    config.FontNo = choice.face;
+    atlas.AddFontFromFileTTF(choice.path.c_str(), size, &config, choice.ranges.data());
+    config.MergeMode = true;
+  }
+  if (!config.MergeMode) {
+    config.SizePixels = size;
+    atlas.AddFontDefault(&config);
+  }
+}
+
+/// The first font is the console's usual one, the last its title's.
+void load_fonts(const std::vector<std::string>& texts, float scale) {
+  const std::vector<FontChoice> choices = choose_fonts(texts);
+  ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
+  add_font(atlas, choices, kLetters * scale);
+  add_font(atlas, choices, kTitleLetters * scale);
+  atlas.Build();
+}
+
+}  // namespace
+
+ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Place& place,
+                             ParticipantWindow& participant)
+    : settings_(settings),
+      participant_(participant),
+      window_(make_window(settings.title + " - console", place)) {
+  glfwSetWindowSizeLimits(window_, 700, 480, GLFW_DONT_CARE, GLFW_DONT_CARE);
+  context_ = ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // writes no file
+  float scale = 1, ignored = 1;
+  glfwGetWindowContentScale(window_, &scale, &ignored);
+  scale = std::clamp(scale, 1.0F, 4.0F);
+  load_fonts(settings.texts, scale);
+  style_console(scale);
+  glfwSetWindowUserPointer(window_, this);
+  glfwSetKeyCallback(window_, &ConsoleWindow::on_key);
+  glfwSetCharCallback(window_, &ConsoleWindow::on_letter);
+  glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
+  glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
+  glfwSetMouseButtonCallback(window_, &ImGui_ImplGlfw_MouseButtonCallback);
+  glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
+  ImGui_ImplGlfw_InitForOpenGL(window_, false);
+  ImGui_ImplOpenGL3_Init("#version 330 core");
+  view_ = std::make_unique<ConsoleView>(settings);
+}
+
+ConsoleWindow::~ConsoleWindow() {
+  if (window_ == nullptr) {
+    // The display is gone, and with it what OpenGL and GLFW would be asked to free.
+    static_cast<void>(view_.release());
+    return;
+  }
+  glfwMakeContextCurrent(window_);
+  view_.reset();
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext(context_);
+  glfwDestroyWindow(window_);
+}
+
+void ConsoleWindow::ask(ConsoleCommand::Kind kind, std::string text) {
+  const std::int64_t now = settings_.clock->now_ns();
+  if (kind == ConsoleCommand::Kind::emergency_zero && settings_.emergency) settings_.emergency();
+  commands_.add({kind, std::move(text), now});
+}
+
+void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action, int mods) {
+  auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  const bool typing = ImGui::GetIO().WantTextInput;
+  const bool answer = on_keypad(key) && self.participant_.answers(key, scancode);
+  self.swallow_letter_ = answer;
+  if (action == GLFW_PRESS) {
+    if (key == GLFW_KEY_F12 || key == GLFW_KEY_ESCAPE) {
+      self.ask(ConsoleCommand::Kind::emergency_zero);
+    } else if (answer || !typing) {
+      self.participant_.press(key, scancode);
+    }
+  }
+  if (!answer) ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);
+}
+
+void ConsoleWindow::on_letter(GLFWwindow* window, unsigned letter) {
+  const auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  if (!self.swallow_letter_) ImGui_ImplGlfw_CharCallback(window, letter);
+}
+
+void ConsoleWindow::draw() {
+  const double now = static_cast<double>(settings_.clock->now_ns()) * 1e-9;
+  if (auto state = states_.take()) view_->take(std::move(*state), now);
+  int width = 0, height = 0;
+  glfwGetFramebufferSize(window_, &width, &height);
+  if (width <= 0 || height <= 0) return;
+  glfwMakeContextCurrent(window_);
+  ImGui_ImplOpenGL3_NewFrame();
+  ImGui_ImplGlfw_NewFrame();
+  ImGui::NewFrame();
+  for (const ConsoleCommand::Kind kind : view_->draw(now)) ask(kind);
+  if (auto note = view_->note()) ask(ConsoleCommand::Kind::note, std::move(*note));
+  ImGui::Render();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glViewport(0, 0, width, height);
+  glClearColor(0, 0, 0, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+  glfwSwapBuffers(window_);
+}
+
+}  // namespace palpate

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <memory>
+
+#include "runner/display/console_view.h"
+#include "runner/display/mailbox.h"
+#include "runner/display/participant_window.h"
+
+struct GLFWwindow;
+struct ImGuiContext;
+
+namespace palpate {
+
+/// The experimenter's window. Made and drawn by the display's thread.
+class ConsoleWindow final : public ExperimenterConsole {
+ public:
+  /// Keys that answer go to the participant whichever window has the keyboard, but while a note is
+  /// being written; the numeric pad always does. \throws DisplayError
+  ConsoleWindow(const WindowSettings& settings, const Place& place, ParticipantWindow& participant);
+  ConsoleWindow(const ConsoleWindow&) = delete;
+  ConsoleWindow& operator=(const ConsoleWindow&) = delete;
+  ~ConsoleWindow() override;
+
+  void show(const ConsoleState& state) override { states_.put(state); }
+  std::vector<ConsoleCommand> commands() override { return commands_.take(); }
+
+  GLFWwindow* handle() const { return window_; }
+  void draw();
+  /// From a key of either window or a button.
+  void ask(ConsoleCommand::Kind kind, std::string text = {});
+  void abandon() noexcept { window_ = nullptr; }
+
+ private:
+  static void on_key(GLFWwindow* window, int key, int scancode, int action, int mods);
+  static void on_letter(GLFWwindow* window, unsigned letter);
+
+  const WindowSettings& settings_;
+  ParticipantWindow& participant_;
+  GLFWwindow* window_ = nullptr;
+  ImGuiContext* context_ = nullptr;
+  std::unique_ptr<ConsoleView> view_;
+  bool swallow_letter_ = false;  ///< the next one came from the numeric pad
+  Mailbox<ConsoleState> states_;
+  Inbox<ConsoleCommand> commands_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,50 @@
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "rendering/renderer.h"
+#include "runner/display/console_panels.h"
+#include "runner/sample.h"
+
+namespace palpate {
+
+std::string fault_words(std::uint32_t faults) {
+  constexpr std::array<std::pair<std::uint32_t, const char*>, 11> kWords = {{
+      {render_fault::kNonFinite, "not a finite number"},
+      {render_fault::kStartedInside, "started inside"},
+      {render_fault::kWalkCapped, "search cut short"},
+      {render_fault::kContactsDropped, "too many contacts"},
+      {servo_fault::kForceLimited, "force limited"},
+      {servo_fault::kDeviceLost, "device lost"},
+      {servo_fault::kMissedTicks, "ticks missed"},
+      {servo_fault::kTripped, "forces off"},
+      {servo_fault::kEmergency, "emergency"},
+      {servo_fault::kSamplesLost, "samples lost"},
+      {servo_fault::kStalled, "servo stalled"},
+  }};
+  std::string out;
+  for (const auto& [bit, words] : kWords) {
+    if ((faults & bit) == 0) continue;
+    if (!out.empty()) out += ", ";
+    out += words;
+    faults &= ~bit;
+  }
+  if (faults != 0) {
+    if (!out.empty()) out += ", ";
+    out += "others (";
+    out += std::to_string(faults);
+    out += ')';
+  }
+  return out;
+}
+
+std::string in_words(double seconds) {
+  if (!std::isfinite(seconds) || seconds < 0) return "-";
+  const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };
+  const long all = std::lround(std::min(seconds, 1e9));
+  if (all < 60) return std::to_string(all) + " s";
+  if (all < 3600) return std::to_string(all / 60) + " min " + two(all % 60) + " s";
+  return std::to_string(all / 3600) + " h " + two(all % 3600 / 60) + " min";
+}
+
+}  // namespace palpate

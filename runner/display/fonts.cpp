@@ -1,0 +1,115 @@
+#include "runner/display/fonts.h"
+
+#include <fontconfig/fontconfig.h>
+#include <glib.h>
+
+#include <algorithm>
+#include <memory>
+#include <set>
+
+namespace palpate {
+namespace {
+
+template <auto destroy>
+struct With {
+  template <class T>
+  void operator()(T* what) const {
+    destroy(what);
+  }
+};
+using Pattern = std::unique_ptr<FcPattern, With<FcPatternDestroy>>;
+using FontSet = std::unique_ptr<FcFontSet, With<FcFontSetDestroy>>;
+
+// Latin with all accents, Greek, Cyrillic, dashes and quotation marks, arrows.
+constexpr unsigned short kEuropean[] = {0x0020, 0x024f, 0x0370, 0x052f, 0x1e00, 0x1fff, 0x2000,
+                                        0x206f, 0x2190, 0x21ff, 0x2200, 0x22ff, 0};
+
+bool european(unsigned letter) {
+  for (const unsigned short* at = kEuropean; *at != 0; at += 2) {
+    if (letter >= at[0] && letter <= at[1]) return true;
+  }
+  return false;
+}
+
+/// The console's own; it draws 16-bit letters one by one, left to right.
+std::set<unsigned> letters_of(const std::vector<std::string>& texts) {
+  std::set<unsigned> letters;
+  for (const std::string& text : texts) {
+    char* const valid = g_utf8_make_valid(text.data(), static_cast<gssize>(text.size()));
+    for (const char* at = valid; *at != 0; at = g_utf8_next_char(at)) {
+      const gunichar letter = g_utf8_get_char(at);
+      if (letter < 0x10000 && g_unichar_isgraph(letter) && !european(letter))
+        letters.insert(letter);
+    }
+    g_free(valid);
+  }
+  return letters;
+}
+
+FontSet installed() {
+  const Pattern wanted(FcNameParse(reinterpret_cast<const FcChar8*>("Noto Sans,DejaVu Sans,Sans")));
+  FcConfigSubstitute(nullptr, wanted.get(), FcMatchPattern);
+  FcDefaultSubstitute(wanted.get());
+  FcResult result = FcResultMatch;
+  return FontSet(FcFontSort(nullptr, wanted.get(), FcFalse, nullptr, &result));
+}
+
+bool readable(FcPattern* font, FontChoice& choice) {
+  FcChar8* text = nullptr;
+  if (FcPatternGetString(font, FC_FONTFORMAT, 0, &text) != FcResultMatch ||
+      std::string(reinterpret_cast<const char*>(text)) != "TrueType") {
+    return false;
+  }
+  FcBool outline = FcFalse;
+  if (FcPatternGetBool(font, FC_OUTLINE, 0, &outline) != FcResultMatch || outline == FcFalse) {
+    return false;
+  }
+  if (FcPatternGetString(font, FC_FILE, 0, &text) != FcResultMatch) return false;
+  choice.path = reinterpret_cast<const char*>(text);
+  int index = 0;
+  FcPatternGetInteger(font, FC_INDEX, 0, &index);
+  choice.face = index & 0xffff;  // above: the instance of a variable font
+  return g_file_test(choice.path.c_str(), G_FILE_TEST_IS_REGULAR) != 0;
+}
+
+/// Takes from `letters` what the font has.
+std::vector<unsigned short> take(FcPattern* font, std::set<unsigned>& letters) {
+  std::vector<unsigned short> ranges;
+  FcCharSet* has = nullptr;
+  if (FcPatternGetCharSet(font, FC_CHARSET, 0, &has) != FcResultMatch) return ranges;
+  for (auto at = letters.begin(); at != letters.end();) {
+    if (FcCharSetHasChar(has, *at) == FcFalse) {
+      ++at;
+      continue;
+    }
+    const auto letter = static_cast<unsigned short>(*at);
+    ranges.insert(ranges.end(), {letter, letter});
+    at = letters.erase(at);
+  }
+  if (!ranges.empty()) ranges.push_back(0);
+  return ranges;
+}
+
+}  // namespace
+
+std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts) {
+  std::vector<FontChoice> choices;
+  const FontSet fonts = installed();
+  if (fonts == nullptr) return choices;
+  std::set<unsigned> letters = letters_of(texts);
+  for (int i = 0; i < fonts->nfont; ++i) {
+    FcPattern* const font = fonts->fonts[i];
+    FontChoice choice;
+    if (!readable(font, choice)) continue;
+    if (choices.empty()) {
+      choice.ranges.assign(std::begin(kEuropean), std::end(kEuropean));
+      choices.push_back(choice);
+    }
+    choice.ranges = take(font, letters);
+    if (!choice.ranges.empty()) choices.push_back(std::move(choice));
+    if (letters.empty()) break;
+  }
+  return choices;
+}
+
+}  // namespace palpate

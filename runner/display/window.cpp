@@ -1,0 +1,124 @@
+#include "runner/display/window.h"
+
+#include <epoxy/gl.h>
+// After epoxy, which replaces the GL headers.
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+
+#include "runner/display/console_window.h"
+#include "runner/display/key_names.h"
+#include "runner/display/lost_display.h"
+#include "runner/display/monitors.h"
+#include "runner/display/participant_window.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kFrame = 1.0 / 60;  // s, from frame to frame of the console
+
+double seconds() {
+  const auto since = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(since).count();
+}
+
+class GlfwLibrary {
+ public:
+  GlfwLibrary() {
+    if (glfwInit() == GLFW_FALSE) throw DisplayError("no graphical display: " + glfw_reason());
+  }
+  GlfwLibrary(const GlfwLibrary&) = delete;
+  GlfwLibrary& operator=(const GlfwLibrary&) = delete;
+  ~GlfwLibrary() {
+    if (!abandoned_) glfwTerminate();
+  }
+  void abandon() { abandoned_ = true; }
+
+ private:
+  bool abandoned_ = false;
+};
+
+class Windows final : public DisplayLoop {
+ public:
+  explicit Windows(const WindowSettings& settings)
+      : settings_(settings),
+        places_(place_windows(settings_)),
+        participant_(settings_, places_.participant),
+        console_(settings_, places_.console, participant_) {
+    GLFWwindow* const window = participant_.handle();
+    glfwSetWindowUserPointer(window, this);
+    glfwSetKeyCallback(window, &Windows::on_participant_key);
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* from) {
+      static_cast<Windows*>(glfwGetWindowUserPointer(from))->participant_.refresh();
+    });
+    survive_loss_of(window);
+    survive_loss_of(console_.handle());
+    survive_lost_display();
+    glfwShowWindow(console_.handle());
+    glfwShowWindow(window);  // last: it has the keyboard
+  }
+
+  ParticipantScreen& participant() override { return participant_; }
+  ExperimenterConsole& console() override { return console_; }
+
+  void run() override {
+    try {
+      while (!ended_.load()) {
+        if (display_lost()) throw LostDisplay();
+        step();
+      }
+    } catch (const LostDisplay&) {
+      participant_.abandon();
+      console_.abandon();
+      library_.abandon();
+    }
+  }
+
+  void end() noexcept override { ended_.store(true); }
+
+ private:
+  void step() {
+    const double started = seconds();
+    participant_.draw();
+    console_.draw();
+    // Where a processor has to draw, it has as much time for everything else.
+    const double drawn = seconds();
+    const double next = std::max(started + kFrame, 2 * drawn - started);
+    glfwPollEvents();
+    for (double now = seconds(); now < next && !ended_.load(); now = seconds()) {
+      glfwWaitEventsTimeout(next - now);
+    }
+    if (glfwWindowShouldClose(participant_.handle()) != 0) participant_.close();
+    if (glfwWindowShouldClose(console_.handle()) != 0) {
+      glfwSetWindowShouldClose(console_.handle(), GLFW_FALSE);
+      console_.ask(ConsoleCommand::Kind::quit);
+    }
+  }
+
+  static void on_participant_key(GLFWwindow* window, int key, int scancode, int action, int) {
+    auto& self = *static_cast<Windows*>(glfwGetWindowUserPointer(window));
+    if (action != GLFW_PRESS) return;
+    const bool answer = self.participant_.answers(key, scancode);
+    if (key == GLFW_KEY_F12 || (key == GLFW_KEY_ESCAPE && !answer)) {
+      self.console_.ask(ConsoleCommand::Kind::emergency_zero);
+    }
+    self.participant_.press(key, scancode);
+  }
+
+  const WindowSettings settings_;
+  GlfwLibrary library_;
+  const Places places_;
+  ParticipantWindow participant_;
+  ConsoleWindow console_;
+  std::atomic<bool> ended_{false};
+};
+
+}  // namespace
+
+std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings) {
+  return std::make_unique<Windows>(settings);
+}
+
+}  // namespace palpate
