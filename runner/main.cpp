@@ -31,6 +31,7 @@ constexpr Command kCommands[] = {
     {"forget", "remove a participant who has withdrawn", palpate::forget_command},
     {"merge", "stations' databases into one", palpate::merge_command},
     {"render", "forces along a recorded path, offline", palpate::render_command},
+    {"replay", "a stored trial through a renderer again", palpate::replay_command},
     {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
     {"simulate", "the whole study with simulated participants", palpate::simulate_command},
     {"validate", "check a protocol and list all its faults", palpate::validate_command},

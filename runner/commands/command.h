@@ -42,6 +42,7 @@ int export_command(const std::vector<std::string>& args);
 int forget_command(const std::vector<std::string>& args);
 int merge_command(const std::vector<std::string>& args);
 int render_command(const std::vector<std::string>& args);
+int replay_command(const std::vector<std::string>& args);
 int schedule_command(const std::vector<std::string>& args);
 int simulate_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);

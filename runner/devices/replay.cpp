@@ -1,0 +1,44 @@
+#include "runner/devices/replay.h"
+
+#include <cmath>
+#include <limits>
+
+namespace palpate {
+namespace {
+
+Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+}  // namespace
+
+ReplayDevice::ReplayDevice(std::span<const SampleRecord> samples, double rate)
+    : samples_(samples), nominal_ns_(std::llround(1e9 / rate)), now_ns_(nominal_ns_) {
+  capabilities_.name = "replay";
+  capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
+  // Limits were the recorded device's: what was rendered comes before them.
+  capabilities_.max_force = capabilities_.max_stiffness = std::numeric_limits<double>::max();
+  capabilities_.max_rate = rate;
+}
+
+DeviceReading ReplayDevice::read() noexcept {
+  DeviceReading reading;
+  if (next_ >= samples_.size()) {
+    reading.lost = true;
+    return reading;
+  }
+  const SampleRecord& sample = samples_[next_++];
+  reading.stylus = {vec(sample.tip), vec(sample.tail)};
+  reading.buttons = sample.buttons;
+  return reading;
+}
+
+void ReplayDevice::wait_until(std::int64_t when_ns) noexcept {
+  const bool known = next_ < samples_.size() && samples_[next_].period_ns > 0;
+  // The first tick of a trial follows on nothing that is on record.
+  if (known && next_ > 0) {
+    now_ns_ += samples_[next_].period_ns;
+  } else {
+    now_ns_ = when_ns > now_ns_ ? when_ns : now_ns_;
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,106 @@
+"""palpate replay from outside. Usage: replay_command_test.py PALPATE"""
+
+import csv
+import json
+import pathlib
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE = sys.argv[1]
+
+
+def protocol(samples=True, **material):
+    return {"version": 1, "name": "short", "renderers": ["point", "ray"], "samples": samples,
+            "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
+                        {"name": "cube", "shape": "cube", "edge_m": 0.05}],
+            "repetitions": 1, "material": {"stiffness_n_per_m": 800, **material},
+            "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 5}, "seed": 7}
+
+
+class Replay(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def study(self, name="study", **wanted):
+        path, db = self.dir / f"{name}.json", self.dir / f"{name}.db"
+        path.write_text(json.dumps(protocol(**wanted)))
+        self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3)
+        with sqlite3.connect(db) as base:
+            trials = base.execute("SELECT p.code, s.number, a.trial, a.renderer FROM attempts a JOIN runs r ON r.id = a.run_id "
+                                  "JOIN sessions s ON s.id = r.session_id JOIN participants p ON p.id = s.participant_id "
+                                  "ORDER BY a.trial").fetchall()
+        base.close()
+        return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
+
+    def test_every_trial_is_equal_bit_by_bit_whatever_the_material(self):
+        for name, material in [("plain", {}), ("rough", {"friction_static": 0.4, "friction_dynamic": 0.3, "damping_ns_per_m": 0.5})]:
+            db, trials = self.study(name, **material)
+            self.assertEqual({renderer for _, renderer in trials}, {"point", "ray"})
+            for trial, renderer in trials:
+                out = self.dir / "out.json"
+                done = self.palpate("replay", "--db", db, "--trial", trial, "--json", out, "--force")
+                self.assertIn("equal the record, bit by bit", done.stdout)
+                self.assertIn("SIMULATED", done.stdout)
+                result = json.loads(out.read_text())
+                self.assertEqual(result["ticks"], result["equal_ticks"])
+                self.assertGreater(result["ticks"], 100)
+                self.assertGreater(result["recorded"]["share_in_contact"], 0)
+                self.assertEqual(result["recorded"]["renderer"], renderer)
+
+    def test_compares_with_the_other_renderer_tick_by_tick(self):
+        db, trials = self.study()
+        trial = next(trial for trial, renderer in trials if renderer == "ray")
+        out, figures = self.dir / "both.csv", self.dir / "both.json"
+        done = self.palpate("replay", "--db", db, "--trial", trial, "--compare", "--out", out, "--json", figures)
+        self.assertIn("their forces differ by", done.stdout)
+        result = json.loads(figures.read_text())
+        self.assertEqual(result["other"]["renderer"], "point")
+        rows = list(csv.DictReader(out.read_text().splitlines()))
+        self.assertEqual(len(rows), result["ticks"])
+
+        def size(row, name):
+            return sum(float(row[f"{name}_{axis}"]) ** 2 for axis in "xyz") ** 0.5
+        for name, figure in [("recorded_force", result["recorded"]), ("other_force", result["other"])]:
+            self.assertAlmostEqual(max(size(row, name) for row in rows), figure["max_force_n"], 12)
+        # The point has no side: it feels no torque, and less often something.
+        self.assertTrue(all(size(row, "other_torque") == 0 for row in rows))
+        self.assertLess(result["other"]["share_in_contact"], result["recorded"]["share_in_contact"])
+        for row in rows:
+            for axis in "xyz":
+                self.assertEqual(row[f"recorded_force_{axis}"], row[f"again_force_{axis}"])
+
+    def test_a_record_that_was_changed_differs(self):
+        db, trials = self.study()
+        with sqlite3.connect(db) as base:
+            base.execute("UPDATE attempts SET orientation_w = orientation_x, orientation_x = orientation_w")
+        base.close()
+        done = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=1)
+        self.assertRegex(done.stdout, r"ticks differ from the record, the first is tick \d+")
+
+    def test_says_what_is_missing(self):
+        db, trials = self.study()
+        bare, names = self.study("bare", samples=False)
+        for args, message in [((db, "P9/1/1"), "not on record"), ((db, "nonsense"), "CODE/SESSION/TRIAL"),
+                              ((db, trials[0][0] + "x"), "CODE/SESSION/TRIAL"), ((db, "/1/1"), "CODE/SESSION/TRIAL"),
+                              ((bare, names[0][0]), "without servo samples"), ((self.dir / "no.db", "P1/1/1"), "no.db")]:
+            done = self.palpate("replay", "--db", args[0], "--trial", args[1], status=2)
+            self.assertIn(message, done.stderr)
+            self.assertEqual(done.stdout, "")
+        kept = self.dir / "kept.csv"
+        kept.write_text("mine")
+        self.palpate("replay", "--db", db, "--trial", trials[0][0], "--out", kept, status=2)
+        self.assertEqual(kept.read_text(), "mine")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
