@@ -106,6 +106,8 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.program_version = program_version;
   out.description = describe(table, settings.too_fast);
   out.shapes = compare_by_shape(table, out.description, settings.seed);
+  out.rm_anova = rm_anova(out.description.people);
+  out.mixed_model = mixed_model(out.description.people, table.renderers, table.shapes);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     out.exclusions.push_back(count_exclusions(out.description, r));
   }

@@ -16,8 +16,12 @@ struct Sphericity {
   /// Why something is missing; empty: all is there. With one degree of freedom there is nothing to
   /// test or to correct, and nothing is here.
   std::string undefined;
-  std::optional<double> mauchly_w, mauchly_p;  ///< Mauchly (1940), p with Box's second-order term
-  std::optional<double> gg_epsilon, gg_p;      ///< Greenhouse & Geisser (1959)
+  std::optional<double> mauchly_w;  ///< Mauchly (1940)
+  /// From Box's (1949) series to its second order. `mauchly_p` is what R's packages print (afex and
+  /// car: the number of cells stands in one place of that term where Box has the number of
+  /// contrasts), `mauchly_p_box` Box's own.
+  std::optional<double> mauchly_p, mauchly_p_box;
+  std::optional<double> gg_epsilon, gg_p;                       ///< Greenhouse & Geisser (1959)
   std::optional<double> hf_epsilon_raw, hf_epsilon_used, hf_p;  ///< Huynh & Feldt (1976); used <= 1
 };
 
