@@ -4,7 +4,8 @@
 
 namespace palpate::falcon {
 
-FalconDevice::FalconDevice(std::unique_ptr<FalconArm> arm) : arm_(std::move(arm)) {
+FalconDevice::FalconDevice(std::unique_ptr<FalconArm> arm, const std::string& calibration)
+    : arm_(std::move(arm)) {
   capabilities_ = {"falcon",
                    3,
                    3,
@@ -13,12 +14,14 @@ FalconDevice::FalconDevice(std::unique_ptr<FalconArm> arm) : arm_(std::move(arm)
                    kMaxRate,
                    kWorkspaceRadius,
                    kResolution,
-                   false};
+                   false,
+                   arm_->serial(),
+                   calibration};
 }
 
 DeviceReading FalconDevice::read() noexcept {
   const ArmReading& at = arm_->update();
-  return {{at.position, at.position}, at.buttons, at.trouble != ArmTrouble::none};
+  return {{at.position, at.position}, at.buttons, !at.usable(), at.trouble};
 }
 
 void FalconDevice::write(const Vec3& device1, const Vec3& device2) noexcept {

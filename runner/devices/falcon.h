@@ -2,6 +2,7 @@
 // A Novint Falcon: position and force of one point, no rotation. Needs one thread.
 
 #include <memory>
+#include <string>
 
 #include "runner/device.h"
 #include "runner/devices/falcon_arm.h"
@@ -10,7 +11,8 @@ namespace palpate::falcon {
 
 class FalconDevice final : public Device {
  public:
-  explicit FalconDevice(std::unique_ptr<FalconArm> arm);
+  /// \param calibration  what is known of its force scale, for DeviceCapabilities
+  explicit FalconDevice(std::unique_ptr<FalconArm> arm, const std::string& calibration = "");
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Tip and tail are both the grip: the device senses no axis.

@@ -1,22 +1,39 @@
 #include "runner/devices/falcon2.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace palpate::falcon {
 
 Falcon2Device::Falcon2Device(std::unique_ptr<FalconArm> tip, std::unique_ptr<FalconArm> tail,
-                             const StylusFromEnds& stylus, double max_force)
+                             const StylusFromEnds& stylus, const std::string& calibration)
     : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
-  capabilities_ = {"falcon2",        5,           5,    max_force, kMaxStiffness, kMaxRate,
-                   kWorkspaceRadius, kResolution, false};
+  capabilities_ = {
+      "falcon2",
+      5,
+      5,
+      std::min(sure_force(tip_->counts_per_torque()), sure_force(tail_->counts_per_torque())),
+      kMaxStiffness,
+      kMaxRate,
+      kWorkspaceRadius,
+      kResolution,
+      false,
+      tip_->serial() + ", " + tail_->serial(),
+      calibration};
 }
 
 DeviceReading Falcon2Device::read() noexcept {
   const ArmReading& tip = tip_->update();
   const ArmReading& tail = tail_->update();
-  const bool both = tip.trouble == ArmTrouble::none && tail.trouble == ArmTrouble::none;
-  lost_ = !both || !stylus_.update(tip.position, tail.position);
-  return {stylus_.stylus(), static_cast<std::uint8_t>(tip.buttons | tail.buttons << 4), lost_};
+  DeviceTrouble trouble = tip.trouble;
+  if (tip.usable() && tail.trouble != DeviceTrouble::none) trouble = tail.trouble;
+  lost_ = !tip.usable() || !tail.usable();
+  if (!lost_ && !stylus_.update(tip.position, tail.position)) {
+    lost_ = true;
+    trouble = DeviceTrouble::apart;
+  }
+  return {stylus_.stylus(), static_cast<std::uint8_t>(tip.buttons | tail.buttons << 4), lost_,
+          trouble};
 }
 
 void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {

@@ -4,6 +4,7 @@
 // device; the rest of the program need not know that there are two.
 
 #include <memory>
+#include <string>
 
 #include "runner/device.h"
 #include "runner/devices/falcon_arm.h"
@@ -14,7 +15,7 @@ namespace palpate::falcon {
 class Falcon2Device final : public Device {
  public:
   Falcon2Device(std::unique_ptr<FalconArm> tip, std::unique_ptr<FalconArm> tail,
-                const StylusFromEnds& stylus, double max_force);
+                const StylusFromEnds& stylus, const std::string& calibration = "");
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Lost when either device is, or when the ends are not as far apart as the stylus is long.

@@ -18,23 +18,6 @@ constexpr int kHaltTries = 3;
 
 }  // namespace
 
-const char* advice(ArmTrouble trouble) noexcept {
-  switch (trouble) {
-    case ArmTrouble::none:
-      return "ready";
-    case ArmTrouble::unplugged:
-      return "unplugged: plug it in again";
-    case ArmTrouble::silent:
-      return "does not answer: check its power supply, then switch it off and on";
-    case ArmTrouble::not_homed:
-      return "not homed: pull the grip fully out, then push it straight in, until the light turns "
-             "green";
-    case ArmTrouble::implausible:
-      return "its position jumped: switch it off and on, and home it again";
-  }
-  return "";
-}
-
 FalconArm::FalconArm(std::unique_ptr<Transport> transport, const ArmSettings& settings)
     : transport_(std::move(transport)), settings_(settings) {
   restart();
@@ -81,18 +64,20 @@ const ArmReading& FalconArm::update() noexcept {
   take_replies(0);
   const bool fresh = std::exchange(fresh_, false);
   if (transport_->gone()) {
-    reading_.trouble = ArmTrouble::unplugged;
+    reading_.trouble = DeviceTrouble::unplugged;
   } else if (transport_->now_ns() - replied_ns_ > settings_.silence_ns || counts_.replies == 0) {
-    reading_.trouble = ArmTrouble::silent;
+    reading_.trouble = DeviceTrouble::silent;
   } else if (fresh) {
     reading_.buttons = reply_.buttons;
     if (reply_.all_homed()) {
       locate();
     } else {
-      reading_.trouble = ArmTrouble::not_homed;
+      reading_.trouble = DeviceTrouble::not_homed;
     }
+  } else if (reading_.usable() && waiting_) {
+    reading_.trouble = DeviceTrouble::late;
   }
-  if (reading_.trouble != ArmTrouble::none) located_ = false;
+  if (!reading_.usable()) located_ = false;
   return reading_;
 }
 
@@ -106,9 +91,8 @@ void FalconArm::locate() noexcept {
   if (!plausible) {
     ++counts_.implausible;
     // The last good place stands in for a few; without one there is nothing to go by.
-    if (++implausible_in_a_row_ >= kMaxImplausible || !located_) {
-      reading_.trouble = ArmTrouble::implausible;
-    }
+    const bool lost = ++implausible_in_a_row_ >= kMaxImplausible || !located_;
+    reading_.trouble = lost ? DeviceTrouble::implausible : DeviceTrouble::late;
     return;
   }
   implausible_in_a_row_ = 0;
@@ -116,7 +100,7 @@ void FalconArm::locate() noexcept {
   located_ns_ = replied_ns_;
   located_ = true;
   reading_.position = to_world(falcon_position_ - kCentre);
-  reading_.trouble = ArmTrouble::none;
+  reading_.trouble = DeviceTrouble::none;
 }
 
 std::array<int, 3> FalconArm::motors_for(const Vec3& force) noexcept {
@@ -146,7 +130,7 @@ Vec3 FalconArm::shown_force() const noexcept {
 }
 
 bool FalconArm::send(const std::array<int, 3>& motors) noexcept {
-  const bool homed = reply_.all_homed() && reading_.trouble != ArmTrouble::silent;
+  const bool homed = reply_.all_homed() && reading_.trouble != DeviceTrouble::silent;
   Command command;
   command.motors = motors;
   command.green = homed;
@@ -169,7 +153,7 @@ void FalconArm::push(const Vec3& force) noexcept {
     ++counts_.resent;
     stream_.reset();
   }
-  send(reading_.trouble == ArmTrouble::none && located_ ? motors_for(force) : std::array<int, 3>{});
+  send(reading_.usable() && located_ ? motors_for(force) : std::array<int, 3>{});
 }
 
 bool FalconArm::halt() noexcept {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "runner/device.h"
 #include "runner/devices/falcon_packets.h"
 #include "runner/devices/falcon_parameters.h"
 #include "runner/devices/falcon_transport.h"
@@ -22,21 +23,13 @@ struct ArmSettings {
   std::int64_t silence_ns = 25'000'000;
 };
 
-/// Why a grip's position cannot be had.
-enum class ArmTrouble : std::uint8_t {
-  none,
-  unplugged,
-  silent,       ///< no reply for too long
-  not_homed,    ///< its counts mean nothing until all axes have passed their index
-  implausible,  ///< several positions in a row that no hand could have moved to
-};
-/// In words, with what the experimenter can do.
-const char* advice(ArmTrouble trouble) noexcept;
-
 struct ArmReading {
   Vec3 position;  ///< m, world frame about the device's centre; the last good one when in trouble
   std::uint8_t buttons = 0;
-  ArmTrouble trouble = ArmTrouble::silent;
+  DeviceTrouble trouble = DeviceTrouble::silent;
+
+  /// The last good position still stands: nothing worse than a late reply.
+  bool usable() const { return trouble == DeviceTrouble::none || trouble == DeviceTrouble::late; }
 };
 
 /// What the line was like.

@@ -1,7 +1,10 @@
 #include "runner/devices/falcon_open.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
+#include <iostream>
 #include <optional>
 #include <utility>
 
@@ -18,67 +21,98 @@ std::int64_t unix_ns() {
   return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-Calibration calibration_of(const FalconOptions& options) {
-  return options.calibration.empty() ? Calibration{} : read_calibration(options.calibration);
+Calibration calibration_in(const std::string& path) {
+  return path.empty() ? Calibration{} : read_calibration(path);
 }
 
-double scale_of(const std::string& serial, const Calibration& calibration) {
-  const ForceCalibration* force = calibration.force_of(serial);
-  return force != nullptr ? force->counts_per_torque : kCountsPerTorque;
+CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::string>& serials) {
+  CalibrationVerdict verdict = judge_forces(calibration, serials, unix_ns());
+  if (serials.size() == 2) {
+    verdict = both(verdict, judge_pair(calibration, serials[0], serials[1], unix_ns()));
+  }
+  return verdict;
+}
+
+/// As DeviceCapabilities tells it: nothing when it is missing.
+std::string in_short(const CalibrationVerdict& verdict) {
+  if (verdict.state == CalibrationState::missing) return "";
+  return (verdict.state == CalibrationState::stale ? "stale: " : "") + verdict.text;
+}
+
+void tell(const std::string& serial, const BootProgress& progress) {
+  if (isatty(STDERR_FILENO) == 0) return;
+  using Stage = BootProgress::Stage;
+  if (progress.stage == Stage::monitor && progress.attempt > 1) {
+    std::cerr << "\n  " << progress.trouble << "; attempt " << progress.attempt << "\n";
+  }
+  if (progress.stage != Stage::uploading) return;
+  std::cerr << "\rFalcon " << serial << ": firmware " << 100 * progress.sent / progress.size << " %"
+            << (progress.sent == progress.size ? "\n" : "") << std::flush;
 }
 
 }  // namespace
 
+std::vector<ConnectedDevice> connected_falcons() {
+  std::vector<ConnectedDevice> connected;
+  for (UsbListing& listing : list_usb()) {
+    connected.push_back({std::move(listing.serial), std::move(listing.trouble)});
+  }
+  return connected;
+}
+
+CalibrationVerdict judge_calibration(const std::string& path,
+                                     const std::vector<std::string>& serials) {
+  return judge(calibration_in(path), serials);
+}
+
 std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
-                                    const Calibration& calibration, const BootReport& report) {
+                                    const Calibration& calibration) {
   std::optional<FirmwareImage> image;  // a bad file is found before the device is touched
   if (!firmware.empty()) image = read_image(firmware);
   auto line = open_usb(serial);
-  boot(*line, image ? &*image : nullptr, {}, report);
+  const std::string name = line->serial();
+  boot(*line, image ? &*image : nullptr, {},
+       [&name](const BootProgress& progress) { tell(name, progress); });
   ArmSettings settings;
-  settings.counts_per_torque = scale_of(line->serial(), calibration);
+  if (const ForceCalibration* force = calibration.force_of(name)) {
+    settings.counts_per_torque = force->counts_per_torque;
+  }
   return std::make_unique<FalconArm>(std::move(line), settings);
 }
 
-OpenedDevice open_falcon(const FalconOptions& options, const BootReport& report) {
-  const Calibration calibration = calibration_of(options);
-  auto arm = open_arm(options.serial, options.firmware, calibration, report);
-  OpenedDevice opened;
-  opened.serials = {arm->serial()};
-  opened.calibration = judge_forces(calibration, opened.serials, unix_ns());
-  opened.device = std::make_unique<FalconDevice>(std::move(arm));
-  return opened;
+std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
+  if (order.serials.size() > 1) {
+    throw TransportError("falcon is one device; " + std::to_string(order.serials.size()) +
+                         " serial numbers are given");
+  }
+  const Calibration calibration = calibration_in(order.calibration);
+  auto arm = open_arm(order.serials.empty() ? "" : order.serials[0], order.firmware, calibration);
+  const std::string known = in_short(judge(calibration, {arm->serial()}));
+  return std::make_unique<FalconDevice>(std::move(arm), known);
 }
 
-OpenedDevice open_falcon2(const FalconOptions& options, const BootReport& report) {
-  if (options.serial.empty() || options.tail_serial.empty() ||
-      options.serial == options.tail_serial) {
+std::unique_ptr<Device> open_falcon2(const DeviceOrder& order) {
+  if (order.serials.size() != 2 || order.serials[0] == order.serials[1]) {
     throw TransportError(
         "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
         "the one at its tail (palpate devices lists them)");
   }
-  const Calibration calibration = calibration_of(options);
-  const PairRegistration* pair = calibration.pair_of(options.serial, options.tail_serial);
+  const std::string &tip_serial = order.serials[0], &tail_serial = order.serials[1];
+  const Calibration calibration = calibration_in(order.calibration);
+  const PairRegistration* pair = calibration.pair_of(tip_serial, tail_serial);
   if (pair == nullptr) {
     throw InputError(
-        {{options.calibration.empty() ? "(no calibration file)" : options.calibration, "/pairs",
-          "expected a registration of the Falcons " + options.serial + " (tip) and " +
-              options.tail_serial +
+        {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
+          "expected a registration of the Falcons " + tip_serial + " (tip) and " + tail_serial +
               " (tail), without which nobody knows how they stand to each other: run "
               "palpate devices --calibrate --device falcon2"}});
   }
-  auto tip = open_arm(options.serial, options.firmware, calibration, report);
-  auto tail = open_arm(options.tail_serial, options.firmware, calibration, report);
-  const double max_force =
-      std::min(sure_force(tip->counts_per_torque()), sure_force(tail->counts_per_torque()));
-  OpenedDevice opened;
-  opened.serials = {tip->serial(), tail->serial()};
-  opened.calibration = both(judge_forces(calibration, opened.serials, unix_ns()),
-                            judge_pair(calibration, tip->serial(), tail->serial(), unix_ns()));
-  opened.device = std::make_unique<Falcon2Device>(
-      std::move(tip), std::move(tail), StylusFromEnds(pair->tail_in_tip, pair->stylus_length),
-      max_force);
-  return opened;
+  auto tip = open_arm(tip_serial, order.firmware, calibration);
+  auto tail = open_arm(tail_serial, order.firmware, calibration);
+  const std::string known = in_short(judge(calibration, order.serials));
+  return std::make_unique<Falcon2Device>(std::move(tip), std::move(tail),
+                                         StylusFromEnds(pair->tail_in_tip, pair->stylus_length),
+                                         known);
 }
 
 }  // namespace palpate::falcon

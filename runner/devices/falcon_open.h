@@ -1,5 +1,6 @@
 #pragma once
-// From what a user names to a device that is ready but for its homing.
+// From what a user names to a device that is ready but for its homing: the Falcon's rows in the
+// registry.
 
 #include <memory>
 #include <string>
@@ -9,30 +10,29 @@
 #include "runner/devices/falcon_arm.h"
 #include "runner/devices/falcon_boot.h"
 #include "runner/devices/falcon_calibration.h"
+#include "runner/devices/registry.h"
 
 namespace palpate::falcon {
 
-struct FalconOptions {
-  std::string firmware;     ///< file; needed once after each power-up; empty: none
-  std::string calibration;  ///< file; empty: none, the nominal scale
-  std::string serial;       ///< of the one, or at the tip; empty: the only one
-  std::string tail_serial;  ///< at the tail; falcon2 only
-};
+/// Falcons that are plugged in. \throws TransportError where this computer cannot look.
+std::vector<ConnectedDevice> connected_falcons();
 
-struct OpenedDevice {
-  std::unique_ptr<Device> device;
-  std::vector<std::string> serials;
-  CalibrationVerdict calibration;  ///< what the pre-flight needs to know
-};
+/// One Falcon. Its capabilities' `calibration` is empty when none is stored, and begins with
+/// "stale" when it is too old. \throws TransportError, InputError.
+std::unique_ptr<Device> open_falcon(const DeviceOrder& order);
 
-/// \throws TransportError, InputError.
-OpenedDevice open_falcon(const FalconOptions& options, const BootReport& report = {});
-/// Two with their registration, which must be in the calibration file.
-/// \throws TransportError, InputError.
-OpenedDevice open_falcon2(const FalconOptions& options, const BootReport& report = {});
+/// Two, which order.serials names: first the one at the stylus' tip. Their registration must be in
+/// order.calibration. \throws TransportError, InputError.
+std::unique_ptr<Device> open_falcon2(const DeviceOrder& order);
 
-/// One arm, with the scale of force of the calibration when it has one. \throws as above.
+/// For a pre-flight that has the serial numbers: is all calibrated that these need, and not too
+/// long ago? Two are a pair, tip and tail. \param path  empty: none. \throws InputError.
+CalibrationVerdict judge_calibration(const std::string& path,
+                                     const std::vector<std::string>& serials);
+
+/// One arm, with the scale of force of the calibration when it has one. Tells the progress of an
+/// upload to a terminal. \throws TransportError, InputError.
 std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
-                                    const Calibration& calibration, const BootReport& report = {});
+                                    const Calibration& calibration);
 
 }  // namespace palpate::falcon

@@ -44,7 +44,7 @@ class Procedure {
     due_ns_ += kTickNs;
     clock_.wait_until(due_ns_);
     for (FalconArm* arm : {&tip_, &tail_}) {
-      if (arm->update().trouble != ArmTrouble::none) {
+      if (!arm->update().usable()) {
         throw GuideError("the Falcon " + arm->serial() + ": " + advice(arm->reading().trouble));
       }
       arm->push(Vec3(0));

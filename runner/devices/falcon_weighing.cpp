@@ -99,7 +99,7 @@ class Procedure {
     due_ns_ += kTickNs;
     clock_.wait_until(due_ns_);
     const ArmReading& reading = arm_.update();
-    if (reading.trouble != ArmTrouble::none) throw GuideError(advice(reading.trouble));
+    if (!reading.usable()) throw GuideError(advice(reading.trouble));
     return reading;
   }
 

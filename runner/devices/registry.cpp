@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "runner/devices/falcon_open.h"
 #include "runner/devices/mouse.h"
 #include "runner/devices/simulated.h"
 
@@ -26,6 +27,10 @@ std::unique_ptr<Device> open_mouse(const DeviceOrder& order) {
 }
 
 constexpr DeviceKind kKinds[] = {
+    {"falcon", "a Novint Falcon: feels with one point, no direction", true,
+     falcon::connected_falcons, falcon::open_falcon},
+    {"falcon2", "two Novint Falcons that hold the ends of a stylus", true,
+     falcon::connected_falcons, falcon::open_falcon2},
     {"mouse", "the pointer moves a stylus in the window; contact is seen, nothing is felt", false,
      always_there, open_mouse},
     {"simulated", "a stylus held by two simulated devices and a simulated hand", false,

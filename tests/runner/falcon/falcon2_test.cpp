@@ -62,7 +62,7 @@ struct Bench {
   }
 
   Falcon2Device device() {
-    return {std::move(tip), std::move(tail), StylusFromEnds(tail_in_tip, kLength), 4.8};
+    return {std::move(tip), std::move(tail), StylusFromEnds(tail_in_tip, kLength)};
   }
 };
 
