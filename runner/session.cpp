@@ -92,6 +92,7 @@ void Session::run_trial() {
     faults = sample.faults;
     if (sample.phase == Phase::feeling) {
       note(sample);
+      if (protocol.samples) keep(sample);
       record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns;
       record_.response_ns = sample.time_ns;
     }
@@ -135,7 +136,10 @@ void Session::note(const Sample& sample) {
     record_.first_contact_time =
         static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
   }
-  if (!parts_.protocol.samples) return;
+}
+
+void Session::keep(const Sample& sample) {
+  const Rendering& rendering = sample.rendering;
   SampleRecord kept;
   kept.tick = sample.tick;
   kept.period_ns = sample.period_ns;

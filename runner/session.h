@@ -57,6 +57,7 @@ class Session {
   TrialRecord planned_record(const Trial& trial) const;
   void run_trial();
   void note(const Sample& sample);
+  void keep(const Sample& sample);  ///< among the record's samples
 
   Parts parts_;
   SessionPlan plan_;

@@ -62,14 +62,13 @@ Rendering without_survey(const Scene& scene, RenderState& state, const LineProbe
 struct World {
   PolygonSoup shape = icosphere(0.03, 0);
   Material material;
-  int near = 1;         ///< objects side by side, all in reach
-  int far = 0;          ///< objects that are never in reach
-  bool forced = false;  ///< trees and map although the mesh is small
+  int near = 1;                               ///< objects side by side, all in reach
+  int far = 0;                                ///< objects that are never in reach
+  std::size_t scanned = ContactTrees::kScan;  ///< so many facets or edges get no tree
   bool side_contact = true;
 
   Scene build() const {
     const auto mesh = std::make_shared<const ConvexMesh>(shape);
-    const std::size_t scanned = forced ? 0 : ContactTrees::kScan;
     const auto trees = std::make_shared<const ContactTrees>(*mesh, side_contact, scanned);
     std::vector<SceneObject> objects;
     for (int i = 0; i < near + far; ++i) {
@@ -129,15 +128,20 @@ std::vector<Case> cases() {
       all.back().world.side_contact = ray;
     };
     const auto pick = [&](Tick of_ray, Tick of_point) { return ray ? of_ray : of_point; };
-    World plain, near, far, forced, large;
+    World plain, near, far, forced, large, bare;
     near.near = 2;
     far.near = 2;
     far.far = 1000;
-    forced.forced = true;
-    large.shape = icosphere(0.03, 4);
+    forced.scanned = 0;
+    large.shape = bare.shape = icosphere(0.03, 4);
+    bare.scanned = SIZE_MAX;
     add("plain", plain);
     add("plain-least", plain, pick(&least_tick<SegmentProbe>, &least_tick<PointProbe>));
+    add("plain-alone", plain,
+        pick(&tick::render<SegmentProbe, Needs{}>, &tick::render<PointProbe, Needs{}>));
+    if (ray) add("torqueless", plain, &least_tick<SegmentProbe, false>);
     add("large", large);
+    add("large-bare", bare);
     add("forced-trees", forced);
     add("near", near);
     add("near-without-survey", near,
@@ -212,4 +216,11 @@ int main_with(int argc, char** argv) {
 }  // namespace
 }  // namespace palpate::bench
 
-int main(int argc, char** argv) { return palpate::bench::main_with(argc, argv); }
+int main(int argc, char** argv) {
+  try {
+    return palpate::bench::main_with(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "feature_cost: %s\n", error.what());
+    return 1;
+  }
+}

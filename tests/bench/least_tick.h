@@ -73,7 +73,8 @@ bool met(const ScenePart& part, PartState& memory, const RenderState& state, con
 /// One convex part of few facets that is a plain spring, and nothing else in the world: no trees,
 /// no survey, no list of contacts, no sums, no materials. The point has no torque and no second
 /// device.
-template <class Probe>
+/// \tparam kTorque  whether there are torque and a second device
+template <class Probe, bool kTorque = Probe::kSegment>
 [[gnu::flatten]] Rendering least_tick(const Scene& scene, RenderState& state,
                                       const LineProbe& probe, double) noexcept {
   if (!tick::plausible(probe.tip) || !tick::plausible(probe.tail))
@@ -99,6 +100,8 @@ template <class Probe>
   Vec3 point = probe.tip + shift, torque, device2;
   if constexpr (Probe::kSegment) {
     point += c.place * (probe.tail - probe.tip);
+  }
+  if constexpr (kTorque) {
     torque = glm::cross(point - probe.tip, force);
     device2 = c.place * force;
   }

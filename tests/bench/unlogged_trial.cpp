@@ -1,0 +1,40 @@
+#include "tests/bench/unlogged_trial.h"
+
+#include "data/utc.h"
+
+namespace palpate::bench {
+namespace {
+
+constexpr double kSecond_ns = 1e9;
+
+}  // namespace
+
+void UnloggedTrial::run() {
+  std::optional<Answer> answer;
+  std::uint32_t faults = 0;
+  while (!answer && !record_.timed_out && !(faults & servo_fault::kTripped)) {
+    const Sample& sample = servo_.next();
+    faults = sample.faults;
+    if (sample.phase == Phase::feeling) {
+      note(sample);
+      record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns_;
+      record_.response_ns = sample.time_ns;
+    }
+    if (!record_.timed_out) answer = participant_.step(sample);
+  }
+}
+
+void UnloggedTrial::note(const Sample& sample) {
+  if (sample.tick == 0) {
+    record_.onset_ns = sample.time_ns;
+    record_.onset_utc = format_utc(sample.time_ns);
+    record_.start_tip = {sample.probe.tip.x, sample.probe.tip.y, sample.probe.tip.z};
+    record_.start_tail = {sample.probe.tail.x, sample.probe.tail.y, sample.probe.tail.z};
+  }
+  if (sample.rendering.contacts > 0 && !record_.first_contact_time) {
+    record_.first_contact_time =
+        static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
+  }
+}
+
+}  // namespace palpate::bench
