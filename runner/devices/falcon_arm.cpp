@@ -122,13 +122,6 @@ std::array<int, 3> FalconArm::motors_for(const Vec3& force) noexcept {
   return motors;
 }
 
-Vec3 FalconArm::shown_force() const noexcept {
-  const auto legs = inverse(falcon_position_);
-  if (!legs) return Vec3(0);
-  const Vec3 torque = Vec3(motors_[0], motors_[1], motors_[2]) / settings_.counts_per_torque;
-  return to_world(force_of(jacobian(*legs), torque));
-}
-
 bool FalconArm::send(const std::array<int, 3>& motors) noexcept {
   const bool homed = reply_.all_homed() && reading_.trouble != DeviceTrouble::silent;
   Command command;

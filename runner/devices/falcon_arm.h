@@ -62,10 +62,7 @@ class FalconArm {
   const std::string& serial() const { return transport_->serial(); }
   /// As last sent.
   const std::array<int, 3>& motors() const { return motors_; }
-  /// The force (N, world frame) of those by the scale in use, where the grip is now.
-  Vec3 shown_force() const noexcept;
   double counts_per_torque() const { return settings_.counts_per_torque; }
-  void set_counts_per_torque(double scale) { settings_.counts_per_torque = scale; }
   Transport& transport() { return *transport_; }
   /// After reopen() and boot(): as if new. Waits for a first reply.
   void restart() noexcept;

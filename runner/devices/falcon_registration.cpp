@@ -17,7 +17,7 @@ constexpr double kMostResidual = 0.003;  // m; more, and a point was wrong
 
 class Procedure {
  public:
-  Procedure(FalconArm& tip, FalconArm& tail, Clock& clock, Guide& guide)
+  Procedure(Device& tip, Device& tail, Clock& clock, Guide& guide)
       : tip_(tip), tail_(tail), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
 
   /// Asks until a point was taken that counts.
@@ -41,15 +41,19 @@ class Procedure {
 
  private:
   PairedPoint tick() {
-    due_ns_ += kTickNs;
+    // A stall is not made up for by a burst.
+    due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
-    for (FalconArm* arm : {&tip_, &tail_}) {
-      if (!arm->update().usable()) {
-        throw GuideError("the Falcon " + arm->serial() + ": " + advice(arm->reading().trouble));
-      }
-      arm->push(Vec3(0));
+    return {free_position(tip_), free_position(tail_)};
+  }
+
+  static Vec3 free_position(Device& device) {
+    const DeviceReading reading = device.read();
+    if (reading.lost) {
+      throw GuideError(device.capabilities().serial + ": " + advice(reading.trouble));
     }
-    return {tip_.reading().position, tail_.reading().position};
+    device.write(Vec3(0), Vec3(0));
+    return reading.stylus.tip;
   }
 
   /// The mean over a while; nothing where either grip moved.
@@ -75,7 +79,7 @@ class Procedure {
     return answer == Guide::Answer::go_on;
   }
 
-  FalconArm &tip_, &tail_;
+  Device &tip_, &tail_;
   Clock& clock_;
   Guide& guide_;
   std::int64_t due_ns_;
@@ -83,7 +87,7 @@ class Procedure {
 
 }  // namespace
 
-PairRegistration register_pair(FalconArm& tip, FalconArm& tail, Clock& clock, Guide& guide,
+PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
                                const RegistrationSettings& settings) {
   Procedure procedure(tip, tail, clock, guide);
   guide.say(glm::length(settings.offset) == 0
@@ -108,8 +112,8 @@ PairRegistration register_pair(FalconArm& tip, FalconArm& tail, Clock& clock, Gu
     throw GuideError(text.str());
   }
   PairRegistration pair;
-  pair.tip_serial = tip.serial();
-  pair.tail_serial = tail.serial();
+  pair.tip_serial = tip.capabilities().serial;
+  pair.tail_serial = tail.capabilities().serial;
   pair.tail_in_tip = fit.tail_in_tip;
   pair.stylus_length = settings.stylus_length;
   pair.residual = fit.residual;

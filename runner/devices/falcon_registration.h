@@ -2,7 +2,6 @@
 // Where the two Falcons of a stylus stand to each other, from places that both have seen.
 
 #include "runner/device.h"
-#include "runner/devices/falcon_arm.h"
 #include "runner/devices/falcon_calibration.h"
 #include "runner/devices/falcon_guide.h"
 #include "runner/devices/stylus_from_ends.h"
@@ -19,7 +18,8 @@ struct RegistrationSettings {
 };
 
 /// The whole procedure; no force is shown. \throws GuideError, RegistrationError.
-PairRegistration register_pair(FalconArm& tip, FalconArm& tail, Clock& clock, Guide& guide,
+/// \param tip, tail  one Falcon each
+PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
                                const RegistrationSettings& settings);
 
 }  // namespace palpate::falcon

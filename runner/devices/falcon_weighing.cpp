@@ -6,15 +6,17 @@
 #include <optional>
 #include <sstream>
 
+#include "runner/devices/falcon_parameters.h"
+
 namespace palpate::falcon {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
 constexpr std::int64_t kTickNs = 1'000'000;
 constexpr double kNearCentre = 0.01;  // m, to begin with
-constexpr double kMaxDrift = 0.035;   // m; beyond, the weight has won
-constexpr double kMaxForce = 8;       // N, nominal
-constexpr double kRamp = 0.5;         // s, from nothing to full force
+constexpr int kLastTicks = 20;
+constexpr double kMaxDrift = 0.035;  // m; beyond, the weight has won
+constexpr double kRamp = 0.5;        // s, from nothing to full force
 // By the nominal scale; the true one may be 4 times stronger, and the loop must bear that.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
@@ -24,7 +26,7 @@ constexpr double kMostResidual = 0.1;                              // of the hea
 /// Holds the grip at a target.
 class Holder {
  public:
-  explicit Holder(const Vec3& position) : last_(position) {}
+  Holder(const Vec3& position, double max_force) : last_(position), max_force_(max_force) {}
 
   Vec3 force(const Vec3& position, const Vec3& target) {
     const double blend = kTick / (kVelocityTime + kTick);
@@ -33,30 +35,39 @@ class Holder {
     const Vec3 error = target - position;
     sum_ += kTick * error;
     const double strength = kIntegral * glm::length(sum_);
-    if (strength > kMaxForce) sum_ *= kMaxForce / strength;
+    if (strength > max_force_) sum_ *= max_force_ / strength;
     ramp_ = std::min(1.0, ramp_ + kTick / kRamp);
     const Vec3 wanted = kStiffness * error + kIntegral * sum_ - kDamping * velocity_;
     const double size = glm::length(wanted);
-    return ramp_ * std::min(1.0, kMaxForce / std::max(size, kMaxForce)) * wanted;
+    if (ramp_ == 1 && size > max_force_) ++saturated_;
+    return ramp_ * std::min(1.0, max_force_ / std::max(size, max_force_)) * wanted;
   }
+  long saturated() const { return saturated_; }  ///< ticks
 
  private:
   Vec3 last_, velocity_, sum_;
+  double max_force_;  // N, nominal
   double ramp_ = 0;
+  long saturated_ = 0;
 };
 
 class Procedure {
  public:
-  Procedure(FalconArm& arm, Clock& clock, Guide& guide)
-      : arm_(arm), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
-  ~Procedure() { arm_.halt(); }
+  Procedure(Device& device, Clock& clock, Guide& guide)
+      : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
+  ~Procedure() {
+    for (int i = 0; i < kLastTicks; ++i) {  // one may come while a reply is still awaited
+      next_reading();
+      device_.write(Vec3(0), Vec3(0));
+    }
+  }
   Procedure(const Procedure&) = delete;
   Procedure& operator=(const Procedure&) = delete;
 
   void find_centre() {
     guide_.ask("Take the grip to the middle of its space, hold it there, and press ENTER.");
     for (;;) {
-      const Vec3& position = tick_free();
+      const Vec3 position = tick_free();
       if (!answered()) continue;
       if (glm::length(position) <= kNearCentre) break;
       std::ostringstream where;
@@ -65,7 +76,7 @@ class Procedure {
             << " cm up (less than 1 cm off is enough), and press ENTER.";
       guide_.ask(where.str());
     }
-    holder_.emplace(arm_.reading().position);
+    holder_.emplace(device_.read().stylus.tip, device_.capabilities().max_force);
   }
 
   Weighing measure(double weight, const std::string& question, const WeighingSettings& settings) {
@@ -77,16 +88,15 @@ class Procedure {
     const auto ticks = [](double seconds) { return std::lround(seconds / kTick); };
     for (long i = 0; i < ticks(settings.settle); ++i) tick_held(Vec3(0));
     Weighing weighing{weight, Vec3(0)};
-    const std::uint64_t saturated = arm_.counts().saturated;
+    const long saturated = holder_->saturated();
     const long count = ticks(settings.cycle * settings.cycles);
     for (long i = 0; i < count; ++i) {
       const double phase = static_cast<double>(i) * kTick / settings.cycle;
       const double part = phase - std::floor(phase);
       const double triangle = part < 0.25 ? 4 * part : part < 0.75 ? 2 - 4 * part : 4 * part - 4;
-      tick_held({0, 0, settings.sweep * triangle});
-      weighing.force += arm_.shown_force() / static_cast<double>(count);
+      weighing.force += tick_held({0, 0, settings.sweep * triangle}) / static_cast<double>(count);
     }
-    if (arm_.counts().saturated > saturated) {
+    if (holder_->saturated() > saturated) {
       throw GuideError("the motors were at their limit: take lighter weights");
     }
     return weighing;
@@ -95,28 +105,35 @@ class Procedure {
  private:
   static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
 
-  const ArmReading& next_reading() {
-    due_ns_ += kTickNs;
+  DeviceReading next_reading() {
+    // A stall is not made up for by a burst.
+    due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
-    const ArmReading& reading = arm_.update();
-    if (!reading.usable()) throw GuideError(advice(reading.trouble));
-    return reading;
+    return device_.read();
   }
 
-  const Vec3& tick_free() {
-    const Vec3& position = next_reading().position;
-    arm_.push(Vec3(0));
-    return position;
+  Vec3 position() {
+    const DeviceReading reading = next_reading();
+    if (reading.lost) throw GuideError(advice(reading.trouble));
+    return reading.stylus.tip;
   }
 
-  void tick_held(const Vec3& target) {
-    const Vec3& position = next_reading().position;
-    if (glm::length(position - target) > kMaxDrift) {
+  Vec3 tick_free() {
+    const Vec3 at = position();
+    device_.write(Vec3(0), Vec3(0));
+    return at;
+  }
+
+  /// The force that was told.
+  Vec3 tick_held(const Vec3& target) {
+    const Vec3 at = position();
+    if (glm::length(at - target) > kMaxDrift) {
       throw GuideError(
-          "the grip got away from the middle: take lighter weights, and let them down "
-          "slowly");
+          "the grip got away from the middle: take lighter weights, and let them down slowly");
     }
-    arm_.push(holder_->force(position, target));
+    const Vec3 force = holder_->force(at, target);
+    device_.write(force, Vec3(0));
+    return force;
   }
 
   bool answered() {
@@ -125,7 +142,7 @@ class Procedure {
     return answer == Guide::Answer::go_on;
   }
 
-  FalconArm& arm_;
+  Device& device_;
   Clock& clock_;
   Guide& guide_;
   std::int64_t due_ns_;
@@ -177,10 +194,9 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   return force;
 }
 
-ForceCalibration weigh(FalconArm& arm, Clock& clock, Guide& guide,
+ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings) {
-  arm.set_counts_per_torque(kCountsPerTorque);
-  Procedure procedure(arm, clock, guide);
+  Procedure procedure(device, clock, guide);
   procedure.find_centre();
   std::vector<Weighing> weighings = {
       procedure.measure(0, "Let go of the grip: it holds itself. Press ENTER.", settings)};
@@ -191,7 +207,7 @@ ForceCalibration weigh(FalconArm& arm, Clock& clock, Guide& guide,
     weighings.push_back(procedure.measure(mass * settings.gravity, question.str(), settings));
   }
   ForceCalibration force = fit_scale(weighings);
-  force.serial = arm.serial();
+  force.serial = device.capabilities().serial;
   force.weights = settings.weights;
   return force;
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "runner/device.h"
-#include "runner/devices/falcon_arm.h"
 #include "runner/devices/falcon_calibration.h"
 #include "runner/devices/falcon_guide.h"
 
@@ -32,9 +31,10 @@ struct Weighing {
 /// sense: no more force for more weight, or far off a line.
 ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
 
-/// The whole procedure. Zero force before and after. Its clock paces it at 1 kHz.
+/// The whole procedure, at 1 kHz of the clock. Zero force before and after.
+/// \param device  one Falcon, opened with its nominal scale; through a guard process, best
 /// \throws GuideError when it is stopped, the device is lost, or the grip gets away.
-ForceCalibration weigh(FalconArm& arm, Clock& clock, Guide& guide,
+ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings);
 
 }  // namespace palpate::falcon

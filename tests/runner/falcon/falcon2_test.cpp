@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "runner/devices/falcon.h"
 #include "runner/devices/falcon_registration.h"
 #include "tests/runner/falcon/emulator.h"
 #include "tests/runner/falcon/fake_transport.h"
@@ -165,7 +166,8 @@ PairRegistration registration(Bench& bench, const Vec3& offset, const std::funct
     return act(question);
   });
   BenchClock clock(bench);
-  return register_pair(*bench.tip, *bench.tail, clock, guide, {kLength, offset, points, 0.3});
+  FalconDevice tip(std::move(bench.tip)), tail(std::move(bench.tail));
+  return register_pair(tip, tail, clock, guide, {kLength, offset, points, 0.3});
 }
 
 TEST(FalconRegistration, FindsHowTheDevicesStand) {
@@ -209,8 +211,8 @@ TEST(FalconRegistration, TheSamePlaceTwiceIsAskedAgain) {
     return question < 6;
   });
   BenchClock clock(bench);
-  EXPECT_THROW(register_pair(*bench.tip, *bench.tail, clock, guide, {kLength, Vec3(0), 8, 0.3}),
-               GuideError);
+  FalconDevice tip(std::move(bench.tip)), tail(std::move(bench.tail));
+  EXPECT_THROW(register_pair(tip, tail, clock, guide, {kLength, Vec3(0), 8, 0.3}), GuideError);
   const auto near = std::count_if(guide.said.begin(), guide.said.end(), [](const auto& text) {
     return text.find("too near") != std::string::npos;
   });

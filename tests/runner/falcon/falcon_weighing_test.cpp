@@ -6,8 +6,10 @@
 #include <memory>
 #include <string>
 
+#include "runner/devices/falcon.h"
 #include "tests/runner/falcon/emulator.h"
 #include "tests/runner/falcon/fake_transport.h"
+#include "tests/runner/falcon/line_clock.h"
 #include "tests/runner/falcon/scripted_guide.h"
 
 namespace palpate::falcon {
@@ -15,25 +17,13 @@ namespace {
 
 using testing::Emulator;
 using testing::FakeTransport;
+using testing::LineClock;
 using testing::ScriptedGuide;
-
-/// The line's own time.
-class LineClock final : public Clock {
- public:
-  explicit LineClock(FakeTransport& line) : line_(line) {}
-  std::int64_t now_ns() noexcept override { return line_.now_ns(); }
-  void wait_until(std::int64_t when_ns) noexcept override {
-    if (when_ns > line_.now_ns()) line_.wait(when_ns - line_.now_ns());
-  }
-
- private:
-  FakeTransport& line_;
-};
 
 struct Bench {
   Emulator emulator;
   FakeTransport* line = nullptr;
-  std::unique_ptr<FalconArm> arm;
+  std::unique_ptr<FalconDevice> device;
   WeighingSettings settings;
   std::vector<std::string> asked;
 
@@ -44,7 +34,8 @@ struct Bench {
     auto transport = std::make_unique<FakeTransport>(emulator);
     line = transport.get();
     line->control(request::kLatency, 1);
-    arm = std::make_unique<FalconArm>(std::move(transport), ArmSettings{});
+    device = std::make_unique<FalconDevice>(
+        std::make_unique<FalconArm>(std::move(transport), ArmSettings{}));
     settings.weights = {0.1, 0.2, 0.3};
     settings.settle = 2;
     settings.cycles = 1;
@@ -62,7 +53,7 @@ struct Bench {
       return true;
     });
     LineClock clock(*line);
-    ForceCalibration force = weigh(*arm, clock, guide, settings);
+    ForceCalibration force = weigh(*device, clock, guide, settings);
     asked = guide.asked;
     return force;
   }
@@ -121,7 +112,7 @@ TEST(FalconWeighing, StoppingAndUnpluggingEndIt) {
   Bench stopped(-1e4);
   ScriptedGuide guide([](int question) { return question < 1; });
   LineClock clock(*stopped.line);
-  EXPECT_THROW(weigh(*stopped.arm, clock, guide, stopped.settings), GuideError);
+  EXPECT_THROW(weigh(*stopped.device, clock, guide, stopped.settings), GuideError);
   EXPECT_TRUE(stopped.emulator.torque_is_zero());
 
   Bench gone(-1e4);
@@ -131,7 +122,7 @@ TEST(FalconWeighing, StoppingAndUnpluggingEndIt) {
   });
   LineClock its_clock(*gone.line);
   try {
-    weigh(*gone.arm, its_clock, pulls, gone.settings);
+    weigh(*gone.device, its_clock, pulls, gone.settings);
     ADD_FAILURE();
   } catch (const GuideError& error) {
     EXPECT_NE(std::string(error.what()).find("unplugged"), std::string::npos) << error.what();
@@ -148,7 +139,7 @@ TEST(FalconWeighing, AGripFarFromTheMiddleIsAskedBack) {
     return question < 2;
   });
   LineClock clock(*bench.line);
-  EXPECT_THROW(weigh(*bench.arm, clock, guide, bench.settings), GuideError);  // stopped at 2
+  EXPECT_THROW(weigh(*bench.device, clock, guide, bench.settings), GuideError);  // stopped at 2
   ASSERT_EQ(guide.asked.size(), 3U);
   EXPECT_NE(guide.asked[1].find("-2 cm right"), std::string::npos) << guide.asked[1];
 }
