@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <memory>
-#include <vector>
 
 #include "rendering/peers.h"
 #include "rendering/separation.h"
+#include "rendering/support_map.h"
 
 namespace palpate::peers {
 
@@ -22,25 +22,24 @@ struct Scale {
   double radius;
 };
 
-/// The mesh as a support function: climbs from a table of starts over the directions (the faces of
-/// a cube, kCells x kCells each), so that a direction asked twice gets the same vertex twice, ties
-/// included: Bullet asks again for its witness points.
+/// The mesh as a support function: climbs from the start that a map has for the direction, so that
+/// a direction asked twice gets the same vertex twice, ties included: Bullet asks again for its
+/// witness points.
 class Hull {
  public:
-  explicit Hull(const ConvexMesh& mesh);
+  explicit Hull(const ConvexMesh& mesh) : mesh_(mesh), scale_(mesh), map_(mesh, 0, 1) {}
   const Scale& scale() const { return scale_; }
   Vec3 support(const Vec3& direction) const {
-    const std::uint32_t vertex = support_vertex(mesh_, direction, start_[cell_of(direction)]);
+    // Libraries may ask for no direction at all.
+    const Vec3 asked = glm::dot(direction, direction) > 0 ? direction : Vec3(1, 0, 0);
+    const std::uint32_t vertex = support_vertex(mesh_, asked, map_.near_support(asked));
     return scale_.to_unit(mesh_.vertices()[vertex]);
   }
 
  private:
-  static constexpr int kCells = 32;
-  static std::size_t cell_of(const Vec3& direction);
-
   const ConvexMesh& mesh_;
   Scale scale_;
-  std::vector<std::uint32_t> start_;
+  SupportMap map_;
 };
 
 struct Segment {

@@ -16,10 +16,11 @@ int cell_of(double c, int resolution) {
 
 }  // namespace
 
-SupportMap::SupportMap(const ConvexMesh& mesh, std::size_t climbed) {
+SupportMap::SupportMap(const ConvexMesh& mesh, std::size_t climbed, double vertices_per_cell) {
   const std::size_t vertices = mesh.vertices().size();
   if (vertices <= climbed) return;
-  resolution_ = static_cast<int>(std::sqrt(static_cast<double>(vertices) / (6 * kVerticesPerCell)));
+  const double cells = static_cast<double>(vertices) / (6 * vertices_per_cell);
+  resolution_ = std::max(1, static_cast<int>(std::sqrt(cells)));
   const auto side = static_cast<std::size_t>(resolution_);
   cells_.resize(6 * side * side);
   std::uint32_t vertex = 0;

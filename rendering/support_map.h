@@ -14,10 +14,11 @@ namespace palpate {
 class SupportMap {
  public:
   static constexpr std::size_t kClimbed = 2048;  ///< vertices; so few are climbed as they are
-  static constexpr double kVerticesPerCell = 8;
 
-  /// \param climbed  so few vertices get no map
-  explicit SupportMap(const ConvexMesh& mesh, std::size_t climbed = kClimbed);
+  /// \param climbed            so few vertices get no map
+  /// \param vertices_per_cell  on average; fewer make a finer map
+  explicit SupportMap(const ConvexMesh& mesh, std::size_t climbed = kClimbed,
+                      double vertices_per_cell = 8);
 
   bool empty() const { return cells_.empty(); }
   /// A vertex near the one farthest along `direction` (any length but 0); not empty.
