@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Runs each fuzz target under AddressSanitizer and UndefinedBehaviorSanitizer from the kept corpus on.
+# Usage: tests/fuzz/run.sh [SECONDS_EACH [TARGET ...]]; inputs that fail are left in .build/fuzz/found.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+seconds="${1:-10}"
+shift || true
+targets=("$@")
+[ ${#targets[@]} -gt 0 ] || targets=(protocol scene csv obj stl packets)
+
+cmake --preset fuzz > /dev/null
+cmake --build --preset fuzz --target "${targets[@]/#/fuzz_}"
+found="$PWD/.build/fuzz/found"
+mkdir -p "$found"
+run() {
+  local target="$1" corpora=("tests/fuzz/corpus/$1")
+  [ "$target" != protocol ] || corpora+=(tests/protocols/good tests/protocols/bad)
+  mkdir -p ".build/fuzz/corpus/$target"
+  ".build/fuzz/tests/fuzz/fuzz_$target" ".build/fuzz/corpus/$target" "${corpora[@]}" -max_total_time="$seconds" \
+    -max_len=4096 -timeout=20 -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix="$found/$target-" \
+    > ".build/fuzz/$target.log" 2>&1 ||
+    { tail -n 40 ".build/fuzz/$target.log"; echo "fuzz $target: an input fails, see $found" >&2; return 1; }
+  echo "$target: $(grep -E 'number_of_executed_units' ".build/fuzz/$target.log" | tr -s ' ' | cut -d' ' -f2) inputs, none fails"
+}
+failed=0
+for target in "${targets[@]}"; do run "$target" || failed=1; done
+exit "$failed"

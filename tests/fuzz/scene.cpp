@@ -1,0 +1,37 @@
+// Whatever a scene file holds: every fault is named, or its forces are finite.
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "protocols/parse.h"
+#include "runner/scene_builder.h"
+#include "stimuli/convex_mesh.h"
+#include "tests/fuzz/feel.h"
+#include "tests/fuzz/input_file.h"
+
+namespace {
+
+/// Fine tessellations are slow to build and show nothing more.
+bool small(const palpate::ObjectSpec& spec) {
+  return spec.subdivisions <= 3 && spec.segments <= 256 &&
+         std::all_of(spec.parts.begin(), spec.parts.end(), small);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const palpate::testing::InputFile file("scene.json");
+  try {
+    const auto objects = palpate::parse_scene(file.write(data, size));
+    if (objects.size() > 50 || !std::all_of(objects.begin(), objects.end(), small)) return 0;
+    palpate::SceneBuilder builder;
+    for (const palpate::Renderer* renderer :
+         {&palpate::point_renderer(), &palpate::ray_renderer()}) {
+      palpate::testing::feel(builder.build(objects, renderer->side_contact()), *renderer);
+    }
+  } catch (const palpate::InputError& error) {
+    if (error.faults().empty()) std::abort();
+  } catch (const palpate::MeshError&) {
+  }
+  return 0;
+}
