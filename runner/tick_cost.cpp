@@ -1,19 +1,15 @@
 #include "runner/tick_cost.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <numbers>
 
-#if defined(__x86_64__)
-#include <x86intrin.h>
-#endif
-
 #include "rendering/renderer.h"
 #include "runner/allocation_count.h"
+#include "runner/tick_clock.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 
@@ -27,34 +23,6 @@ constexpr double kTick = 1e-3;    // s
 constexpr int kWarm = 1000;       // ticks
 constexpr double kContactTarget = 100, kFreeTarget = 100, kFirstTarget = 2000,
                  kThousandTarget = 1000;  // ns
-
-/// Counts of a fast clock. On x86 the time stamp counter: reading it costs some 10 ns.
-std::uint64_t begin_count() {
-#if defined(__x86_64__)
-  return __rdtsc();
-#else
-  return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
-#endif
-}
-
-std::uint64_t end_count() {
-#if defined(__x86_64__)
-  unsigned core;
-  return __rdtscp(&core);
-#else
-  return begin_count();
-#endif
-}
-
-double nanoseconds_per_count() {
-  const auto start = std::chrono::steady_clock::now();
-  const std::uint64_t count = begin_count();
-  while (std::chrono::steady_clock::now() - start < std::chrono::milliseconds(100)) {
-  }
-  const auto counts = static_cast<double>(end_count() - count);
-  const std::chrono::duration<double, std::nano> passed = std::chrono::steady_clock::now() - start;
-  return passed.count() / counts;
-}
 
 /// Times ticks one by one.
 class Timer {

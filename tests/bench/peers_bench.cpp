@@ -1,0 +1,233 @@
+// The renderer beside other people's collision libraries: the same meshes and the same path of a
+// hand in one run. How long a tick takes, how that grows with the mesh, how often the depth is
+// wrong.
+//
+// Usage: peers_bench [SECONDS]   spent on each row, timing; 5 if not given
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "rendering/accuracy_methods.h"
+#include "rendering/reference.h"
+#include "rendering/renderer.h"
+#include "rendering/stroking_hand.h"
+#include "rendering/ways_out.h"
+#include "runner/tick_clock.h"
+#include "stimuli/primitives.h"
+
+namespace palpate::bench {
+namespace {
+
+constexpr double kRadius = 0.03;        // m
+constexpr std::size_t kWarm = 2000;     // ticks
+constexpr std::size_t kTicks = 60'000;  // at most, after them
+constexpr double kWrong = 1e-6;         // of the size
+constexpr double kRounding = 1e-12;     // of the size
+constexpr std::size_t kCheckedVisits =
+    30'000'000;  // facets that the exact reference looks at, a row
+
+using Path = std::vector<LineProbe>;
+
+/// In contact some 70 % of the time.
+Path hand_over(const std::shared_ptr<const ConvexMesh>& mesh, bool segment) {
+  const Renderer& renderer = segment ? ray_renderer() : point_renderer();
+  const Scene scene({{mesh, Pose{}, Material{}, 0, nullptr}}, segment);
+  RenderState state = scene.initial_state();
+  StrokeSettings settings;
+  settings.side = segment;
+  settings.lifted = 0.27;
+  StrokingHand hand(settings);
+  Path path(kWarm + kTicks);
+  double depth = 0;
+  for (LineProbe& probe : path) {
+    probe = hand.next(depth);
+    depth = renderer.tick(scene, state, probe, 1e-3).deepest.depth;
+    if (!segment) probe.tail = probe.tip;
+  }
+  return path;
+}
+
+struct Row {
+  std::string method;
+  std::size_t triangles = 0, ticks = 0;
+  double median_ns = 0, p99_ns = 0, worst_ns = 0;
+  std::size_t touching = 0;
+  std::size_t checked = 0, wrong = 0, lost = 0, gave_up = 0, other_side = 0;
+  double worst_error = 0;  ///< m
+};
+
+double at(std::vector<std::uint64_t>& counts, double share) {
+  const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(counts.size() - 1));
+  std::nth_element(counts.begin(), counts.begin() + k, counts.end());
+  return static_cast<double>(counts[static_cast<std::size_t>(k)]);
+}
+
+/// Holds answers against the exact least depth. A method that remembers its side may hold a longer
+/// way out, and is then held against that one.
+void check(const ConvexMesh& mesh, const LineProbe& probe, const ReferenceDepth& exact,
+           const Answer& answer, bool follows_side, Row& row) {
+  const double tolerance = kWrong * mesh.size();
+  ++row.checked;
+  if (std::isnan(answer.depth)) {
+    ++row.gave_up;
+    ++row.wrong;
+    return;
+  }
+  const double depth = answer.touching ? answer.depth : 0;
+  double error = std::abs(depth - std::max(0.0, exact.depth));
+  if (error > kRounding * mesh.size() && follows_side && answer.touching) {
+    const double to_least = error;
+    for (const WayOut& way : ways_out(mesh, probe, answer.normal, 1e-3))
+      error = std::min(error, std::abs(depth - way.depth));
+    if (error < to_least) ++row.other_side;
+  }
+  row.worst_error = std::max(row.worst_error, error);
+  if (error <= tolerance) return;
+  ++row.wrong;
+  if (!answer.touching) ++row.lost;
+}
+
+/// The exact depths of every so many ticks of a path.
+struct Yardstick {
+  std::size_t every = 1;
+  std::map<std::size_t, ReferenceDepth> depths;
+
+  Yardstick(const ConvexMesh& mesh, const Path& path) {
+    const std::size_t size = mesh.facets().size() + mesh.edges().size();
+    every = std::max<std::size_t>(1, kTicks * size / kCheckedVisits);
+    for (std::size_t i = kWarm; i < path.size(); i += every)
+      depths.emplace(i, reference_depth(mesh, path[i]));
+  }
+};
+
+Row run(const MethodKind& kind, const ConvexMesh& mesh, const Path& path, const Yardstick& exact,
+        bool segment, double seconds) {
+  const double ns = nanoseconds_per_count();
+  const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
+  const std::unique_ptr<Method> method = kind.make(mesh, segment);
+  Row row;
+  row.method = kind.name;
+  std::vector<std::uint64_t> counts;
+  counts.reserve(kTicks);
+  std::vector<Answer> answers;
+  answers.reserve(kTicks);
+  std::uint64_t spent = 0;
+  // Who remembers comes in from outside; the others may begin anywhere.
+  for (std::size_t i = kind.remembers ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
+    const std::uint64_t start = begin_count();
+    const Answer answer = method->tick(path[i]);
+    const std::uint64_t count = end_count() - start;
+    if (i < kWarm) continue;
+    spent += count;
+    counts.push_back(count);
+    answers.push_back(answer);
+    row.touching += answer.touching ? 1 : 0;
+  }
+  row.ticks = counts.size();
+  row.median_ns = at(counts, 0.5) * ns;
+  row.p99_ns = at(counts, 0.99) * ns;
+  row.worst_ns = at(counts, 1) * ns;
+  for (const auto& [i, depth] : exact.depths) {
+    if (i - kWarm >= answers.size()) break;
+    check(mesh, path[i], depth, answers[i - kWarm], kind.follows_side, row);
+  }
+  return row;
+}
+
+/// Ours as it is shipped, the plainest that is exact, and the libraries that were found.
+std::vector<MethodKind> compared() {
+  std::vector<MethodKind> kinds;
+  for (MethodKind& kind : accuracy_methods()) {
+    if (!kind.name.starts_with("walk") && kind.name != "scan") kinds.push_back(std::move(kind));
+  }
+  return kinds;
+}
+
+std::string share(std::size_t part, std::size_t whole) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %%",
+                whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0);
+  return text;
+}
+
+void print(const std::vector<Row>& rows) {
+  const Row& ours = rows.front();
+  for (const Row& r : rows) {
+    std::printf("%9zu  %-12s%7zu%6.0f %%%10.3f%10.3f%10.1f%9.1fx%8.1fx%9s%9s%9s%10.1e\n",
+                r.triangles, r.method.c_str(), r.ticks,
+                100.0 * static_cast<double>(r.touching) / static_cast<double>(r.ticks),
+                r.median_ns / 1e3, r.p99_ns / 1e3, r.worst_ns / 1e3, r.median_ns / ours.median_ns,
+                r.p99_ns / ours.p99_ns, share(r.wrong, r.checked).c_str(),
+                share(r.lost, r.checked).c_str(), share(r.other_side, r.checked).c_str(),
+                r.worst_error);
+  }
+  std::fflush(stdout);
+}
+
+void compare(bool segment, double seconds) {
+  std::printf("\n%s, us a tick\n%9s  %-12s%7s%8s%10s%10s%10s%10s%9s%9s%9s%9s%10s\n",
+              segment ? "Segment of 0.12 m" : "Point", "triangles", "method", "ticks", "touch",
+              "median", "p99", "worst", "/ours", "p99", "wrong", "lost", "2nd way", "error, m");
+  std::map<std::string, std::array<double, 2>> growth;  // median at 1,280 and 327,680
+  for (const int level : {0, 3, 5, 7}) {
+    const auto mesh = std::make_shared<const ConvexMesh>(icosphere(kRadius, level));
+    const Path path = hand_over(mesh, segment);
+    const Yardstick exact(*mesh, path);
+    std::vector<Row> rows;
+    for (const MethodKind& kind : compared()) {
+      rows.push_back(run(kind, *mesh, path, exact, segment, seconds));
+      rows.back().triangles = std::size_t{20} << (2 * level);
+      if (level == 3) growth[kind.name][0] = rows.back().median_ns;
+      if (level == 7) growth[kind.name][1] = rows.back().median_ns;
+    }
+    print(rows);
+  }
+  std::printf("\nGrowth of the median from 1,280 to 327,680 triangles:");
+  for (const auto& [name, medians] : growth)
+    std::printf("  %s %.2fx", name.c_str(), medians[1] / medians[0]);
+  std::printf("\n");
+}
+
+int main_with(int argc, char** argv) {
+  double seconds = 5;
+  if (argc > 2 ||
+      (argc == 2 &&
+       (std::from_chars(argv[1], argv[1] + std::strlen(argv[1]), seconds).ec != std::errc{} ||
+        !(seconds > 0)))) {
+    std::fprintf(stderr, "usage: peers_bench [SECONDS a row]\n");
+    return 2;
+  }
+  std::printf(
+      "Icospheres of 30 mm radius, a hand at 0.1 m/s, 1 to 2 mm deep for 70 %% of the time, the "
+      "same "
+      "path for all.\nMethods:\n");
+  for (const MethodKind& kind : compared())
+    std::printf("  %-12s %s\n", kind.name.c_str(), kind.description.c_str());
+  std::printf(
+      "wrong: depth off by more than 1e-6 of the size from the exact one (every facet looked at), "
+      "lost contacts and refusals among them;\nlost: of these, a contact that was not reported; "
+      "2nd "
+      "way: a way out that is exact but not the shortest, held since the probe came in by it.\n");
+  for (const bool segment : {true, false}) compare(segment, seconds);
+  return 0;
+}
+
+}  // namespace
+}  // namespace palpate::bench
+
+int main(int argc, char** argv) {
+  try {
+    return palpate::bench::main_with(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "peers_bench: %s\n", error.what());
+    return 1;
+  }
+}
