@@ -73,6 +73,27 @@ class Render(FromOutside):
         with open(out, newline="") as file:
             return [{k: v if k == "contact_type" else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
+    def test_explain_lists_what_runs_and_what_was_left_out(self):
+        scene, out = self.write("scene.json", self.CUBE), self.dir / "stages.json"
+        explain = ["render", "--scene", scene, "--renderer", "point", "--explain"]
+        text = self.palpate(*explain, "--json", out).stdout
+        report = json.loads(out.read_text())
+        stages = {stage["stage"]: stage for stage in report["stages"]}
+        for name, stage in stages.items():
+            self.assertIn(name, text)
+            self.assertTrue(stage["why"])
+            if not stage["runs"]:
+                self.assertIsNone(stage["ns"], name)
+        for name in ("tree of edges", "several parts", "side contact", "friction", "torque and second device"):
+            self.assertFalse(stages[name]["runs"], name)
+        for name in ("pose check", "neighbourhood watch", "spring"):
+            self.assertTrue(stages[name]["runs"], name)
+            self.assertGreater(stages[name]["ns"], 0)
+        self.assertGreater(report["contact_ns"], 0)
+        self.palpate(*explain, "--out", "x.csv", status=2)
+        self.palpate(*explain[:-1], "--json", out, status=2)
+        self.palpate(*explain[:-1], status=2)
+
     def test_a_tip_pressed_into_the_top_of_a_cube(self):
         rows = self.render(self.CUBE, "point", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [0.001, 0.01, 0, 0.024, 0.01, 0, 0.144]])
         self.assertEqual(rows[0]["contact_type"], "none")
