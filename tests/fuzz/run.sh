@@ -10,6 +10,7 @@ targets=("$@")
 
 cmake --preset fuzz > /dev/null
 cmake --build --preset fuzz --target "${targets[@]/#/fuzz_}"
+[ ! -w /dev/shm ] || export TMPDIR=/dev/shm  # targets that read files write them first
 found="$PWD/.build/fuzz/found"
 mkdir -p "$found"
 run() {
