@@ -1,5 +1,8 @@
 #include "runner/servo_thread.h"
 
+#include <sys/syscall.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <future>
 #include <utility>
@@ -31,7 +34,10 @@ ServoThread::~ServoThread() {
   thread_.join();
 }
 
+int ServoThread::current_thread() noexcept { return static_cast<int>(syscall(SYS_gettid)); }
+
 void ServoThread::run() noexcept {
+  thread_id_ = current_thread();
   servo_.start();
   while (!quit_.load(std::memory_order_relaxed)) {
     take_orders();

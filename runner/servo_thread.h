@@ -50,11 +50,15 @@ class ServoThread final : public TickSource {
   /// True once zero force was commanded to the device after emergency_zero(). Signal safe.
   bool forces_are_off() const noexcept { return off_.load(); }
 
+  /// Whether the caller is the servo's thread. Signal safe.
+  bool in_this_thread() const noexcept { return thread_id_.load() == current_thread(); }
+
   const RealtimeRights& rights() const { return rights_; }
   /// Every tick since the thread began, trials or not. From any thread.
   const ServoHealth& health() const { return health_; }
 
  private:
+  static int current_thread() noexcept;
   void run() noexcept;
   void take_orders() noexcept;
   void publish(const Sample& sample) noexcept;
@@ -76,6 +80,7 @@ class ServoThread final : public TickSource {
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};
+  std::atomic<int> thread_id_{0};
   Sample popped_;
   std::jthread thread_;
 };

@@ -1,0 +1,137 @@
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <thread>
+
+#include "runner/guard.h"
+#include "runner/realtime.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t kSpin_ns = 20'000;  // before sleeping for the reading
+constexpr int kUnanswered = 25;            // reads in a row: the guard has gone
+constexpr auto kNap = std::chrono::milliseconds(2);
+constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
+
+GuardChannel* make_channel() {
+  void* memory = mmap(nullptr, sizeof(GuardChannel), PROT_READ | PROT_WRITE,
+                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED)
+    throw std::runtime_error(std::string("no memory to share with a guard process: ") +
+                             std::strerror(errno));
+  return new (memory) GuardChannel;
+}
+
+}  // namespace
+
+void GuardedDevice::Unmap::operator()(GuardChannel* channel) const {
+  munmap(channel, sizeof(GuardChannel));
+}
+
+GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings)
+    : channel_(make_channel()), settings_(settings) {
+  const int runner = getpid();
+  guard_ = fork();
+  if (guard_ < 0)
+    throw std::runtime_error(std::string("no guard process could be started: ") +
+                             std::strerror(errno));
+  if (guard_ == 0) {
+    run_guard(*channel_, factory, settings, runner);
+    _exit(0);
+  }
+  const auto give_up = std::chrono::steady_clock::now() +
+                       std::chrono::milliseconds(std::llround(settings.patience * 1e3));
+  while (channel_->state.load() == GuardState::opening) {
+    if (ended() && channel_->state.load() == GuardState::opening)
+      throw std::runtime_error("the guard process ended while it opened the device");
+    if (std::chrono::steady_clock::now() >= give_up) {
+      kill(guard_, SIGKILL);
+      end();
+      throw std::runtime_error("the device was not ready after " +
+                               std::to_string(std::llround(settings.patience)) + " s");
+    }
+    std::this_thread::sleep_for(kNap);
+  }
+  if (channel_->state.load() == GuardState::failed) {
+    end();
+    throw std::runtime_error(channel_->message.data());
+  }
+  capabilities_ = channel_->capabilities.numbers();
+}
+
+GuardedDevice::~GuardedDevice() { end(); }
+
+bool GuardedDevice::ended() noexcept {
+  if (!ended_) ended_ = waitpid(guard_, nullptr, WNOHANG) != 0;
+  return ended_;
+}
+
+void GuardedDevice::end() noexcept {
+  channel_->quit.store(true);
+  emergency_zero();
+  const auto give_up = std::chrono::steady_clock::now() + kFarewell;
+  while (!ended()) {
+    if (std::chrono::steady_clock::now() >= give_up) kill(guard_, SIGKILL);
+    std::this_thread::sleep_for(kNap);
+  }
+}
+
+DeviceReading GuardedDevice::read() noexcept {
+  const std::uint32_t asked = channel_->reads.load(std::memory_order_relaxed) + 1;
+  channel_->reads.store(asked, std::memory_order_release);
+  channel_->calls.fetch_add(1, std::memory_order_release);
+  futex_wake(channel_->calls);
+  RealClock clock;
+  const std::int64_t began = clock.now_ns();
+  const auto patience = static_cast<std::int64_t>(0.5e9 / settings_.rate);
+  for (std::int64_t waited = 0; waited < patience; waited = clock.now_ns() - began) {
+    const std::uint32_t answered = channel_->answered.load(std::memory_order_acquire);
+    if (answered == asked) break;
+    if (waited > kSpin_ns) futex_wait(channel_->answered, answered, patience - waited);
+  }
+  GuardedReading reading;
+  if (channel_->answered.load(std::memory_order_acquire) == asked &&
+      channel_->reading.read(reading)) {
+    unanswered_ = 0;
+    last_ = reading.reading();
+    if (reading.trips != trips_seen_) {
+      trips_seen_ = reading.trips;
+      last_.lost = true;
+      last_.trouble = DeviceTrouble::guarded;
+    }
+    return last_;
+  }
+  ++unanswered_;
+  DeviceReading old = last_;
+  old.trouble = DeviceTrouble::late;
+  if (unanswered_ >= kUnanswered || ended()) {
+    old.lost = true;
+    old.trouble = DeviceTrouble::guard_lost;
+  }
+  return old;
+}
+
+void GuardedDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
+  channel_->command.write(
+      {{device1.x, device1.y, device1.z}, {device2.x, device2.y, device2.z}, trips_seen_});
+  channel_->commands.fetch_add(1, std::memory_order_release);
+  channel_->calls.fetch_add(1, std::memory_order_release);
+  futex_wake(channel_->calls);
+}
+
+void GuardedDevice::emergency_zero() noexcept {
+  channel_->zeros.fetch_add(1);
+  channel_->calls.fetch_add(1);
+  futex_wake(channel_->calls);
+}
+
+}  // namespace palpate

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+
+#include "runner/device.h"
+#include "runner/realtime.h"
+
+namespace palpate::testing {
+
+/// What a device was told and when, by the machine's clock; meant for memory shared with its
+/// process.
+struct DeviceRecord {
+  struct Write {
+    std::int64_t time_ns = 0;
+    double force = 0;  ///< N, size
+  };
+  static constexpr std::uint32_t kRoom = 1 << 16;
+
+  void add(double force) {
+    const std::uint32_t at = count.load();
+    if (at >= kRoom) return;
+    writes[at] = {RealClock().now_ns(), force};
+    count.store(at + 1);
+  }
+  double last_force() const {
+    const std::uint32_t n = count;
+    return n > 0 ? writes[n - 1].force : 0;
+  }
+
+  std::atomic<std::uint32_t> count{0};
+  std::atomic<bool> closed{false};
+  std::array<Write, kRoom> writes{};
+};
+
+/// Stands where it is told and writes down every command.
+class RecordingDevice final : public Device {
+ public:
+  RecordingDevice(DeviceRecord& record, DeviceReading (*where)(int tick))
+      : record_(record), where_(where) {
+    capabilities_ = {"recording", 5, 5, 8, 3000, 10000, 0.2, 0, true, "R-1", "never"};
+  }
+  ~RecordingDevice() override { record_.closed = true; }
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  DeviceReading read() noexcept override { return where_(tick_++); }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    const Vec3 sum = device1 + device2;
+    record_.add(std::sqrt(sum.x * sum.x + sum.y * sum.y + sum.z * sum.z));
+  }
+
+ private:
+  DeviceRecord& record_;
+  DeviceReading (*where_)(int);
+  DeviceCapabilities capabilities_;
+  int tick_ = 0;
+};
+
+}  // namespace palpate::testing
