@@ -12,8 +12,9 @@ namespace palpate::falcon {
 namespace {
 
 constexpr std::uint32_t kKey = 0x08AA;
-constexpr std::size_t kHeader = 2 * (1 + 8 + 2);  // bytes: key, reserved words, entry point
-constexpr std::uintmax_t kMaxBytes = 1 << 18;     // the processor's whole memory
+constexpr std::size_t kHeader =
+    std::size_t{2} * (1 + 8 + 2);              // bytes: key, reserved words, entry point
+constexpr std::uintmax_t kMaxBytes = 1 << 18;  // the processor's whole memory
 
 [[noreturn]] void refuse(const std::string& file, std::size_t at, const std::string& expected) {
   throw InputError({{file, "byte " + std::to_string(at),

@@ -105,9 +105,9 @@ PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& g
   const RigidFit fit = fit_rigid(points);
   if (fit.residual > kMostResidual) {
     std::ostringstream text;
-    text << "the places fit only to " << std::lround(fit.residual * 1e4) / 10.0 << " mm ("
+    text << "the places fit only to " << std::round(fit.residual * 1e4) / 10 << " mm ("
          << kMostResidual * 1e3 << " mm are borne; the worst is "
-         << std::lround(fit.worst * 1e4) / 10.0
+         << std::round(fit.worst * 1e4) / 10
          << " mm off): are the grips firmly together, and both devices homed?";
     throw GuideError(text.str());
   }
