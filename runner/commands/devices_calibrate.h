@@ -1,0 +1,20 @@
+#pragma once
+// `palpate devices --calibrate`: called by the devices command.
+
+#include <boost/program_options.hpp>
+#include <string>
+
+#include "runner/devices/registry.h"
+
+namespace palpate {
+
+/// The options that only calibration has.
+void add_calibrate_options(boost::program_options::options_description& options);
+
+/// Guides the experimenter through the calibration of `device` (falcon: force by weights; falcon2:
+/// registration of both frames) and stores it in order.calibration. \returns the exit status.
+/// \throws UsageError, std::runtime_error.
+int calibrate_devices(const std::string& device, const DeviceOrder& order,
+                      const boost::program_options::variables_map& values);
+
+}  // namespace palpate
