@@ -13,7 +13,10 @@ namespace palpate {
 /// Counts of a fast clock. On x86 the time stamp counter: reading it costs some 10 ns.
 inline std::uint64_t begin_count() {
 #if defined(__x86_64__)
-  return __rdtsc();
+  _mm_lfence();  // what goes before, as working out the pose, is not to be finished in this time
+  const std::uint64_t count = __rdtsc();
+  _mm_lfence();
+  return count;
 #else
   return static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
 #endif
