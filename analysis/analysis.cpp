@@ -88,6 +88,22 @@ void warn_of_times(Analysis& analysis) {
   }
 }
 
+/// A gain that practice may have made.
+void warn_of_practice(Analysis& analysis) {
+  const OrderEffect& order = analysis.practice.all_shapes;
+  const std::size_t point_first = order.point_first.n_participants,
+                    ray_first = order.ray_first.n_participants;
+  if (point_first + ray_first > 0 && (point_first == 0 || ray_first == 0)) {
+    analysis.warnings.push_back(
+        std::string("All participants had the ") + (ray_first == 0 ? "point" : "ray") +
+        " first: what practice does and what the renderer does cannot be told apart.");
+  } else if (order.test.p.value_or(1) < kAlpha) {
+    analysis.warnings.push_back(
+        "The gain depends on which renderer came first (p " + p_text(*order.test.p) +
+        "): see practice; the gain with the two orders balanced stands there.");
+  }
+}
+
 std::string with_reduction(const std::string& name, const PairedShape& shape) {
   return name + " (" + fixed(std::fabs(*shape.percent_reduction_geometric), 0) + " %)";
 }
@@ -108,6 +124,8 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.shapes = compare_by_shape(table, out.description, settings.seed);
   out.rm_anova = rm_anova(out.description.people);
   out.mixed_model = mixed_model(out.description.people, table.renderers, table.shapes);
+  out.speed_accuracy = speed_accuracy(table, out.description, out.shapes);
+  out.practice = practice_effects(table, out.description, settings.too_fast);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     out.exclusions.push_back(count_exclusions(out.description, r));
   }
@@ -125,6 +143,7 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   warn_of_times(out);
   warn_of_exclusions(out);
   warn_of_dropped(out);
+  warn_of_practice(out);
   return out;
 }
 

@@ -1,29 +1,13 @@
 #include "analysis/report_json.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <utility>
+
+#include "analysis/inference_json.h"
 
 namespace palpate {
 
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-constexpr const char* kModelNote =
-    "Beside the primary inference (paired_by_shape.*.t_test): the model leaves participant x shape "
-    "variance out, and is too sure where there is some.";
-
-/// A number that is too large to be one (the percent of a huge log ratio) is null as well.
-Json number(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
-}
-
-void put_status(Json& out, const std::string& undefined) {
-  out["status"] = undefined.empty() ? "ok" : "undefined";
-  if (!undefined.empty()) out["reason"] = undefined;
-}
 
 void put_interval(Json& out, const std::optional<Interval>& interval) {
   std::optional<double> low, high, percent_low, percent_high;
@@ -122,101 +106,6 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   return out;
 }
 
-Json anova(const RmAnova& anova, const TrialTable& table) {
-  Json out;
-  put_status(out, anova.undefined);
-  out["n_participants_used"] = anova.n_participants_used;
-  for (const AnovaEffect& effect : anova.effects) {
-    Json& one = out["effects"][effect.name];
-    put_status(one, effect.undefined);
-    one["num_df"] = number(effect.num_df);
-    one["den_df"] = number(effect.den_df);
-    one["F"] = number(effect.f);
-    one["p"] = number(effect.p);
-    one["generalized_eta_squared"] = number(effect.generalized_eta_squared);
-    Json& sphericity = one["sphericity"];
-    put_status(sphericity, effect.sphericity.undefined);
-    sphericity["mauchly_W"] = number(effect.sphericity.mauchly_w);
-    sphericity["mauchly_p"] = number(effect.sphericity.mauchly_p);
-    sphericity["mauchly_p_box"] = number(effect.sphericity.mauchly_p_box);
-    sphericity["gg_epsilon"] = number(effect.sphericity.gg_epsilon);
-    sphericity["gg_p"] = number(effect.sphericity.gg_p);
-    sphericity["hf_epsilon_raw"] = number(effect.sphericity.hf_epsilon_raw);
-    sphericity["hf_epsilon_used"] = number(effect.sphericity.hf_epsilon_used);
-    sphericity["hf_p"] = number(effect.sphericity.hf_p);
-  }
-  Json& dropped = out["dropped_participants"] = Json::array();
-  for (const std::size_t participant : anova.dropped) {
-    dropped.push_back(table.participants[participant]);
-  }
-  return out;
-}
-
-Json model_estimate(const ModelEstimate& value) {
-  Json out;
-  put_status(out, value.undefined);
-  out["estimate"] = number(value.estimate);
-  out["se"] = number(value.se);
-  out["df_satterthwaite"] = number(value.df_satterthwaite);
-  out["t"] = number(value.t);
-  out["p"] = number(value.p);
-  out["ci95_low"] = value.ci95 ? Json(value.ci95->low) : Json(nullptr);
-  out["ci95_high"] = value.ci95 ? Json(value.ci95->high) : Json(nullptr);
-  return out;
-}
-
-Json mixed(const MixedModel& model, const TrialTable& table) {
-  Json out;
-  put_status(out, model.undefined);
-  if (model.undefined.empty() && !model.singular.empty()) {
-    out["status"] = "singular";
-    out["reason"] = model.singular;
-  }
-  out["n_observations"] = model.n_observations;
-  out["n_participants"] = model.n_participants;
-  out["logLik_REML"] = number(model.log_likelihood_reml);
-  Json& fixed_effects = out["fixed_effects"] = Json::object();
-  Json& tests = out["fixed_effects_tests"] = Json::object();
-  for (const FixedEffect& effect : model.fixed_effects) {
-    fixed_effects[effect.name] = number(effect.value.estimate);
-    tests[effect.name] = model_estimate(effect.value);
-  }
-  out["fixed_effects_left_out"] = model.left_out;
-
-  Json& components = out["variance_components"];
-  std::optional<double> intercept, slope, correlation;
-  if (model.random_sds.size() == 2) {
-    intercept = model.random_sds[0];
-    slope = model.random_sds[1];
-    correlation = model.random_correlations[0];
-  }
-  put_status(components, !model.undefined.empty() ? model.undefined
-                         : !correlation           ? "no correlation with what does not vary"
-                                                  : "");
-  components["participant_intercept_sd"] = number(intercept);
-  components["participant_renderer_slope_sd"] = number(slope);
-  components["intercept_slope_correlation"] = number(correlation);
-  components["residual_sd"] = number(model.residual_sd);
-
-  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
-    const ModelEstimate& contrast = model.contrasts.front()[s];
-    Json one = model_estimate(contrast);
-    one["p_holm"] = number(contrast.p_holm);
-    std::optional<double> percent, low, high;
-    if (contrast.estimate) percent = percent_reduction(*contrast.estimate);
-    if (contrast.ci95) {
-      low = percent_reduction(*contrast.ci95).low;
-      high = percent_reduction(*contrast.ci95).high;
-    }
-    one["percent_reduction"] = number(percent);
-    one["percent_reduction_ci95_low"] = number(low);
-    one["percent_reduction_ci95_high"] = number(high);
-    out["contrasts_ray_minus_point"][table.shapes[s]] = std::move(one);
-  }
-  out["note"] = kModelNote;
-  return out;
-}
-
 Json provenance(const Provenance& from) {
   const auto text = [](const std::string& value) {
     return value.empty() ? Json(nullptr) : Json(value);
@@ -262,8 +151,10 @@ std::string report_json(const Analysis& analysis) {
   for (std::size_t s = 0; s < table.shapes.size(); ++s) {
     out["paired_by_shape"][table.shapes[s]] = paired(analysis.shapes[s], table);
   }
-  out["rm_anova"] = anova(analysis.rm_anova, table);
-  out["mixed_model"] = mixed(analysis.mixed_model, table);
+  out["rm_anova"] = anova_json(analysis.rm_anova, table);
+  out["mixed_model"] = mixed_model_json(analysis.mixed_model, table);
+  out["speed_accuracy"] = speed_accuracy_json(analysis.speed_accuracy, table);
+  out["practice"] = practice_json(analysis.practice, table);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     const Exclusions& lost = analysis.exclusions[r];
     out["exclusions"][table.renderers[r]] = {{"n_trials", lost.n_trials},

@@ -1,76 +1,14 @@
 #include "analysis/tables.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <optional>
 #include <utility>
 
+#include "analysis/table_cells.h"
 #include "analysis/text.h"
 
 namespace palpate {
-
-namespace {
-
-constexpr const char* kMissing = "–";
-
-std::string number(const std::optional<double>& value, int decimals) {
-  return value ? fixed(*value, decimals) : kMissing;
-}
-
-std::string percent(const std::optional<double>& value, int decimals = 1) {
-  return value ? fixed(*value, decimals) + " %" : kMissing;
-}
-
-std::optional<double> hundredfold(const std::optional<double>& share) {
-  if (!share) return std::nullopt;
-  return 100 * *share;
-}
-
-/// A change: with its sign.
-std::string signed_fixed(double value, int decimals) {
-  const std::string text = fixed(value, decimals);
-  return (value > 0 && text.find_first_not_of("0.") != std::string::npos ? "+" : "") + text;
-}
-
-std::string p_or_missing(const std::optional<double>& p) { return p ? p_text(*p) : kMissing; }
-
-std::string reduction_interval(const std::optional<Interval>& log_ratio) {
-  if (!log_ratio) return kMissing;
-  const Interval percent = percent_reduction(*log_ratio);
-  return fixed(percent.low, 1) + " to " + fixed(percent.high, 1);
-}
-
-/// "Response times" or "Response times (SIMULATED PARTICIPANTS)".
-std::string caption(const Analysis& analysis, const std::string& what) {
-  const std::string label = simulated_label(analysis.table.simulated);
-  return label.empty() ? what : what + " (" + label + ")";
-}
-
-/// A note for each reason, with the shapes that it holds for.
-class Reasons {
- public:
-  void add(const std::string& reason, const std::string& shape) {
-    if (reason.empty()) return;
-    for (auto& [known, shapes] : reasons_) {
-      if (known == reason) {
-        if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
-        return;
-      }
-    }
-    reasons_.push_back({reason, {shape}});
-  }
-  void put(std::vector<std::string>& notes) const {
-    for (const auto& [reason, shapes] : reasons_) {
-      notes.push_back("Undefined for " + joined(shapes) + ": " + reason + ".");
-    }
-  }
-
- private:
-  std::vector<std::pair<std::string, std::vector<std::string>>> reasons_;
-};
-
-}  // namespace
 
 Table reduction_table(const Analysis& analysis) {
   Table table;
@@ -140,37 +78,6 @@ Table accuracy_table(const Analysis& analysis) {
     }
   }
   table.notes = {"A time-out counts as wrong; “of answered” leaves time-outs out."};
-  return table;
-}
-
-Table speed_accuracy_table(const Analysis& analysis) {
-  Table table;
-  table.caption = caption(analysis, "Speed and accuracy together, ray against point");
-  table.header = {"shape", "time", "accuracy point", "accuracy ray", "accuracy", "reading"};
-  if (analysis.table.renderers.size() < 2) return table;
-  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
-    const auto point =
-        hundredfold(analysis.description.accuracy[0][s].mean_of_participant_accuracies);
-    const auto ray =
-        hundredfold(analysis.description.accuracy[1][s].mean_of_participant_accuracies);
-    const auto& reduction = analysis.shapes[s].percent_reduction_geometric;
-    std::optional<double> change;
-    if (point && ray) change = *ray - *point;
-    std::string reading = kMissing;
-    constexpr double kNotable = 1;  // percent of time, percentage points of accuracy
-    if (change && reduction) {
-      const bool faster = *reduction > kNotable, slower = *reduction < -kNotable;
-      const bool better = *change > kNotable, worse = *change < -kNotable;
-      reading = (faster && worse) || (slower && better) ? "trade-off possible" : "no trade-off";
-    }
-    table.rows.push_back({analysis.table.shapes[s],
-                          reduction ? signed_fixed(-*reduction, 1) + " %" : kMissing,
-                          percent(point), percent(ray),
-                          change ? signed_fixed(*change, 1) + " points" : kMissing, reading});
-  }
-  table.notes = {
-      "Trade-off possible: faster and less accurate, or slower and more accurate, by more "
-      "than 1 % of the time and 1 percentage point."};
   return table;
 }
 
@@ -248,7 +155,6 @@ Table provenance_table(const Analysis& analysis) {
   Table table;
   table.caption = "Where this comes from";
   table.n_names = 2;
-  table.n_names = 2;
   table.header = {"what", "value"};
   const auto add = [&](const char* what, const std::string& value) {
     if (!value.empty()) table.rows.push_back({what, value});
@@ -272,6 +178,10 @@ std::vector<Table> all_tables(const Analysis& analysis) {
   if (analysis.table.renderers.size() == 2) tables.push_back(speed_accuracy_table(analysis));
   std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
   tables.push_back(tests_table(analysis));
+  tables.push_back(anova_table(analysis));
+  tables.push_back(mixed_model_table(analysis));
+  tables.push_back(learning_table(analysis));
+  if (analysis.table.renderers.size() == 2) tables.push_back(renderer_order_table(analysis));
   tables.push_back(exclusions_table(analysis));
   tables.push_back(provenance_table(analysis));
   return tables;

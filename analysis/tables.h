@@ -27,6 +27,14 @@ Table speed_accuracy_table(const Analysis& analysis);
 std::vector<Table> confusion_tables(const Analysis& analysis);
 Table tests_table(const Analysis& analysis);
 Table exclusions_table(const Analysis& analysis);
+/// Renderer x shape with the corrections for sphericity.
+Table anova_table(const Analysis& analysis);
+/// Contrasts, variances and how far to trust them.
+Table mixed_model_table(const Analysis& analysis);
+/// Log times over the trials with each renderer.
+Table learning_table(const Analysis& analysis);
+/// Gains by which renderer came first.
+Table renderer_order_table(const Analysis& analysis);
 /// What and where from: two columns of text.
 Table provenance_table(const Analysis& analysis);
 

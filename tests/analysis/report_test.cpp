@@ -42,7 +42,8 @@ Analysis analysis_of(const Study& study) {
           raw.participant = study.people[p];
           raw.renderer = renderer;
           raw.shape = shape;
-          raw.trial = ++number;
+          // Half of the people have the ray first.
+          raw.trial = ++number + (renderer == "point" && p % 2 == 1 ? 100000 : 0);
           raw.timed_out = renderer == "ray" && random.unit() < study.lost_with_ray;
           if (!raw.timed_out) raw.response = shape;
           raw.correct = !raw.timed_out;

@@ -1,0 +1,209 @@
+#include "analysis/inference_json.h"
+
+#include <cmath>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+constexpr const char* kModelNote =
+    "Beside the primary inference (paired_by_shape.*.t_test): the model leaves participant x shape "
+    "variance out, and is too sure where there is some.";
+
+Json model_estimate(const ModelEstimate& value) {
+  Json out;
+  put_status(out, value.undefined);
+  out["estimate"] = number(value.estimate);
+  out["se"] = number(value.se);
+  out["df_satterthwaite"] = number(value.df_satterthwaite);
+  out["t"] = number(value.t);
+  out["p"] = number(value.p);
+  out["ci95_low"] = value.ci95 ? Json(value.ci95->low) : Json(nullptr);
+  out["ci95_high"] = value.ci95 ? Json(value.ci95->high) : Json(nullptr);
+  return out;
+}
+
+/// Of a mean over participants that stands beside it.
+void put_test(Json& out, const TTest& test) {
+  put_status(out, test.undefined);
+  out["sd"] = number(test.sd);
+  out["se"] = number(test.se);
+  out["t"] = number(test.t);
+  out["df"] = number(test.df);
+  out["p"] = number(test.p);
+  std::optional<double> low, high;
+  if (test.log_ratio_ci95) {
+    low = test.log_ratio_ci95->low;
+    high = test.log_ratio_ci95->high;
+  }
+  out["ci95_low"] = number(low);
+  out["ci95_high"] = number(high);
+}
+
+Json order_group(const OrderGroup& group) {
+  return {{"n_participants", group.n_participants},
+          {"mean_log_ratio", number(group.mean_log_ratio)}};
+}
+
+Json order_effect(const OrderEffect& effect) {
+  Json out;
+  put_test(out, effect.test);
+  out["difference"] = number(effect.difference);
+  out["point_first"] = order_group(effect.point_first);
+  out["ray_first"] = order_group(effect.ray_first);
+  out["balanced_log_ratio"] = number(effect.balanced_log_ratio);
+  std::optional<double> percent, low, high;
+  if (effect.balanced_log_ratio) percent = percent_reduction(*effect.balanced_log_ratio);
+  if (effect.balanced_ci95) {
+    low = percent_reduction(*effect.balanced_ci95).low;
+    high = percent_reduction(*effect.balanced_ci95).high;
+  }
+  out["balanced_percent_reduction"] = number(percent);
+  out["balanced_percent_reduction_ci95_low"] = number(low);
+  out["balanced_percent_reduction_ci95_high"] = number(high);
+  return out;
+}
+
+Json learning_json(const Learning& learning) {
+  Json out;
+  put_test(out, learning.slope);
+  out["n_participants"] = learning.n_participants;
+  out["mean_slope_per_100_trials"] = number(learning.mean_slope);
+  Json& bins = out["bins"] = Json::array();
+  for (const LearningBin& bin : learning.bins) {
+    bins.push_back({{"n_participants", bin.n_participants},
+                    {"n_trials", bin.n_trials},
+                    {"mean_log", number(bin.mean_log)},
+                    {"se_mean_log", number(bin.se_mean_log)}});
+  }
+  return out;
+}
+
+}  // namespace
+
+Json number(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
+
+void put_status(Json& out, const std::string& undefined) {
+  out["status"] = undefined.empty() ? "ok" : "undefined";
+  if (!undefined.empty()) out["reason"] = undefined;
+}
+
+Json anova_json(const RmAnova& anova, const TrialTable& table) {
+  Json out;
+  put_status(out, anova.undefined);
+  out["n_participants_used"] = anova.n_participants_used;
+  for (const AnovaEffect& effect : anova.effects) {
+    Json& one = out["effects"][effect.name];
+    put_status(one, effect.undefined);
+    one["num_df"] = number(effect.num_df);
+    one["den_df"] = number(effect.den_df);
+    one["F"] = number(effect.f);
+    one["p"] = number(effect.p);
+    one["generalized_eta_squared"] = number(effect.generalized_eta_squared);
+    Json& sphericity = one["sphericity"];
+    put_status(sphericity, effect.sphericity.undefined);
+    sphericity["mauchly_W"] = number(effect.sphericity.mauchly_w);
+    sphericity["mauchly_p"] = number(effect.sphericity.mauchly_p);
+    sphericity["mauchly_p_box"] = number(effect.sphericity.mauchly_p_box);
+    sphericity["gg_epsilon"] = number(effect.sphericity.gg_epsilon);
+    sphericity["gg_p"] = number(effect.sphericity.gg_p);
+    sphericity["hf_epsilon_raw"] = number(effect.sphericity.hf_epsilon_raw);
+    sphericity["hf_epsilon_used"] = number(effect.sphericity.hf_epsilon_used);
+    sphericity["hf_p"] = number(effect.sphericity.hf_p);
+  }
+  Json& dropped = out["dropped_participants"] = Json::array();
+  for (const std::size_t participant : anova.dropped) {
+    dropped.push_back(table.participants[participant]);
+  }
+  return out;
+}
+
+Json mixed_model_json(const MixedModel& model, const TrialTable& table) {
+  Json out;
+  put_status(out, model.undefined);
+  if (model.undefined.empty() && !model.singular.empty()) {
+    out["status"] = "singular";
+    out["reason"] = model.singular;
+  }
+  out["n_observations"] = model.n_observations;
+  out["n_participants"] = model.n_participants;
+  out["logLik_REML"] = number(model.log_likelihood_reml);
+  Json& fixed_effects = out["fixed_effects"] = Json::object();
+  Json& tests = out["fixed_effects_tests"] = Json::object();
+  for (const FixedEffect& effect : model.fixed_effects) {
+    fixed_effects[effect.name] = number(effect.value.estimate);
+    tests[effect.name] = model_estimate(effect.value);
+  }
+  out["fixed_effects_left_out"] = model.left_out;
+
+  Json& components = out["variance_components"];
+  std::optional<double> intercept, slope, correlation;
+  if (model.random_sds.size() == 2) {
+    intercept = model.random_sds[0];
+    slope = model.random_sds[1];
+    correlation = model.random_correlations[0];
+  }
+  put_status(components, !model.undefined.empty() ? model.undefined
+                         : !correlation           ? "no correlation with what does not vary"
+                                                  : "");
+  components["participant_intercept_sd"] = number(intercept);
+  components["participant_renderer_slope_sd"] = number(slope);
+  components["intercept_slope_correlation"] = number(correlation);
+  components["residual_sd"] = number(model.residual_sd);
+
+  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+    const ModelEstimate& contrast = model.contrasts.front()[s];
+    Json one = model_estimate(contrast);
+    one["p_holm"] = number(contrast.p_holm);
+    std::optional<double> percent, low, high;
+    if (contrast.estimate) percent = percent_reduction(*contrast.estimate);
+    if (contrast.ci95) {
+      low = percent_reduction(*contrast.ci95).low;
+      high = percent_reduction(*contrast.ci95).high;
+    }
+    one["percent_reduction"] = number(percent);
+    one["percent_reduction_ci95_low"] = number(low);
+    one["percent_reduction_ci95_high"] = number(high);
+    out["contrasts_ray_minus_point"][table.shapes[s]] = std::move(one);
+  }
+  out["note"] = kModelNote;
+  return out;
+}
+
+Json speed_accuracy_json(const std::vector<SpeedAccuracy>& shapes, const TrialTable& table) {
+  Json out;
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    const SpeedAccuracy& shape = shapes[s];
+    Json& one = out[table.shapes[s]];
+    put_test(one, shape.test);
+    one["n_pairs"] = shape.n_pairs;
+    one["percent_change_time"] = number(shape.percent_change_time);
+    one["accuracy_point"] = number(shape.accuracy_point);
+    one["accuracy_ray"] = number(shape.accuracy_ray);
+    one["accuracy_change"] = number(shape.accuracy_change);
+    one["reading"] = shape.reading.empty() ? Json(nullptr) : Json(shape.reading);
+  }
+  return out;
+}
+
+Json practice_json(const Practice& practice, const TrialTable& table) {
+  Json out;
+  for (std::size_t r = 0; r < practice.learning.size(); ++r) {
+    out["learning"][table.renderers[r]] = learning_json(practice.learning[r]);
+  }
+  Json& difference = out["slope_difference_ray_minus_point"];
+  put_test(difference, practice.slope_difference);
+  difference["mean_per_100_trials"] = number(practice.mean_slope_difference);
+  Json& order = out["renderer_order"];
+  order["n_interleaved"] = practice.n_interleaved;
+  order["all_shapes"] = order_effect(practice.all_shapes);
+  for (std::size_t s = 0; s < practice.shapes.size(); ++s) {
+    order["shapes"][table.shapes[s]] = order_effect(practice.shapes[s]);
+  }
+  return out;
+}
+
+}  // namespace palpate
