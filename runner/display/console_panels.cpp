@@ -179,11 +179,19 @@ void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand::Kind>
     asked.push_back(ConsoleCommand::Kind::emergency_zero);
   }
   ImGui::PopStyleColor(3);
-  if (!off) return;
+  // Always there, so that no other button moves under the hand when forces go off.
+  const float clear = 8 * ImGui::GetFontSize();
+  ImGui::BeginChild("forces", {width - clear - ImGui::GetStyle().ItemSpacing.x,
+                               2 * ImGui::GetTextLineHeightWithSpacing()});
   ImGui::PushTextWrapPos(0);
-  text(kBad, "Forces are off: " + fault_words(state.sample.faults));
+  text(off ? kBad : kQuiet,
+       off ? "Forces are off: " + fault_words(state.sample.faults) : "No fault");
   ImGui::PopTextWrapPos();
-  if (wide_button("Clear the fault", width)) asked.push_back(ConsoleCommand::Kind::clear_fault);
+  ImGui::EndChild();
+  ImGui::SameLine();
+  ImGui::BeginDisabled(!off);
+  if (wide_button("Clear the fault", clear)) asked.push_back(ConsoleCommand::Kind::clear_fault);
+  ImGui::EndDisabled();
 }
 
 void draw_health(const ConsoleState& state) {

@@ -38,7 +38,7 @@ std::optional<std::string> ConsoleView::note() {
   return out;
 }
 
-std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now) {
+std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now, const Modifiers& modifiers) {
   std::vector<ConsoleCommand::Kind> asked;
   const ImGuiViewport* const all = ImGui::GetMainViewport();
   ImGui::SetNextWindowPos(all->WorkPos);
@@ -53,7 +53,7 @@ std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now) {
   const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
 
   ImGui::BeginChild("picture", {room.x - side - gap, 0}, false, ImGuiWindowFlags_NoScrollbar);
-  draw_view();
+  draw_view(modifiers);
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
   draw_forces(forces_, half, plots);
   ImGui::SameLine();
@@ -67,7 +67,7 @@ std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now) {
   return asked;
 }
 
-void ConsoleView::draw_view() {
+void ConsoleView::draw_view(const Modifiers& modifiers) {
   const float font = ImGui::GetFontSize();
   const ImVec2 room = ImGui::GetContentRegionAvail();
   const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
@@ -93,8 +93,9 @@ void ConsoleView::draw_view() {
   pointer.wheel = ImGui::IsItemHovered() ? io.MouseWheel : 0;
   pointer.orbit = ImGui::IsItemActive() && (ImGui::IsMouseDown(ImGuiMouseButton_Right) ||
                                             (!hand_ && ImGui::IsMouseDown(ImGuiMouseButton_Left)));
-  pointer.turn = io.KeyCtrl || (ImGui::IsItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left));
-  pointer.reach = io.KeyShift;
+  pointer.turn =
+      modifiers.ctrl || (ImGui::IsItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left));
+  pointer.reach = modifiers.shift;
   if (pointer.orbit) camera_.orbit(-0.008F * pointer.moved.x, 0.008F * pointer.moved.y);
   if (hand_) hand_->step(pointer, camera_);
 

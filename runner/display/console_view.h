@@ -19,6 +19,11 @@ struct ForcePoint {
   double force = 0;  ///< N, on the hand, of both devices together
 };
 
+/// Held down, whichever window has the keyboard.
+struct Modifiers {
+  bool ctrl = false, shift = false;
+};
+
 class ConsoleView {
  public:
   /// Needs a current OpenGL context.
@@ -27,12 +32,12 @@ class ConsoleView {
   /// \param now  s, when it came
   void take(ConsoleState state, double now);
   /// One frame; what was asked for in it. \param now  s
-  std::vector<ConsoleCommand::Kind> draw(double now);
+  std::vector<ConsoleCommand::Kind> draw(double now, const Modifiers& modifiers);
   /// A note that was finished in the last frame.
   std::optional<std::string> note();
 
  private:
-  void draw_view();
+  void draw_view(const Modifiers& modifiers);
   void draw_side(double now, std::vector<ConsoleCommand::Kind>& asked);
   void draw_notes();
 

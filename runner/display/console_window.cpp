@@ -61,7 +61,7 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Place& place,
   glfwSetCharCallback(window_, &ConsoleWindow::on_letter);
   glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
   glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
-  glfwSetMouseButtonCallback(window_, &ImGui_ImplGlfw_MouseButtonCallback);
+  glfwSetMouseButtonCallback(window_, &ConsoleWindow::on_button);
   glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
   ImGui_ImplGlfw_InitForOpenGL(window_, false);
   ImGui_ImplOpenGL3_Init("#version 330 core");
@@ -100,12 +100,29 @@ void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action
       self.participant_.press(key, scancode);
     }
   }
-  if (!answer) ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);
+  if (answer) return;
+  // Dear ImGui looks at keys once a frame: one that was down and up between two frames stays down
+  // until it was seen.
+  if (action == GLFW_PRESS) self.fresh_keys_.push_back(key);
+  if (action == GLFW_RELEASE &&
+      std::count(self.fresh_keys_.begin(), self.fresh_keys_.end(), key) > 0) {
+    self.late_releases_.push_back({key, scancode, mods});
+  } else {
+    ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);
+  }
 }
 
 void ConsoleWindow::on_letter(GLFWwindow* window, unsigned letter) {
   const auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
   if (!self.swallow_letter_) ImGui_ImplGlfw_CharCallback(window, letter);
+}
+
+void ConsoleWindow::on_button(GLFWwindow* window, int button, int action, int mods) {
+  // For displays without a window manager, which leave the keyboard where it is.
+  if (action == GLFW_PRESS && glfwGetWindowAttrib(window, GLFW_FOCUSED) == GLFW_FALSE) {
+    glfwFocusWindow(window);
+  }
+  ImGui_ImplGlfw_MouseButtonCallback(window, button, action, mods);
 }
 
 void ConsoleWindow::draw() {
@@ -118,8 +135,23 @@ void ConsoleWindow::draw() {
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
-  for (const ConsoleCommand::Kind kind : view_->draw(now)) ask(kind);
+  const auto held = [&](int left, int right) {
+    for (GLFWwindow* const window : {window_, participant_.handle()}) {
+      if (glfwGetKey(window, left) == GLFW_PRESS || glfwGetKey(window, right) == GLFW_PRESS) {
+        return true;
+      }
+    }
+    return false;
+  };
+  const Modifiers modifiers{held(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL),
+                            held(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT)};
+  for (const ConsoleCommand::Kind kind : view_->draw(now, modifiers)) ask(kind);
   if (auto note = view_->note()) ask(ConsoleCommand::Kind::note, std::move(*note));
+  fresh_keys_.clear();
+  for (const Release& up : late_releases_) {
+    ImGui_ImplGlfw_KeyCallback(window_, up.key, up.scancode, GLFW_RELEASE, up.mods);
+  }
+  late_releases_.clear();
   ImGui::Render();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glViewport(0, 0, width, height);

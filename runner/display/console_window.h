@@ -31,7 +31,11 @@ class ConsoleWindow final : public ExperimenterConsole {
   void abandon() noexcept { window_ = nullptr; }
 
  private:
+  struct Release {
+    int key, scancode, mods;
+  };
   static void on_key(GLFWwindow* window, int key, int scancode, int action, int mods);
+  static void on_button(GLFWwindow* window, int button, int action, int mods);
   static void on_letter(GLFWwindow* window, unsigned letter);
 
   const WindowSettings& settings_;
@@ -39,7 +43,9 @@ class ConsoleWindow final : public ExperimenterConsole {
   GLFWwindow* window_ = nullptr;
   ImGuiContext* context_ = nullptr;
   std::unique_ptr<ConsoleView> view_;
-  bool swallow_letter_ = false;  ///< the next one came from the numeric pad
+  bool swallow_letter_ = false;         ///< the next one came from the numeric pad
+  std::vector<int> fresh_keys_;         ///< went down since the last frame
+  std::vector<Release> late_releases_;  ///< of these
   Mailbox<ConsoleState> states_;
   Inbox<ConsoleCommand> commands_;
 };

@@ -68,6 +68,7 @@ struct ConsoleState {
   double remaining = 0;               ///< s, estimated, without breaks; 0 while unknown
   std::vector<double> times;          ///< s, identification times so far, in order
   std::vector<std::string> messages;  ///< newest last: faults, notes, what was done
+  std::size_t older_messages = 0;     ///< that were left out before the first
   Sample sample;                      ///< the servo's newest
   std::shared_ptr<const std::vector<ObjectSpec>>
       objects;                                ///< of the trial under way, virtual frame

@@ -25,7 +25,8 @@ void PointerHand::step(const PointerMotion& pointer, const Camera& camera) {
     const Vec3 by = workspace_.to_device(point) - hand_.tip;
     hand_.move(by.x, by.y, by.z);
   };
-  if (!was_over_) held_ = {0, 0};
+  const bool entered = !was_over_;
+  if (entered) held_ = {0, 0};
   was_over_ = true;
   double reach = pointer.wheel * kNotch;
   if (pointer.orbit) {
@@ -35,7 +36,7 @@ void PointerHand::step(const PointerMotion& pointer, const Camera& camera) {
     held_ = pointer.at - camera.pixel(tip());
   } else if (pointer.reach) {
     reach -= kReachPerPixel * pointer.moved.y;
-  } else if (pointer.moved != glm::vec2(0, 0)) {
+  } else if (entered || pointer.moved != glm::vec2(0, 0)) {
     move_to(Vec3(camera.under(pointer.at - held_, tip())));
   }
   if (reach != 0) {

@@ -1,0 +1,156 @@
+#include "runner/display/text_input.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+using Kind = ConsoleCommand::Kind;
+
+struct Word {
+  std::string_view line;
+  Kind kind;
+};
+
+constexpr Word kWords[] = {
+    {"pause", Kind::pause},
+    {"go", Kind::go_on},
+    {"repeat", Kind::repeat_trial},
+    {"stop", Kind::stop_after_trial},
+    {"stop block", Kind::stop_after_block},
+    {"zero", Kind::emergency_zero},
+    {"clear", Kind::clear_fault},
+    {"quit", Kind::quit},
+};
+
+constexpr char kEscape = '\x1b';
+constexpr char kDelete = '\x7f';
+constexpr char kClearLine = '\x15';  // Ctrl-U
+constexpr std::size_t kLongestLine = 4000;
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return text;
+}
+
+bool continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U; }
+
+/// Bytes of the UTF-8 sequence that begins with this one; 0: none does.
+std::size_t sequence_length(char lead) {
+  const auto byte = static_cast<unsigned char>(lead);
+  if (byte < 0x80) return 1;
+  if (byte >= 0xC2 && byte <= 0xDF) return 2;
+  if (byte >= 0xE0 && byte <= 0xEF) return 3;
+  return byte >= 0xF0 && byte <= 0xF4 ? 4 : 0;
+}
+
+}  // namespace
+
+const char* text_commands_help() {
+  return "commands, each ended by Enter:\n"
+         "  :pause       before the next trial       :go          go on\n"
+         "  :repeat      show this trial again       :note TEXT   a note with its time\n"
+         "  :stop        end after this trial        :stop block  end after this block\n"
+         "  :zero, Esc   emergency: forces off       :clear       forces may go on again\n"
+         "  :quit        end at once                 :quit withdrawn  the participant withdraws\n";
+}
+
+ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
+  line = trimmed(line);
+  for (const Word& word : kWords) {
+    if (line == word.line) return {word.kind, "", time_ns};
+  }
+  for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
+                                   std::pair(std::string_view("quit "), Kind::quit)}) {
+    if (line.substr(0, word.size()) == word)
+      return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
+  }
+  return {Kind::note, "", time_ns};
+}
+
+void TextInput::end_line(std::int64_t time_ns, std::vector<Event>& out) {
+  const std::string line = std::exchange(line_, {});
+  const ConsoleCommand command = parse_text_command(std::string_view(line).substr(1), time_ns);
+  if (command.kind == Kind::note && command.text.empty()) {
+    out.emplace_back(Unknown{line});
+  } else {
+    out.emplace_back(command);
+  }
+}
+
+void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vector<Event>& out) {
+  const bool enter = text == "\n" || text == "\r";
+  if (!line_.empty()) {
+    if (enter) {
+      end_line(time_ns, out);
+    } else if (text[0] == kDelete || text[0] == '\b') {
+      while (continues(line_.back())) line_.pop_back();
+      line_.pop_back();
+    } else if (text[0] == kClearLine) {
+      line_.clear();
+    } else if (static_cast<unsigned char>(text[0]) >= ' ' && line_.size() < kLongestLine) {
+      line_ += text;
+    }
+    return;
+  }
+  if (text == ":") {
+    line_ = text;
+  } else if (enter) {
+    out.emplace_back(KeyPress{"enter", time_ns});
+  } else if (text == " ") {
+    out.emplace_back(KeyPress{"space", time_ns});
+  } else if (static_cast<unsigned char>(text[0]) > ' ' && text[0] != kDelete) {
+    out.emplace_back(KeyPress{text, time_ns});
+  }
+}
+
+/// \return how many bytes of `rest`, which begins with Escape, it took
+std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
+                              std::vector<Event>& out) {
+  const ConsoleCommand emergency{Kind::emergency_zero, "", time_ns};
+  if (rest.size() >= 3 && rest[1] == 'O') {  // keypad in its application mode
+    if (rest[2] >= 'p' && rest[2] <= 'y')
+      out.emplace_back(KeyPress{std::string(1, static_cast<char>('0' + rest[2] - 'p')), time_ns});
+    if (rest[2] == 'M') out.emplace_back(KeyPress{"enter", time_ns});
+    return 3;
+  }
+  if (rest.size() >= 3 && rest[1] == '[') {
+    std::size_t end = 2;
+    while (end < rest.size() && (rest[end] < '@' || rest[end] > '~')) ++end;
+    if (rest.substr(2, end - 2) == "24" && end < rest.size() && rest[end] == '~')  // F12
+      out.emplace_back(emergency);
+    return std::min(end + 1, rest.size());
+  }
+  out.emplace_back(emergency);
+  return 1;
+}
+
+std::vector<TextInput::Event> TextInput::feed(std::string_view bytes, std::int64_t time_ns) {
+  std::vector<Event> out;
+  const std::string all = std::exchange(partial_, {}) + std::string(bytes);
+  const std::string_view rest = all;
+  for (std::size_t at = 0; at < rest.size();) {
+    if (rest[at] == kEscape) {
+      at += escape(rest.substr(at), time_ns, out);
+      continue;
+    }
+    const std::size_t length = sequence_length(rest[at]);
+    if (length == 0) {  // no UTF-8
+      ++at;
+      continue;
+    }
+    std::size_t whole = 1;
+    while (whole < length && at + whole < rest.size() && continues(rest[at + whole])) ++whole;
+    if (whole < length && at + whole == rest.size()) {
+      partial_ = rest.substr(at);
+      break;
+    }
+    if (whole == length) letter(std::string(rest.substr(at, length)), time_ns, out);
+    at += whole;
+  }
+  return out;
+}
+
+}  // namespace palpate

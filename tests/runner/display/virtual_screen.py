@@ -1,0 +1,113 @@
+"""A display in memory, with keyboard, pointer and a camera: Xvfb, xdotool, ImageMagick."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+PATIENCE = 60  # s, for what takes a moment on an idle machine; only a hang reaches it
+
+NEEDED = ["Xvfb", "xdotool", "import"]
+
+
+def skip_without_screen():
+    missing = [tool for tool in NEEDED if shutil.which(tool) is None]
+    if missing:
+        raise unittest.SkipTest("not installed: " + ", ".join(missing))
+
+
+def wait_for(what, condition):
+    """The first result of condition() that is true."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        result = condition()
+        if result:
+            return result
+        time.sleep(0.05)
+    raise AssertionError(f"waited {PATIENCE} s in vain for {what}")
+
+
+class VirtualScreen:
+    def __init__(self, size="1600x1000"):
+        reading, writing = os.pipe()
+        self.server = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp"],
+            pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            number = pipe.readline().strip()
+        if not number:
+            raise AssertionError("Xvfb did not start")
+        self.name = ":" + number
+        # One thread of software drawing: the tests share their machine with a servo.
+        self.environment = dict(os.environ, DISPLAY=self.name, LP_NUM_THREADS="1")
+
+    def close(self):
+        if self.server.poll() is None:
+            self.server.send_signal(signal.SIGCONT)
+            self.server.terminate()
+        self.server.wait()
+
+    def kill(self):
+        self.server.kill()
+        self.server.wait()
+
+    def stall(self):
+        self.server.send_signal(signal.SIGSTOP)
+
+    def go_on(self):
+        self.server.send_signal(signal.SIGCONT)
+
+    def do(self, *words):
+        done = subprocess.run(["xdotool", *map(str, words)], env=self.environment, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        return done.stdout
+
+    def window(self, title):
+        """The visible window whose whole title matches the regular expression."""
+        return wait_for(f"a window '{title}'", lambda: self.do(
+            "search", "--onlyvisible", "--name", f"^{title}$").split())[0]
+
+    def key(self, *keys):
+        self.do("key", "--clearmodifiers", *keys)
+
+    def focus(self, window):
+        self.do("windowfocus", window)
+        wait_for("the keyboard", lambda: self.do("getwindowfocus").strip() == window)
+
+    def size(self, window):
+        words = dict(line.split("=") for line in self.do(
+            "getwindowgeometry", "--shell", window).split())
+        return int(words["WIDTH"]), int(words["HEIGHT"])
+
+    def point(self, window, x, y):
+        self.do("mousemove", "--window", window, x, y)
+
+    def click(self, window, x, y):
+        self.point(window, x, y)
+        time.sleep(0.2)  # a frame that sees the pointer there before the button goes down
+        self.do("mousedown", 1)
+        time.sleep(0.2)
+        self.do("mouseup", 1)
+
+    def picture(self, window):
+        """Its pixels as bytes."""
+        return subprocess.run(["import", "-silent", "-window", window, "-depth", "8", "rgb:-"],
+                              env=self.environment, check=True, stdout=subprocess.PIPE).stdout
+
+    def keep(self, window, name):
+        """For looking at: PALPATE_PICTURES names a folder."""
+        folder = os.environ.get("PALPATE_PICTURES")
+        if folder:
+            subprocess.run(["import", "-silent", "-window", window, f"{folder}/{name}.png"],
+                           env=self.environment, check=True)
+
+    def settled_picture(self, window, differs_from=None):
+        """Two equal pictures in a row, of something else than before."""
+        def pair():
+            first = self.picture(window)
+            time.sleep(0.1)
+            return first if first == self.picture(window) and first != differs_from else None
+        return wait_for("a picture that stands still", pair)

@@ -1,0 +1,224 @@
+"""Participant's window and experimenter's console on a real display, without a session.
+
+Usage: windows_test.py HARNESS
+"""
+
+import os
+import queue
+import subprocess
+import sys
+import threading
+import unittest
+
+from virtual_screen import PATIENCE, VirtualScreen, skip_without_screen, wait_for
+
+HARNESS = sys.argv.pop() if len(sys.argv) > 1 else None
+
+EMERGENCY, PAUSE, NOTE, QUIT = 5, 0, 7, 8
+
+
+class Windows:
+    """The harness, with what it says in order."""
+
+    def __init__(self, screen):
+        self.program = subprocess.Popen([HARNESS], env=screen.environment, text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.lines = queue.Queue()
+        self.listener = threading.Thread(target=self._listen, daemon=True)
+        self.listener.start()
+        self.expect("ready")
+        self.participant = screen.window("harness")
+        self.console = screen.window("harness - console")
+
+    def _listen(self):
+        for line in self.program.stdout:
+            self.lines.put(line.strip())
+
+    def say(self, line):
+        self.program.stdin.write(line + "\n")
+        self.program.stdin.flush()
+
+    def expect(self, line):
+        """Returns what was said before it."""
+        seen = []
+        while True:
+            try:
+                heard = self.lines.get(timeout=PATIENCE)
+            except queue.Empty:
+                raise AssertionError(f"no '{line}', but {seen}") from None
+            if heard.startswith(line):
+                return seen, heard
+            seen.append(heard)
+
+    def where(self):
+        """Tip and axis of the mouse's stylus."""
+        self.say("where")
+        words = self.expect("tip")[1].split()
+        return [float(x) for x in words[1:4]], [float(x) for x in words[5:8]]
+
+    def close(self):
+        if self.program.poll() is None:
+            self.program.kill()
+        self.program.wait()
+        self.listener.join()
+        self.program.stdin.close()
+        self.program.stdout.close()
+
+
+class WindowsTest(unittest.TestCase):
+    def setUp(self):
+        skip_without_screen()
+        self.screen = VirtualScreen()
+        self.addCleanup(self.screen.close)
+        self.windows = Windows(self.screen)
+        self.addCleanup(self.windows.close)
+
+    def press(self, *keys):
+        self.screen.key(*keys)
+
+    def expect(self, line):
+        return self.windows.expect(line)
+
+    def test_a_trial_looks_the_same_whatever_the_shape(self):
+        self.windows.say("page neutral")
+        self.windows.say("state sphere 0")
+        wait_for("the key map", lambda: len(set(self.screen.picture(self.windows.participant))) > 20)
+        blank = self.screen.settled_picture(self.windows.participant)
+        console = self.screen.settled_picture(self.windows.console)
+        for shape in ["cone", "cylinder", "cube"]:
+            self.windows.say(f"page neutral {shape}")
+            self.windows.say(f"state {shape} 0")
+            console = self.screen.settled_picture(self.windows.console, differs_from=console)
+            self.screen.keep(self.windows.console, f"console_{shape}")
+            self.assertEqual(self.screen.settled_picture(self.windows.participant), blank, shape)
+        self.screen.keep(self.windows.participant, "participant_trial")
+        self.windows.say("page text Fühlen Sie die Form. 触って形を当ててください。")
+        self.screen.settled_picture(self.windows.participant, differs_from=blank)
+        self.screen.keep(self.windows.participant, "participant_text")
+
+    def test_keys_in_order_keypad_as_digits(self):
+        self.windows.say("page neutral")
+        self.screen.focus(self.windows.participant)
+        self.screen.settled_picture(self.windows.participant)
+        self.press("1", "KP_2", "3", "KP_4", "space", "a")
+        for key in ["1", "2", "3", "4", "space", "a"]:
+            self.assertEqual(self.expect("key")[1], f"key {key}")
+
+    def test_answers_reach_the_participants_screen_from_the_console(self):
+        self.windows.say("page neutral")
+        self.screen.settled_picture(self.windows.participant)
+        self.screen.focus(self.windows.console)
+        self.press("2", "KP_3")
+        self.assertEqual(self.expect("key")[1], "key 2")
+        self.assertEqual(self.expect("key")[1], "key 3")
+
+    def test_a_note_takes_the_keyboard_but_not_the_keypad(self):
+        self.windows.say("page neutral")
+        self.windows.say("state cube 0")
+        self.screen.settled_picture(self.windows.console)
+        width, height = self.screen.size(self.windows.console)
+        self.screen.point(self.windows.console, width - 200, height - 28)
+        pointed = self.screen.settled_picture(self.windows.console)
+        self.screen.click(self.windows.console, width - 200, height - 28)
+        wait_for("the cursor", lambda: self.screen.picture(self.windows.console) != pointed)
+        self.screen.do("type", "--delay", 120, "moved chair 1")
+        self.press("KP_2")
+        self.screen.do("type", "--delay", 120, "x")
+        self.press("Return")
+        seen, note = self.expect(f"command {NOTE}")
+        self.assertEqual(note, f"command {NOTE} moved chair 1x")
+        self.assertEqual(seen, ["key 2"])
+
+    def test_emergency_from_every_window_and_by_the_button(self):
+        self.windows.say("page neutral")
+        self.windows.say("state cube 384")
+        self.screen.settled_picture(self.windows.console)
+        for window in [self.windows.participant, self.windows.console]:
+            self.screen.focus(window)
+            for key in ["F12", "Escape"]:
+                self.press(key)
+                self.expect("emergency")
+                self.expect(f"command {EMERGENCY}")
+        self.screen.keep(self.windows.console, "console_fault")
+        width, _ = self.screen.size(self.windows.console)
+        self.screen.click(self.windows.console, width - 200, 40)
+        self.expect("emergency")
+        self.expect(f"command {EMERGENCY}")
+
+    def test_the_pointer_moves_and_turns_the_stylus(self):
+        self.windows.say("state cube 0")
+        self.screen.settled_picture(self.windows.console)
+        rest, rest_axis = self.windows.where()
+        self.screen.point(self.windows.console, 300, 250)
+        self.screen.point(self.windows.console, 310, 260)
+        wait_for("the tip", lambda: self.windows.where()[0] != rest)
+        self.screen.settled_picture(self.windows.console)
+        there, axis = self.windows.where()
+        self.assertEqual(axis, rest_axis)
+        self.screen.do("click", 4)  # the wheel
+        wait_for("the tip", lambda: self.windows.where()[0] != there)
+        there = self.windows.where()[0]
+        self.screen.do("keydown", "ctrl")
+        self.screen.point(self.windows.console, 380, 260)
+        wait_for("the axis", lambda: self.windows.where()[1] != axis)
+        self.screen.settled_picture(self.windows.console)
+        self.screen.do("keyup", "ctrl")
+        after = self.windows.where()[0]
+        for a, b in zip(after, there):
+            self.assertAlmostEqual(a, b, delta=1e-6)
+
+    def test_a_stalled_display_keeps_nobody_waiting(self):
+        self.windows.say("page neutral")
+        self.windows.say("state cube 0")
+        self.screen.settled_picture(self.windows.console)
+        self.screen.stall()
+        for i in range(2000):
+            self.windows.say(f"page message {i}")
+            self.windows.say("state cone 0")
+        self.windows.say("ping")
+        self.expect("pong")  # while the display still stands
+        self.screen.go_on()
+        self.screen.focus(self.windows.participant)
+        self.press("1")
+        self.expect("key 1")
+
+    def test_windows_destroyed_or_killed(self):
+        for how in ["windowclose", "windowkill"]:
+            screen = VirtualScreen()
+            self.addCleanup(screen.close)
+            windows = Windows(screen)
+            self.addCleanup(windows.close)
+            screen.settled_picture(windows.participant)
+            screen.do(how, windows.participant)
+            windows.expect("closed")
+            windows.say("ping")
+            windows.expect("pong")
+            windows.say("end")
+            self.assertEqual(windows.program.wait(PATIENCE), 0, how)
+
+    def test_the_display_server_dies(self):
+        self.windows.say("page neutral")
+        self.screen.settled_picture(self.windows.participant)
+        self.screen.kill()
+        self.expect("closed")
+        self.windows.say("ping")
+        self.expect("pong")
+        self.windows.say("end")
+        self.assertEqual(self.windows.program.wait(PATIENCE), 0)
+
+    def test_ends_when_asked(self):
+        self.windows.say("end")
+        self.assertEqual(self.windows.program.wait(PATIENCE), 0)
+
+
+class NoDisplay(unittest.TestCase):
+    def test_says_so(self):
+        environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        done = subprocess.run([HARNESS], env=environment, text=True, stdout=subprocess.PIPE,
+                              stdin=subprocess.DEVNULL)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("no graphical display", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
