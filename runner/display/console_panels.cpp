@@ -137,12 +137,13 @@ void draw_status(const ConsoleState& state) {
   ImGui::EndTable();
 }
 
-void draw_buttons(const ConsoleState& state, std::vector<ConsoleCommand::Kind>& asked) {
+void draw_buttons(const ConsoleState& state, TypedText& reason,
+                  std::vector<ConsoleCommand>& asked) {
   using Kind = ConsoleCommand::Kind;
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
   const auto button = [&](const char* words, Kind kind, bool lit = false) {
-    if (wide_button(words, half, lit)) asked.push_back(kind);
+    if (wide_button(words, half, lit)) asked.push_back({kind, {}, 0});
   };
   button("Pause", Kind::pause, state.state == "paused");
   ImGui::SameLine();
@@ -158,25 +159,32 @@ void draw_buttons(const ConsoleState& state, std::vector<ConsoleCommand::Kind>& 
                              ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove)) {
     text(kBright,
          "The trial under way is cut off. All answers are on record;\n"
-         "the session can be resumed.");
-    if (wide_button("End the session", half)) {
-      asked.push_back(Kind::quit);
+         "the session can be resumed, unless the participant withdraws.");
+    ImGui::SetNextItemWidth(-1);
+    ImGui::InputTextWithHint("##why", "Why, for the record", reason.data(), reason.size());
+    const auto end = [&](const char* words, const std::string& why) {
+      if (!wide_button(words, 1.2F * half)) return;
+      asked.push_back({Kind::quit, why, 0});
+      reason.fill(0);
       ImGui::CloseCurrentPopup();
-    }
+    };
+    end("End the session", reason.data());
     ImGui::SameLine();
-    if (wide_button("Go on", half)) ImGui::CloseCurrentPopup();
+    end("The participant withdraws", "withdrawn");
+    ImGui::SameLine();
+    if (wide_button("Back", half / 2)) ImGui::CloseCurrentPopup();
     ImGui::EndPopup();
   }
 }
 
-void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand::Kind>& asked) {
+void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand>& asked) {
   const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
   const float width = ImGui::GetContentRegionAvail().x;
   ImGui::PushStyleColor(ImGuiCol_Button, kRed);
   ImGui::PushStyleColor(ImGuiCol_ButtonHovered, kRedLit);
   ImGui::PushStyleColor(ImGuiCol_ButtonActive, kRedLit);
   if (ImGui::Button("EMERGENCY: ZERO FORCE   (F12 or Esc)", {width, 3.4F * ImGui::GetFontSize()})) {
-    asked.push_back(ConsoleCommand::Kind::emergency_zero);
+    asked.push_back({ConsoleCommand::Kind::emergency_zero, {}, 0});
   }
   ImGui::PopStyleColor(3);
   // Always there, so that no other button moves under the hand when forces go off.
@@ -190,7 +198,8 @@ void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand::Kind>
   ImGui::EndChild();
   ImGui::SameLine();
   ImGui::BeginDisabled(!off);
-  if (wide_button("Clear the fault", clear)) asked.push_back(ConsoleCommand::Kind::clear_fault);
+  if (wide_button("Clear the fault", clear))
+    asked.push_back({ConsoleCommand::Kind::clear_fault, {}, 0});
   ImGui::EndDisabled();
 }
 

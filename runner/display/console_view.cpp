@@ -32,14 +32,8 @@ void ConsoleView::take(ConsoleState state, double now) {
   while (forces_.front().time < time - kForceSpan) forces_.pop_front();
 }
 
-std::optional<std::string> ConsoleView::note() {
-  std::optional<std::string> out;
-  out.swap(note_);
-  return out;
-}
-
-std::vector<ConsoleCommand::Kind> ConsoleView::draw(double now, const Modifiers& modifiers) {
-  std::vector<ConsoleCommand::Kind> asked;
+std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modifiers) {
+  std::vector<ConsoleCommand> asked;
   const ImGuiViewport* const all = ImGui::GetMainViewport();
   ImGui::SetNextWindowPos(all->WorkPos);
   ImGui::SetNextWindowSize(all->WorkSize);
@@ -104,28 +98,31 @@ void ConsoleView::draw_view(const Modifiers& modifiers) {
                                         colour, words.c_str());
   };
   if (!scene_.trouble().empty()) label(0, scene_.trouble(), IM_COL32(247, 117, 102, 255));
-  const char* const help =
-      hand_ ? "pointer: move the tip     wheel or Shift: to and fro     Ctrl or left button: turn"
-              "     right button: look around"
-            : "drag: look around";
-  label((height / font - 2.1F) / 1.4F, help, IM_COL32(150, 158, 168, 255));
+  const float last = (height / font - 2.1F) / 1.4F;
+  const ImU32 quiet = IM_COL32(150, 158, 168, 255);
+  if (hand_) {
+    label(last - 1, "pointer: the tip     wheel or Shift: to and fro", quiet);
+    label(last, "Ctrl or left button: turn     right button: look around", quiet);
+  } else {
+    label(last, "drag: look around", quiet);
+  }
 }
 
-void ConsoleView::draw_side(double now, std::vector<ConsoleCommand::Kind>& asked) {
+void ConsoleView::draw_side(double now, std::vector<ConsoleCommand>& asked) {
   draw_emergency(state_, asked);
   draw_status(state_);
   if (any_ && now - came_ > kSilence) {
     ImGui::TextColored({0.97F, 0.46F, 0.40F, 1}, "No news from the session for %.0f s",
                        now - came_);
   }
-  draw_buttons(state_, asked);
+  draw_buttons(state_, reason_, asked);
   ImGui::Dummy({0, 2});
   draw_health(state_);
   ImGui::Dummy({0, 2});
-  draw_notes();
+  draw_notes(asked);
 }
 
-void ConsoleView::draw_notes() {
+void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
   const float field = ImGui::GetFrameHeightWithSpacing();
   const float room = std::max(ImGui::GetContentRegionAvail().y - field, 5 * ImGui::GetFontSize());
   ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
@@ -135,15 +132,16 @@ void ConsoleView::draw_notes() {
     ImGui::TextUnformatted(message.c_str(), message.c_str() + message.size());
   }
   ImGui::PopTextWrapPos();
-  if (state_.messages.size() != messages_seen_) ImGui::SetScrollHereY(1);
-  messages_seen_ = state_.messages.size();
+  const std::size_t count = state_.older_messages + state_.messages.size();
+  if (count != messages_seen_) ImGui::SetScrollHereY(1);
+  messages_seen_ = count;
   ImGui::EndChild();
   ImGui::PopStyleColor();
   ImGui::SetNextItemWidth(-1);
-  if (ImGui::InputTextWithHint("##note", "A note, stored with its time; Enter", typed_.data(),
-                               typed_.size(), ImGuiInputTextFlags_EnterReturnsTrue)) {
-    if (typed_[0] != 0) note_ = typed_.data();
-    typed_.fill(0);
+  if (ImGui::InputTextWithHint("##note", "A note, stored with its time; Enter", note_.data(),
+                               note_.size(), ImGuiInputTextFlags_EnterReturnsTrue)) {
+    if (note_[0] != 0) asked.push_back({ConsoleCommand::Kind::note, note_.data(), 0});
+    note_.fill(0);
   }
 }
 

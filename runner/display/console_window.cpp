@@ -145,8 +145,9 @@ void ConsoleWindow::draw() {
   };
   const Modifiers modifiers{held(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL),
                             held(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT)};
-  for (const ConsoleCommand::Kind kind : view_->draw(now, modifiers)) ask(kind);
-  if (auto note = view_->note()) ask(ConsoleCommand::Kind::note, std::move(*note));
+  for (ConsoleCommand& command : view_->draw(now, modifiers)) {
+    ask(command.kind, std::move(command.text));
+  }
   fresh_keys_.clear();
   for (const Release& up : late_releases_) {
     ImGui_ImplGlfw_KeyCallback(window_, up.key, up.scancode, GLFW_RELEASE, up.mods);
