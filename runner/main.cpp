@@ -27,6 +27,8 @@ constexpr Command kCommands[] = {
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
      palpate::analyze_command},
     {"bench", "what a tick of the renderers costs on this machine", palpate::bench_command},
+    {"devices", "what is connected, its limits; whether this machine keeps time; calibration",
+     palpate::devices_command},
     {"export", "the trials of a database as files for others", palpate::export_command},
     {"forget", "remove a participant who has withdrawn", palpate::forget_command},
     {"merge", "stations' databases into one", palpate::merge_command},

@@ -38,6 +38,7 @@ void write_whole(const std::string& path, const std::string& text);
 int accuracy_command(const std::vector<std::string>& args);
 int analyze_command(const std::vector<std::string>& args);
 int bench_command(const std::vector<std::string>& args);
+int devices_command(const std::vector<std::string>& args);
 int export_command(const std::vector<std::string>& args);
 int forget_command(const std::vector<std::string>& args);
 int merge_command(const std::vector<std::string>& args);

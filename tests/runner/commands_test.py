@@ -16,7 +16,7 @@ import time
 import unittest
 
 PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
-COMMANDS = ["accuracy", "analyze", "bench", "export", "forget", "merge", "render", "replay", "schedule", "simulate", "validate"]
+COMMANDS = ["accuracy", "analyze", "bench", "devices", "export", "forget", "merge", "render", "replay", "schedule", "simulate", "validate"]
 
 
 class FromOutside(unittest.TestCase):
