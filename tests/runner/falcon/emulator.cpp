@@ -177,7 +177,9 @@ void Emulator::obey(std::int64_t now_ns) {
   }
   ++packets_;
   move_to(now_ns);
+  const bool had_torque = !torque_is_zero();
   motors_ = command->motors;
+  if (had_torque && torque_is_zero()) zeroed_ns_ = now_ns;
   for (const int motor : motors_) largest_count_ = std::max(largest_count_, std::abs(motor));
   if (!torque_is_zero()) {
     last_torque_ns_ = now_ns;

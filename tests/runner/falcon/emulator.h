@@ -64,6 +64,8 @@ class Emulator {
   bool torque_is_zero() const { return motors_ == std::array<int, 3>{}; }
   /// When the motors were last told something else than zero, ns; -1: never.
   std::int64_t last_torque_ns() const { return last_torque_ns_; }
+  /// When a zero command last ended a torque, ns; -1: never.
+  std::int64_t zeroed_ns() const { return zeroed_ns_; }
   int largest_count() const { return largest_count_; }
   bool torque_before_homing() const { return torque_before_homing_; }
   unsigned homed() const { return homed_; }
@@ -107,7 +109,7 @@ class Emulator {
 
   std::uint64_t packets_ = 0, malformed_ = 0;
   std::array<int, 3> motors_{};
-  std::int64_t last_torque_ns_ = -1;
+  std::int64_t last_torque_ns_ = -1, zeroed_ns_ = -1;
   int largest_count_ = 0;
   bool torque_before_homing_ = false;
   bool homing_ = false;
