@@ -11,9 +11,9 @@ namespace palpate {
 void style_console(float scale);
 
 void draw_status(const ConsoleState& state);
-/// What it asks for is added to `asked`.
-void draw_buttons(const ConsoleState& state, std::vector<ConsoleCommand::Kind>& asked);
-void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand::Kind>& asked);
+/// What it asks for is added to `asked`, without a time. \param reason  typed so far, why to end
+void draw_buttons(const ConsoleState& state, TypedText& reason, std::vector<ConsoleCommand>& asked);
+void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand>& asked);
 void draw_health(const ConsoleState& state);
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);

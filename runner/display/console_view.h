@@ -19,6 +19,9 @@ struct ForcePoint {
   double force = 0;  ///< N, on the hand, of both devices together
 };
 
+/// Of a field, ended by a zero.
+using TypedText = std::array<char, 1000>;
+
 /// Held down, whichever window has the keyboard.
 struct Modifiers {
   bool ctrl = false, shift = false;
@@ -31,15 +34,13 @@ class ConsoleView {
 
   /// \param now  s, when it came
   void take(ConsoleState state, double now);
-  /// One frame; what was asked for in it. \param now  s
-  std::vector<ConsoleCommand::Kind> draw(double now, const Modifiers& modifiers);
-  /// A note that was finished in the last frame.
-  std::optional<std::string> note();
+  /// One frame; what was asked for in it, without times. \param now  s
+  std::vector<ConsoleCommand> draw(double now, const Modifiers& modifiers);
 
  private:
   void draw_view(const Modifiers& modifiers);
-  void draw_side(double now, std::vector<ConsoleCommand::Kind>& asked);
-  void draw_notes();
+  void draw_side(double now, std::vector<ConsoleCommand>& asked);
+  void draw_notes(std::vector<ConsoleCommand>& asked);
 
   SceneView scene_;
   Camera camera_;
@@ -48,8 +49,7 @@ class ConsoleView {
   double came_ = 0;  ///< s
   bool any_ = false;
   std::deque<ForcePoint> forces_;
-  std::array<char, 1000> typed_{};
-  std::optional<std::string> note_;
+  TypedText note_{}, reason_{};
   std::size_t messages_seen_ = 0;
 };
 
