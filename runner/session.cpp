@@ -12,6 +12,18 @@ constexpr double kSecond_ns = 1e9;
 
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
+std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
+  if (faults & servo_fault::kEmergency) return "zero force was asked for";
+  if (faults & servo_fault::kStalled) return "the servo gives no more samples";
+  if (faults & servo_fault::kDeviceLost) {
+    const std::string why = advice(trouble);
+    return "the device was lost" + (why.empty() ? why : ": " + why);
+  }
+  if (faults & servo_fault::kMissedTicks) return "too many ticks were missed in a row";
+  if (faults & render_fault::kNonFinite) return "a force or pose was not finite";
+  return "they had not been cleared since the last fault";
+}
+
 }  // namespace
 
 Session::Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp)
@@ -38,19 +50,15 @@ void Session::step() {
       break;
     case State::block:
     case State::rest:
-      if (plan_.done() > 0) {
-        parts_.participant.read(texts.break_text);
-        parts_.clock.wait_until(parts_.clock.now_ns() +
-                                std::llround(parts_.protocol.breaks.min_seconds * kSecond_ns));
-      }
+      if (plan_.done() > 0) end_rest();
       state_ = State::trial;
       break;
     case State::trial:
-      run_trial();
-      state_ = State::response;
+      if (run_trial()) state_ = State::response;
       break;
     case State::response:
       parts_.log.finish(record_);
+      if (parts_.events != nullptr) parts_.events->recorded(record_);
       if (record_.practice || parts_.protocol.response.feedback)
         parts_.participant.feedback(record_.correct);
       plan_.answered(record_.correct);
@@ -75,38 +83,68 @@ TrialRecord Session::planned_record(const Trial& trial) const {
   return record;
 }
 
-void Session::run_trial() {
+void Session::end_rest() {
+  const std::int64_t until =
+      parts_.clock.now_ns() + std::llround(parts_.protocol.breaks.min_seconds * kSecond_ns);
+  parts_.participant.rest(parts_.protocol.texts.break_text, until);
+  parts_.clock.wait_until(until);
+}
+
+void Session::cut_off(const std::string& reason) {
+  if (parts_.events != nullptr) parts_.events->cut_off(reason);
+  parts_.log.cut_off(reason);
+}
+
+std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& trouble) {
+  const std::int64_t limit_ns = std::llround(parts_.protocol.response.time_out * kSecond_ns);
+  while (true) {
+    const Sample& sample = parts_.servo.next();
+    faults = sample.faults;
+    trouble = sample.trouble;
+    if (faults & servo_fault::kTripped) return std::nullopt;
+    if (sample.phase == Phase::feeling) {
+      note(sample);
+      if (parts_.protocol.samples) keep(sample);
+      record_.response_ns = sample.time_ns;
+    }
+    const std::optional<Answer> answer = parts_.participant.step(sample);
+    if (answer && answer->time_ns - record_.onset_ns < limit_ns) return answer;
+    record_.timed_out =
+        sample.phase == Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
+    if (record_.timed_out) return std::nullopt;
+  }
+}
+
+bool Session::run_trial() {
   const Trial& trial = plan_.next();
   const Protocol& protocol = parts_.protocol;
   record_ = planned_record(trial);
   record_.attempt = parts_.log.begin(record_, parts_.clock.now_ns());
+  if (parts_.events != nullptr) parts_.events->began(trial);
   const HomeZone home{parts_.library.reach(trial.stimulus) + protocol.home.margin,
                       protocol.home.rest};
-  parts_.participant.begin_trial(trial);
-  parts_.servo.prepare(parts_.library.scene(trial), renderer_for(trial.renderer), home);
-  const std::int64_t limit_ns = std::llround(protocol.response.time_out * kSecond_ns);
   std::optional<Answer> answer;
   std::uint32_t faults = 0;
-  while (!answer && !record_.timed_out && !(faults & servo_fault::kTripped)) {
-    const Sample& sample = parts_.servo.next();
-    faults = sample.faults;
-    if (sample.phase == Phase::feeling) {
-      note(sample);
-      if (protocol.samples) keep(sample);
-      record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns;
-      record_.response_ns = sample.time_ns;
-    }
-    if (!record_.timed_out) answer = parts_.participant.step(sample);
+  DeviceTrouble trouble = DeviceTrouble::none;
+  try {
+    parts_.participant.begin_trial(trial);
+    parts_.servo.prepare(parts_.library.scene(trial), renderer_for(trial.renderer), home);
+    answer = feel_trial(faults, trouble);
+  } catch (const TrialCutOff& again) {
+    parts_.servo.stop();
+    cut_off(again.what());
+    return false;
+  } catch (const std::exception& error) {
+    parts_.servo.stop();
+    cut_off(error.what());
+    throw;
   }
   const ServoQuality quality = parts_.servo.stop();
   if (faults & servo_fault::kTripped) {
-    const char* reason = faults & servo_fault::kDeviceLost ? "the device was lost"
-                         : faults & servo_fault::kMissedTicks
-                             ? "too many ticks were missed in a row"
-                             : "a force or pose was not finite";
-    parts_.log.cut_off(reason);
-    throw SessionFault(std::string("forces are off: ") + reason + "; trial " +
-                       std::to_string(record_.trial) + " will be shown again");
+    const std::string reason = trip_reason(faults, trouble);
+    cut_off(reason);
+    throw SessionFault("forces are off: " + reason + "; trial " + std::to_string(record_.trial) +
+                       " will be shown again");
   }
   record_.response_time = protocol.response.time_out;
   if (answer) {
@@ -116,12 +154,17 @@ void Session::run_trial() {
     record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
+  // The answer may have come before the tick that was looked at last.
+  if (record_.first_contact_time && *record_.first_contact_time > record_.response_time)
+    record_.first_contact_time.reset();
   record_.ticks = quality.ticks;
   record_.missed_ticks = quality.missed_ticks;
   record_.longest_period_ns = quality.longest_period_ns;
   record_.faults = quality.faults;
   record_.started_inside = (quality.faults & render_fault::kStartedInside) != 0;
   record_.max_force = quality.max_force;
+  if (parts_.events != nullptr) parts_.events->answered(record_);
+  return true;
 }
 
 void Session::note(const Sample& sample) {
@@ -130,11 +173,13 @@ void Session::note(const Sample& sample) {
     record_.onset_utc = format_utc(to_unix_ns(stamp_, sample.time_ns));
     record_.start_tip = values(sample.probe.tip);
     record_.start_tail = values(sample.probe.tail);
+    if (parts_.events != nullptr) parts_.events->onset(record_);
   }
   const Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
     record_.first_contact_time =
         static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
+    if (parts_.events != nullptr) parts_.events->first_contact(record_, sample.time_ns);
   }
 }
 

@@ -19,6 +19,20 @@ class SessionFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What happens in a trial, as it happens: for markers and the experimenter's console.
+class SessionEvents {
+ public:
+  virtual ~SessionEvents() = default;
+  virtual void began(const Trial& trial) = 0;
+  /// Time zero.
+  virtual void onset(const TrialRecord& so_far) = 0;
+  /// \param time_ns  session clock
+  virtual void first_contact(const TrialRecord& so_far, std::int64_t time_ns) = 0;
+  virtual void answered(const TrialRecord& record) = 0;  ///< not on record yet; also a time-out
+  virtual void cut_off(const std::string& reason) = 0;
+  virtual void recorded(const TrialRecord& record) = 0;
+};
+
 class Session {
  public:
   enum class State {
@@ -39,6 +53,7 @@ class Session {
     Clock& clock;
     Respondent& participant;
     TrialLog& log;
+    SessionEvents* events = nullptr;  ///< may be none
   };
 
   /// \param plan  already fed with what is on record
@@ -48,14 +63,18 @@ class Session {
   State state() const { return state_; }
   const SessionPlan& plan() const { return plan_; }
   /// Does what the state asks for and moves on. Between any two calls everything that happened is
-  /// on record. \throws SessionFault; StoreError when a record could not be written (forces are
-  /// zero).
+  /// on record: whatever is thrown in a trial, forces are zero, the attempt is cut off, and the
+  /// next call shows the trial again. \throws SessionFault; StoreError when a record could not be
+  /// written; what the participant throws, but TrialCutOff.
   void step();
 
  private:
   State before_trial() const;
   TrialRecord planned_record(const Trial& trial) const;
-  void run_trial();
+  bool run_trial();  ///< false: it was cut off
+  std::optional<Answer> feel_trial(std::uint32_t& faults, DeviceTrouble& trouble);
+  void cut_off(const std::string& reason);
+  void end_rest();
   void note(const Sample& sample);
   void keep(const Sample& sample);  ///< among the record's samples
 

@@ -16,6 +16,8 @@ class SessionPlan {
   const Trial& next() const { return trials_[next_]; }  ///< \pre not finished()
   std::size_t done() const { return next_; }
   std::size_t size() const { return trials_.size(); }  ///< as far as is known now
+  /// The number of its last block.
+  int blocks() const { return trials_.empty() ? 0 : trials_.back().block; }
   /// True at the first trial of a block (of a session, for the first).
   bool block_begins() const;
   /// The next trial has been answered.

@@ -1,0 +1,73 @@
+#pragma once
+// Marks in other recordings (EEG, motion capture): what happened in the session, at once, to
+// whoever wants to know. Nothing here makes the session wait; what a receiver does not take is
+// counted and dropped.
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate {
+
+struct Marker {
+  enum class Kind : std::uint8_t {  // the value is what the serial port gets
+    trial_start = 1,                ///< time zero: forces go on
+    first_contact = 2,
+    response = 3,
+    time_out = 4,
+    cut_off = 5,  ///< the trial will be shown again
+  };
+  Kind kind = Kind::trial_start;
+  std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of the event itself
+  std::string participant;
+  int session = 0, block = 0, trial = 0, attempt = 0;
+  std::string renderer, shape, response;  ///< response: empty but for Kind::response
+};
+const char* to_string(Marker::Kind kind);  ///< "trial_start", ...
+/// One line of JSON with its newline; `sent_ns` is the present on the clock of time_ns.
+std::string to_json_line(const Marker& marker, std::int64_t sent_ns);
+
+/// Where markers go. send() is called in the markers' own thread.
+class MarkerSink {
+ public:
+  virtual ~MarkerSink() = default;
+  /// False: the receiver did not take it. May not wait.
+  virtual bool send(const Marker& marker) noexcept = 0;
+};
+
+/// From what the user names: "udp:HOST:PORT", "serial:PATH[:BAUD]", "lsl[:NAME]".
+/// \throws std::invalid_argument for another text; std::runtime_error where it cannot be opened.
+std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name);
+
+class Markers {
+ public:
+  explicit Markers(std::vector<std::unique_ptr<MarkerSink>> sinks);
+  /// Sends what is left.
+  ~Markers();
+  Markers(const Markers&) = delete;
+  Markers& operator=(const Markers&) = delete;
+
+  /// From the session's thread; returns at once.
+  void send(const Marker& marker);
+  /// Not taken by a receiver.
+  std::uint64_t dropped() const noexcept { return dropped_.load(); }
+
+ private:
+  void work();
+
+  const std::vector<std::unique_ptr<MarkerSink>> sinks_;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::vector<Marker> queue_;
+  bool quit_ = false;
+  std::atomic<std::uint64_t> dropped_{0};
+  std::jthread thread_;  ///< none where there is no sink
+};
+
+}  // namespace palpate

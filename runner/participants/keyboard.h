@@ -1,0 +1,63 @@
+#pragma once
+// A person who answers by keys (row or numeric pad) or by the buttons of the device.
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "runner/display/display.h"
+#include "runner/participants/respondent.h"
+
+namespace palpate {
+
+/// Looks after everything else while the participant is waited for.
+class Attendant {
+ public:
+  virtual ~Attendant() = default;
+  /// Called at every tick of a trial and every few milliseconds between trials. What it throws ends
+  /// the wait.
+  virtual void attend() = 0;
+};
+
+enum class AnswerBy {
+  keys,     ///< the protocol's
+  buttons,  ///< of the device: the first stands for the first of the protocol's keys, and so on
+};
+
+class KeyboardRespondent final : public Respondent {
+ public:
+  /// All must outlive it. \param clock  what keys are stamped with
+  KeyboardRespondent(const Protocol& protocol, ParticipantScreen& screen, Attendant& attendant,
+                     Clock& clock, AnswerBy by);
+
+  void read(const std::string& text) override;
+  void rest(const std::string& text, std::int64_t until_ns) override;
+  void feedback(bool correct) override;
+  void begin_trial(const Trial& trial) override;
+  std::optional<Answer> step(const Sample& sample) override;
+
+  /// A page with nothing to press.
+  void show_message(const std::string& text);
+
+ private:
+  void wait_until(std::int64_t when_ns);
+  void wait_for_space();
+  void listen(const Sample& sample);
+  std::optional<int> meaning(const std::string& key) const;
+
+  const Protocol& protocol_;
+  ParticipantScreen& screen_;
+  Attendant& attendant_;
+  Clock& clock_;
+  AnswerBy by_;
+  std::vector<std::pair<std::string, std::string>> keys_;  ///< as shown
+  std::vector<int> stimuli_;                               ///< of keys_, in order
+  std::int64_t onset_ns_ = 0;                              ///< 0: not yet
+  std::uint8_t buttons_ = 0xFF;                            ///< down at the last tick
+  std::optional<Answer> pending_;  ///< given until the servo's samples have come as far
+};
+
+}  // namespace palpate

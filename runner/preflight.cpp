@@ -1,0 +1,97 @@
+#include "runner/preflight.h"
+
+#include <algorithm>
+
+namespace palpate {
+namespace {
+
+constexpr int kHomedLongEnough = 20;  // samples in a row
+constexpr const char* kSides[] = {"left", "right", "down", "up", "away from you", "towards you"};
+
+std::string millimetres(double metres) {
+  return std::to_string(static_cast<int>(metres * 1e3 + 0.5)) + " mm";
+}
+
+}  // namespace
+
+void Preflight::finish(const std::string& finding) {
+  findings_.push_back(finding);
+  step_ = static_cast<Step>(static_cast<int>(step_) + 1);
+  if (step_ == Step::range && needs_.reach <= 0) step_ = Step::buttons;
+  if (step_ == Step::buttons && needs_.buttons == 0) step_ = Step::done;
+}
+
+void Preflight::add(const Sample& sample) {
+  const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
+  if (lost) {  // also later: a device that was lost has to be homed again
+    homed_ = 0;
+    if (step_ != Step::done) step_ = Step::homing;
+    return;
+  }
+  switch (step_) {
+    case Step::homing:
+      least_ = most_ = sample.probe.tip;
+      if (++homed_ >= kHomedLongEnough) finish("device homed");
+      break;
+    case Step::range:
+      add_range(sample.probe.tip);
+      break;
+    case Step::buttons:
+      pressed_ |= sample.buttons & released_;  // one that is stuck does not count
+      released_ |= ~static_cast<unsigned>(sample.buttons);
+      if (missing_button() == 0) finish("buttons 1 to " + std::to_string(needs_.buttons) + " work");
+      break;
+    case Step::done:
+      break;
+  }
+}
+
+void Preflight::add_range(const Vec3& tip) {
+  for (int i = 0; i < 3; ++i) {
+    least_[i] = std::min(least_[i], tip[i]);
+    most_[i] = std::max(most_[i], tip[i]);
+  }
+  if (missing_sides().empty()) finish("range of " + millimetres(needs_.reach) + " to each side");
+}
+
+std::string Preflight::missing_sides() const {
+  std::string missing;
+  for (int i = 0; i < 6; ++i) {
+    const double went = i % 2 == 0 ? -least_[i / 2] : most_[i / 2];
+    if (went >= needs_.reach) continue;
+    if (!missing.empty()) missing += ", ";
+    missing += kSides[i];
+  }
+  return missing;
+}
+
+int Preflight::missing_button() const {
+  for (int i = 0; i < needs_.buttons; ++i) {
+    if ((pressed_ >> i & 1U) == 0) return i + 1;
+  }
+  return 0;
+}
+
+void Preflight::skip() {
+  if (step_ == Step::range) finish("range NOT checked: not reached: " + missing_sides());
+  if (step_ == Step::buttons)
+    finish("button " + std::to_string(missing_button()) + " and those after it NOT checked");
+}
+
+std::string Preflight::instruction() const {
+  switch (step_) {
+    case Step::homing:
+      return "home the device: pull the grip fully out, then push it straight in";
+    case Step::range:
+      return "move the stylus " + millimetres(needs_.reach) +
+             " from the centre; still to come: " + missing_sides() + " (go: leave it unchecked)";
+    case Step::buttons:
+      return "press button " + std::to_string(missing_button()) +
+             " of the device (go: leave it unchecked)";
+    case Step::done:
+      break;
+  }
+  return "";
+}
+
+}  // namespace palpate
