@@ -81,6 +81,9 @@ WeighingSettings weighing_settings(const po::variables_map& values) {
   WeighingSettings settings;
   settings.weights = numbers(values["weights"].as<std::string>(), "weights");
   settings.gravity = values["gravity"].as<double>();
+  settings.cycle = values["sweep-seconds"].as<double>();
+  settings.settle = 0.75 * settings.cycle;
+  check(settings.cycle >= 1 && settings.cycle <= 60, "--sweep-seconds is between 1 and 60");
   for (const double weight : settings.weights) {
     check(weight > 0 && weight <= 2, "--weights are masses in kg, above 0 and at most 2");
   }
@@ -184,8 +187,10 @@ void add_calibrate_options(po::options_description& options) {
                         "--calibrate falcon: masses to hang at the grip in turn, kg")(
       "gravity", po::value<double>()->default_value(9.80665),
       "--calibrate falcon: at this place, m/s^2")(
-      "stylus-length", po::value<double>()->default_value(0.12),
-      "--calibrate falcon2: between the centres of the grips on the stylus, m")(
+      "sweep-seconds", po::value<double>()->default_value(4),
+      "--calibrate falcon: the grip goes up and down twice while it is weighed, so long each time, "
+      "s")("stylus-length", po::value<double>()->default_value(0.12),
+           "--calibrate falcon2: between the centres of the grips on the stylus, m")(
       "offset", po::value<std::string>()->default_value("0,0,0"),
       "--calibrate falcon2: from the tip's grip to the tail's while places are taken, x,y,z in m; "
       "0,0,0: they are pinned together")("points", po::value<int>()->default_value(8),

@@ -37,7 +37,7 @@ void FalconArm::restart() noexcept {
 void FalconArm::take_replies(std::int64_t wait_ns) noexcept {
   bool fresh = false;
   std::array<std::uint8_t, 256> bytes{};
-  for (std::size_t count = 1; count > 0; wait_ns = 0) {
+  for (std::size_t count = bytes.size(); count == bytes.size(); wait_ns = 0) {  // more may wait
     count = transport_->receive(bytes, wait_ns);
     for (const std::uint8_t byte : std::span(bytes).first(count)) {
       const auto packet = stream_.take(byte);

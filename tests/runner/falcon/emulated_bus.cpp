@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <linux/usbdevice_fs.h>
+#include <pthread.h>
 #include <sys/ioctl.h>
 #include <umockdev.h>
 #include <unistd.h>
@@ -137,6 +138,13 @@ class Node {
   }
 
   static gboolean handle(UMockdevIoctlBase* /*base*/, UMockdevIoctlClient* client, gpointer self) {
+    // A real device does not wait for a processor. Where rights allow, nor does this one.
+    thread_local const bool asked = [] {
+      const sched_param priority{60};
+      pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+      return true;
+    }();
+    static_cast<void>(asked);
     return static_cast<Node*>(self)->ioctl(client) ? TRUE : FALSE;
   }
 
