@@ -26,13 +26,15 @@ int stay_quiet(Display*) { return 0; }
 // never used again, and carry the unwinding tables that compilers for Debian always write.
 void leave(Display*, void*) { throw LostDisplay(); }
 
-int leave_or_ignore(Display* display, XErrorEvent* error) {
-  XPointer found = nullptr;
-  if (XFindContext(display, error->resourceid, our_windows(), &found) == 0 &&
-      (error->error_code == BadWindow || error->error_code == BadDrawable)) {
-    throw LostDisplay();
+/// A picture or a focus that could not be had is no reason to end a session. Nothing may be thrown
+/// from here: the display would stay locked.
+int note_or_ignore(Display* display, XErrorEvent* error) {
+  XPointer gone = nullptr;
+  if ((error->error_code == BadWindow || error->error_code == BadDrawable) &&
+      XFindContext(display, error->resourceid, our_windows(), &gone) == 0) {
+    *reinterpret_cast<bool*>(gone) = true;
   }
-  return 0;  // a picture or a focus that could not be had is no reason to end a session
+  return 0;
 }
 
 }  // namespace
@@ -40,17 +42,16 @@ int leave_or_ignore(Display* display, XErrorEvent* error) {
 void survive_lost_display() {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return;
-  XSetErrorHandler(&leave_or_ignore);
+  XSetErrorHandler(&note_or_ignore);
   XSetIOErrorHandler(&stay_quiet);
   XSetIOErrorExitHandler(display, &leave, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-void survive_loss_of(GLFWwindow* window) {
+void watch_window(GLFWwindow* window, bool& gone) {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return;
-  XSaveContext(display, glfwGetX11Window(window), our_windows(),
-               reinterpret_cast<XPointer>(window));
+  XSaveContext(display, glfwGetX11Window(window), our_windows(), reinterpret_cast<XPointer>(&gone));
 }
 
 bool display_lost() {

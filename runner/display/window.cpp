@@ -53,8 +53,8 @@ class Windows final : public DisplayLoop {
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* from) {
       static_cast<Windows*>(glfwGetWindowUserPointer(from))->participant_.refresh();
     });
-    survive_loss_of(window);
-    survive_loss_of(console_.handle());
+    watch_window(window, window_gone_);
+    watch_window(console_.handle(), window_gone_);
     survive_lost_display();
     glfwShowWindow(console_.handle());
     glfwShowWindow(window);  // last: it has the keyboard
@@ -65,10 +65,11 @@ class Windows final : public DisplayLoop {
 
   void run() override {
     try {
-      while (!ended_.load()) {
+      while (!ended_.load() && !window_gone_) {
         if (display_lost()) throw LostDisplay();
         step();
       }
+      if (window_gone_) participant_.close();
     } catch (const LostDisplay&) {
       participant_.abandon();
       console_.abandon();
@@ -108,6 +109,7 @@ class Windows final : public DisplayLoop {
   }
 
   const WindowSettings settings_;
+  bool window_gone_ = false;  ///< outlives the library
   GlfwLibrary library_;
   const Places places_;
   ParticipantWindow participant_;
