@@ -14,14 +14,18 @@ namespace palpate {
 struct SampleRecord {
   std::uint32_t tick = 0;               ///< from time zero of the trial
   std::int64_t period_ns = 0;           ///< since the tick before; 0: not known (older records)
+  std::int64_t lateness_ns = 0;         ///< behind the time at which the tick was due
+  std::int64_t compute_ns = 0;          ///< from the device's reading to the command for it
   std::array<double, 3> tip{}, tail{};  ///< m, world frame
-  std::array<double, 3> force{};        ///< N, on the hand
-  std::array<double, 3> torque{};       ///< N m, about the virtual tip
-  double depth = 0;                     ///< m, deepest contact
+  std::array<double, 3> force{};        ///< N, on the hand, as rendered
+  std::array<double, 3> torque{};       ///< N m, about the virtual tip, as rendered
+  /// N, as commanded after the limits, to the device at the tip and to that at the tail
+  std::array<double, 3> device1{}, device2{};
+  double depth = 0;  ///< m, deepest contact
   std::uint8_t contacts = 0;
   std::uint8_t contact_type = 0;
   std::uint8_t buttons = 0;
-  std::uint8_t faults = 0;  ///< fault bits of the tick
+  std::uint32_t faults = 0;  ///< fault bits of the tick
 };
 
 /// One presentation of one trial. Every number is finite; -0.0 comes back from the store as 0.

@@ -32,11 +32,14 @@ void put_attempt(TableRow& row, const StoredTrial& attempt) {
 
 void put_sample(TableRow& row, const SampleRecord& sample) {
   row << sample.tick;
-  for (const auto& vector : {sample.tip, sample.tail, sample.force, sample.torque}) {
+  for (const auto& vector :
+       {sample.tip, sample.tail, sample.force, sample.torque, sample.device1, sample.device2}) {
     for (const double x : vector) row << x;
   }
   row << sample.depth << unsigned{sample.contacts} << unsigned{sample.contact_type}
-      << unsigned{sample.buttons} << unsigned{sample.faults};
+      << unsigned{sample.buttons} << sample.faults << static_cast<double>(sample.period_ns) / 1e9
+      << static_cast<double>(sample.lateness_ns) / 1e9
+      << static_cast<double>(sample.compute_ns) / 1e9;
 }
 
 }  // namespace palpate

@@ -188,15 +188,19 @@ void Session::keep(const Sample& sample) {
   SampleRecord kept;
   kept.tick = sample.tick;
   kept.period_ns = sample.period_ns;
+  kept.lateness_ns = sample.lateness_ns;
+  kept.compute_ns = sample.compute_ns;
   kept.tip = values(sample.probe.tip);
   kept.tail = values(sample.probe.tail);
   kept.force = values(rendering.force);
   kept.torque = values(rendering.torque);
+  kept.device1 = values(sample.device1);
+  kept.device2 = values(sample.device2);
   kept.depth = rendering.deepest.depth;
   kept.contacts = static_cast<std::uint8_t>(rendering.contacts);
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
-  kept.faults = static_cast<std::uint8_t>(sample.faults);
+  kept.faults = sample.faults;
   record_.samples.push_back(kept);
 }
 
