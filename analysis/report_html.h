@@ -3,11 +3,13 @@
 #include <string>
 
 #include "analysis/analysis.h"
+#include "analysis/report_record.h"
 
 namespace palpate {
 
-/// The analysis as one HTML page with the figure inside: no scripts, nothing from the network, fit
-/// for dark screens and for paper.
-std::string report_html(const Analysis& analysis);
+/// The analysis as one HTML page that is complete in itself: its content security policy allows no
+/// network and no script but its own, every text is escaped. Figures are drawn by Vega where the
+/// program was built with it, and are there as SVG for where scripts do not run and for saving.
+std::string report_html(const Analysis& analysis, const ReportRecord& record);
 
 }  // namespace palpate

@@ -46,6 +46,17 @@ std::string points(std::initializer_list<std::pair<double, double>> corners) {
   return attribute("points", text);
 }
 
+std::string points(const std::vector<double>& x, const std::vector<double>& y) {
+  std::string text;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (i > 0) text += ' ';
+    text += coordinate(x[i]);
+    text += ',';
+    text += coordinate(y[i]);
+  }
+  return attribute("points", text);
+}
+
 }  // namespace
 
 void Svg::line(double x1, double y1, double x2, double y2, std::string_view colour, double width,
@@ -73,9 +84,22 @@ void Svg::square(double x, double y, double half, std::string_view fill, double 
            attribute("fill-opacity", opacity) + "/>\n";
 }
 
-void Svg::diamond(double x, double y, double half, std::string_view stroke) {
+void Svg::diamond(double x, double y, double half, std::string_view stroke, std::string_view fill) {
   body_ += "<polygon" + points({{x, y - half}, {x + half, y}, {x, y + half}, {x - half, y}}) +
-           " fill=\"#ffffff\"" + attribute("stroke", stroke) + " stroke-width=\"2\"/>\n";
+           attribute("fill", fill) + attribute("stroke", stroke) + " stroke-width=\"2\"/>\n";
+}
+
+void Svg::area(const std::vector<double>& x, const std::vector<double>& y, std::string_view fill,
+               double opacity, std::string_view stroke, double width) {
+  body_ += "<polygon" + points(x, y) + attribute("fill", fill) +
+           attribute("fill-opacity", opacity) + attribute("stroke", stroke) +
+           attribute("stroke-width", width) + "/>\n";
+}
+
+void Svg::path(const std::vector<double>& x, const std::vector<double>& y, std::string_view stroke,
+               double width, double opacity) {
+  body_ += "<polyline" + points(x, y) + " fill=\"none\"" + attribute("stroke", stroke) +
+           attribute("stroke-width", width) + attribute("stroke-opacity", opacity) + "/>\n";
 }
 
 void Svg::triangle(double x, double y, double half, bool up, std::string_view fill) {
@@ -105,16 +129,16 @@ void Svg::begin_group(std::string_view title) {
 void Svg::end_group() { body_ += "</g>\n"; }
 
 std::string Svg::document(double width, double height, std::string_view title,
-                          std::string_view description) const {
+                          std::string_view description, std::string_view id) const {
   const std::string w = std::to_string(static_cast<int>(width)),
-                    h = std::to_string(static_cast<int>(height));
+                    h = std::to_string(static_cast<int>(height)), name = escaped(id);
   return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h +
          "\" viewBox=\"0 0 " + w + " " + h +
          "\" style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
-         "px\" role=\"img\" aria-labelledby=\"figure-title figure-description\" font-family=\"" +
-         std::string(kFont) + "\">\n<title id=\"figure-title\">" + escaped(title) +
-         "</title>\n<desc id=\"figure-description\">" + escaped(description) + "</desc>\n" + body_ +
-         "</svg>\n";
+         "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
+         "-description\" font-family=\"" + std::string(kFont) + "\">\n<title id=\"" + name +
+         "-title\">" + escaped(title) + "</title>\n<desc id=\"" + name + "-description\">" +
+         escaped(description) + "</desc>\n" + body_ + "</svg>\n";
 }
 
 double text_width(std::string_view text, double size, bool bold) {

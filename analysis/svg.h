@@ -25,8 +25,14 @@ class Svg {
             std::string_view stroke = "none", double corner = 0);
   void circle(double x, double y, double radius, std::string_view fill, double opacity = 1);
   void square(double x, double y, double half, std::string_view fill, double opacity = 1);
-  void diamond(double x, double y, double half, std::string_view stroke);
+  void diamond(double x, double y, double half, std::string_view stroke,
+               std::string_view fill = "#ffffff");
   void triangle(double x, double y, double half, bool up, std::string_view fill);
+  /// Corners as x and y one by one, equally many. Closed and filled, or an open line.
+  void area(const std::vector<double>& x, const std::vector<double>& y, std::string_view fill,
+            double opacity, std::string_view stroke, double width);
+  void path(const std::vector<double>& x, const std::vector<double>& y, std::string_view stroke,
+            double width, double opacity);
   void text(double x, double y, std::string_view text, const TextStyle& style);
   /// What follows until end_group() shows `title` when pointed at.
   void begin_group(std::string_view title);
@@ -36,8 +42,9 @@ class Svg {
   void append(const Svg& other) { body_ += other.body_; }
 
   /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small.
+  /// \param id starts the ids of title and description: unique within a page
   std::string document(double width, double height, std::string_view title,
-                       std::string_view description) const;
+                       std::string_view description, std::string_view id = "figure") const;
 
  private:
   std::string body_;

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -10,9 +9,11 @@
 #include <vector>
 
 #include "analysis/analysis.h"
-#include "analysis/figure.h"
+#include "analysis/figures.h"
+#include "analysis/figures_svg.h"
 #include "analysis/report_html.h"
 #include "analysis/report_json.h"
+#include "analysis/report_record.h"
 #include "analysis/report_text.h"
 #include "analysis/trials.h"
 #include "data/store.h"
@@ -27,7 +28,6 @@ namespace fs = std::filesystem;
 struct Output {
   const char* option;
   std::string path;
-  std::string (*write)(const Analysis&);
 };
 
 bool same_file(const std::string& a, const std::string& b) {
@@ -65,16 +65,40 @@ TrialTable read_trials(const std::string& database, const std::string& csv) {
   }
 }
 
+/// Every figure as an SVG file in `folder`. None is written where one would replace a file.
+void write_figures(const std::string& folder, bool force, const std::vector<Figure>& figures) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder + ": " + error.message());
+  const auto path = [&](const Figure& figure) {
+    return (fs::path(folder) / (figure.id + ".svg")).string();
+  };
+  if (!force) {
+    std::string there;
+    for (const Figure& figure : figures) {
+      if (fs::exists(path(figure))) there += "\n  " + path(figure);
+    }
+    if (!there.empty()) {
+      throw UsageError("--figures: these files exist; --force replaces them:" + there);
+    }
+  }
+  for (const Figure& figure : figures) {
+    write_whole(path(figure), figure_svg(figure, light_palette()));
+  }
+}
+
 }  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR]";
+      "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR "
+      "[--force]]";
   line.summary =
       "Is a shape identified faster with the ray than with the point renderer, by how much, how "
       "sure?\n"
-      "The answer and its tables go to stdout. Files that are there already are replaced.";
+      "The answer and its tables go to stdout. A JSON file or report that is there already is "
+      "replaced, figures only with --force.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html   (other "
@@ -82,6 +106,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "      data: participant_id, session, block, trial, renderer, shape, response, correct and\n"
       "      response_time are enough)";
   std::string database, csv, json, report, figures;
+  bool force = false;
   AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -89,7 +114,9 @@ int analyze_command(const std::vector<std::string>& args) {
   add("csv", po::value(&csv)->value_name("FILE"), "trials as CSV, one row a trial");
   add("json", po::value(&json)->value_name("FILE"), "write every figure as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a report to look at and print");
-  add("figures", po::value(&figures)->value_name("DIR"), "write figure15.svg into this folder");
+  add("figures", po::value(&figures)->value_name("DIR"),
+      "write the report's figures as SVG files into this folder");
+  add("force", po::bool_switch(&force), "replace figures that are there already");
   add("too-fast-s", po::value(&settings.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
       "leave correct answers before this time out of the times");
   const auto values = line.parse(args);
@@ -102,20 +129,19 @@ int analyze_command(const std::vector<std::string>& args) {
     throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
   }
   std::vector<Output> outputs;
-  if (values->count("json")) outputs.push_back({"json", json, report_json});
-  if (values->count("report")) outputs.push_back({"report", report, report_html});
-  if (values->count("figures")) {
-    outputs.push_back({"figures", (fs::path(figures) / "figure15.svg").string(), figure15});
-  }
+  if (values->count("json")) outputs.push_back({"json", json});
+  if (values->count("report")) outputs.push_back({"report", report});
   check_outputs(outputs, csv.empty() ? database : csv);
+  if (values->count("figures") && figures.empty()) throw UsageError("--figures: expected a folder");
 
   const Analysis analysis = analyze(read_trials(database, csv), settings, PALPATE_VERSION);
-  if (values->count("figures")) {
-    std::error_code error;
-    fs::create_directories(figures, error);
-    if (error) throw std::runtime_error(figures + ": " + error.message());
+  ReportRecord record;
+  if (!database.empty() && (values->count("report") || values->count("figures"))) {
+    record = read_report_record(database);
   }
-  for (const Output& output : outputs) write_whole(output.path, output.write(analysis));
+  if (values->count("figures")) write_figures(figures, force, figures_of(analysis, record));
+  if (values->count("json")) write_whole(json, report_json(analysis));
+  if (values->count("report")) write_whole(report, report_html(analysis, record));
   std::cout << report_text(analysis);
   return 0;
 }

@@ -3,8 +3,11 @@
 Usage: analyze_command_test.py PALPATE FIXTURES
 """
 
+import base64
+import hashlib
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -29,6 +32,13 @@ class Tags(HTMLParser):
         self.tags.add(tag)
         for name, value in attrs:
             self.attributes.setdefault(name, []).append(value)
+
+
+def without_scripts(page):
+    """The page as XML and what its scripts hold."""
+    page = page.removeprefix("<!DOCTYPE html>\n")
+    pattern = re.compile(r"<script[^>]*>(.*?)</script>", re.S)
+    return pattern.sub("", page), pattern.findall(page)
 
 
 class Analyze(unittest.TestCase):
@@ -56,7 +66,7 @@ class Analyze(unittest.TestCase):
 
     def all_outputs(self, csv):
         done = self.run_palpate("--csv", csv, "--json", self.dir / "a.json", "--report",
-                                self.dir / "a.html", "--figures", self.dir / "figures")
+                                self.dir / "a.html", "--figures", self.dir / "figures", "--force")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stderr, "")
         return (done.stdout, json.loads((self.dir / "a.json").read_text("utf-8")),
@@ -70,21 +80,35 @@ class Analyze(unittest.TestCase):
         self.assertIn("</svg><script>", figures["times"]["ray"])
         root = xml.fromstring(svg)
         self.assertEqual({e.tag for e in root.iter()} - {SVG + t for t in (
-            "svg", "title", "desc", "g", "line", "rect", "circle", "polygon", "text")}, set())
-        self.assertIn(who[0], [e.text for e in root.iter(SVG + "title")])
-        xml.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
-        tags = Tags(page)
-        self.assertFalse({"script", "img", "iframe", "link", "object"} & tags.tags)
+            "svg", "title", "desc", "g", "line", "rect", "circle", "polygon", "polyline", "text")}, set())
+        self.assertTrue([e.text for e in root.iter(SVG + "title") if e.text.startswith(who[0] + ", ")])
+        markup, scripts = without_scripts(page)
+        xml.fromstring(markup)
+        self.assertLessEqual(len(scripts), 3)
+        tags = Tags(markup)
+        self.assertFalse({"script", "img", "iframe", "object"} & tags.tags)
         self.assertFalse([name for name in tags.attributes if name.startswith("on")])
-        self.assertFalse({"href", "src"} & set(tags.attributes))
-        self.assertIn("default-src 'none'", page)
+        self.assertNotIn("src", tags.attributes)
+        self.assertEqual([], [value for value in re.findall(r'href="([^"]*)"', markup)
+                              if not re.fullmatch(r"#[a-z0-9-]+|data:,", value)])
+        policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page).group(1)
+        self.assertTrue(policy.startswith("default-src 'none'; script-src 'sha256-"), policy)
+        self.assertNotIn("unsafe-eval", policy)
+        self.assertNotIn("http", policy)
+        for script in scripts[1:]:  # the first is data
+            digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+            self.assertIn(f"'sha256-{digest}'", policy)
 
     def test_every_fixture_gives_well_formed_files(self):
         for csv in sorted(FIXTURES.glob("*.csv")):
             with self.subTest(csv=csv.name):
                 text, figures, page, svg = self.all_outputs(csv)
                 xml.fromstring(svg)
-                xml.fromstring(page.removeprefix("<!DOCTYPE html>\n"))
+                for other in (self.dir / "figures").iterdir():
+                    xml.fromstring(other.read_text("utf-8"))
+                    self.assertEqual("SIMULATED" in other.read_text("utf-8"), figures["simulated"] is True)
+                page = without_scripts(page)[0]
+                xml.fromstring(page)
                 self.assertTrue(all(len(line) <= 100 for line in text.splitlines()))
                 labelled = figures["simulated"] is True
                 self.assertEqual("SIMULATED" in text, labelled)
@@ -96,6 +120,19 @@ class Analyze(unittest.TestCase):
         first, second = self.all_outputs(csv), self.all_outputs(csv)
         self.assertEqual(first, second)
         self.assertEqual(sorted(p.name for p in self.dir.iterdir()), ["a.html", "a.json", "figures"])
+
+    def test_figures_that_are_there_are_kept_unless_forced(self):
+        (self.dir / "figures").mkdir()
+        (self.dir / "figures" / "servo-of-mine.svg").write_text("mine")
+        (self.dir / "figures" / "times.svg").write_text("mine")
+        args = ("--csv", FIXTURES / "full.csv", "--figures", self.dir / "figures")
+        done = self.run_palpate(*args)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("times.svg", done.stderr)
+        self.assertEqual(sorted(p.read_text() for p in (self.dir / "figures").iterdir()), ["mine"] * 2)
+        self.assertEqual(self.run_palpate(*args, "--force").returncode, 0)
+        self.assertIn("</svg>", (self.dir / "figures" / "times.svg").read_text("utf-8"))
+        self.assertEqual((self.dir / "figures" / "servo-of-mine.svg").read_text(), "mine")
 
     def test_bad_input_is_status_2_and_writes_nothing(self):
         bad = self.dir / "bad.csv"

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "analysis/analysis.h"
-#include "analysis/figure.h"
+#include "analysis/figures.h"
+#include "analysis/figures_svg.h"
+#include "analysis/figures_vega.h"
 #include "analysis/report_html.h"
 #include "analysis/report_json.h"
 #include "analysis/report_text.h"
@@ -59,6 +61,14 @@ Analysis analysis_of(const Study& study) {
   return analyze(builder.finish({}), {}, "1.2.3");
 }
 
+std::string page(const Analysis& analysis) { return report_html(analysis, {}); }
+
+std::string drawings(const Analysis& analysis) {
+  std::string all;
+  for (const Figure& figure : figures_of(analysis, {})) all += figure_svg(figure, light_palette());
+  return all;
+}
+
 bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
@@ -90,7 +100,7 @@ TEST(Answer, SaysWhyNothingCanBeSaid) {
 
 TEST(Reports, SaySimulatedWhereverAFigureStands) {
   Study study;
-  for (const auto& write : {report_text, report_html, figure15}) {
+  for (const auto& write : {report_text, page, drawings}) {
     study.simulated = Simulated::no;
     EXPECT_FALSE(holds(write(analysis_of(study)), "SIMULATED"));
     study.simulated = Simulated::yes;
@@ -135,7 +145,7 @@ TEST(Reports, NeverPrintNanOrInfinity) {
       study.renderers = renderers;
       study.lost_with_ray = 1;
       const Analysis analysis = analysis_of(study);
-      for (const auto& write : {report_text, report_html, figure15, report_json}) {
+      for (const auto& write : {report_text, drawings, report_json}) {
         const std::string text = write(analysis);
         for (const char* bad : {"nan", "NaN", "inf ", "inf\"", "inf%", "Infinity"}) {
           EXPECT_FALSE(holds(text, bad)) << bad << " with " << people;
@@ -161,10 +171,19 @@ TEST(Escaping, NothingFromAFileIsMarkup) {
   study.people = {"<script>alert(1)</script>", "B", "C"};
   study.shapes = {"cone", "<script>"};
   study.renderers = {"point", "ray"};
-  for (const auto& write : {report_html, figure15}) {
-    EXPECT_FALSE(holds(write(analysis_of(study)), "<script"));
-    EXPECT_TRUE(holds(write(analysis_of(study)), "&lt;script&gt;"));
+  study.shapes = {"cone", "<script>", "</script>"};
+  for (const auto& write : {page, drawings}) {
+    const std::string text = write(analysis_of(study));
+    EXPECT_FALSE(holds(text, "<script>alert"));
+    EXPECT_TRUE(holds(text, "&lt;script&gt;"));
   }
+  // Three scripts at most, each with its end: data, Vega, ours.
+  const std::string text = page(analysis_of(study));
+  std::size_t begins = 0, ends = 0;
+  for (std::size_t at = 0; (at = text.find("<script", at)) != std::string::npos; ++at) ++begins;
+  for (std::size_t at = 0; (at = text.find("</script", at)) != std::string::npos; ++at) ++ends;
+  EXPECT_LE(begins, 3U);
+  EXPECT_EQ(begins, ends);
 }
 
 TEST(TextHelpers, NumbersAndNames) {

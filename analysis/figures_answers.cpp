@@ -1,0 +1,190 @@
+// What was answered: confusion, accuracy beside speed, and what is lost on the way to the times.
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "analysis/figures_parts.h"
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+std::string percent_text(std::size_t part, std::size_t of) {
+  const double percent = of ? 100 * static_cast<double>(part) / static_cast<double>(of) : 0;
+  return fixed(percent, percent > 0 && percent < 9.95 ? 1 : 0) + " %";
+}
+
+Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_t shapes) {
+  const auto& table = analysis.table;
+  std::vector<std::string> answers(
+      table.answers.begin(), table.answers.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                         table.answers.size(), kShownShapes)));
+  answers.emplace_back("none");
+  Panel panel;
+  panel.title = table.renderers[renderer];
+  panel.x = names_axis(answers, answers.size(), "answered");
+  panel.y = names_axis(table.shapes, shapes, "shown");
+  for (Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;  // the first on top
+  panel.width = std::max(340.0, 62.0 * static_cast<double>(answers.size()));
+  panel.height = 56.0 * static_cast<double>(shapes);
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const auto& row = analysis.description.confusion[renderer][s];
+    const std::size_t total = std::accumulate(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t a = 0; a < answers.size(); ++a) {
+      const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
+      const double share = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
+      const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
+      const std::string text = table.renderers[renderer] + ": " + printable(table.shapes[s], 40) +
+                               " answered as " + printable(answers[a], 40) + " " +
+                               counted(n, "time", "times") + " of " + std::to_string(total) + " (" +
+                               percent_text(n, total) + ")";
+      panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
+                                      n ? 0.08 + 0.9 * share : 0.03, text));
+      if (n == 0) continue;
+      // On the dark cells of a light page, and the light ones of a dark page, the page's colour.
+      Mark mark = text_mark(share > 0.5 ? Role::page : Role::ink, x + 0.5, y + 0.5,
+                            percent_text(n, total), 12);
+      mark.bold = analysis.table.answers.size() > a && answers[a] == table.shapes[s];
+      mark.dy = 4;
+      panel.marks.push_back(std::move(mark));
+    }
+  }
+  return panel;
+}
+
+}  // namespace
+
+Figure confusion_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "confusion", "What was shown and what was answered");
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+    figure.panels.push_back(confusion_panel(analysis, r, shapes));
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const AccuracyCell& cell = analysis.description.accuracy[r][s];
+      figure.description += analysis.table.renderers[r] + ", " +
+                            printable(analysis.table.shapes[s], 40) + ": " +
+                            percent_text(cell.n_correct, cell.n_trials) + " correct. ";
+    }
+  }
+  figure.notes.insert(
+      figure.notes.begin(),
+      "Share of the trials of a row; bold: the right answer. None: no answer in time.");
+  return figure;
+}
+
+Figure speed_accuracy_of(const Analysis& analysis) {
+  Figure figure =
+      new_figure(analysis, "speed-accuracy", "Change of time beside change of accuracy");
+  const std::size_t shapes =
+      std::min(shown_shapes(analysis, figure), analysis.speed_accuracy.size());
+  double widest = 5, highest = 3;
+  bool any = false;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const SpeedAccuracy& both = analysis.speed_accuracy[s];
+    if (!both.percent_change_time || !both.accuracy_change) continue;
+    any = true;
+    widest = std::max(widest, std::fabs(*both.percent_change_time));
+    highest = std::max(highest, 100 * std::fabs(*both.accuracy_change));
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->low)));
+      highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->high)));
+    }
+  }
+  if (!any) return figure;
+  Panel panel;
+  panel.x = linear_axis(-1.15 * widest, 1.15 * widest, "change of time with the ray (%)");
+  panel.y = linear_axis(-1.05 * highest, 1.05 * highest, "change of accuracy (points)");
+  panel.width = 560;
+  panel.height = 340;
+  panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
+                                  "faster and less accurate: a trade-off"));
+  panel.marks.push_back(rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1,
+                                  "slower and more accurate: a trade-off"));
+  panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
+  panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const SpeedAccuracy& both = analysis.speed_accuracy[s];
+    if (!both.percent_change_time || !both.accuracy_change) continue;
+    const std::string name = printable(analysis.table.shapes[s], 40);
+    const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
+    const std::string text = name + ": time " + fixed(x, 1) + " %, accuracy " + fixed(y, 1) +
+                             " points" + (both.reading.empty() ? "" : ", " + both.reading);
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
+    }
+    panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
+    Mark mark = text_mark(Role::ink, x, y, name, 13);
+    mark.anchor = -1;
+    mark.dx = 11;
+    mark.dy = 4;
+    mark.bold = true;
+    panel.marks.push_back(std::move(mark));
+    figure.description += text + ". ";
+  }
+  figure.panels.push_back(std::move(panel));
+  figure.notes.insert(figure.notes.begin(),
+                      "Ray minus point, means over participants; bars: 95 % interval of the change "
+                      "of accuracy. Shaded: speed may have been bought with errors, or accuracy "
+                      "with time.");
+  return figure;
+}
+
+Figure exclusions_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "exclusions", "From trials to times");
+  const std::size_t n = analysis.exclusions.size();
+  if (n == 0) return figure;
+  double highest = 10;
+  for (const Exclusions& lost : analysis.exclusions) {
+    highest = std::max(highest, 100 * lost.share_excluded());
+  }
+  struct Reason {
+    const char* name;
+    std::size_t Exclusions::*count;
+  };
+  constexpr Reason kReasons[] = {{"wrong", &Exclusions::n_wrong},
+                                 {"no response", &Exclusions::n_timeouts},
+                                 {"too fast", &Exclusions::n_too_fast},
+                                 {"all", nullptr}};
+  constexpr std::size_t kGroups = std::size(kReasons);
+  std::vector<std::string> names;
+  for (const Reason& reason : kReasons) names.emplace_back(reason.name);
+  Panel panel;
+  panel.x = names_axis(names, kGroups, "");
+  panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
+  panel.width = 560;
+  panel.height = 260;
+  panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {10, 10}, 1.4));
+  const double width = 0.6 / static_cast<double>(n);
+  for (std::size_t r = 0; r < n; ++r) {
+    const Exclusions& lost = analysis.exclusions[r];
+    const std::string& renderer = analysis.table.renderers[r];
+    figure.legend.push_back({renderer, role_of(renderer), Shape::square});
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      const std::size_t count =
+          kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;
+      const double percent =
+          lost.n_trials ? 100 * static_cast<double>(count) / static_cast<double>(lost.n_trials) : 0;
+      const double x = static_cast<double>(g) + 0.2 + static_cast<double>(r) * width;
+      const std::string text = renderer + ", " + kReasons[g].name + ": " +
+                               counted(count, "trial", "trials") + " of " +
+                               std::to_string(lost.n_trials) + " (" + fixed(percent, 1) + " %)";
+      panel.marks.push_back(
+          rect_mark(role_of(renderer), x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
+      Mark mark = text_mark(Role::soft, x + width / 2, percent, fixed(percent, 1), 12);
+      mark.dy = -5;
+      panel.marks.push_back(std::move(mark));
+      figure.description += text + ". ";
+    }
+  }
+  figure.panels.push_back(std::move(panel));
+  figure.notes.push_back(
+      "Amber line: 10 %; beyond it, or where renderers differ, the times are to be read with "
+      "care.");
+  return figure;
+}
+
+}  // namespace palpate

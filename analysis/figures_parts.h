@@ -1,0 +1,49 @@
+#pragma once
+// Pieces that the figures are made of. Internal to analysis/figures*.
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "analysis/figures.h"
+
+namespace palpate {
+
+/// Everything that figures have in common: label, subtitle.
+Figure new_figure(const Analysis& analysis, std::string id, std::string title);
+
+Role role_of(std::string_view renderer);    ///< point and ray have their own, others are ink
+Shape shape_of(std::string_view renderer);  ///< told apart without colour, too
+
+/// Shapes that are drawn, and a note where there are more.
+std::size_t shown_shapes(const Analysis& analysis, Figure& figure);
+
+/// Slots 0..1, 1..2, ... named in their middles.
+FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
+/// Round ticks, ends widened to them.
+FigureAxis linear_axis(double low, double high, std::string title);
+/// For log10 of seconds: ticks at 1, 2 and 5 times powers of ten.
+FigureAxis seconds_axis(double low, double high, std::string title);
+
+Mark symbol(Role role, Shape shape, double x, double y, double size, std::string text = {});
+Mark text_mark(Role role, double x, double y, std::string text, double size = 12);
+Mark line_mark(Role role, std::vector<double> x, std::vector<double> y, double width = 2);
+Mark rect_mark(Role role, double x0, double y0, double x1, double y1, double opacity,
+               std::string text);
+
+/// An interval, cut to the axis, with arrowheads where it leaves it.
+void add_interval(Panel& panel, Role role, double x, double low, double high, std::string text);
+
+/// "1.25 s"
+std::string seconds_text(double seconds);
+
+Figure times_of(const Analysis& analysis);
+Figure confusion_of(const Analysis& analysis);
+Figure speed_accuracy_of(const Analysis& analysis);
+Figure exclusions_of(const Analysis& analysis);
+Figure learning_of(const Analysis& analysis);
+Figure order_of(const Analysis& analysis);
+Figure servo_of(const Analysis& analysis, const ReportRecord& record);
+
+}  // namespace palpate

@@ -1,0 +1,163 @@
+// Learning over trials, and which renderer came first.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/figures_parts.h"
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr double kNormal975 = 1.959963984540054;  // of the standard normal distribution
+
+}  // namespace
+
+Figure learning_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "learning", "Times over the trials with a renderer");
+  const auto& learning = analysis.practice.learning;
+  double low = 1e9, high = -1e9;
+  for (const Learning& curve : learning) {
+    for (const LearningBin& bin : curve.bins) {
+      if (!bin.mean_log) continue;
+      const double se = std::min(bin.se_mean_log.value_or(0), 1.0);
+      low = std::min(low, *bin.mean_log - kNormal975 * se);
+      high = std::max(high, *bin.mean_log + kNormal975 * se);
+    }
+  }
+  if (low > high) return figure;
+  const double per_decade = std::log(10.0);
+  Panel panel;
+  std::vector<std::string> parts;
+  parts.reserve(kLearningBins);
+  for (std::size_t b = 0; b < kLearningBins; ++b) parts.push_back(std::to_string(b + 1));
+  panel.x = names_axis(parts, kLearningBins, "part of the trials with a renderer, first to last");
+  panel.y = seconds_axis(low / per_decade - 0.05, high / per_decade + 0.05,
+                         "geometric mean time (s, logarithmic)");
+  if (panel.y.ticks.size() < 3) {
+    const FigureAxis seconds =
+        linear_axis(std::pow(10, panel.y.low), std::pow(10, panel.y.high), "");
+    panel.y.ticks.clear();
+    for (const Tick& tick : seconds.ticks) {
+      if (!(tick.at > 0)) continue;
+      const double at = std::log10(tick.at);
+      if (at >= panel.y.low && at <= panel.y.high) panel.y.ticks.push_back({at, tick.label});
+    }
+  }
+  panel.width = 640;
+  panel.height = 300;
+  for (std::size_t r = 0; r < learning.size(); ++r) {
+    const std::string& renderer = analysis.table.renderers[r];
+    const Role role = role_of(renderer);
+    const double shift = learning.size() < 2 ? 0 : (r == 0 ? -0.06 : 0.06);
+    Mark line = line_mark(role, {}, {}, 2);
+    for (std::size_t b = 0; b < kLearningBins; ++b) {
+      const LearningBin& bin = learning[r].bins[b];
+      if (!bin.mean_log) continue;
+      const double x = static_cast<double>(b) + 0.5 + shift, y = *bin.mean_log / per_decade;
+      line.x.push_back(x);
+      line.y.push_back(y);
+      const std::string text = renderer + ", part " + parts[b] + ": " +
+                               seconds_text(std::exp(*bin.mean_log)) + ", " +
+                               counted(bin.n_trials, "trial", "trials");
+      if (bin.se_mean_log) {
+        const double half = kNormal975 * *bin.se_mean_log / per_decade;
+        add_interval(panel, role, x, y - half, y + half, text);
+      }
+      panel.marks.push_back(symbol(role, shape_of(renderer), x, y, 5, text));
+    }
+    if (line.x.size() > 1) panel.marks.push_back(std::move(line));
+    figure.legend.push_back({renderer, role, shape_of(renderer)});
+    if (const auto& slope = learning[r].mean_slope) {
+      std::string text = renderer + ": " + fixed(100 * std::expm1(*slope), 1) + " % per 100 trials";
+      if (const auto& ends = learning[r].slope.log_ratio_ci95) {
+        text += " (95 % interval " + fixed(100 * std::expm1(ends->low), 1) + " to " +
+                fixed(100 * std::expm1(ends->high), 1) + " %)";
+      }
+      figure.description += text + ". ";
+    }
+  }
+  const std::string slopes = figure.description;
+  figure.panels.push_back(std::move(panel));
+  figure.notes.push_back(
+      "Each participant’s times relative to their own mean of the shape, then the mean over "
+      "participants, the renderer’s mean added back; bars: 1.96 standard errors." +
+      (slopes.empty() ? "" : " Change of the time: " + slopes));
+  return figure;
+}
+
+Figure order_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "order", "The gain by which renderer came first");
+  const std::size_t shapes =
+      std::min(shown_shapes(analysis, figure), analysis.practice.shapes.size());
+  double low = 0, high = 10;
+  bool any = false;
+  const auto groups = [&](std::size_t s) {
+    const OrderEffect& order = analysis.practice.shapes[s];
+    return std::array<const OrderGroup*, 2>{&order.point_first, &order.ray_first};
+  };
+  for (std::size_t s = 0; s < shapes; ++s) {
+    for (const OrderGroup* group : groups(s)) {
+      if (!group->mean_log_ratio) continue;
+      any = true;
+      low = std::min(low, percent_reduction(*group->mean_log_ratio));
+      high = std::max(high, percent_reduction(*group->mean_log_ratio));
+    }
+    if (const auto& ends = analysis.practice.shapes[s].balanced_ci95) {
+      low = std::min(low, percent_reduction(*ends).low);
+      high = std::max(high, percent_reduction(*ends).high);
+    }
+  }
+  if (!any) return figure;
+  Panel panel;
+  panel.x = names_axis(analysis.table.shapes, shapes, "");
+  panel.y = linear_axis(std::max(low, -150.0), high, "less time with the ray (%)");
+  panel.width = std::max(std::clamp(150.0 * static_cast<double>(shapes), 340.0, 860.0),
+                         60.0 * static_cast<double>(shapes));
+  panel.height = 300;
+  panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
+  constexpr const char* kNames[] = {"point first", "ray first"};
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const std::string name = printable(analysis.table.shapes[s], 40);
+    const double x = static_cast<double>(s) + 0.5;
+    const auto both = groups(s);
+    for (std::size_t g = 0; g < both.size(); ++g) {
+      if (!both[g]->mean_log_ratio) continue;
+      const double value = percent_reduction(*both[g]->mean_log_ratio);
+      const std::string text = name + ", " + kNames[g] + ": " + fixed(value, 1) + " %, " +
+                               counted(both[g]->n_participants, "participant", "participants");
+      panel.marks.push_back(symbol(g == 0 ? Role::point : Role::ray,
+                                   g == 0 ? Shape::circle : Shape::square,
+                                   x - 0.2 + 0.4 * static_cast<double>(g),
+                                   std::clamp(value, panel.y.low, panel.y.high), 5.5, text));
+      figure.description += text + ". ";
+    }
+    const OrderEffect& order = analysis.practice.shapes[s];
+    if (!order.balanced_log_ratio) continue;
+    const double value = percent_reduction(*order.balanced_log_ratio);
+    std::string text = name + ", orders balanced: " + fixed(value, 1) + " %";
+    if (order.balanced_ci95) {
+      const Interval ends = percent_reduction(*order.balanced_ci95);
+      text += ", 95 % interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) + " %";
+      add_interval(panel, Role::ink, x, ends.low, ends.high, text);
+    }
+    panel.marks.push_back(symbol(Role::ink, Shape::diamond, x,
+                                 std::clamp(value, panel.y.low, panel.y.high), 6, text));
+    figure.description += text + ". ";
+  }
+  figure.panels.push_back(std::move(panel));
+  figure.legend = {{"point first", Role::point, Shape::circle},
+                   {"ray first", Role::ray, Shape::square},
+                   {"orders balanced", Role::ink, Shape::diamond}};
+  figure.notes.insert(
+      figure.notes.begin(),
+      "Practice makes whichever renderer comes second look faster: the gain of those "
+      "who began with the point is then too large, that of the others too small. "
+      "The mean of both groups is free of it (two-period crossover); bars: 95 % "
+      "interval.");
+  return figure;
+}
+
+}  // namespace palpate

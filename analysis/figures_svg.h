@@ -1,0 +1,23 @@
+#pragma once
+// Figures as SVG, without a browser.
+
+#include <array>
+#include <string>
+
+#include "analysis/figures.h"
+
+namespace palpate {
+
+/// Colours by role: what SVG and CSS read.
+using Palette = std::array<std::string, kRoles>;
+
+/// For paper. Okabe & Ito's (2008) colours: told apart with every common colour vision.
+Palette light_palette();
+Palette dark_palette();
+/// "var(--point)" and so on: a page's style says which.
+Palette page_palette();
+
+/// A stand-alone document with title, label, legend and notes.
+std::string figure_svg(const Figure& figure, const Palette& palette);
+
+}  // namespace palpate

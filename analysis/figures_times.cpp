@@ -1,0 +1,167 @@
+// Distributions of times, binned: a million trials take no more room than a thousand.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "analysis/figures_parts.h"
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kBins = 80;
+constexpr std::size_t kFewTimes = 12;  // below it each time is drawn: a curve would pretend
+using Bins = std::array<double, kBins>;
+
+/// log10 of s, sorted, of the trials that the times use. [renderer][shape]
+using Times = std::vector<std::vector<std::vector<float>>>;
+
+Times used_times(const Analysis& analysis) {
+  Times times(analysis.table.renderers.size(),
+              std::vector<std::vector<float>>(analysis.table.shapes.size()));
+  for (const TrialRow& row : analysis.table.rows) {
+    if (!row.correct || row.timed_out || row.answer < 0) continue;
+    if (!(row.response_time >= analysis.settings.too_fast)) continue;
+    times[row.renderer][row.shape].push_back(static_cast<float>(std::log10(row.response_time)));
+  }
+  for (auto& shapes : times) {
+    for (auto& cell : shapes) std::ranges::sort(cell);
+  }
+  return times;
+}
+
+double quantile_of(const std::vector<float>& sorted, double share) {
+  const double at = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(at);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  const double part = at - static_cast<double>(below);
+  return (1 - part) * static_cast<double>(sorted[below]) +
+         part * static_cast<double>(sorted[above]);
+}
+
+/// Gaussian kernel of Silverman's (1986) width on bins from low to high; sums to 1.
+Bins density(const std::vector<float>& sorted, double low, double high) {
+  const double step = (high - low) / kBins;
+  Bins counts{}, smooth{};
+  for (const float time : sorted) {
+    const double bin = (static_cast<double>(time) - low) / step;
+    counts[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))] += 1;
+  }
+  const double spread = (quantile_of(sorted, 0.75) - quantile_of(sorted, 0.25)) / 1.34;
+  const double width =
+      std::max(0.9 * spread * std::pow(static_cast<double>(sorted.size()), -0.2) / step, 0.6);
+  double total = 0;
+  for (std::size_t to = 0; to < kBins; ++to) {
+    for (std::size_t from = 0; from < kBins; ++from) {
+      const double z = (static_cast<double>(to) - static_cast<double>(from)) / width;
+      smooth[to] += counts[from] * std::exp(-0.5 * z * z);
+    }
+    total += smooth[to];
+  }
+  for (double& value : smooth) value /= total;
+  return smooth;
+}
+
+/// The half of a violin that bulges to `side` (-1 or 1) of x.
+void add_half(Panel& panel, Role role, const Bins& share, double x, double side, double scale,
+              const std::string& text) {
+  const double step = (panel.y.high - panel.y.low) / kBins;
+  Mark area = line_mark(role, {}, {}, 1.2);
+  area.kind = Mark::Kind::area;
+  area.opacity = 0.4;
+  area.text = text;
+  const auto corner = [&](double width, double bin) {
+    area.x.push_back(x + side * (0.02 + width));
+    area.y.push_back(panel.y.low + (bin + 0.5) * step);
+  };
+  std::size_t first = 0, last = kBins - 1;
+  const double least = 0.004 / scale;
+  while (first < last && share[first] < least) ++first;
+  while (last > first && share[last] < least) --last;
+  corner(0, static_cast<double>(first));
+  for (std::size_t b = first; b <= last; ++b) corner(scale * share[b], static_cast<double>(b));
+  corner(0, static_cast<double>(last));
+  panel.marks.push_back(std::move(area));
+}
+
+void add_cell(Panel& panel, const std::string& renderer, const std::vector<float>& times,
+              const Bins& share, double x, double side, double scale, const std::string& text) {
+  const Role role = role_of(renderer);
+  if (times.size() < kFewTimes) {
+    for (const float time : times) {
+      panel.marks.push_back(
+          symbol(role, shape_of(renderer), x + side * 0.12, static_cast<double>(time), 3, text));
+    }
+    return;
+  }
+  add_half(panel, role, share, x, side, scale, text);
+  const double at = x + side * 0.055;
+  panel.marks.push_back(
+      line_mark(role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
+  panel.marks.push_back(
+      symbol(Role::page, shape_of(renderer), at, quantile_of(times, 0.5), 3.6, text));
+  panel.marks.push_back(symbol(role, shape_of(renderer), at, quantile_of(times, 0.5), 2.6, text));
+}
+
+}  // namespace
+
+Figure times_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "times", "Distributions of the times");
+  const auto& table = analysis.table;
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const Times times = used_times(analysis);
+  double low = 1e9, high = -1e9;
+  for (const auto& renderer : times) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      if (renderer[s].empty()) continue;
+      low = std::min(low, static_cast<double>(renderer[s].front()));
+      high = std::max(high, static_cast<double>(renderer[s].back()));
+    }
+  }
+  if (low > high) return figure;
+  Panel panel;
+  panel.x = names_axis(table.shapes, shapes, "");
+  panel.y = seconds_axis(low - 0.08, high + 0.08, "time (s, logarithmic)");
+  panel.width = std::max(std::clamp(190.0 * static_cast<double>(shapes), 380.0, 860.0),
+                         70.0 * static_cast<double>(shapes));
+  panel.height = 360;
+  std::vector<std::vector<Bins>> shares(times.size(), std::vector<Bins>(shapes));
+  double widest = 0;
+  for (std::size_t r = 0; r < times.size(); ++r) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      if (times[r][s].size() < kFewTimes) continue;
+      shares[r][s] = density(times[r][s], panel.y.low, panel.y.high);
+      widest = std::max(widest, *std::ranges::max_element(shares[r][s]));
+    }
+  }
+  for (std::size_t s = 0; s < shapes; ++s) {
+    for (std::size_t r = 0; r < times.size(); ++r) {
+      if (times[r][s].empty()) continue;
+      std::string text = printable(table.shapes[s], 40) + ", " + table.renderers[r] + ": median " +
+                         seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
+                         ", middle half " + fixed(std::pow(10, quantile_of(times[r][s], 0.25)), 2) +
+                         " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
+                         counted(times[r][s].size(), "time", "times");
+      const double side = table.renderers[r] == "ray" ? 1 : -1;
+      add_cell(panel, table.renderers[r], times[r][s], shares[r][s], static_cast<double>(s) + 0.5,
+               side, 0.4 / std::max(widest, 1e-9), text);
+      figure.description += text + ". ";
+    }
+  }
+  figure.panels.push_back(std::move(panel));
+  for (const std::string& renderer : table.renderers) {
+    figure.legend.push_back({renderer, role_of(renderer), shape_of(renderer)});
+  }
+  figure.notes.insert(
+      figure.notes.begin(),
+      "All correct answers of all participants. Width: share of the trials "
+      "(smoothed); mark: median; bar: the middle half of the trials. Cells of fewer "
+      "than " +
+          std::to_string(kFewTimes) + " times show each one.");
+  return figure;
+}
+
+}  // namespace palpate
