@@ -131,12 +131,13 @@ Json mixed_model_json(const MixedModel& model, const TrialTable& table) {
   out["n_observations"] = model.n_observations;
   out["n_participants"] = model.n_participants;
   out["logLik_REML"] = number(model.log_likelihood_reml);
-  Json& fixed_effects = out["fixed_effects"] = Json::object();
-  Json& tests = out["fixed_effects_tests"] = Json::object();
+  Json fixed_effects = Json::object(), tests = Json::object();
   for (const FixedEffect& effect : model.fixed_effects) {
     fixed_effects[effect.name] = number(effect.value.estimate);
     tests[effect.name] = model_estimate(effect.value);
   }
+  out["fixed_effects"] = std::move(fixed_effects);
+  out["fixed_effects_tests"] = std::move(tests);
   out["fixed_effects_left_out"] = model.left_out;
 
   Json& components = out["variance_components"];
