@@ -213,20 +213,13 @@ WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& 
   return walk<false>(mesh, start, tip, Vec3(0));
 }
 
-void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at, int tick) {
+void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at) {
   if (at.kind == Kind::face) {
-    // A face's neighbours are at hand: the walk has just asked them.
-    if (tick > 0) return;
     for (const Neighbour& next : mesh.facets()[at.index].triangle)
       fetch_beyond<false>(mesh, next.across);
     return;
   }
-  if (tick == 1) return;  // what was asked for at tick 0 is on its way
   for (const std::uint32_t facet : {mesh.edges()[at.index].left, mesh.edges()[at.index].right}) {
-    if (tick == 0) {
-      fetch_beyond<true>(mesh, facet);
-      continue;
-    }
     for (const Neighbour& next : mesh.facets()[facet].triangle) {
       if (next.edge == at.index) continue;
       __builtin_prefetch(&mesh.vertices()[mesh.edges()[next.edge].v0]);

@@ -52,11 +52,10 @@ WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3
 /// The same walk with the probe shrunk to its tip: faces only.
 WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
 
-/// Asks for the memory that later walks from this facet may touch, so that a step need not wait for
-/// it; changes nothing. Neighbours of triangles only: other facets are few.
-/// \param tick  since the walk came to the facet, from 0: farther memory is asked for later, when
-/// the nearer, which says where it is, has had time to arrive
-void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at, int tick);
+/// Asks for the memory two steps from a facet that the walk has come to, so that later walks need
+/// not wait for it; changes nothing. What is one step away was asked for one facet before.
+/// Neighbours of triangles only: other facets are few.
+void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at);
 
 /// The facet of M of least depth, by looking at all of them: where there is no history to walk
 /// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.

@@ -77,7 +77,6 @@ struct PartState {
   SeparatingPlane plane;      ///< mesh frame; where valid, the last pose was beyond it
   MinkowskiFacet watch;       ///< not in contact: of a plane that lately separated, if any
   std::uint32_t support = 0;  ///< vertex that the last search for a plane ended on
-  std::uint8_t fetched = 0;   ///< times that memory around `facet` has been asked for
   bool blocked = false;       ///< the trial began inside: no force until it has been left once
   Vec3 share;    ///< m; its part of the ideal probe's translation, where parts share one
   Vec3 yielded;  ///< m; the translation that its siblings' shares gave it at the last tick

@@ -16,8 +16,6 @@ namespace palpate::tick {
 // squares below it are exact enough to separate objects.
 constexpr double kFarthest = 1e6;
 
-constexpr std::uint8_t kFetches = 3;  // ticks on a facet that ask for the memory around it
-
 inline bool plausible(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
 template <class Probe>
@@ -168,8 +166,8 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
     if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return false;
   }
   state.facet = hit.facet;
-  state.fetched = 0;
   state.plane.valid = false;
+  fetch_ahead(mesh, state.facet);
   return true;
 }
 
@@ -195,10 +193,10 @@ template <class Probe>
       return false;
     }
   }
-  if (!(hit.facet == state.facet)) state.fetched = 0;
+  const bool moved = !(hit.facet == state.facet);
   state.facet = hit.facet;
   if (hit.facet.kind != Kind::none) {
-    if (state.fetched < kFetches) fetch_ahead(mesh, state.facet, state.fetched++);
+    if (moved) fetch_ahead(mesh, state.facet);
     return true;
   }
   leave(state, hit, probe);

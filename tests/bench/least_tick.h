@@ -44,8 +44,8 @@ bool approached(const ScenePart& part, PartState& memory, const LineProbe& from,
     return false;
   }
   memory.facet = hit.facet;
-  memory.fetched = 0;
   memory.plane.valid = false;
+  fetch_ahead(mesh, memory.facet);
   return true;
 }
 
