@@ -25,16 +25,15 @@ class SharedValue {
     std::memcpy(words.data(), &value, sizeof(T));
     const std::uint32_t before = sequence_.load(std::memory_order_relaxed);
     sequence_.store(before + 1, std::memory_order_relaxed);
-    std::atomic_thread_fence(std::memory_order_release);
-    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
+    // Released: who reads a new word also sees that the count is odd.
+    for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
     sequence_.store(before + 2, std::memory_order_release);
   }
   /// False while it is being written.
   bool read(T& value) const noexcept {
     const std::uint32_t before = sequence_.load(std::memory_order_acquire);
     std::array<std::uint64_t, kWords> words{};
-    for (std::size_t i = 0; i < kWords; ++i) words[i] = words_[i].load(std::memory_order_relaxed);
-    std::atomic_thread_fence(std::memory_order_acquire);
+    for (std::size_t i = 0; i < kWords; ++i) words[i] = words_[i].load(std::memory_order_acquire);
     if ((before & 1) != 0 || sequence_.load(std::memory_order_relaxed) != before) return false;
     std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
     return true;

@@ -20,6 +20,8 @@ class FakeDevice final : public Device {
     last2 = device2;
   }
 
+  void limit(double max_force) { capabilities_.max_force = max_force; }
+
   Vec3 force, last1, last2;
 
  private:

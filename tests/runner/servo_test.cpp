@@ -68,6 +68,87 @@ TEST(Servo, NoForceBeforeTheStylusHasRested) {
   for (int tick = 0; tick < 5000; ++tick) ASSERT_EQ(other.tick().phase, Phase::homing);
 }
 
+TEST(Servo, ForceIsLimitedInSizeAndChangeAndRampedAndBothForcesAreOnRecord) {
+  for (const double device_limit : {8.0, 2.0}) {
+    // 20 mm into the cube: 16 N rendered.
+    FakeDevice device([](int tick) { return come_down(tick, 0.01); });
+    device.limit(device_limit);
+    VirtualClock clock;
+    Servo servo(device, clock, 1000, ForceLimits{});
+    servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+    Vec3 last(0);
+    bool cut = false;
+    for (int tick = 0; tick < 3000; ++tick) {
+      const Sample& sample = servo.tick();
+      ASSERT_LE(glm::length(device.last1), std::min(6.0, device_limit) + 1e-12);
+      ASSERT_LE(glm::length(device.last1 - last), 0.5 + 1e-12);
+      ASSERT_EQ(sample.device1, device.last1) << "what was commanded";
+      cut = cut || (sample.faults & servo_fault::kForceLimited) != 0;
+      last = device.last1;
+    }
+    EXPECT_TRUE(cut);
+    EXPECT_NEAR(device.last1.z, std::min(6.0, device_limit), 1e-9);
+    EXPECT_NEAR(servo.tick().rendering.device1.z, 16, 1e-9) << "what was rendered";
+  }
+  // In contact from time zero on: the forces come up over 200 ms.
+  FakeDevice pressed([](int tick) { return stylus_at(tick < 500 ? 0.1 : 0.0275); });
+  VirtualClock clock;
+  Servo servo(pressed, clock, 1000, ForceLimits{});
+  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  int onset = -1;
+  for (int tick = 0; tick < 1000; ++tick) {
+    const Sample& sample = servo.tick();
+    if (sample.phase == Phase::feeling && onset < 0) onset = tick;
+    if (tick < 500) continue;
+    ASSERT_NEAR(pressed.force.z, std::min(2.0, 2.0 * (tick - onset + 1) / 200), 1e-9) << tick;
+  }
+}
+
+TEST(Servo, AnEmergencyIsZeroWithinTheTickAndUntilCleared) {
+  FakeDevice device([](int tick) { return come_down(tick, 0.029); });
+  VirtualClock clock;
+  Servo servo(device, clock, 1000, ForceLimits{});
+  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  for (int tick = 0; tick < 2000; ++tick) servo.tick();
+  ASSERT_GT(device.force.z, 0.5);
+  servo.emergency_zero();
+  EXPECT_TRUE(servo.tick().faults & servo_fault::kEmergency);
+  EXPECT_EQ(device.force, Vec3(0));
+  servo.stop();
+  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  for (int tick = 0; tick < 2000; ++tick) {
+    EXPECT_TRUE(servo.tick().faults & servo_fault::kTripped);
+    ASSERT_EQ(device.force, Vec3(0)) << "a new trial does not clear it";
+  }
+  servo.clear_fault();
+  EXPECT_EQ(servo.tick().faults & servo_fault::kTripped, 0u);
+}
+
+TEST(Servo, WhatIsWrongWithTheDeviceIsOnRecord) {
+  for (const DeviceTrouble trouble :
+       {DeviceTrouble::unplugged, DeviceTrouble::not_homed, DeviceTrouble::guard_lost}) {
+    FakeDevice device([trouble](int tick) {
+      DeviceReading reading = come_down(tick, 0.029);
+      if (tick == 2000) {
+        reading.lost = true;
+        reading.trouble = trouble;
+      }
+      return reading;
+    });
+    VirtualClock clock;
+    Servo servo(device, clock, 1000, ForceLimits{});
+    servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+    for (int tick = 0; tick < 2000; ++tick) servo.tick();
+    const Sample& sample = servo.tick();
+    EXPECT_EQ(sample.trouble, trouble);
+    EXPECT_TRUE(sample.faults & servo_fault::kDeviceLost);
+    EXPECT_EQ(device.force, Vec3(0));
+    EXPECT_STRNE(advice(trouble), "");
+    for (int tick = 0; tick < 100; ++tick) servo.tick();
+    EXPECT_EQ(device.force, Vec3(0)) << "plugged in again: still zero";
+  }
+}
+
 struct DeviceFault {
   const char* name;
   DeviceReading reading;

@@ -108,6 +108,39 @@ TEST(ServoThread, AFullRingIsAFaultOnRecordAndTheServoGoesOn) {
   EXPECT_GT(servo.health().lost_samples(), 300u);
 }
 
+TEST(ServoThread, ADisplayThatStallsForSecondsIsNotNoticed) {
+  FakeDevice device([](int) { return stylus_at(0.1); });
+  UnhurriedClock clock;
+  ServoThread servo(device, clock, fast(1 << 16));
+  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  std::atomic<bool> done{false};
+  std::uint64_t during_stalls = 0;
+  std::jthread display([&] {
+    Sample seen;
+    std::uint32_t last = 0;
+    while (!done) {
+      const std::uint64_t before = servo.health().ticks();
+      std::this_thread::sleep_for(std::chrono::milliseconds(700));
+      during_stalls = std::max(during_stalls, servo.health().ticks() - before);
+      if (!servo.latest(seen) || seen.phase != Phase::feeling) continue;
+      EXPECT_GT(seen.tick, last) << "newer than the last one, and whole";
+      EXPECT_EQ(seen.probe.tip.z, 0.1);
+      last = seen.tick;
+    }
+  });
+  std::uint32_t expected = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(2200);
+  while (std::chrono::steady_clock::now() < end) {
+    const Sample& sample = servo.next();
+    if (sample.phase != Phase::feeling) continue;
+    ASSERT_EQ(sample.tick, expected++) << "none is missing for the display's sake";
+  }
+  done = true;
+  display.join();
+  EXPECT_GT(during_stalls, 100u);
+  EXPECT_EQ(servo.health().lost_samples(), 0u);
+}
+
 TEST(ServoThread, StopsAndBeginsAgain) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
