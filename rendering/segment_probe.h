@@ -32,7 +32,7 @@ struct Portion {
     const double to = slope < 0 ? t : 1.0;
     enter = from > enter ? from : enter;
     leave = to < leave ? to : leave;
-    const double all = (slope == 0) & (height < 0) ? -1.0 : 1.0;
+    const double all = ((slope == 0) & (height < 0)) ? -1.0 : 1.0;
     leave = all < leave ? all : leave;
   }
 };
