@@ -191,6 +191,9 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
   });
   reader.section("servo", [&](ObjectReader& section) {
     section.number("rate_hz", protocol.servo_rate, {100, 10000, "Hz"});
+    section.boolean("passivity_controller", protocol.passivity_controller);
+    section.choice("material_limit", protocol.material_limit,
+                   {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
   });
   reader.section("home", [&](ObjectReader& section) {
     section.number("rest_s", protocol.home.rest, {0, 60, "s"});

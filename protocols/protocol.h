@@ -18,6 +18,8 @@ const char* to_string(RendererKind kind);  ///< "point", "ray"
 enum class RendererOrder { fixed, counterbalanced, interleaved };
 enum class OrderKind { random, sequential };
 enum class OrientationKind { uniform, fixed, listed };
+/// What becomes of a material that the device cannot show without feeding energy to the hand.
+enum class MaterialLimit { refuse, limit };
 
 struct StimulusSpec {
   std::string name;   ///< unique within the protocol
@@ -68,7 +70,9 @@ struct Protocol {
     double scale = 1;      ///< virtual metres per device metre
   } workspace;
   Material material;
-  double servo_rate = 1000;  ///< Hz
+  double servo_rate = 1000;           ///< Hz
+  bool passivity_controller = false;  ///< takes out the energy that sampling feeds to the hand
+  MaterialLimit material_limit = MaterialLimit::refuse;
   struct Home {
     double rest = 0.5;     ///< s
     double margin = 0.01;  ///< m outside the bounding spheres

@@ -1,9 +1,93 @@
 #include "runner/device_check.h"
 
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <sstream>
 
 namespace palpate {
+namespace {
+
+template <class... Parts>
+std::string sentence(const Parts&... parts) {
+  std::ostringstream text;
+  (text << ... << parts);
+  return text.str();
+}
+
+/// The stiffest that the probe can meet in it, N/m.
+double stiffest(const Material& material) {
+  double out = material.stiffness;
+  for (const Layer& layer : material.layers) out = std::max(out, layer.stiffness);
+  return out;
+}
+
+/// Calls visit(material) for the object and the parts of a compound.
+template <class Object, class Visit>
+void visit_materials(Object& object, const Visit& visit) {
+  visit(object.material);
+  for (auto& part : object.parts) visit_materials(part, visit);
+}
+
+/// The device runs no faster than it can, whatever the protocol asks (another misfit).
+double shown_rate(const Protocol& protocol, const DeviceCapabilities& device) {
+  return std::min(protocol.servo_rate, device.max_rate);
+}
+
+}  // namespace
+
+ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
+                          double scale, bool passivity_controller) {
+  ShowableMaterial out;
+  const double stiffness = stiffest(material) * scale, damping = std::abs(material.damping) * scale;
+  const auto bound = [&out](double share, const auto&... reason) {
+    // A hair of rounding does not refuse a material that stands at the bound.
+    if (share >= out.share || share >= 1 - 1e-9) return;
+    out = {std::max(0.0, share), sentence(reason...)};
+  };
+  const std::string shown = scale == 1 ? "" : sentence(" (", stiffness, " N/m at the hand)");
+  if (stiffness > 0) {
+    const double most = device.max_stiffness * rate / device.max_rate;
+    bound(most / stiffness, stiffest(material), " N/m", shown, ", and '", device.name,
+          "' shows up to ", most, " N/m at ", rate, " Hz");
+    if (device.friction > 0 && device.resolution > 0) {
+      const double held = 2 * device.friction / device.resolution;
+      bound(held / stiffness, stiffest(material), " N/m", shown, ", and the friction of '",
+            device.name, "', ", device.friction, " N, holds up to ", held, " N/m against steps of ",
+            device.resolution, " m");
+    }
+  }
+  const double needed = stiffness / rate / 2 + damping;
+  if (device.damping > 0 && needed > 0) {
+    const double b = device.damping * (passivity_controller ? kPassivityExtension : 1);
+    bound(b / needed, stiffest(material), " N/m and ", material.damping, " N s/m", shown, " at ",
+          rate, " Hz, which need ", needed, " N s/m of physical damping, and '", device.name,
+          "' has ", device.damping,
+          passivity_controller ? " with the passivity controller on" : "");
+  }
+  return out;
+}
+
+std::vector<std::string> limit_materials(Protocol& protocol, const DeviceCapabilities& device) {
+  std::vector<std::string> out;
+  if (protocol.material_limit != MaterialLimit::limit || device.actuated_freedom == 0) return out;
+  for (StimulusSpec& stimulus : protocol.stimuli) {
+    visit_materials(stimulus.object, [&](Material& material) {
+      const ShowableMaterial can =
+          showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
+                   protocol.passivity_controller);
+      if (can.reason.empty() || can.share == 0) return;  // nothing to show: a misfit
+      const double shown = can.share * (1 - 1e-12);      // rounding stays below the bound
+      out.push_back(sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
+                             material.stiffness * shown, " N/m and ", material.damping * shown,
+                             " N s/m"));
+      material.stiffness *= shown;
+      material.damping *= shown;
+      for (Layer& layer : material.layers) layer.stiffness *= shown;
+    });
+  }
+  return out;
+}
 
 std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary& library,
                                  const DeviceCapabilities& device) {
@@ -26,11 +110,16 @@ std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary
   }
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const StimulusSpec& stimulus = protocol.stimuli[i];
-    const double stiffness = stimulus.object.material.stiffness;
-    if (stiffness > device.max_stiffness) {
-      add("stimulus '", stimulus.name, "' has ", stiffness, " N/m; '", device.name,
-          "' shows up to ", device.max_stiffness, " N/m");
-    }
+    const auto check_material = [&](const Material& material) {
+      const ShowableMaterial can =
+          showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
+                   protocol.passivity_controller);
+      if (device.actuated_freedom == 0 || can.reason.empty()) return;
+      add("stimulus '", stimulus.name, "' has ", can.reason,
+          ": soften /material, raise /servo/rate_hz, or have it limited by "
+          "/servo/material_limit \"limit\"");
+    };
+    visit_materials(stimulus.object, check_material);
     const double needed =
         glm::length(protocol.workspace.centre) +
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;

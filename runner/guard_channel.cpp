@@ -36,9 +36,9 @@ DeviceReading GuardedReading::reading() const {
 }
 
 DeviceCapabilities FixedCapabilities::numbers() const {
-  return {name.data(),   sensed_freedom, actuated_freedom,  max_force,
-          max_stiffness, max_rate,       workspace_radius,  resolution,
-          simulated,     serial.data(),  calibration.data()};
+  return {name.data(),        sensed_freedom,   actuated_freedom, max_force, max_stiffness,
+          max_rate,           workspace_radius, resolution,       simulated, serial.data(),
+          calibration.data(), damping,          friction};
 }
 
 void FixedCapabilities::set(const DeviceCapabilities& from) {
@@ -52,6 +52,8 @@ void FixedCapabilities::set(const DeviceCapabilities& from) {
   max_rate = from.max_rate;
   workspace_radius = from.workspace_radius;
   resolution = from.resolution;
+  damping = from.damping;
+  friction = from.friction;
   simulated = from.simulated;
 }
 

@@ -41,6 +41,7 @@ void Servo::begin(Stage& stage) noexcept {
   rested_ = 0;
   quality_ = {};
   limiter_.release();
+  if (passivity_) passivity_->reset();
   const std::int64_t last_ns = sample_.time_ns;
   sample_ = {};
   sample_.time_ns = last_ns;
@@ -105,13 +106,28 @@ void Servo::command(const Vec3& device1, const Vec3& device2) noexcept {
     sample_.faults |= servo_fault::kEmergency;
     limiter_.trip();
   }
-  const DeviceForces forces = limiter_.apply(device1, device2);
+  const DeviceForces forces =
+      passivity_ ? kept_passive(device1, device2) : limiter_.apply(device1, device2);
   sample_.compute_ns = clock_.now_ns() - read_ns_;
   device_.write(forces.device1, forces.device2);
   sample_.device1 = forces.device1;
   sample_.device2 = forces.device2;
   sample_.faults |= (forces.limited ? servo_fault::kForceLimited : 0) |
                     (limiter_.tripped() ? servo_fault::kTripped : 0);
+}
+
+DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexcept {
+  if (sample_.phase != Phase::feeling || limiter_.tripped()) {
+    passivity_->reset();
+    return limiter_.apply(device1, device2);
+  }
+  ForceLimiter preview = limiter_;  // what the limits leave of the scene's forces alone
+  const DeviceForces damping = passivity_->damping(
+      {workspace_.to_device(sample_.probe.tip), workspace_.to_device(sample_.probe.tail)},
+      preview.apply(device1, device2));
+  const DeviceForces forces = limiter_.apply(device1 + damping.device1, device2 + damping.device2);
+  passivity_->commanded(forces);
+  return forces;
 }
 
 const Sample& Servo::tick() noexcept {

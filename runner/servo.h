@@ -5,10 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "rendering/renderer.h"
 #include "runner/device.h"
 #include "runner/force_limiter.h"
+#include "runner/passivity.h"
 #include "runner/sample.h"
 #include "runner/tick_source.h"
 
@@ -54,6 +56,9 @@ class Servo final : public TickSource {
   /// The experimenter allows forces again. From any thread.
   void clear_fault() noexcept;
 
+  /// Takes out the energy that sampling feeds to the hand; off unless asked for. Before start().
+  void control_passivity() { passivity_.emplace(PassivitySettings{}, period_); }
+
   /// The next tick is due now.
   void start() noexcept { due_ns_ = clock_.now_ns(); }
 
@@ -65,6 +70,7 @@ class Servo final : public TickSource {
   void keep_time() noexcept;
   void check(const DeviceReading& reading) noexcept;
   void command(const Vec3& device1, const Vec3& device2) noexcept;
+  DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
 
   static constexpr int kMissedInARow = 5;  ///< so many and the forces go off
 
@@ -76,6 +82,7 @@ class Servo final : public TickSource {
   std::int64_t read_ns_ = 0;  ///< when the device had been read
   ForceLimiter limiter_;
   WorkspaceMap workspace_;
+  std::optional<PassivityController> passivity_;
   std::unique_ptr<Stage> own_;  ///< of prepare()
   Stage* stage_ = nullptr;
   Vec3 rest_tip_;

@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr auto kNap = std::chrono::milliseconds(1);  // of the session, where nothing is new
+constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
 constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as stalled
 
 }  // namespace
@@ -21,6 +21,7 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
     : wish_(settings.realtime),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
       ring_(settings.ring) {
+  if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
   thread_ = std::jthread([this, &granted] {
     granted.set_value(request_realtime(wish_));

@@ -20,6 +20,7 @@ struct ServoSettings {
   double rate = 1000;  ///< Hz
   ForceLimits limits;
   WorkspaceMap workspace;
+  bool passivity_controller = false;
   RealtimeWish realtime;
   std::size_t ring = 16384;  ///< samples that wait for the session before some are lost
 };

@@ -111,6 +111,7 @@ void run_session(const Shared& shared, const Work& work, std::size_t index, Queu
   VirtualClock clock(work.clock_ns);
   Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{},
               {protocol.workspace.centre, protocol.workspace.scale});
+  if (protocol.passivity_controller) servo.control_passivity();
   SimulatedParticipant participant(own, shared.hypotheses, stylus, protocol, shared.seed,
                                    work.participant.number);
   QueueLog log(queue, index);

@@ -29,6 +29,8 @@ Json to_json(const DeviceCapabilities& c) {
           {"max_rate_hz", c.max_rate},
           {"workspace_radius_m", c.workspace_radius},
           {"resolution_m", c.resolution},
+          {"damping_ns_per_m", c.damping},
+          {"friction_n", c.friction},
           {"simulated", c.simulated},
           {"serial", c.serial},
           {"calibration", c.calibration}};

@@ -308,14 +308,16 @@ int report(const Station& at, const LiveSession::Outcome& outcome) {
 }
 
 int run_station(const RunSettings& settings) {
-  const Protocol protocol = parse_protocol(settings.protocol);
-  const StimulusLibrary library(protocol);
+  Protocol protocol = parse_protocol(settings.protocol);
   const DeviceKind& kind = kind_of(settings.device);
   Markers markers(open_markers(settings.markers));
   FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);
   const Watch guard_watch(signals, open.guard);
   const DeviceCapabilities& able = open.device->capabilities();
+  for (const std::string& limited : limit_materials(protocol, able))
+    std::fprintf(stderr, "%s\n", limited.c_str());
+  const StimulusLibrary library(protocol);
   check_fitness(kind, *open.device, settings, protocol, library);
 
   Store store = Store::open(settings.database, Store::Mode::write_or_create);
@@ -336,6 +338,7 @@ int run_station(const RunSettings& settings) {
   ServoSettings servo_settings;
   servo_settings.rate = protocol.servo_rate;
   servo_settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+  servo_settings.passivity_controller = protocol.passivity_controller;
   ServoThread servo(*open.device, clock, servo_settings);
   const Watch servo_watch(signals, &servo);
   const auto emergency = [&servo, guard = open.guard] {

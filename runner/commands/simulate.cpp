@@ -10,6 +10,8 @@
 
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/device_check.h"
+#include "runner/devices/simulated.h"
 #include "runner/simulated_study.h"
 
 namespace palpate {
@@ -99,8 +101,12 @@ int simulate_command(const std::vector<std::string>& args) {
     throw UsageError("--participants: 1 to 100000 was expected");
   if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: 1 to 1024 was expected");
 
-  const Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
   const SimulatedSettings settings = load_simulated_settings(settings_patch);
+  const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
+                               protocol.stylus.grip, 1 / protocol.servo_rate);
+  for (const std::string& limited : limit_materials(protocol, stylus.capabilities()))
+    std::fprintf(stderr, "%s\n", limited.c_str());
   Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
   watch_signals();
   const auto start = std::chrono::steady_clock::now();

@@ -70,7 +70,11 @@ SimulatedStylus::SimulatedStylus(const SimulatedDeviceSettings& device, const Ha
                    1 / tick,
                    device.workspace_radius,
                    device.resolution,
-                   true};
+                   true,
+                   "",
+                   "",
+                   device.damping,
+                   device.friction};
 }
 
 void SimulatedStylus::reset(const HandTarget& target) {
