@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <nlohmann/json.hpp>
 
 namespace palpate {
 namespace {
@@ -51,6 +52,16 @@ double TimeHistogram::share_above(std::int64_t ns) const noexcept {
   return count() > 0 ? static_cast<double>(above) / static_cast<double>(count()) : 0;
 }
 
+std::vector<std::pair<std::int64_t, std::uint64_t>> TimeHistogram::steps() const {
+  std::vector<std::pair<std::int64_t, std::uint64_t>> out;
+  for (int i = 0; i < kBins; ++i) {
+    const std::uint64_t in_step =
+        bins_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
+    if (in_step > 0) out.emplace_back(upper_edge(i), in_step);
+  }
+  return out;
+}
+
 void ServoHealth::add(const Sample& sample, std::int64_t period_ns) noexcept {
   lateness_.add(sample.lateness_ns);
   compute_.add(sample.compute_ns);
@@ -63,6 +74,29 @@ void ServoHealth::add(const Sample& sample, std::int64_t period_ns) noexcept {
 void ServoHealth::add_lost_sample() noexcept {
   increase<std::uint64_t>(lost_, 1);
   faults_.store(faults() | servo_fault::kSamplesLost, std::memory_order_relaxed);
+}
+
+std::string to_json_text(const ServoHealth& health, double rate) {
+  const auto times = [](const TimeHistogram& histogram) {
+    return nlohmann::ordered_json{{"median", histogram.quantile(0.5)},
+                                  {"p99", histogram.quantile(0.99)},
+                                  {"p99.9", histogram.quantile(0.999)},
+                                  {"max", histogram.longest()},
+                                  {"up_to_and_count", histogram.steps()}};
+  };
+  const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
+  const nlohmann::ordered_json json{
+      {"servo",
+       {{"rate_hz", rate},
+        {"ticks", health.ticks()},
+        {"missed_ticks", health.missed_ticks()},
+        {"late_by_a_period_share", health.lateness().share_above(period_ns)},
+        {"lost_samples", health.lost_samples()},
+        {"faults", health.faults()},
+        {"longest_period_ns", health.longest_period_ns()},
+        {"lateness_ns", times(health.lateness())},
+        {"compute_ns", times(health.compute())}}}};
+  return json.dump();
 }
 
 }  // namespace palpate

@@ -4,6 +4,9 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runner/sample.h"
 
@@ -20,6 +23,8 @@ class TimeHistogram {
   std::int64_t quantile(double p) const noexcept;
   /// Share of counts in steps that lie above `ns`.
   double share_above(std::int64_t ns) const noexcept;
+  /// The steps that hold any, as upper edge (ns) and count, in order.
+  std::vector<std::pair<std::int64_t, std::uint64_t>> steps() const;
 
  private:
   static constexpr int kSteps = 8;   ///< for each doubling
@@ -56,5 +61,9 @@ class ServoHealth {
   std::atomic<std::uint32_t> faults_{0};
   std::atomic<std::int64_t> longest_period_{0};
 };
+
+/// For a session's record, as JSON: counts, quantiles, and the histograms of every tick's lateness
+/// and computing time.
+std::string to_json_text(const ServoHealth& health, double rate);
 
 }  // namespace palpate

@@ -88,6 +88,8 @@ TEST(ServoThread, TicksComeAtTheRateOfTheMachinesClock) {
   const std::int64_t periods = (newest.time_ns - first.time_ns) / 500'000;
   const auto counted =
       static_cast<std::int64_t>(servo.health().ticks() + servo.health().missed_ticks());
+  const std::string text = to_json_text(servo.health(), 2000);
+  EXPECT_NE(text.find("\"missed_ticks\""), std::string::npos) << text;
   EXPECT_LE(periods, counted + 1) << "a period without a tick is counted as missed";
   EXPECT_GT(periods, 0);
 }
@@ -223,6 +225,9 @@ TEST(TimeHistogram, QuantilesAreWithinAnEighth) {
   }
   EXPECT_EQ(histogram.quantile(1), 100'000);
   EXPECT_NEAR(histogram.share_above(50'000), 0.5, 0.07);
+  std::uint64_t counted = 0;
+  for (const auto& [up_to, count] : histogram.steps()) counted += count;
+  EXPECT_EQ(counted, 100'000u);
   histogram.add(-5);  // a clock that went back
   histogram.add(std::numeric_limits<std::int64_t>::max());
   EXPECT_EQ(histogram.longest(), std::numeric_limits<std::int64_t>::max());
