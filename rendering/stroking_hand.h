@@ -23,11 +23,14 @@ struct StrokeSettings {
 
 /// 0.1 mm a tick along the surface (0.1 m/s at 1 kHz), up to twice that towards it or away, 1 to 2
 /// mm deep. For the point the tip slides; for the ray the
-/// contact wanders between the tip and 40 mm along the side. It comes in from half a radius off.
+/// contact wanders between the tip and 40 mm along the side. It comes in from half a radius off, 15
+/// mm at most.
 class StrokingHand {
  public:
   explicit StrokingHand(const StrokeSettings& settings)
-      : settings_(settings), random_(settings.seed), radius_(1.5 * settings.radius) {}
+      : settings_(settings),
+        random_(settings.seed),
+        radius_(settings.radius + std::min(0.5 * settings.radius, 0.015)) {}
 
   /// How far out the path runs follows what was felt, so that it keeps to the surface of any
   /// object: `depth` m deep at the last tick; negative: above it; 0: off it, unknown how far.

@@ -95,9 +95,10 @@ Explanation explain_with_costs(const Scene& scene, const Renderer& renderer) {
 }
 
 std::string to_text(const Explanation& e) {
-  std::string out = e.renderer + " renderer; " + std::to_string(e.objects) + " objects, " +
-                    std::to_string(e.parts) + " convex parts, " + std::to_string(e.facets) +
-                    " facets, " + std::to_string(e.edges) + " edges\n";
+  std::string out = e.renderer + " renderer; objects: " + std::to_string(e.objects) +
+                    ", convex parts: " + std::to_string(e.parts) +
+                    ", facets: " + std::to_string(e.facets) +
+                    ", edges: " + std::to_string(e.edges) + "\n";
   out += "a tick, ns: " + nanoseconds(e.contact_ns) + " in contact, " + nanoseconds(e.free_ns) +
          " in free space\n\n";
   std::string head = "stage";
@@ -120,7 +121,7 @@ std::string to_text(const Explanation& e) {
   }
   if (e.rest_ns) {
     out += "\nThe rest of a tick in contact: " + nanoseconds(e.rest_ns) +
-           " ns, of which most goes into writing the results.";
+           " ns: results are written, memory is asked for ahead, other parts are followed.";
   }
   out +=
       "\nEach stage was timed by itself over a hand that strokes the first part (0.1 m/s, 1 to 2 "

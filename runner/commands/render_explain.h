@@ -22,7 +22,7 @@ struct Explanation {
   std::string renderer;
   std::size_t objects = 0, parts = 0, facets = 0, edges = 0;
   std::optional<double> contact_ns, free_ns;  ///< of a whole tick
-  std::optional<double> rest_ns;  ///< of contact_ns: what the stages leave over, writing results
+  std::optional<double> rest_ns;              ///< of contact_ns: what the stages leave over
   std::vector<StageCost> stages;
 };
 
