@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -14,7 +15,8 @@
 namespace palpate {
 namespace {
 
-constexpr int kSamples = 4;  // of each pixel, against jagged edges
+constexpr int kSamples =
+    4;  // of each pixel, against jagged edges; too dear without a graphics card
 constexpr glm::vec4 kGround{0.098F, 0.114F, 0.133F, 1};
 constexpr glm::vec4 kObject{0.60F, 0.68F, 0.76F, 1};
 constexpr glm::vec4 kStylus{0.93F, 0.91F, 0.87F, 1};
@@ -66,13 +68,19 @@ unsigned compile(GLenum kind, const char* source) {
   return shader;
 }
 
+bool draws_in_software() {
+  const auto* const name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  return name == nullptr || std::strstr(name, "llvmpipe") != nullptr ||
+         std::strstr(name, "softpipe") != nullptr || std::strstr(name, "Software") != nullptr;
+}
+
 bool finite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 }  // namespace
 
-SceneView::SceneView() {
+SceneView::SceneView() : samples_(draws_in_software() ? 0 : kSamples) {
   const unsigned vertex = compile(GL_VERTEX_SHADER, kVertexShader);
   const unsigned fragment = compile(GL_FRAGMENT_SHADER, kFragmentShader);
   program_ = glCreateProgram();
@@ -134,11 +142,11 @@ void SceneView::resize(int width, int height) {
   glBindFramebuffer(GL_FRAMEBUFFER, samples_frame_);
   glGenRenderbuffers(1, &samples_colour_);
   glBindRenderbuffer(GL_RENDERBUFFER, samples_colour_);
-  glRenderbufferStorageMultisample(GL_RENDERBUFFER, kSamples, GL_RGBA8, width, height);
+  glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples_, GL_RGBA8, width, height);
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, samples_colour_);
   glGenRenderbuffers(1, &samples_depth_);
   glBindRenderbuffer(GL_RENDERBUFFER, samples_depth_);
-  glRenderbufferStorageMultisample(GL_RENDERBUFFER, kSamples, GL_DEPTH_COMPONENT24, width, height);
+  glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples_, GL_DEPTH_COMPONENT24, width, height);
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, samples_depth_);
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);

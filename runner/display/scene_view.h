@@ -42,6 +42,7 @@ class SceneView {
   void draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4& colour) const;
   void draw_stylus(const Sample& sample) const;
 
+  const int samples_;  ///< of each pixel
   unsigned program_ = 0;
   int matrix_at_ = 0, place_at_ = 0, colour_at_ = 0, eye_at_ = 0;
   Shape objects_, cylinder_, cone_, ball_;

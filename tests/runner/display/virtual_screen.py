@@ -9,6 +9,8 @@ import unittest
 
 PATIENCE = 60  # s, for what takes a moment on an idle machine; only a hang reaches it
 
+PER_FRAME = 0.5  # s, more than drawing a frame takes on a busy machine without a graphics card
+
 NEEDED = ["Xvfb", "xdotool", "import"]
 
 
@@ -87,10 +89,10 @@ class VirtualScreen:
 
     def click(self, window, x, y):
         self.point(window, x, y)
-        time.sleep(0.2)  # a frame that sees the pointer there before the button goes down
-        self.do("mousedown", 1)
-        time.sleep(0.2)
-        self.do("mouseup", 1)
+        for step in ("mousedown", "mouseup"):
+            time.sleep(PER_FRAME)
+            self.do(step, 1)
+        time.sleep(PER_FRAME)
 
     def picture(self, window):
         """Its pixels as bytes."""

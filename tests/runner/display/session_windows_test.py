@@ -1,0 +1,291 @@
+"""Sessions in real windows: answered by keys, felt with the pointer, and broken in mid-trial.
+
+Usage: session_windows_test.py PALPATE
+"""
+
+import csv
+import json
+import os
+import pathlib
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from virtual_screen import PATIENCE, VirtualScreen, skip_without_screen, wait_for
+
+PALPATE = sys.argv.pop() if len(sys.argv) > 1 else None
+
+SHAPES = ["sphere", "cone", "cylinder", "cube"]
+TRIALS = 4
+PROTOCOL = {
+    "version": 1, "name": "windows", "renderers": ["ray"],
+    "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
+                {"name": "cone", "shape": "cone", "radius_m": 0.03, "height_m": 0.06},
+                {"name": "cylinder", "shape": "cylinder", "radius_m": 0.03, "height_m": 0.06},
+                {"name": "cube", "shape": "cube", "edge_m": 0.05}],
+    "repetitions": 1,
+    "response": {"keys": {"1": "sphere", "2": "cone", "3": "cylinder", "4": "cube"},
+                 "time_out_s": 600},
+    "home": {"rest_s": 0.1, "margin_m": 0.01},
+    "servo": {"rate_hz": 200},
+    "texts": {"instructions": "Erkennen Sie die Form.", "end": "Danke."},
+    "seed": 5,
+}
+
+
+class SessionTest(unittest.TestCase):
+    def setUp(self):
+        skip_without_screen()
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.database = self.folder / "study.db"
+        self.program = None
+        self.screen = None
+        self.write_protocol()
+        self.addCleanup(self.stop)
+        self.new_screen()
+
+    def write_protocol(self, **changes):
+        (self.folder / "protocol.json").write_text(json.dumps({**PROTOCOL, **changes}))
+
+    def new_screen(self):
+        self.screen = VirtualScreen()
+        self.addCleanup(self.screen.close)
+
+    def stop(self):
+        if self.program and self.program.poll() is None:
+            self.program.kill()
+        if self.program:
+            self.program.wait()
+
+    def start(self, device="mouse"):
+        """Starts a session, or goes on with it, up to its first trial."""
+        with open(self.folder / "messages.txt", "a") as messages:
+            self.program = subprocess.Popen(
+                [PALPATE, "run", self.folder / "protocol.json", "--db", self.database,
+                 "--participant", "P01", "--device", device],
+                env=self.screen.environment, stdout=messages, stderr=messages)
+        self.participant = self.screen.window("windows, P01")
+        self.console = self.screen.window("windows, P01 - console")
+        wait_for("the instructions",
+                 lambda: len(set(self.screen.picture(self.participant))) > 20)
+        instructions = self.screen.settled_picture(self.participant)
+        before = len(self.attempts())
+        self.screen.focus(self.participant)
+        self.press_until("space", lambda: len(self.attempts()) > before)
+        self.screen.settled_picture(self.participant, differs_from=instructions)
+
+    def press_until(self, key, condition):
+        """A key before time zero counts for nothing: it is pressed again."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            if self.halted():
+                self.clear_and_go_on()
+            self.screen.key(key)
+            pause = time.monotonic() + 1
+            while time.monotonic() < pause:
+                if condition():
+                    return
+                time.sleep(0.02)
+        raise AssertionError(f"key {key} did nothing; " + self.messages())
+
+    def halted(self):
+        """A busy machine makes the servo miss ticks, and five in a row turn the forces off."""
+        return self.attempts() and self.attempts()[-1][3] == "cut_off"
+
+    def clear_and_go_on(self):
+        width, _ = self.screen.size(self.console)
+        self.screen.click(self.console, width - 60, 90)
+        self.screen.click(self.console, width - 100, 348)
+
+    def messages(self):
+        return (self.folder / "messages.txt").read_text()
+
+    def rows(self, query):
+        if not self.database.exists():
+            return []
+        connection = sqlite3.connect(f"file:{self.database}?mode=ro", uri=True, timeout=20)
+        try:
+            return connection.execute(query).fetchall()
+        except sqlite3.OperationalError:  # being made
+            return []
+        finally:
+            connection.close()
+
+    def attempts(self):
+        return self.rows("SELECT trial, attempt, shape, state FROM attempts ORDER BY id")
+
+    def done(self):
+        return sum(state == "completed" for *_, state in self.attempts())
+
+    def answer(self, count=1, key="2"):
+        for _ in range(count):
+            before = self.done()
+            self.press_until(key, lambda: self.done() > before)
+
+    def wait_for_trial(self):
+        """A trial is under way, and its page is on the screen."""
+        wait_for("a trial", lambda: self.attempts() and self.attempts()[-1][3] == "running")
+        return self.screen.settled_picture(self.participant)
+
+    def finish(self):
+        while self.done() < TRIALS:
+            self.answer()
+        self.press_until("space", lambda: self.program.poll() is not None)  # read the last page
+        self.assertEqual(self.program.returncode, 0, self.messages())
+
+    def check_whole(self, cut_off):
+        """Every trial once, whatever happened, and each attempt accounted for."""
+        self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
+        out = self.folder / "trials.csv"
+        subprocess.run([PALPATE, "export", "--db", self.database, "--format", "csv", "--out", out,
+                        "--force"], check=True, stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
+        with open(out, newline="") as file:
+            trials = list(csv.DictReader(file))
+        self.assertEqual([int(t["trial"]) for t in trials], list(range(1, TRIALS + 1)))
+        self.assertEqual({t["device"] for t in trials}, {"mouse"})
+        self.assertEqual({t["response"] for t in trials}, {"cone"})
+        self.assertGreaterEqual(sum(state == "cut_off" for *_, state in self.attempts()), cut_off)
+
+    def test_the_participant_sees_the_same_for_every_shape(self):
+        self.start()
+        seen = {}
+        for trial in range(TRIALS):
+            picture = self.wait_for_trial()
+            shape = self.attempts()[-1][2]
+            self.screen.keep(self.participant, f"session_participant_{shape}")
+            self.screen.keep(self.console, f"session_console_{shape}")
+            seen.setdefault(shape, set()).add(picture)
+            self.answer()
+        self.assertEqual(sorted(seen), sorted(SHAPES))
+        self.assertEqual(len(set.union(*seen.values())), 1)
+        self.assertGreater(len(set(picture)), 20, "the key map")
+        self.finish()
+        self.check_whole(cut_off=0)
+
+    def test_the_pointer_feels_the_object(self):
+        self.start()
+        self.wait_for_trial()
+        width, height = self.screen.size(self.console)
+        middle = int(0.3 * width), int(0.39 * height)
+        # Pushes the tip through the middle of the view, where the object stands.
+        self.screen.point(self.console, *middle)
+        for _ in range(19):
+            self.screen.do("click", 4)  # the wheel: away from the viewer
+            time.sleep(0.2)
+        self.screen.settled_picture(self.participant)
+        self.screen.keep(self.console, "session_touch")
+        self.answer()
+        contacts = self.rows("SELECT first_contact_time, max_force FROM attempts "
+                             "WHERE state = 'completed'")
+        self.assertIsNotNone(contacts[0][0], "nothing was touched")
+        self.assertGreater(contacts[0][1], 0.1)
+
+    def test_the_window_is_destroyed_in_mid_trial(self):
+        self.start()
+        self.answer(2)
+        self.wait_for_trial()
+        self.screen.do("windowclose", self.participant)
+        wait_for("the end", lambda: self.program.poll() is not None)
+        self.assertEqual(self.program.returncode, 1, self.messages())
+        self.assertIn("closed", self.messages())
+        self.assertGreaterEqual(self.done(), 2)
+        self.start()
+        self.finish()
+        self.check_whole(cut_off=1)
+
+    def test_the_display_server_dies_in_mid_trial(self):
+        self.start()
+        self.answer(2)
+        self.wait_for_trial()
+        self.screen.kill()
+        wait_for("the end", lambda: self.program.poll() is not None)
+        self.assertEqual(self.program.returncode, 1, self.messages())
+        self.assertEqual(self.rows("SELECT end_reason FROM runs"), [("aborted",)])
+        self.new_screen()
+        self.start()
+        self.finish()
+        self.check_whole(cut_off=1)
+
+    def test_the_process_is_killed_in_mid_trial(self):
+        self.start()
+        self.answer(2)
+        self.wait_for_trial()
+        self.program.kill()
+        self.program.wait()
+        self.start()
+        self.finish()
+        self.check_whole(cut_off=1)
+        self.assertEqual(self.rows("SELECT end_reason FROM runs ORDER BY id"),
+                         [("interrupted",), ("done",)])
+
+    def test_a_signal_ends_it_in_order(self):
+        self.start()
+        self.answer(1)
+        self.wait_for_trial()
+        self.program.send_signal(signal.SIGTERM)
+        wait_for("the end", lambda: self.program.poll() is not None)
+        self.assertEqual(self.program.returncode, 1, self.messages())
+        self.start()
+        self.finish()
+        self.check_whole(cut_off=1)
+
+    def test_a_stalled_display_is_not_noticed(self):
+        self.write_protocol(response={**PROTOCOL["response"], "time_out_s": 1})
+        self.start()
+        self.screen.stall()
+        stalled = self.done()
+        # Trials run out of time and are recorded while nothing can be drawn.
+        wait_for("trials without a display", lambda: self.done() >= stalled + 2)
+        self.screen.go_on()
+        wait_for("the last trial", lambda: self.done() == TRIALS)
+        self.finish()
+        rows = self.rows("SELECT ticks, missed_ticks, longest_period_ns FROM attempts "
+                         "WHERE state = 'completed'")
+        self.assertEqual(len(rows), TRIALS)
+        for ticks, missed, longest in rows:
+            self.assertGreaterEqual(ticks + missed, 180)
+            self.assertLess(longest, 1_000_000_000)
+
+    def test_emergency_zero_until_the_fault_is_cleared(self):
+        self.start()
+        self.answer(1)
+        self.wait_for_trial()
+        self.screen.key("F12")
+        wait_for("the cut-off", lambda: self.attempts()[-1][3] == "cut_off")
+        before = len(self.attempts())
+        self.screen.settled_picture(self.participant)
+        self.screen.keep(self.console, "session_emergency")
+        self.clear_and_go_on()
+        self.screen.keep(self.console, "session_cleared")
+        if len(self.attempts()) == before:
+            self.press_until("space", lambda: len(self.attempts()) > before)
+        self.finish()
+        self.check_whole(cut_off=1)
+        notes = [text for (text,) in self.rows("SELECT text FROM notes ORDER BY id")]
+        self.assertIn("emergency zero", notes)
+        self.assertIn("fault cleared", notes)
+
+
+class NoDisplay(unittest.TestCase):
+    def test_the_mouse_needs_one(self):
+        with tempfile.TemporaryDirectory() as folder:
+            protocol = pathlib.Path(folder) / "protocol.json"
+            protocol.write_text(json.dumps(PROTOCOL))
+            environment = {k: v for k, v in os.environ.items() if k != "DISPLAY"}
+            done = subprocess.run(
+                [PALPATE, "run", protocol, "--db", f"{folder}/study.db", "--participant", "P01",
+                 "--device", "mouse"], env=environment, text=True, stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("no graphical display", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
