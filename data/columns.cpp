@@ -23,7 +23,7 @@ const Column kDevice{"device", "Force-feedback device"};
 const Column kSimulated{"simulated",
                         "Who took part",
                         "",
-                        {{"0", "a person"}, {"1", "a SIMULATED participant: no person"}}};
+                        {{"0", "a person"}, {"1", "SIMULATED: no person, or no real device"}}};
 const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
 const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
 const Column kNumber{"participant_number", "Orders the counterbalancing, unique within a protocol",
@@ -82,6 +82,16 @@ std::vector<Column> make_trials() {
       {"max_force", "Largest force on the hand", "N"},
       {"observer_sha256",
        "SHA-256 of the settings of a simulated participant; missing for a person"},
+      {"before_contact",
+       "Whether the answer came before the first contact",
+       "",
+       {{"0", "after it, or no answer"}, {"1", "before it: nothing had been felt"}}},
+      {"response_device",
+       "What the participant answered with; missing where it is not known",
+       "",
+       {{"keyboard", "keys, also of a numeric pad"},
+        {"device buttons", "buttons of the force-feedback device"},
+        {"simulated", "a SIMULATED participant"}}},
   };
 }
 

@@ -17,7 +17,8 @@ void put_trial_but_who(TableRow& row, const StoredTrial& trial) {
       << trial.protocol_sha256 << trial.run.program_version << trial.participant.number
       << record.started_inside << record.ticks
       << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
-      << trial.run.observer_sha256;
+      << trial.run.observer_sha256 << (!record.response.empty() && !record.first_contact_time)
+      << trial.run.response_device;
 }
 
 void put_attempt(TableRow& row, const StoredTrial& attempt) {

@@ -91,6 +91,7 @@ LiveSession::Outcome LiveSession::go_through() {
 void LiveSession::between_trials() {
   const Session::State now = session_.state();
   if (now == Session::State::response) return;  // a trial that was shown is recorded
+  attend();
   const bool block_begins = now == Session::State::practice || now == Session::State::block;
   const bool began = session_.plan().done() > 0 || now != Session::State::instruction;
   if (stop_ == Stop::after_trial || (stop_ == Stop::after_block && block_begins && began))
@@ -104,7 +105,6 @@ void LiveSession::between_trials() {
 }
 
 void LiveSession::wait_while_held() {
-  attend();
   if (!paused_) return;
   respondent_.show_message(parts_.protocol.texts.break_text);
   while (paused_) {
@@ -208,7 +208,7 @@ void LiveSession::show_console() {
   state_.blocks = plan.blocks();
   state_.remaining = seconds_per_trial_ * static_cast<double>(plan.size() - plan.done());
   parts_.servo.latest(state_.sample);
-  if (in_trial_) state_.state = state_.sample.phase == Phase::feeling ? "trial" : "homing";
+  if (in_trial_) state_.state = feeling_ ? "trial" : "homing";
   state_.ticks = parts_.servo.health().ticks();
   state_.missed_ticks = parts_.servo.health().missed_ticks();
   state_.longest_period_ns = parts_.servo.health().longest_period_ns();
@@ -218,6 +218,7 @@ void LiveSession::show_console() {
 void LiveSession::began(const Trial& trial) {
   const StimulusSpec& stimulus = parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
   in_trial_ = true;
+  feeling_ = false;
   began_ns_ = parts_.clock.now_ns();
   ObjectSpec object = stimulus.object;
   object.pose = {trial.orientation * object.pose.position,
@@ -235,6 +236,7 @@ void LiveSession::began(const Trial& trial) {
 }
 
 void LiveSession::onset(const TrialRecord& so_far) {
+  feeling_ = true;
   marker_.kind = Marker::Kind::trial_start;
   marker_.attempt = so_far.attempt;
   marker_.time_ns = so_far.onset_ns;

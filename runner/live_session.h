@@ -88,7 +88,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   std::int64_t started_ns_, began_ns_ = 0, shown_ns_ = 0;
   double seconds_per_trial_ = 0;  ///< mean, of this run
   int timed_trials_ = 0;
-  bool in_trial_ = false, paused_ = false, faulted_ = false;
+  bool in_trial_ = false, feeling_ = false, paused_ = false, faulted_ = false;
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

@@ -53,17 +53,18 @@ class UdpSink final : public MarkerSink {
   bool send(const Marker& marker) noexcept override {
     try {
       const std::string line = to_json_line(marker, now_ns());
-      // A refusal of an earlier line is reported by the next: try once more.
-      for (int i = 0; i < 2; ++i) {
-        if (::send(socket_.get(), line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0)
-          return true;
-      }
+      // A refusal is reported when the next line is sent, which then was not: once more.
+      if (give(line)) return true;
+      give(line);
     } catch (...) {  // no memory
     }
     return false;
   }
 
  private:
+  bool give(const std::string& line) noexcept {
+    return ::send(socket_.get(), line.data(), line.size(), MSG_DONTWAIT | MSG_NOSIGNAL) >= 0;
+  }
   static int connected(const std::string& host, const std::string& port) {
     addrinfo hints{};
     hints.ai_socktype = SOCK_DGRAM;

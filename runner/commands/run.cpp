@@ -293,6 +293,18 @@ class Watch {
   FaultSignals& signals_;
 };
 
+void report_servo(const Station& at, std::int64_t started_ns) {
+  const ServoHealth& health = at.servo.health();
+  const double elapsed = static_cast<double>(at.clock.now_ns() - started_ns) * 1e-9;
+  std::fprintf(stderr,
+               "servo: %llu ticks in %.3f s, %llu missed, longest period %.2f ms, lateness p99.9 "
+               "%.0f us\n",
+               static_cast<unsigned long long>(health.ticks()), elapsed,
+               static_cast<unsigned long long>(health.missed_ticks()),
+               static_cast<double>(health.longest_period_ns()) * 1e-6,
+               static_cast<double>(health.lateness().quantile(0.999)) * 1e-3);
+}
+
 /// \return the exit status
 int report(const Station& at, const LiveSession::Outcome& outcome) {
   std::printf("%s, participant %s (number %d), session %d: %zu of %zu trials on record; %s\n",
@@ -339,6 +351,7 @@ int run_station(const RunSettings& settings) {
   servo_settings.rate = protocol.servo_rate;
   servo_settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
   servo_settings.passivity_controller = protocol.passivity_controller;
+  const std::int64_t started_ns = clock.now_ns();
   ServoThread servo(*open.device, clock, servo_settings);
   const Watch servo_watch(signals, &servo);
   const auto emergency = [&servo, guard = open.guard] {
@@ -363,6 +376,7 @@ int run_station(const RunSettings& settings) {
   });
   display->run();
   session_thread.join();
+  report_servo(station, started_ns);
   if (failure) std::rethrow_exception(failure);
   return report(station, outcome);
 }

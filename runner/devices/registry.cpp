@@ -4,22 +4,15 @@
 
 #include "runner/devices/falcon_open.h"
 #include "runner/devices/mouse.h"
-#include "runner/devices/simulated.h"
+#include "runner/devices/stroking.h"
 
 namespace palpate {
 namespace {
 
 std::vector<ConnectedDevice> always_there() { return {{}}; }
 
-/// Held by a hand that keeps it behind the workspace.
 std::unique_ptr<Device> open_simulated(const DeviceOrder& order) {
-  auto stylus =
-      std::make_unique<SimulatedStylus>(SimulatedDeviceSettings{}, HandImpedance{},
-                                        order.stylus_length, order.stylus_grip, 1 / order.rate);
-  HandTarget target;
-  target.grip = {0, -0.1, order.stylus_grip};
-  stylus->reset(target);
-  return stylus;
+  return std::make_unique<StrokingStylus>(order.stylus_length, order.stylus_grip, order.rate);
 }
 
 std::unique_ptr<Device> open_mouse(const DeviceOrder& order) {
@@ -33,7 +26,8 @@ constexpr DeviceKind kKinds[] = {
      falcon::connected_falcons, falcon::open_falcon2},
     {"mouse", "the pointer moves a stylus in the window; contact is seen, nothing is felt", false,
      always_there, open_mouse},
-    {"simulated", "a stylus held by two simulated devices and a simulated hand", false,
+    {"simulated",
+     "a stylus held by two simulated devices and a simulated hand that strokes to and fro", false,
      always_there, open_simulated},
 };
 

@@ -87,7 +87,7 @@ TEST_F(ExportCsv, HasTheColumnsOfTheContractAlways) {
       "orientation_w,orientation_x,orientation_y,orientation_z,practice,timed_out,"
       "first_contact_time,onset_utc,device,simulated,missed_ticks,attempt,protocol_sha256,"
       "program_version,participant_number,started_inside,ticks,longest_period,faults,max_force,"
-      "observer_sha256\r\n");
+      "observer_sha256,before_contact,response_device\r\n");
 }
 
 TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
@@ -111,7 +111,10 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
   silent.response_time = 60;
   silent.first_contact_time.reset();
   show(silent);
-  EXPECT_EQ(export_csv(store_, out_, false).trials, 2);
+  TrialRecord guessed = a_record(5);
+  guessed.first_contact_time.reset();
+  show(guessed);
+  EXPECT_EQ(export_csv(store_, out_, false).trials, 3);
   const auto row = by_name(rows(), 1);
   const std::map<std::string, std::string> expected{{"participant_id", "P1"},
                                                     {"session", "1"},
@@ -142,7 +145,9 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
                                                     {"longest_period", "0.001003"},
                                                     {"faults", "6"},
                                                     {"max_force", "7.5"},
-                                                    {"observer_sha256", ""}};
+                                                    {"observer_sha256", ""},
+                                                    {"before_contact", "0"},
+                                                    {"response_device", ""}};
   EXPECT_EQ(row, expected);
   const auto second = by_name(rows(), 2);
   EXPECT_EQ(second.at("timed_out"), "1");
@@ -150,6 +155,8 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
   EXPECT_EQ(second.at("correct"), "0");
   EXPECT_EQ(second.at("response_time"), "60");
   EXPECT_EQ(second.at("first_contact_time"), "");
+  EXPECT_EQ(second.at("before_contact"), "0") << "there was no answer";
+  EXPECT_EQ(by_name(rows(), 3).at("before_contact"), "1");
 }
 
 TEST_F(ExportCsv, NumbersReadBackExactly) {

@@ -1,0 +1,35 @@
+#pragma once
+// The simulated device for a session that nobody feels: its hand rests outside of the workspace,
+// strokes through it and back, and rests again, whatever happens.
+
+#include "runner/devices/simulated.h"
+
+namespace palpate {
+
+struct StrokeSettings {
+  double distance = 0.1;  ///< m, from the centre of the workspace, at rest
+  double rest = 1.0;      ///< s, between strokes: a trial can begin
+  double stroke = 1.5;    ///< s, there and back
+};
+
+class StrokingStylus final : public Device {
+ public:
+  /// \param rate  Hz, of the servo
+  StrokingStylus(double length, double grip, double rate, const StrokeSettings& settings = {});
+
+  const DeviceCapabilities& capabilities() const override { return stylus_.capabilities(); }
+  DeviceReading read() noexcept override;
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    stylus_.write(device1, device2);
+  }
+
+ private:
+  HandTarget target_at(double time) const;  ///< \param time  s, since a rest began
+
+  StrokeSettings settings_;
+  double grip_, tick_;
+  double time_ = 0;
+  SimulatedStylus stylus_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,442 @@
+"""palpate run from outside, on a terminal: a session, and what breaks one.
+
+Usage: run_test.py PALPATE
+"""
+
+import contextlib
+import csv
+import json
+import os
+import pathlib
+import pty
+import signal
+import socket
+import sqlite3
+import stat
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from terminal import Terminal
+
+PALPATE = sys.argv.pop(1)
+
+PROTOCOL = {
+    "version": 1, "name": "two", "renderers": ["ray"], "seed": 7,
+    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 100},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+    "repetitions": 2, "blocks_per_renderer": 2, "home": {"rest_s": 0.1},
+    "texts": {"instructions": "Welcome, \u00dcbung", "break": "have a rest", "end": "good bye"},
+    "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 30},
+}
+FEELING = "[trial, "
+
+
+class Live(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        self.db = self.dir / "live.db"
+
+    def protocol(self, **changes):
+        path = self.dir / "protocol.json"
+        path.write_text(json.dumps(PROTOCOL | changes))
+        return path
+
+    def run_session(self, *options, db=None, code="P01", **changes):
+        return Terminal([PALPATE, "run", self.protocol(**changes), "--db", db or self.db, "--participant", code,
+                         "--device", "simulated", "--no-window", *options])
+
+    def begin(self, *options, **changes):
+        """A session whose first trial is being felt."""
+        terminal = self.run_session(*options, **changes)
+        self.addCleanup(terminal.__exit__)
+        while terminal.wait_for(FEELING, "[space bar: go on]") != FEELING:
+            terminal.type(" ")
+        return terminal
+
+    def finish(self, terminal, key="1", status=0):
+        """Answers whatever trial comes from now on, until the session is over."""
+        while True:
+            came = terminal.wait_for(FEELING, "[space bar: go on]", "[fault, ", "on record; ")
+            if came == "on record; ":
+                break
+            terminal.type({FEELING: key, "[fault, ": ":clear\n:go\n"}.get(came, " "))
+        self.assertEqual(terminal.finish(), status, terminal.text)
+
+    def sql(self, query):
+        with contextlib.closing(sqlite3.connect(self.db)) as db:
+            self.assertEqual(db.execute("PRAGMA integrity_check").fetchone()[0], "ok")
+            self.assertEqual(db.execute("PRAGMA foreign_key_check").fetchall(), [])
+            return db.execute(query).fetchall()
+
+    def export(self):
+        out = self.dir / "trials.csv"
+        subprocess.run([PALPATE, "export", "--db", self.db, "--format", "csv", "--out", out, "--force"], check=True,
+                       capture_output=True)
+        with open(out, newline="", encoding="utf-8") as table:
+            return list(csv.DictReader(table))
+
+    def attempts(self):
+        return self.sql("SELECT trial, attempt, state FROM attempts ORDER BY trial, attempt")
+
+    def ends(self):
+        return [end for (end,) in self.sql("SELECT end_reason FROM runs ORDER BY id")]
+
+    def notes(self):
+        """The experimenter's; the program's own are JSON."""
+        return [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id") if not text.startswith("{")]
+
+
+class Whole(Live):
+    def test_a_session_from_welcome_to_good_bye(self):
+        terminal = self.begin("--consent", "v2 2026-01", "--hand", "left", "--response-latency", "0.012")
+        self.assertIn("participant P01 has number 1; session 1 of 1", terminal.text)
+        self.assertIn("Welcome, \u00dcbung", terminal.text)
+        terminal.type("x1")  # a key without a meaning is none
+        self.finish(terminal, "2")
+        self.assertIn("have a rest", terminal.text)
+        self.assertIn("good bye", terminal.text)
+        self.assertIn("4 of 4 trials on record; done", terminal.text)
+        rows = self.export()
+        self.assertEqual([row["trial"] for row in rows], ["1", "2", "3", "4"])
+        self.assertEqual([row["response"] for row in rows], ["ball", "box", "box", "box"])
+        for row in rows:
+            self.assertEqual(row["correct"], str(int(row["shape"] == row["response"])))
+            self.assertEqual((row["device"], row["simulated"], row["response_device"]), ("simulated", "1", "keyboard"))
+            self.assertGreater(float(row["response_time"]), 0)
+        (consent, at, hand, latency, started, protocol), = self.sql(
+            "SELECT consent_version, consent_utc_ns, hand, response_latency, started_utc_ns, protocols.text "
+            "FROM runs, protocols")
+        self.assertEqual((consent, hand, latency), ("v2 2026-01", "left", 0.012))
+        self.assertEqual(at, started)
+        self.assertEqual(json.loads(protocol), PROTOCOL)
+        self.assertEqual(stat.S_IMODE(os.stat(self.db).st_mode), 0o600)
+
+    def test_the_terminal_never_names_the_shape(self):
+        terminal = self.begin(stimuli=[{"name": "SECRET1", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1}],
+                              response={"keys": {"1": "SECRET1"}})
+        shown = terminal.text.count("SECRET1")
+        trials = terminal.text.count("1 SECRET1")
+        self.assertEqual(shown, trials, "only the key map says it")
+        terminal.type("1")
+        self.finish(terminal)
+
+    def test_numbers_orders_and_sessions(self):
+        sessions = {"sessions": {"count": 2}}
+        with self.run_session("--number", "5", **sessions) as terminal:
+            terminal.wait_for("participant P01 has number 5; session 1 of 2")
+            self.finish(terminal)
+        with self.run_session(code="P02", **sessions) as terminal:
+            terminal.wait_for("participant P02 has number 1; session 1 of 2")
+            terminal.type(":quit\n")
+            self.finish(terminal)
+        with self.run_session(**sessions) as terminal:
+            terminal.wait_for("session 1 was today as well", "has number 5; session 2 of 2")
+            self.finish(terminal)
+        with self.run_session(**sessions) as terminal:
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("participant P01 has done every session", terminal.text)
+        with self.run_session("--number", "4", **sessions) as terminal:
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("has number 5, not 4", terminal.text)
+        schedule = subprocess.run([PALPATE, "schedule", self.protocol(**sessions), "--participant", "5", "--format",
+                                   "csv"], check=True, capture_output=True, text=True).stdout
+        planned = [(row["session"], row["trial"], row["shape"], float(row["orientation_w"]))
+                   for row in csv.DictReader(schedule.splitlines())]
+        done = [(row["session"], row["trial"], row["shape"], float(row["orientation_w"]))
+                for row in self.export() if row["participant_id"] == "P01"]
+        self.assertEqual(done, planned)
+
+    def test_practice_goes_on_until_the_criterion_and_says_what_was_right(self):
+        practice = {"repetitions": 1, "criterion": 1.0, "max_rounds": 2}
+        terminal = self.begin(practice=practice, repetitions=1, blocks_per_renderer=1,
+                              texts={"instructions": "go", "practice": "try it"})
+        terminal.type("1")
+        self.finish(terminal)
+        rows = self.export()
+        self.assertEqual([row["practice"] for row in rows], list("111100"))
+        self.assertEqual(terminal.text.count("\u2713"), 2)
+        self.assertEqual(terminal.text.count("\u2717"), 2)
+
+    def test_time_out(self):
+        terminal = self.begin(response={"keys": {"1": "ball", "2": "box"}, "time_out_s": 1}, repetitions=1,
+                              blocks_per_renderer=1)
+        terminal.wait_for("trial 2 of 2")
+        self.finish(terminal)
+        row = self.export()[0]
+        self.assertEqual((row["timed_out"], row["response"], row["response_time"], row["before_contact"]),
+                         ("1", "", "1", "0"))
+
+    def test_an_answer_before_contact_is_kept_and_flagged(self):
+        terminal = self.begin()
+        terminal.type("1")
+        self.finish(terminal)
+        rows = self.export()
+        self.assertEqual([row["before_contact"] for row in rows],
+                         [str(int(row["first_contact_time"] == "")) for row in rows])
+        self.assertEqual(terminal.text.count("answered before the first contact"),
+                         sum(row["before_contact"] == "1" for row in rows))
+
+
+class Commands(Live):
+    def test_repeat_cuts_the_trial_off_and_shows_it_again(self):
+        terminal = self.begin()
+        terminal.type(":repeat\n")
+        terminal.wait_for("trial 1 was cut off: repeated by the experimenter")
+        self.finish(terminal)
+        self.assertEqual(self.attempts(), [(1, 1, "cut_off"), (1, 2, "completed"), (2, 1, "completed"),
+                                           (3, 1, "completed"), (4, 1, "completed")])
+        self.assertEqual([row["attempt"] for row in self.export()], ["2", "1", "1", "1"])
+
+    def test_pause_holds_the_next_trial_and_keys_do_nothing_meanwhile(self):
+        terminal = self.begin()
+        terminal.type(":pause\n")
+        terminal.wait_for("pause after this trial")
+        terminal.type("1")
+        terminal.wait_for("[paused, ")
+        terminal.type("1 2:note she asked for water\n")
+        terminal.wait_for("note: she asked for water")
+        terminal.type(":go\n")
+        self.finish(terminal)
+        self.assertEqual(len(self.export()), 4)
+        self.assertEqual(self.notes(), ["she asked for water"])
+
+    def test_stop_after_the_trial_and_go_on_another_day(self):
+        terminal = self.begin()
+        terminal.type(":stop\n1")
+        self.finish(terminal)
+        self.assertIn("1 of 4 trials on record; paused", terminal.text)
+        with self.run_session() as again:
+            self.finish(again)
+        self.assertEqual(self.ends(), ["paused", "done"])
+        self.assertEqual(len(self.export()), 4)
+
+    def test_stop_after_the_block(self):
+        terminal = self.begin()
+        terminal.type(":stop block\n1")
+        terminal.wait_for(FEELING)
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertIn("2 of 4 trials on record; paused", terminal.text)
+
+    def test_quit_and_withdrawal_are_recorded_with_their_reason(self):
+        terminal = self.begin()
+        terminal.type(":quit feels unwell\n")
+        self.finish(terminal)
+        self.assertEqual(self.ends(), ["aborted"])
+        self.assertEqual(self.notes(), ["ended: ended by the experimenter: feels unwell"])
+        self.assertEqual(self.attempts(), [(1, 1, "cut_off")])
+        terminal = self.begin()
+        terminal.type(":quit withdrawn\n")
+        self.finish(terminal)
+        self.assertEqual(self.ends(), ["aborted", "withdrawn"])
+        with self.run_session() as refused:
+            self.assertEqual(refused.finish(), 2)
+            self.assertIn("withdrawn and cannot be begun again", refused.text)
+
+    def test_emergency_holds_until_it_is_cleared(self):
+        terminal = self.begin()
+        terminal.type("\x1b")
+        terminal.wait_for("trial 1 was cut off: zero force was asked for")
+        terminal.wait_for("[fault, ")
+        terminal.type(":go\n")
+        terminal.wait_for("clear the fault first")
+        terminal.type(":clear\n")
+        terminal.wait_for("fault cleared")
+        terminal.type(":go\n")
+        self.finish(terminal)
+        self.assertEqual(self.attempts()[:2], [(1, 1, "cut_off"), (1, 2, "completed")])
+        self.assertEqual(self.notes(), ["emergency zero", "fault cleared"])
+
+    def test_a_wrong_command_gets_the_list(self):
+        terminal = self.begin()
+        before = terminal.text.count(":pause ")
+        terminal.type(":nonsense\n")
+        terminal.wait_for(":pause ")
+        self.assertEqual(terminal.text.count(":pause "), before + 1)
+        terminal.type("1")
+        self.finish(terminal)
+
+
+class Broken(Live):
+    def test_killed_in_mid_trial_it_goes_on_with_that_trial(self):
+        terminal = self.begin()
+        terminal.type("1")
+        terminal.wait_for("trial 2 of 4]\n")
+        terminal.wait_for(FEELING)
+        terminal.kill()
+        self.assertEqual(self.attempts(), [(1, 1, "completed"), (2, 1, "running")])
+        with self.run_session() as again:
+            self.finish(again)
+        self.assertEqual(self.attempts(), [(1, 1, "completed"), (2, 1, "cut_off"), (2, 2, "completed"),
+                                           (3, 1, "completed"), (4, 1, "completed")])
+        self.assertEqual(self.ends(), ["interrupted", "done"])
+        self.assertEqual([row["trial"] for row in self.export()], ["1", "2", "3", "4"])
+        attempts = (self.dir / "attempts.csv").read_text()
+        self.assertEqual(attempts.count("\n"), 2, attempts)
+
+    def test_signals_end_it_with_everything_on_record(self):
+        for which, word in ((signal.SIGINT, "Interrupt"), (signal.SIGTERM, "Terminated")):
+            terminal = self.begin(code=f"P{int(which)}")
+            terminal.send_signal(which)
+            self.finish(terminal, status=1)
+            self.assertIn(f"signal: {word}", terminal.text)
+        self.assertEqual(self.ends(), ["aborted", "aborted"])
+        with self.run_session(code=f"P{int(signal.SIGINT)}") as again:
+            self.finish(again)
+
+    def test_a_terminal_that_hangs_up_ends_it(self):
+        terminal = self.begin()
+        terminal.hang_up()
+        self.assertEqual(terminal.process.wait(30), 1)
+        self.assertEqual(self.ends(), ["aborted"])
+        self.assertEqual(self.attempts(), [(1, 1, "cut_off")])
+
+    def test_the_end_of_the_input_ends_it(self):
+        done = subprocess.run([PALPATE, "run", self.protocol(), "--db", self.db, "--participant", "P01", "--device",
+                               "simulated", "--no-window"], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              timeout=60)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("screen was closed", done.stderr)
+
+    def test_pipes_serve_as_well(self):
+        process = subprocess.Popen([PALPATE, "run", self.protocol(repetitions=1, blocks_per_renderer=1, texts={}), "--db",
+                                    self.db, "--participant", "P01", "--device", "simulated", "--no-window"],
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(process.kill)
+        for _ in range(2):
+            while FEELING.encode() not in process.stderr.readline():
+                pass
+            process.stdin.write(b"1\n")
+            process.stdin.flush()
+        out, err = process.communicate(timeout=30)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertIn(b"2 of 2 trials on record; done", out)
+
+    def test_a_full_disk_is_told_and_the_trial_in_hand_is_not_said_to_be_saved(self):
+        disk = self.dir / "disk"
+        disk.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "none", disk], capture_output=True).returncode:
+            self.skipTest("nothing can be mounted here")
+        try:
+            self.db = disk / "live.db"
+            terminal = self.begin(samples=True)
+            with open(disk / "ballast", "wb", buffering=0) as ballast, contextlib.suppress(OSError):
+                while True:
+                    ballast.write(bytes(512))
+            terminal.type("1")
+            self.assertEqual(terminal.finish(), 1, terminal.text)
+            self.assertRegex(terminal.text, "disk|space")
+            os.remove(disk / "ballast")
+            self.assertEqual([state for _, _, state in self.attempts()], ["running"])
+            with self.run_session(samples=False) as refused:  # another text is another protocol
+                refused.wait_for("session 1 of 1")
+                refused.type(":quit\n")
+                self.finish(refused)
+            with self.run_session(samples=True) as again:
+                self.finish(again)
+            self.assertIn((1, 2, "completed"), self.attempts())
+        finally:
+            subprocess.run(["umount", "-l", disk], check=True)
+
+    def test_a_database_in_use_is_refused(self):
+        self.begin()
+        with self.run_session(code="P02") as second:
+            self.assertEqual(second.finish(), 2)
+            self.assertIn("open", second.text)
+
+
+class Usage(Live):
+    def test_wrong_usage_is_status_2_and_leaves_nothing(self):
+        good = {"--db": self.db, "--participant": "P01", "--device": "simulated"}
+        too_fast = {"servo": {"rate_hz": 1000}, "workspace": {"centre_m": [1, 0, 0]}}
+        for changes, word, protocol in (
+                ({"--participant": "Jane Doe"}, "pseudonym", {}), ({"--device": "phantom"}, "there are: falcon", {}),
+                ({"--hand": "both"}, "left or right", {}), ({"--number": "0"}, "1 or more", {}),
+                ({"--session": "0"}, "1 or more", {}), ({"--response-latency": "-1"}, "0 or more", {}),
+                ({"--markers": "smoke"}, "udp:HOST:PORT", {}), ({"--markers": "udp:localhost"}, "udp:HOST:PORT", {}),
+                ({"--device": "mouse"}, "needs the window", {}), ({}, "which reaches", too_fast)):
+            options = [str(part) for pair in (good | changes).items() for part in pair]
+            done = subprocess.run([PALPATE, "run", self.protocol(**protocol), *options, "--no-window"],
+                                  stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(word, done.stderr)
+            self.assertEqual(done.stdout, "")
+        for missing in good:
+            options = [str(part) for pair in good.items() if pair[0] != missing for part in pair]
+            done = subprocess.run([PALPATE, "run", self.protocol(), *options], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(missing[2:], done.stderr)
+        self.assertEqual([path.name for path in self.dir.iterdir()], ["protocol.json"])
+
+
+class Marks(Live):
+    def test_udp_serial_port_and_a_receiver_that_takes_nothing(self):
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.addCleanup(receiver.close)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(30)
+        master, slave = pty.openpty()
+        self.addCleanup(os.close, master)
+        self.addCleanup(os.close, slave)
+        nobody = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        nobody.bind(("127.0.0.1", 0))
+        closed = nobody.getsockname()[1]
+        nobody.close()
+        terminal = self.begin("--markers", f"udp:127.0.0.1:{receiver.getsockname()[1]}", "--markers",
+                              f"serial:{os.ttyname(slave)}:115200", "--markers", f"udp:127.0.0.1:{closed}",
+                              repetitions=1, blocks_per_renderer=1)
+        lines = []
+
+        def until(kind):
+            """The first contact is certain where it was waited for only: the hand strokes by itself."""
+            while True:
+                line = json.loads(receiver.recv(4096))
+                if kind == line["marker"] or line["marker"] != "first_contact":
+                    lines.append(line)
+                if kind == line["marker"]:
+                    return
+
+        until("first_contact")
+        terminal.type("1")
+        until("response")
+        terminal.wait_for(FEELING)
+        terminal.type(":repeat\n")
+        until("cut_off")
+        self.finish(terminal, "2")
+        until("response")
+        kinds = [line["marker"] for line in lines]
+        self.assertEqual(kinds, ["trial_start", "first_contact", "response", "trial_start", "cut_off", "trial_start",
+                                 "response"])
+        sent = os.read(master, 100)
+        self.assertEqual(sent[:2] + sent[2:].replace(b"\2", b""), bytes([1, 2, 3, 1, 5, 1, 3]))
+        rows = self.export()
+        start, contact, response = lines[:3]
+        self.assertEqual({key: response[key] for key in ("participant_id", "session", "block", "trial", "attempt",
+                                                         "renderer", "shape", "response")},
+                         {"participant_id": "P01", "session": 1, "block": 1, "trial": 1, "attempt": 1,
+                          "renderer": "ray", "shape": rows[0]["shape"], "response": "ball"})
+        self.assertAlmostEqual((response["time_ns"] - start["time_ns"]) / 1e9, float(rows[0]["response_time"]), 9)
+        self.assertAlmostEqual((contact["time_ns"] - start["time_ns"]) / 1e9, float(rows[0]["first_contact_time"]), 9)
+        self.assertEqual(rows[0]["before_contact"], "0")
+        self.assertGreater(float(rows[0]["max_force"]), 0)
+        self.assertEqual(lines[-1]["attempt"], 2)
+        for line in lines:
+            self.assertGreaterEqual(line["sent_ns"], line["time_ns"])
+        self.assertIn("markers were not taken", terminal.text)
+
+    def test_what_cannot_be_opened_is_said_before_anything_else(self):
+        for where in ("serial:/dev/null", "serial:" + str(self.dir / "none"), "udp:no.such.host.invalid:9"):
+            with self.run_session("--markers", where) as terminal:
+                self.assertEqual(terminal.finish(), 1)
+                self.assertIn("markers to", terminal.text)
+        self.assertFalse(self.db.exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
