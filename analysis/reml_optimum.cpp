@@ -14,6 +14,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMaxSteps = 200;
+// Participants. With more the criterion has one valley, and two starts are enough to check that.
+constexpr std::size_t kFew = 500;
 constexpr double kOnBoundary = 1e-4;  // of a diagonal theta, as lme4's isSingular()
 
 /// Lambda's lower triangle with a diagonal >= 0 from any root of Lambda Lambda'.
@@ -112,8 +114,10 @@ RemlOptimum optimum_from(const RemlData& data, const MatrixXd& coding, const Vec
   for (int i = 0; i < 10; ++i) {
     best.theta = theta_of(lower_triangle(best.theta, q));
     const VectorXd snapped = with_small_diagonals_at_zero(best.theta, q);
-    RemlOptimum on = descend(data, coding, snapped);
-    if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
+    if (snapped != best.theta || !best.converged) {
+      RemlOptimum on = descend(data, coding, snapped);
+      if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
+    }
     const VectorXd away = way_off_boundary(best, coding, q);
     if (away.isZero(0)) break;
     MatrixXd root(q, q + 1);
@@ -164,10 +168,12 @@ RemlOptimum reml_optimum(const RemlData& data, const MatrixXd& coding) {
   const VectorXd first = theta_of(moments.llt().matrixL());
   std::vector<VectorXd> starts{first};
   starts.push_back(theta_of(MatrixXd::Identity(q, q)));  // lme4's
-  starts.push_back(theta_of(0.1 * MatrixXd::Identity(q, q)));
-  MatrixXd turned = lower_triangle(first, q);  // correlations the other way
-  turned.triangularView<Eigen::StrictlyLower>() *= -1;
-  starts.push_back(theta_of(turned));
+  if (data.groups.size() <= kFew) {
+    starts.push_back(theta_of(0.1 * MatrixXd::Identity(q, q)));
+    MatrixXd turned = lower_triangle(first, q);  // correlations the other way
+    turned.triangularView<Eigen::StrictlyLower>() *= -1;
+    starts.push_back(theta_of(turned));
+  }
   RemlOptimum best;
   best.point.deviance = std::numeric_limits<double>::infinity();
   for (const VectorXd& start : starts) {
