@@ -122,10 +122,14 @@ DeviceOrder one_of(const DeviceOrder& order, const std::string& serial) {
   return one;
 }
 
-/// Owned by a guard process: the motors are at work here, too.
-std::unique_ptr<GuardedDevice> guarded(const DeviceOrder& order) {
-  return std::make_unique<GuardedDevice>([order] { return open_falcon(order); }, GuardSettings{});
+/// Owned by a guard process: the motors are at work here, too. It has more patience than in a
+/// session, where the hand is closer and a late tick spoils a trial. \param rate  Hz
+std::unique_ptr<GuardedDevice> guarded(const DeviceOrder& order, double rate) {
+  GuardSettings settings;
+  settings.rate = rate;
+  return std::make_unique<GuardedDevice>([order] { return open_falcon(order); }, settings);
 }
+constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force there is no hurry
 
 void store(const std::string& path, const Calibration& calibration) {
   write_whole(path, to_json(calibration));
@@ -136,8 +140,10 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
   const WeighingSettings settings = weighing_settings(values);
   Calibration calibration = read_calibration(order.calibration);  // faults are found before work
   FaultSignals signals;
-  const auto device = guarded(one_of(order, order.serials.empty() ? "" : order.serials[0]));
+  const auto device =
+      guarded(one_of(order, order.serials.empty() ? "" : order.serials[0]), kWeighingRate);
   signals.watch(device.get());
+  request_realtime({});
   RealClock clock;
   TerminalGuide guide(signals);
   wait_until_homed(*device, clock, guide);
@@ -162,8 +168,9 @@ int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
         "falcon2 needs two --serial: first that of the Falcon at the stylus' tip");
   Calibration calibration = read_calibration(order.calibration);
   FaultSignals signals;
-  const auto tip = guarded(one_of(order, order.serials[0]));
-  const auto tail = guarded(one_of(order, order.serials[1]));
+  const auto tip = guarded(one_of(order, order.serials[0]), kRegistrationRate);
+  const auto tail = guarded(one_of(order, order.serials[1]), kRegistrationRate);
+  request_realtime({});
   RealClock clock;
   TerminalGuide guide(signals);
   wait_until_homed(*tip, clock, guide);

@@ -93,6 +93,7 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
   progress.stage = BootProgress::Stage::monitor;
   tell();
   purge(transport);
+  transport.control(request::kEvent, kEventNone);
   transport.control(request::kLatency, 16);
   transport.control(request::kBaud, kBaudMonitor);
   transport.control(request::kFormat, 8);
@@ -124,6 +125,7 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
 
 bool firmware_runs(Transport& transport, const BootSettings& settings) {
   transport.control(request::kLatency, 1);
+  transport.control(request::kEvent, kEventReplyEnd);
   transport.control(request::kBaud, kBaudNormal);
   purge(transport);
   const Packet zero = encode(Command{});

@@ -9,12 +9,12 @@ void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
     clock.wait_until(clock.now_ns() + kTickNs);
     const DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
-    if (!reading.lost) return;
+    if (!reading.lost && reading.trouble == DeviceTrouble::none) return;
     if (reading.trouble == DeviceTrouble::unplugged ||
         reading.trouble == DeviceTrouble::guard_lost) {
       throw GuideError(advice(reading.trouble));
     }
-    if (reading.trouble != told) {
+    if (reading.lost && reading.trouble != told && reading.trouble != DeviceTrouble::guarded) {
       told = reading.trouble;
       guide.say(device.capabilities().serial + ": " + advice(told));
     }

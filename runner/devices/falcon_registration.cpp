@@ -49,10 +49,11 @@ class Procedure {
 
   static Vec3 free_position(Device& device) {
     const DeviceReading reading = device.read();
-    if (reading.lost) {
+    device.write(Vec3(0), Vec3(0));
+    // Where there is no force a guard has nothing to cut off.
+    if (reading.lost && reading.trouble != DeviceTrouble::guarded) {
       throw GuideError(device.capabilities().serial + ": " + advice(reading.trouble));
     }
-    device.write(Vec3(0), Vec3(0));
     return reading.stylus.tip;
   }
 

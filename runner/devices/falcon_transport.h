@@ -22,6 +22,7 @@ inline constexpr std::uint8_t kModem = 1;    ///< DTR and RTS
 inline constexpr std::uint8_t kFlow = 2;     ///< 0: off
 inline constexpr std::uint8_t kBaud = 3;     ///< divisor of 3 MHz
 inline constexpr std::uint8_t kFormat = 4;   ///< 8: eight bits, no parity, one stop bit
+inline constexpr std::uint8_t kEvent = 6;    ///< a character that is sent on at once; 0: none
 inline constexpr std::uint8_t kLatency = 9;  ///< ms
 }  // namespace request
 
@@ -29,6 +30,10 @@ inline constexpr std::uint16_t kDtrLow = 0x0100, kDtrHigh = 0x0101, kRtsLow = 0x
 inline constexpr std::uint16_t kBaudMonitor = 0x4138;  ///< 9600
 inline constexpr std::uint16_t kBaudBoot = 0x0015;     ///< 142 857
 inline constexpr std::uint16_t kBaudNormal = 0x0002;   ///< 1.5 M
+
+/// '>' ends every reply: nothing waits for the latency timer, whose beat is not that of the servo.
+/// libnifalcon does without, and has replies late by up to a tick.
+inline constexpr std::uint16_t kEventReplyEnd = 0x0100 | 0x3E, kEventNone = 0;
 
 class Transport {
  public:

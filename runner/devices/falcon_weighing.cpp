@@ -15,8 +15,10 @@ constexpr double kTick = 1e-3;  // s
 constexpr std::int64_t kTickNs = 1'000'000;
 constexpr double kNearCentre = 0.01;  // m, to begin with
 constexpr int kLastTicks = 20;
-constexpr double kMaxDrift = 0.035;  // m; beyond, the weight has won
-constexpr double kRamp = 0.5;        // s, from nothing to full force
+constexpr int kMaxAttempts = 5;
+constexpr long kMaxInterrupted = 20;  // ticks of a measurement
+constexpr double kMaxDrift = 0.035;   // m; beyond, the weight has won
+constexpr double kRamp = 0.5;         // s, from nothing to full force
 // By the nominal scale; the true one may be 4 times stronger, and the loop must bear that.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
@@ -85,24 +87,34 @@ class Procedure {
       tick_held(Vec3(0));
     } while (!answered());
     guide_.say("  measuring; do not touch it");
+    for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+      const long interrupted = interrupted_, saturated = holder_->saturated();
+      const Weighing weighing{weight, mean_force(settings)};
+      if (holder_->saturated() > saturated) {
+        throw GuideError("the motors were at their limit: take lighter weights");
+      }
+      if (interrupted_ - interrupted <= kMaxInterrupted) return weighing;
+    }
+    throw GuideError(
+        "this computer does not keep time: close other programs, or see palpate devices --timing");
+  }
+
+ private:
+  /// Told over whole cycles of slow motion up and down.
+  Vec3 mean_force(const WeighingSettings& settings) {
     const auto ticks = [](double seconds) { return std::lround(seconds / kTick); };
     for (long i = 0; i < ticks(settings.settle); ++i) tick_held(Vec3(0));
-    Weighing weighing{weight, Vec3(0)};
-    const long saturated = holder_->saturated();
+    Vec3 mean(0);
     const long count = ticks(settings.cycle * settings.cycles);
     for (long i = 0; i < count; ++i) {
       const double phase = static_cast<double>(i) * kTick / settings.cycle;
       const double part = phase - std::floor(phase);
       const double triangle = part < 0.25 ? 4 * part : part < 0.75 ? 2 - 4 * part : 4 * part - 4;
-      weighing.force += tick_held({0, 0, settings.sweep * triangle}) / static_cast<double>(count);
+      mean += tick_held({0, 0, settings.sweep * triangle}) / static_cast<double>(count);
     }
-    if (holder_->saturated() > saturated) {
-      throw GuideError("the motors were at their limit: take lighter weights");
-    }
-    return weighing;
+    return mean;
   }
 
- private:
   static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
 
   DeviceReading next_reading() {
@@ -112,28 +124,38 @@ class Procedure {
     return device_.read();
   }
 
-  Vec3 position() {
+  /// Nothing where a guard process has just cut the force off; a zero command takes it on again.
+  std::optional<Vec3> position() {
     const DeviceReading reading = next_reading();
+    if (reading.trouble == DeviceTrouble::guarded) {
+      ++interrupted_;
+      device_.write(Vec3(0), Vec3(0));
+      return std::nullopt;
+    }
     if (reading.lost) throw GuideError(advice(reading.trouble));
     return reading.stylus.tip;
   }
 
   Vec3 tick_free() {
-    const Vec3 at = position();
-    device_.write(Vec3(0), Vec3(0));
-    return at;
+    for (;;) {
+      const auto at = position();
+      if (!at) continue;
+      device_.write(Vec3(0), Vec3(0));
+      return *at;
+    }
   }
 
   /// The force that was told.
   Vec3 tick_held(const Vec3& target) {
-    const Vec3 at = position();
-    if (glm::length(at - target) > kMaxDrift) {
+    const auto at = position();
+    if (!at) return told_;
+    if (glm::length(*at - target) > kMaxDrift) {
       throw GuideError(
           "the grip got away from the middle: take lighter weights, and let them down slowly");
     }
-    const Vec3 force = holder_->force(at, target);
-    device_.write(force, Vec3(0));
-    return force;
+    told_ = holder_->force(*at, target);
+    device_.write(told_, Vec3(0));
+    return told_;
   }
 
   bool answered() {
@@ -147,6 +169,8 @@ class Procedure {
   Guide& guide_;
   std::int64_t due_ns_;
   std::optional<Holder> holder_;
+  Vec3 told_;
+  long interrupted_ = 0;  // ticks
 };
 
 }  // namespace

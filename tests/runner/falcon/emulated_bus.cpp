@@ -26,6 +26,7 @@ namespace {
 
 constexpr const char* kPreload = "libumockdev-preload.so.0";
 constexpr const char* kMark = "PALPATE_PRELOADED";  // of our own: umockdev's comes too late
+constexpr int kPolls = 3;  // a servo looks once a tick; who looks more often is waiting
 constexpr auto kIdle = std::chrono::microseconds(30);
 constexpr std::uint8_t kOut = 0x02, kIn = 0x81;
 constexpr std::uint8_t kGetDescriptor = 6, kStringDescriptor = 3, kSerialString = 3;
@@ -308,12 +309,13 @@ class Node {
       return std::find_if(done_.begin(), done_.end(),
                           [client](const Urb& urb) { return urb.client == client; });
     };
-    if (mine() == done_.end()) {
-      std::this_thread::sleep_for(kIdle);  // or libusb would spin even faster
+    if (mine() == done_.end() && ++empty_reaps_ > kPolls) {
+      std::this_thread::sleep_for(kIdle);  // or a libusb that waits would spin even faster
       pump();
     }
     const auto found = mine();
     if (found == done_.end()) return complete(client, -1, unplugged_ ? ENODEV : EAGAIN);
+    empty_reaps_ = 0;
     const Urb urb = *found;
     done_.erase(found);
     UMockdevIoctlData* out = umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
@@ -333,6 +335,7 @@ class Node {
   std::deque<Urb> waiting_, done_;
   UMockdevIoctlClient* claimed_by_ = nullptr;
   bool unplugged_ = false;
+  int empty_reaps_ = 0;  // in a row
 };
 
 }  // namespace

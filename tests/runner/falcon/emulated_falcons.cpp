@@ -123,12 +123,16 @@ bool obey(EmulatedBus& bus, int falcons, const std::string& line) {
 }
 
 void listen(EmulatedBus& bus, int falcons, const std::string& fifo) {
-  for (std::ifstream in(fifo);; in.open(fifo)) {  // each writer's end of file, then the next writer
-    for (std::string line; std::getline(in, line);) {
-      if (!obey(bus, falcons, line)) std::cerr << "emulated_falcons: what is '" << line << "'?\n";
+  // Open for writing, too: it never ends, however many writers come and go.
+  const int file = open(fifo.c_str(), O_RDWR | O_CLOEXEC);
+  std::string line;
+  for (char letter = 0; read(file, &letter, 1) == 1;) {
+    if (letter != '\n') {
+      line += letter;
+      continue;
     }
-    in.close();
-    in.clear();
+    if (!obey(bus, falcons, line)) std::cerr << "emulated_falcons: what is '" << line << "'?\n";
+    line.clear();
   }
 }
 

@@ -72,6 +72,9 @@ bool Emulator::control_out(std::uint8_t request, std::uint16_t value) {
     case 3:
       baud_ = value;
       return true;
+    case 6:
+      event_ = (value & 0x100) != 0 ? value & 0xFF : -1;
+      return true;
     case 9:
       latency_ms_ = std::max(1, value & 0xFF);
       return true;
@@ -216,13 +219,15 @@ void Emulator::obey(std::int64_t now_ns) {
 std::optional<std::vector<std::uint8_t>> Emulator::in_packet(std::int64_t now_ns,
                                                              std::size_t size) {
   std::size_t ready = 0;
-  while (ready < out_.size() && out_[ready].due_ns <= now_ns) ++ready;
+  bool event = false;
+  for (; ready < out_.size() && out_[ready].due_ns <= now_ns; ++ready) {
+    event = event || out_[ready].byte == event_;
+  }
   const std::int64_t latency_ns = std::int64_t{latency_ms_} * 1'000'000;
-  if (ready < kChipBytes && now_ns < last_in_ns_ + latency_ns) return std::nullopt;
+  const bool full = ready >= kChipBytes || event;
+  if (!full && now_ns < last_in_ns_ + latency_ns) return std::nullopt;
   // The timer runs on its own beat unless it was not listened to for long.
-  last_in_ns_ = now_ns < last_in_ns_ + 2 * latency_ns && ready < kChipBytes
-                    ? last_in_ns_ + latency_ns
-                    : now_ns;
+  last_in_ns_ = now_ns < last_in_ns_ + 2 * latency_ns && !full ? last_in_ns_ + latency_ns : now_ns;
   std::vector<std::uint8_t> packet = {0x01, 0x60};
   const std::size_t count = std::min({ready, kChipBytes, size - 2});
   for (std::size_t i = 0; i < count; ++i) {

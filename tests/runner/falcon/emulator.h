@@ -102,7 +102,7 @@ class Emulator {
   std::deque<TimedByte> out_;
   std::vector<std::uint8_t> heard_, image_;
   std::uint16_t baud_ = 0;
-  int latency_ms_ = 16;
+  int latency_ms_ = 16, event_ = -1;
   bool dtr_ = false, dtr_fell_ = false;
   std::int64_t last_in_ns_ = 0, wire_free_ns_ = 0;
   int uploads_ = 0;
