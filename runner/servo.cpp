@@ -125,7 +125,7 @@ DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexc
   const DeviceForces damping = passivity_->damping(
       {workspace_.to_device(sample_.probe.tip), workspace_.to_device(sample_.probe.tail)},
       preview.apply(device1, device2));
-  const DeviceForces forces = limiter_.apply(device1 + damping.device1, device2 + damping.device2);
+  DeviceForces forces = limiter_.apply(device1 + damping.device1, device2 + damping.device2);
   passivity_->commanded(forces);
   return forces;
 }

@@ -18,7 +18,7 @@ void increase(std::atomic<T>& value, T by) noexcept {
 int TimeHistogram::bin(std::int64_t ns) noexcept {
   if (ns < kSteps) return static_cast<int>(std::max<std::int64_t>(ns, 0));
   // The leading bit says the doubling, the next three the step in it.
-  const int shift = std::bit_width(static_cast<std::uint64_t>(ns)) - 4;
+  const int shift = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(ns))) - 4;
   return std::min(kBins - 1, shift * kSteps + static_cast<int>(ns >> shift));
 }
 

@@ -81,7 +81,7 @@ class MeteredDevice final : public Device {
     const std::int64_t began = thread_time_ns();
     if (skip_ == 0 && tick_.size() < tick_.capacity())
       tick_.push_back(began - written_ + last_compute_);
-    const DeviceReading reading = device_.read();
+    DeviceReading reading = device_.read();
     read_ = thread_time_ns();
     return reading;
   }

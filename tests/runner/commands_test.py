@@ -36,6 +36,53 @@ class FromOutside(unittest.TestCase):
         return path
 
 
+class Devices(FromOutside):
+    def test_what_needs_no_hardware_is_always_there_and_passes_its_test(self):
+        out = self.dir / "devices.json"
+        text = self.palpate("devices", "--device", "simulated", "--json", out).stdout
+        self.assertIn("5 degrees of freedom", text)
+        (device,) = json.loads(out.read_text())["devices"]
+        self.assertEqual(device["limits"]["sensed_freedom"], 5)
+        self.assertTrue(device["self_test"])
+        for test in device["self_test"]:
+            if "time" not in test["what"]:  # a busy machine
+                self.assertTrue(test["passed"], test)
+
+    def test_the_machine_is_judged_in_a_sentence_that_fits_the_figures(self):
+        out = self.dir / "timing.json"
+        command = [PALPATE, "devices", "--timing", "--seconds", "0.5", "--rate", "2000", "--json", str(out)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        timing = json.loads(out.read_text())["timing"]
+        self.assertEqual(timing["ticks"], 1000)
+        self.assertEqual(done.returncode, 1 if timing["verdict"] == "unfit" else 0, done.stderr)
+        self.assertIn(timing["sentence"], done.stdout)
+        self.assertEqual("is fit for" in done.stdout, timing["verdict"] == "fit")
+        late = timing["lateness_ns"]
+        self.assertLessEqual(0, late["median"])
+        self.assertLessEqual(late["median"], late["p99"])
+        self.assertLessEqual(late["p99"], late["max"])
+        self.assertGreater(timing["compute_cpu_ns"]["median"], 0)
+
+    def test_without_rights_it_runs_and_says_what_that_costs(self):
+        wish = ["--timing", "--seconds", "0.1"]
+        command = ["prlimit", "--rtprio=0:0", "--memlock=0:0", "setpriv", "--bounding-set=-all", "--inh-caps=-all"]
+        if os.geteuid() != 0:
+            command = []  # a user's rights are few
+        else:
+            command += ["--reuid=65534", "--clear-groups"]
+        done = subprocess.run(command + [PALPATE, "devices", *wish], capture_output=True, text=True, timeout=60)
+        if done.returncode not in (0, 1):
+            self.skipTest(f"rights cannot be dropped here: {done.stderr}")
+        if os.geteuid() == 0:
+            self.assertIn("No real-time priority", done.stdout)
+            self.assertIn("Memory is not locked", done.stdout)
+
+    def test_wrong_usage(self):
+        for wrong in (["--device", "phantom"], ["--rate", "0"], ["--rate", "20000"], ["--timing", "--seconds", "0"],
+                      ["--timing", "--core", "4096"], ["--calibrate"]):
+            self.palpate("devices", *wrong, status=2)
+
+
 class Usage(FromOutside):
     def test_every_command_has_help_with_an_example(self):
         listed = self.palpate("--help").stdout
