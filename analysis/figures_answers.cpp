@@ -56,6 +56,62 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
   return panel;
 }
 
+struct Label {
+  double x, y;
+  std::string text;
+};
+
+struct Box {
+  double left, right, top, bottom;  ///< px
+
+  bool meets(const Box& other) const {
+    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
+  }
+};
+
+/// Names beside their points: right or left, above or below, wherever they hide no other.
+void put_labels(Panel& panel, const std::vector<Label>& labels) {
+  constexpr double kSize = 13, kLetter = 7.5, kPoint = 7;  // px
+  const auto px = [&](double x) {
+    return (x - panel.x.low) / (panel.x.high - panel.x.low) * panel.width;
+  };
+  const auto py = [&](double y) {
+    return (panel.y.high - y) / (panel.y.high - panel.y.low) * panel.height;
+  };
+  std::vector<Box> taken;
+  taken.reserve(2 * labels.size());
+  for (const Label& label : labels) {
+    const double x = px(label.x), y = py(label.y);
+    taken.push_back({x - kPoint, x + kPoint, y - kPoint, y + kPoint});
+  }
+  for (const Label& label : labels) {
+    const double wide = kLetter * static_cast<double>(width(label.text));
+    Mark best;
+    Box place{};
+    std::ptrdiff_t fewest = std::ssize(taken) + 1;
+    for (const double dy : {4.0, -14.0, 22.0, -32.0, 40.0}) {
+      for (const int anchor : {-1, 1}) {
+        Mark mark = text_mark(Role::ink, label.x, label.y, label.text, kSize);
+        mark.anchor = anchor;
+        mark.bold = true;
+        mark.dx = -11 * anchor;
+        mark.dy = dy;
+        const double left = px(label.x) + mark.dx - (anchor > 0 ? wide : 0);
+        const double base = py(label.y) + dy;
+        const Box box{left, left + wide, base - kSize, base + 3};
+        const auto hits =
+            std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); });
+        if (hits >= fewest) continue;
+        fewest = hits;
+        best = std::move(mark);
+        place = box;
+      }
+    }
+    taken.push_back(place);
+    panel.marks.push_back(std::move(best));
+  }
+}
+
 }  // namespace
 
 Figure confusion_of(const Analysis& analysis) {
@@ -98,7 +154,7 @@ Figure speed_accuracy_of(const Analysis& analysis) {
   Panel panel;
   panel.x = linear_axis(-1.15 * widest, 1.15 * widest, "change of time with the ray (%)");
   panel.y = linear_axis(-1.05 * highest, 1.05 * highest, "change of accuracy (points)");
-  panel.width = 560;
+  panel.width = kWide;
   panel.height = 340;
   panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
                                   "faster and less accurate: a trade-off"));
@@ -106,6 +162,7 @@ Figure speed_accuracy_of(const Analysis& analysis) {
                                   "slower and more accurate: a trade-off"));
   panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
   panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
+  std::vector<Label> labels;
   for (std::size_t s = 0; s < shapes; ++s) {
     const SpeedAccuracy& both = analysis.speed_accuracy[s];
     if (!both.percent_change_time || !both.accuracy_change) continue;
@@ -117,14 +174,10 @@ Figure speed_accuracy_of(const Analysis& analysis) {
       add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
     }
     panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
-    Mark mark = text_mark(Role::ink, x, y, name, 13);
-    mark.anchor = -1;
-    mark.dx = 11;
-    mark.dy = 4;
-    mark.bold = true;
-    panel.marks.push_back(std::move(mark));
+    labels.push_back({x, y, name});
     figure.description += text + ". ";
   }
+  put_labels(panel, labels);
   figure.panels.push_back(std::move(panel));
   figure.notes.insert(figure.notes.begin(),
                       "Ray minus point, means over participants; bars: 95 % interval of the change "
@@ -155,7 +208,7 @@ Figure exclusions_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(names, kGroups, "");
   panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
-  panel.width = 560;
+  panel.width = kWide;
   panel.height = 260;
   panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {10, 10}, 1.4));
   const double width = 0.6 / static_cast<double>(n);

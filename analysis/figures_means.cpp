@@ -124,8 +124,7 @@ Figure figure15_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
   panel.y = linear_axis(0, highest_time(analysis, shapes), "time (s)");
-  panel.width = std::clamp(190.0 * static_cast<double>(shapes), 380.0, 860.0);
-  panel.width = std::max(panel.width, 70.0 * static_cast<double>(shapes));
+  panel.width = std::max(kWide, 70.0 * static_cast<double>(shapes));
   panel.height = 380;
   for (std::size_t s = 0; s < shapes; ++s) {
     add_people(panel, analysis, s);
@@ -171,8 +170,7 @@ Figure speedup_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(analysis.table.shapes, shapes, "");
   panel.y = reduction_axis(analysis, shapes);
-  panel.width = std::clamp(150.0 * static_cast<double>(shapes), 340.0, 860.0);
-  panel.width = std::max(panel.width, 60.0 * static_cast<double>(shapes));
+  panel.width = std::max(kWide, 60.0 * static_cast<double>(shapes));
   panel.height = 340;
   panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
   bool with_paper = false, any = false;

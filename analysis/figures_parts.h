@@ -10,6 +10,9 @@
 
 namespace palpate {
 
+/// Width of a panel that stands alone, px.
+constexpr double kWide = 850;
+
 /// Everything that figures have in common: label, subtitle.
 Figure new_figure(const Analysis& analysis, std::string id, std::string title);
 

@@ -46,7 +46,7 @@ Figure learning_of(const Analysis& analysis) {
       if (at >= panel.y.low && at <= panel.y.high) panel.y.ticks.push_back({at, tick.label});
     }
   }
-  panel.width = 640;
+  panel.width = kWide;
   panel.height = 300;
   for (std::size_t r = 0; r < learning.size(); ++r) {
     const std::string& renderer = analysis.table.renderers[r];
@@ -114,8 +114,7 @@ Figure order_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(analysis.table.shapes, shapes, "");
   panel.y = linear_axis(std::max(low, -150.0), high, "less time with the ray (%)");
-  panel.width = std::max(std::clamp(150.0 * static_cast<double>(shapes), 340.0, 860.0),
-                         60.0 * static_cast<double>(shapes));
+  panel.width = std::max(kWide, 60.0 * static_cast<double>(shapes));
   panel.height = 300;
   panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
   constexpr const char* kNames[] = {"point first", "ray first"};

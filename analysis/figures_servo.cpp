@@ -39,7 +39,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
     panel.x = seconds_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
     panel.x.grid = false;
     panel.y = linear_axis(0, room, "trials (%)");
-    panel.width = 400;
+    panel.width = 380;
     panel.height = 200;
     for (int b = first; b <= last; ++b) {
       const std::size_t n = servo.longest_periods[static_cast<std::size_t>(b)];

@@ -29,7 +29,7 @@ class Drawing {
       y = draw_row(row_start, row_end, y);
       row_start = row_end;
     }
-    y = draw_notes(y + 6);
+    y = draw_notes(y + 16);
     Svg page;
     page.rect(0, 0, total_, y + kMargin - 10, colour(Role::page));
     page.append(svg_);

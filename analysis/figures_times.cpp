@@ -101,9 +101,9 @@ void add_cell(Panel& panel, const std::string& renderer, const std::vector<float
   const double at = x + side * 0.055;
   panel.marks.push_back(
       line_mark(role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
-  panel.marks.push_back(
-      symbol(Role::page, shape_of(renderer), at, quantile_of(times, 0.5), 3.6, text));
-  panel.marks.push_back(symbol(role, shape_of(renderer), at, quantile_of(times, 0.5), 2.6, text));
+  const double median = quantile_of(times, 0.5);
+  panel.marks.push_back(symbol(role, shape_of(renderer), at, median, 5.2, text));
+  panel.marks.push_back(symbol(Role::page, shape_of(renderer), at, median, 3, text));
 }
 
 }  // namespace
@@ -125,8 +125,7 @@ Figure times_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
   panel.y = seconds_axis(low - 0.08, high + 0.08, "time (s, logarithmic)");
-  panel.width = std::max(std::clamp(190.0 * static_cast<double>(shapes), 380.0, 860.0),
-                         70.0 * static_cast<double>(shapes));
+  panel.width = std::max(kWide, 70.0 * static_cast<double>(shapes));
   panel.height = 360;
   std::vector<std::vector<Bins>> shares(times.size(), std::vector<Bins>(shapes));
   double widest = 0;

@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFont =
-    "Helvetica Neue, Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
+    "system-ui, Helvetica Neue, Arial, Liberation Sans, DejaVu Sans, sans-serif";
 constexpr std::size_t kLongestName = 18;
 
 Json signal(const std::string& expression) { return {{"signal", expression}}; }
@@ -136,6 +136,7 @@ void add_points(Json& group, const Panel& panel, Mark::Kind kind, const std::str
     type = "text";
     update.erase("tooltip");
     update["text"] = {{"field", "t"}};
+    update["font"] = {{"value", kFont}};
     update["fontSize"] = {{"field", "s"}};
     update["align"] = {{"field", "a"}};
     update["fontWeight"] = signal("datum.b ? 'bold' : 'normal'");
@@ -279,6 +280,9 @@ Json panel_group(const Panel& panel, std::size_t number) {
       {"type", "group"},
       {"name", "panel_" + std::to_string(number)},
       {"aria", false},
+      {"signals",  // by which axes measure their grid
+       Json::array(
+           {{{"name", "width"}, {"update", wide}}, {{"name", "height"}, {"value", panel.height}}})},
       {"encode", {{"update", {{"width", signal(wide)}, {"height", {{"value", panel.height}}}}}}},
       {"data", Json::array()},
       {"scales", std::move(scales)},

@@ -24,6 +24,12 @@
     return Math.max(280, Math.floor(box.clientWidth));
   }
 
+  // The second run takes up the size that the first found.
+  function fit(view, room) {
+    view.signal('room', room).resize().run();
+    view.run();
+  }
+
   function draw(id, spec) {
     const box = document.querySelector(`#${id} .drawing`);
     if (!box) return;
@@ -41,7 +47,7 @@
         logLevel: 1,
       });
       view.tooltip(showTip);
-      view.signal('room', roomIn(box)).run();
+      fit(view, roomIn(box));
       views.set(id, {view, box});
     } catch (error) {
       target.remove();
@@ -56,7 +62,7 @@
     window.addEventListener('resize', () => {
       cancelAnimationFrame(waiting);
       waiting = requestAnimationFrame(() => {
-        for (const {view, box} of views.values()) view.signal('room', roomIn(box)).run();
+        for (const {view, box} of views.values()) fit(view, roomIn(box));
       });
     });
     const chooser = document.getElementById('person');
@@ -115,11 +121,11 @@
   window.addEventListener('beforeprint', () => {
     opened = [...document.querySelectorAll('details:not([open]):not(.long)')];
     for (const part of opened) part.open = true;
-    for (const {view} of views.values()) view.signal('room', 700).run();
+    for (const {view} of views.values()) fit(view, 900);
   });
   window.addEventListener('afterprint', () => {
     for (const part of opened) part.open = false;
-    for (const {view, box} of views.values()) view.signal('room', roomIn(box)).run();
+    for (const {view, box} of views.values()) fit(view, roomIn(box));
   });
   document.documentElement.dataset.ready = String(views.size);
 })();

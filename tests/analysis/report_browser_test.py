@@ -1,0 +1,222 @@
+"""The report in a headless Chromium. Usage: report_browser_test.py PALPATE QUICK_PROTOCOL FIXTURES"""
+
+import json
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import xml.etree.ElementTree as xml
+
+import report_chromium
+
+PALPATE, QUICK, FIXTURES = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
+SVG = "{http://www.w3.org/2000/svg}"
+TITLE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
+FIGURES = ["figure15", "speedup", "times", "confusion", "speed-accuracy", "learning", "order", "servo", "exclusions"]
+# Whether the program was built with Vega: then its figures, not the fixed ones, are seen.
+DRAWN = "[...document.querySelectorAll('.drawing > div:not([hidden]) svg')]"
+
+
+def texts(svg):
+    return sorted(e.text for e in svg.iter() if e.text and e.text.strip() and e.tag != SVG + "style")
+
+
+class Report(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.dir = pathlib.Path(cls.folder.name)
+        protocol = json.loads(QUICK.read_text("utf-8"))
+        protocol.pop("$schema", None)
+        protocol["title"] = TITLE
+        (cls.dir / "protocol.json").write_text(json.dumps(protocol))
+        cls.run_palpate("simulate", cls.dir / "protocol.json", "--db", cls.dir / "study.db", "--participants", 4)
+        cls.page = cls.dir / "report.html"
+        cls.run_palpate("analyze", "--db", cls.dir / "study.db", "--report", cls.page, "--figures", cls.dir / "figures")
+        cls.browser = report_chromium.Browser(report_chromium.find())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.folder.cleanup()
+
+    @staticmethod
+    def run_palpate(*args):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=600)
+        if done.returncode != 0:
+            raise AssertionError(done.stderr)
+
+    def open(self, path=None, width=1200, dark=False):
+        self.browser.window(width, 900, dark)
+        self.browser.open(path or self.page)
+        self.assertEqual(self.browser.complaints(), [])
+        self.assertEqual(self.browser.requests(), [])
+        self.assertNotIn("Page.javascriptDialogOpening", [name for name, _ in self.browser.events])
+
+    def press(self, key, code, **more):
+        for kind in ("keyDown", "keyUp"):
+            self.browser.call("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code,
+                              **(more if kind == "keyDown" else {}))
+
+    def shown(self):
+        """Of each figure that is seen: section, width, height, number of drawn things."""
+        return self.browser.run(DRAWN + ".map(s => { const b = s.getBoundingClientRect(); return "
+                                "[s.closest('section').id, b.width, b.height, "
+                                "s.querySelectorAll('path, line, circle, rect, polygon, text').length]; })")
+
+    def test_every_figure_is_drawn_without_a_complaint_or_a_request(self):
+        self.open()
+        shown = self.shown()
+        self.assertEqual([figure[0] for figure in shown], FIGURES)
+        for name, width, height, things in shown:
+            self.assertGreater(width, 300, name)
+            self.assertGreater(height, 150, name)
+            self.assertGreater(things, 20, name)
+        vega = self.browser.run("document.querySelectorAll('.vega svg').length")
+        self.assertEqual(vega, len(FIGURES) if self.browser.run("'palpateVega' in window") else 0)
+
+    def test_every_fixture_is_drawn(self):
+        for csv in sorted(FIXTURES.glob("*.csv")):
+            with self.subTest(csv=csv.name):
+                self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+                self.open(self.dir / "other.html")
+                self.assertTrue(all(figure[1] > 200 and figure[3] > 10 for figure in self.shown()), self.shown())
+
+    def test_texts_from_files_are_text(self):
+        self.open()
+        self.assertEqual(self.browser.run("document.querySelector('.study').textContent"), TITLE)
+        self.assertEqual(self.browser.run("document.querySelectorAll('img').length"), 0)
+        csv = self.dir / "hostile.csv"
+        shape, who = "<b>x</b></script>", "</script><script>alert(3)</script>"
+        rows = [f"{p},1,1,{i},{r},{s},{s},1,{2 + 0.3 * i + 0.2 * len(r)}\n" for p in (who, "B", "C")
+                for i, (r, s) in enumerate([(r, s) for r in ("point", "ray") for s in (shape, "cube")] * 3, 1)]
+        csv.write_text("participant_id,session,block,trial,renderer,shape,response,correct,response_time\n" +
+                       "".join(rows))
+        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+        self.open(self.dir / "other.html")
+        self.assertIn(shape, self.browser.run("[...document.querySelectorAll('.cards b')].map(b => b.textContent)"))
+        self.assertIn(shape, self.browser.run(DRAWN + "[0].textContent"))
+        self.assertEqual(self.browser.run("document.querySelector('#person').options[1].value"), who)
+        self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b').length"), 0)
+
+    def test_nothing_foreign_runs_and_nothing_is_fetched(self):
+        self.open()
+        self.assertEqual(self.browser.run(
+            "(() => { const s = document.createElement('script'); s.textContent = 'window.ran = 1';"
+            "document.body.append(s); return window.ran === undefined; })()"), True)
+        self.assertEqual(self.browser.run("fetch('http://127.0.0.1:9/').then(() => 'got', () => 'refused')"), "refused")
+        self.assertIn("Content Security Policy", " ".join(self.browser.complaints()))
+        policy = self.browser.run("document.querySelector('meta[http-equiv]').content")
+        self.assertNotIn("unsafe-eval", policy)
+
+    def test_figures_are_saved_as_svg_and_png(self):
+        self.open()
+        out = self.dir / "saved"
+        out.mkdir()
+        self.browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(out))
+        for name in FIGURES:
+            for kind in ("svg", "png"):
+                self.browser.run(f"document.querySelector('#{name} button[data-save={kind}]').focus()")
+                self.press("Enter", 13, text="\r")
+                path = out / f"{name}.{kind}"
+                deadline = time.monotonic() + 60
+                while not path.exists() and time.monotonic() < deadline:
+                    self.browser.run("new Promise(r => setTimeout(r, 20))")
+                self.assertTrue(path.exists(), path.name)
+            saved = (out / f"{name}.svg").read_text("utf-8")
+            self.assertNotIn("var(", saved)
+            self.assertIn("SIMULATED PARTICIPANTS", saved)
+            written = xml.parse(self.dir / "figures" / f"{name}.svg").getroot()
+            self.assertEqual(texts(xml.fromstring(saved)), texts(written))
+            png = (out / f"{name}.png").read_bytes()
+            self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+            width, height = struct.unpack(">II", png[16:24])
+            self.assertEqual([width, height], [2 * int(written.get(side)) for side in ("width", "height")])
+        self.assertEqual(self.browser.complaints(), [])
+
+    def test_vega_and_the_files_show_the_same_numbers(self):
+        self.open()
+        if not self.browser.run("'palpateVega' in window"):
+            self.skipTest("built without Vega")
+        self.browser.run("window.dispatchEvent(new Event('resize'))")
+        for name in FIGURES:
+            drawn = self.browser.run(f"[...document.querySelectorAll('#{name} .vega text')].map(t => t.textContent)")
+            fixed = self.browser.run(f"[...document.querySelectorAll('#{name} .fixed text')].map(t => t.textContent)")
+            number = re.compile(r"^−?[\d.]+( %)?$")
+            self.assertEqual(sorted(t for t in drawn if number.match(t)), sorted(t for t in fixed if number.match(t)))
+
+    def test_dark_and_light(self):
+        seen = {}
+        for dark in (False, True):
+            self.open(dark=dark)
+            seen[dark] = self.browser.run(
+                "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.querySelector("
+                "'#figure15 .drawing > div:not([hidden]) text')).fill]")
+        light, dark = ([[int(n) for n in re.findall(r"\d+", c)[:3]] for c in seen[k]] for k in (False, True))
+        self.assertGreater(min(light[0]), 200)
+        self.assertLess(max(dark[0]), 60)
+        self.assertLess(max(light[1]), 160)
+        self.assertGreater(min(dark[1]), 130)
+
+    def test_a_phone_need_not_scroll_sideways(self):
+        self.open(width=390)
+        self.assertLessEqual(self.browser.run("document.documentElement.scrollWidth"), 390)
+        for name, width, _, _ in self.shown():
+            self.assertLessEqual(width, 362, name)
+
+    def test_keyboard_and_screen_reader(self):
+        self.open()
+        for name in FIGURES:
+            said = self.browser.run(
+                f"[...document.querySelectorAll('#{name} .vega svg, #{name} .vega')].map(e => "
+                "e.getAttribute('aria-label')).find(Boolean) || "
+                f"document.querySelector('#{name} .fixed desc').textContent")
+            self.assertGreater(len(said), 40, name)
+            self.assertEqual(self.browser.run(f"document.querySelectorAll('#{name} button').length"), 2)
+        reached = []
+        for _ in range(30):
+            self.press("Tab", 9)
+            reached.append(self.browser.run("document.activeElement.dataset.save || document.activeElement.tagName"))
+        self.assertIn("svg", reached)
+        self.assertIn("png", reached)
+        self.assertIn("SUMMARY", reached)
+        self.assertEqual(self.browser.run("document.querySelectorAll('[id]').length"),
+                         self.browser.run("new Set([...document.querySelectorAll('[id]')].map(e => e.id)).size"))
+
+    def test_a_participant_can_be_picked_out(self):
+        self.open()
+        if not self.browser.run("'palpateVega' in window"):
+            self.skipTest("built without Vega")
+        faint = ("[...document.querySelectorAll('#figure15 .vega .lines_marks path')]"
+                 ".map(p => p.getAttribute('stroke-width')).filter(w => w === '2.5').length")
+        self.assertEqual(self.browser.run(faint), 0)
+        self.browser.run("(() => { const s = document.getElementById('person'); s.selectedIndex = 2; "
+                         "s.dispatchEvent(new Event('change')); })()")
+        self.assertEqual(self.browser.run(faint), 4)  # one for each shape
+
+    def test_without_scripts_the_figures_are_there(self):
+        self.browser.call("Emulation.setScriptExecutionDisabled", value=True)
+        try:
+            self.open()
+        finally:
+            self.browser.call("Emulation.setScriptExecutionDisabled", value=False)
+        self.assertEqual([figure[0] for figure in self.shown()], FIGURES)
+
+    def test_it_prints_and_is_as_before(self):
+        self.open()
+        before = self.shown()
+        self.assertEqual(self.browser.pdf()[:5], b"%PDF-")
+        self.assertEqual(self.shown(), before)
+        self.assertEqual(self.browser.run("document.querySelectorAll('details[open]').length"), 0)
+        self.assertEqual(self.browser.complaints(), [])
+
+
+if __name__ == "__main__":
+    if report_chromium.find() is None:
+        print("SKIPPED: no Chromium is installed (runner/install_packages.sh quality brings it)")
+        sys.exit(77)
+    unittest.main(argv=sys.argv[:1])
