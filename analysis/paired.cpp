@@ -1,10 +1,12 @@
 #include "analysis/paired.h"
 
 #include <algorithm>
+#include <atomic>
 #include <boost/math/distributions/students_t.hpp>
 #include <boost/math/special_functions/gamma.hpp>
 #include <cmath>
 #include <numeric>
+#include <thread>
 
 #include "stimuli/random.h"
 
@@ -12,6 +14,8 @@ namespace palpate {
 
 namespace {
 
+constexpr std::size_t kManyPairs =
+    1000;  // from here a bootstrap takes longer than a thread's start
 constexpr const char* kOnePair = "one participant cannot tell chance from effect";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
 constexpr const char* kNoVariance = "no variance: all differences are alike";
@@ -25,6 +29,27 @@ std::string no_inference(const std::vector<double>& differences) {
 
 bool no_variance(double sd, double centre) {
   return sd <= 1e-10 * std::max(1.0, std::fabs(centre));
+}
+
+/// Each shape has its own stream of the seed, so threads change nothing but the time it takes.
+void bootstrap_all(std::vector<PairedShape>& shapes, std::uint64_t seed) {
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t s = next++; s < shapes.size(); s = next++) {
+      Random random(seed, {s});
+      shapes[s].bootstrap = bootstrap_mean(shapes[s].differences, random);
+      shapes[s].bootstrap.seed = seed;
+    }
+  };
+  std::size_t pairs = 0;
+  for (const PairedShape& shape : shapes) pairs += shape.n_pairs;
+  std::vector<std::jthread> threads;
+  if (pairs > kManyPairs) {
+    const std::size_t most = std::max(1U, std::thread::hardware_concurrency());
+    threads.reserve(most);
+    while (threads.size() + 1 < std::min(most, shapes.size())) threads.emplace_back(work);
+  }
+  work();
 }
 
 }  // namespace
@@ -132,10 +157,8 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
     shape.t_test = t_test(shape.differences);
     shape.effect_size = effect_size(shape.differences);
     shape.wilcoxon = wilcoxon(shape.differences);
-    Random random(seed, {s});
-    shape.bootstrap = bootstrap_mean(shape.differences, random);
-    shape.bootstrap.seed = seed;
   }
+  bootstrap_all(all, seed);
 
   std::vector<std::optional<double>> p;
   p.reserve(all.size());
