@@ -7,6 +7,7 @@
 #include <ctime>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "runner/guard.h"
 #include "runner/servo_thread.h"
@@ -120,7 +121,7 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
 
 /// One long trial; what came of each tick with forces on.
 void feel(ServoThread& servo, double rate, std::size_t wanted, const std::function<bool()>& wait,
-          ServoTiming& out) {
+          ServoTiming& out, std::vector<std::int64_t>& compute) {
   const Scene scene({{std::make_shared<const ConvexMesh>(icosphere(kRadius, 3)), Pose{}, Material{},
                       0, nullptr}});
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
@@ -139,6 +140,7 @@ void feel(ServoThread& servo, double rate, std::size_t wanted, const std::functi
     tripped = trips;
     if (sample.phase != Phase::feeling) continue;
     out.lateness.push_back(sample.lateness_ns);
+    compute.push_back(sample.compute_ns);
     const auto missed = sample.lateness_ns / period_ns;
     out.missed_ticks += static_cast<std::uint64_t>(missed);
     run = missed > 0 ? run + static_cast<int>(missed) : 0;
@@ -174,10 +176,12 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   ServoTiming out;
   out.rate = rate;
   out.lateness.reserve(wanted);
+  std::vector<std::int64_t> by_clock;
+  by_clock.reserve(wanted);
   {
     ServoThread servo(device, clock, servo_settings);
     out.rights = servo.rights();
-    feel(servo, rate, wanted, wait, out);
+    feel(servo, rate, wanted, wait, out, by_clock);
   }
   std::sort(out.lateness.begin(), out.lateness.end());
   out.ticks = out.lateness.size();
@@ -190,6 +194,10 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
       out.lateness.end() - std::upper_bound(out.lateness.begin(), out.lateness.end(), period_ns);
   if (out.ticks > 0) out.late_share = static_cast<double>(late) / static_cast<double>(out.ticks);
   const auto compute = sorted(device.compute()), whole = sorted(device.whole());
+  by_clock = sorted(std::move(by_clock));
+  out.clock_median = quantile(by_clock, 0.5);
+  out.clock_p999 = quantile(by_clock, 0.999);
+  out.clock_max = quantile(by_clock, 1);
   out.compute_median = quantile(compute, 0.5);
   out.compute_p999 = quantile(compute, 0.999);
   out.compute_max = quantile(compute, 1);

@@ -27,8 +27,10 @@ struct ServoTiming {
   double late_share = 0;    ///< of ticks, more than a period late
   int worst_run = 0;        ///< missed ticks in a row, at most
   std::uint64_t trips = 0;  ///< times that this cut the forces off
-  /// Of the servo's thread itself, without the time that others took: from the device's reading to
-  /// the command, and the whole tick but for the device's own transfer and the wait.
+  /// By the clock, from the device's reading to the command: with what others took of it.
+  std::int64_t clock_median = 0, clock_p999 = 0, clock_max = 0;
+  /// Of the servo's thread itself: the same, and the whole tick but for the device's own transfer.
+  /// With what it costs to ask the system for that time, and interrupts that came meanwhile.
   std::int64_t compute_median = 0, compute_p999 = 0, compute_max = 0;
   std::int64_t tick_median = 0, tick_p999 = 0, tick_max = 0;
   std::vector<std::int64_t> lateness;  ///< of every tick, sorted
