@@ -38,6 +38,8 @@ constexpr Command kCommands[] = {
     {"run", "a live session with a person and a device", palpate::run_command},
     {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
     {"simulate", "the whole study with simulated participants", palpate::simulate_command},
+    {"stability", "at what stiffness a loop of hand, device and renderer buzzes",
+     palpate::stability_command},
     {"validate", "check a protocol and list all its faults", palpate::validate_command},
 };
 

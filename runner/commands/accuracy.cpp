@@ -1,7 +1,4 @@
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -16,43 +13,11 @@
 #include "rendering/first_contact.h"
 #include "runner/commands/accuracy_report.h"
 #include "runner/commands/command.h"
+#include "runner/commands/progress_line.h"
 #include "stimuli/primitives.h"
 
 namespace palpate {
 namespace {
-
-double now_ns() {
-  return std::chrono::duration<double, std::nano>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
-
-/// One line on a terminal: what is done, and how long the rest will take.
-class ProgressLine {
- public:
-  explicit ProgressLine(std::string what)
-      : what_(std::move(what)), on_terminal_(isatty(STDERR_FILENO) == 1), start_(now_ns()) {}
-  ~ProgressLine() {
-    if (shown_ > 0) std::cerr << "\r\033[K";
-  }
-  ProgressLine(const ProgressLine&) = delete;
-  ProgressLine& operator=(const ProgressLine&) = delete;
-
-  void show(double done) {
-    const double now = now_ns();
-    if (!on_terminal_ || now - shown_ < 2e8) return;
-    shown_ = now;
-    const double gone = (now - start_) / 1e9;
-    std::cerr << "\r\033[K" << what_ << ": " << std::lround(100 * done) << " %";
-    if (done > 0.02) std::cerr << ", about " << std::lround(gone / done - gone) << " s left";
-    std::cerr << std::flush;
-  }
-
- private:
-  std::string what_;
-  bool on_terminal_;
-  double start_, shown_ = 0;
-};
 
 void study_first_contacts(AccuracyReport& report, int entries) {
   struct Shape {

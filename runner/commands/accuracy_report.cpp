@@ -10,27 +10,6 @@
 namespace palpate {
 namespace {
 
-void put_table(std::ostream& out, const Table& table) {
-  std::vector<std::size_t> widths;
-  for (const std::string& name : table.header) widths.push_back(width(name));
-  for (const auto& row : table.rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
-  }
-  out << "\n" << table.caption << "\n";
-  const auto put = [&](const std::vector<std::string>& cells) {
-    std::string line;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      line += "  " +
-              (i < table.n_names ? pad_right(cells[i], widths[i]) : pad_left(cells[i], widths[i]));
-    }
-    line.erase(line.find_last_not_of(' ') + 1);
-    out << line << "\n";
-  };
-  put(table.header);
-  for (const auto& row : table.rows) put(row);
-  for (const std::string& note : table.notes) out << "  " << note << "\n";
-}
-
 /// What was measured, how the numbers are meant, and what the methods are.
 std::vector<std::string> how_to_read(const AccuracyReport& report) {
   const AccuracySettings& s = report.settings;
@@ -85,6 +64,27 @@ void put_wrapped(std::ostream& out, const std::string& text) {
 }
 
 }  // namespace
+
+void put_table(std::ostream& out, const Table& table) {
+  std::vector<std::size_t> widths;
+  for (const std::string& name : table.header) widths.push_back(width(name));
+  for (const auto& row : table.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+  }
+  out << "\n" << table.caption << "\n";
+  const auto put = [&](const std::vector<std::string>& cells) {
+    std::string line;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      line += "  " +
+              (i < table.n_names ? pad_right(cells[i], widths[i]) : pad_left(cells[i], widths[i]));
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    out << line << "\n";
+  };
+  put(table.header);
+  for (const auto& row : table.rows) put(row);
+  for (const std::string& note : table.notes) out << "  " << note << "\n";
+}
 
 std::string accuracy_text(const AccuracyReport& report) {
   std::ostringstream out;

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,8 @@ constexpr const char* kAccuracyShapes[] = {"sphere", "cone", "cylinder", "cube"}
 std::string significant(double value);
 /// "327,680"
 std::string thousands(long long n);
+/// For a terminal.
+void put_table(std::ostream& out, const Table& table);
 
 /// "sphere: ...", the tessellation a lab should choose.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);

@@ -14,11 +14,11 @@
 namespace palpate {
 namespace {
 
-constexpr double kDepth = 1e-3;    // m, at rest
-constexpr double kLength = 0.12;   // m
-constexpr double kAtRest = 1e-12;  // m, from crest to trough: rounding
-constexpr double kFarOff = 0.02;   // m, from rest: gone
-constexpr int kMostDelay = 16;     // ticks
+constexpr double kDepth = 1e-3;   // m, at rest
+constexpr double kLength = 0.12;  // m
+constexpr double kAtRest = 1e-9;  // m, from crest to trough: nobody's concern
+constexpr double kFarOff = 0.02;  // m, from rest: gone
+constexpr int kMostDelay = 16;    // ticks
 
 Quat turned_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
 
@@ -223,10 +223,11 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
       outcome.late = HUGE_VAL;
       return outcome;
     }
+    // What the springs feel, in metres: a stylus that turns about its contact is no buzz.
     Range* const part = i >= ticks / 4 && i < ticks / 2 ? &early
                         : i >= 3 * ticks / 4            ? &late
                                                         : nullptr;
-    if (part) part->add(tip.z() + 0.7 * (renderer.side_contact() ? tail.z() : 0));
+    if (part) part->add((r.device1.z + 0.7 * r.device2.z) / stiffness);
   }
   outcome.early = early.size();
   outcome.late = late.size();

@@ -62,7 +62,7 @@ class LoopScene {
 
 struct LoopOutcome {
   bool stable = false;
-  double early = 0, late = 0;  ///< m, from crest to trough, early and late
+  double early = 0, late = 0;  ///< m, of the springs, from crest to trough, early and late
   std::uint64_t ticks = 0;
 };
 

@@ -1,0 +1,35 @@
+#include "runner/commands/progress_line.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <utility>
+
+namespace palpate {
+
+double now_ns() {
+  return std::chrono::duration<double, std::nano>(
+             std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+ProgressLine::ProgressLine(std::string what)
+    : what_(std::move(what)), on_terminal_(isatty(STDERR_FILENO) == 1), start_(now_ns()) {}
+
+ProgressLine::~ProgressLine() {
+  if (shown_ > 0) std::cerr << "\r\033[K";
+}
+
+void ProgressLine::show(double done) {
+  const double now = now_ns();
+  if (!on_terminal_ || now - shown_ < 2e8) return;
+  shown_ = now;
+  const double gone = (now - start_) / 1e9;
+  std::cerr << "\r\033[K" << what_ << ": " << std::lround(100 * done) << " %";
+  if (done > 0.02) std::cerr << ", about " << std::lround(gone / done - gone) << " s left";
+  std::cerr << std::flush;
+}
+
+}  // namespace palpate

@@ -1,0 +1,58 @@
+"""palpate stability from outside. Usage: stability_command_test.py PALPATE"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+PALPATE = sys.argv[1]
+
+
+class Stability(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def stability(self, *args, status=0):
+        done = subprocess.run([PALPATE, "stability", *map(str, args)], capture_output=True, text=True, timeout=600)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def test_answers_in_text_numbers_and_pictures(self):
+        numbers, figure, page = self.dir / "s.json", self.dir / "s.svg", self.dir / "s.html"
+        done = self.stability("--json", numbers, "--figure", figure, "--report", page)
+        self.assertIn("is the theory's", done.stdout)
+        result = json.loads(numbers.read_text())
+        self.assertLess(result["worst_disagreement"], 0.05)
+        self.assertEqual(result["unsafe_points"], 0)
+        rates = {curve["loop"]["rate_hz"] for curve in result["curves"]}
+        self.assertEqual(rates, {500, 1000, 2000, 5000, 10000})
+        self.assertEqual({(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("scenes")},
+                         {(s, r) for s in ("wall", "edge", "sphere", "two objects") for r in ("point", "ray")})
+        # Theory, worked out again.
+        for curve in result["theory"] + result["curves"]:
+            loop = curve["loop"]
+            for point in curve["points"]:
+                theory = point["stiffness_n_per_m"] / loop["rate_hz"] * (0.5 + loop["delay_ticks"]) + loop["virtual_damping_ns_per_m"]
+                self.assertAlmostEqual(point["theory_ns_per_m"] / theory, 1, 12)
+        # A dot or a triangle for every point, a dot for every name.
+        root = xml.etree.ElementTree.parse(figure).getroot()
+        svg = "{http://www.w3.org/2000/svg}"
+        points = sum(len(curve["points"]) for curve in result["curves"])
+        self.assertEqual(len(root.findall(svg + "circle")) + len(root.findall(svg + "polygon")), points + len(result["curves"]))
+        xml.etree.ElementTree.fromstring(page.read_text().replace("<!DOCTYPE html>", ""))
+
+    def test_refuses_what_it_should(self):
+        kept = self.dir / "kept.json"
+        kept.write_text("mine")
+        for args in (["--json", kept], ["--jobs", "0"], ["extra"]):
+            self.assertTrue(self.stability(*args, status=2).stderr)
+        self.assertEqual(kept.read_text(), "mine")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
