@@ -57,7 +57,10 @@ class Servo final : public TickSource {
   void clear_fault() noexcept;
 
   /// Takes out the energy that sampling feeds to the hand; off unless asked for. Before start().
-  void control_passivity() { passivity_.emplace(PassivitySettings{}, period_); }
+  void control_passivity() {
+    constexpr double kLightestEnd = 0.1;  // kg, of a stylus at its tip
+    passivity_.emplace(PassivitySettings{0.5 * kLightestEnd / period_}, period_);
+  }
 
   /// The next tick is due now.
   void start() noexcept { due_ns_ = clock_.now_ns(); }
