@@ -109,8 +109,8 @@ Pilot read_pilot(const Analysis& analysis) {
                         counted(fit.n_participants, "participant", "participants") +
                         " are rough: try --gain-sd half as large again as well.");
   }
-  const std::string label = simulated_label(analysis.table.simulated);
-  if (!label.empty()) out.notes.push_back(label + " in the pilot.");
+  out.label = simulated_label(analysis.table.simulated);
+  if (!out.label.empty()) out.notes.push_back(out.label + " in the pilot.");
   return out;
 }
 

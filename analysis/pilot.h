@@ -12,6 +12,7 @@ namespace palpate {
 struct Pilot {
   std::string undefined;  ///< why nothing can be drawn from it; empty: something can
   StudyModel model;       ///< its effects are what the pilot found
+  std::string label;      ///< "SIMULATED PARTICIPANTS" and the like; empty: people
   std::vector<std::string> notes;
 };
 

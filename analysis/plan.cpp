@@ -31,7 +31,7 @@ double goal_power(const Plan& plan, const Power& power) {
 
 Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string> notes,
                const std::function<void(std::size_t, std::size_t)>& progress) {
-  Plan plan{std::move(model), std::move(settings), std::move(notes), {}};
+  Plan plan{std::move(model), std::move(settings), std::move(notes), {}, {}};
   for (const std::size_t trials : plan.settings.trials) {
     PlanCurve curve;
     curve.trials = trials;

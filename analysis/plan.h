@@ -38,6 +38,7 @@ struct Plan {
   PlanSettings settings;
   std::vector<std::string> notes;
   std::vector<PlanCurve> curves;
+  std::string label;  ///< where the pilot's participants are simulated: said on the figure
 };
 
 /// A grid of participants, then halving between its points. Power grows with participants; near the

@@ -146,6 +146,7 @@ std::string plan_json(const Plan& plan) {
   const StudyModel& model = plan.model;
   Json out;
   out["version"] = 1;
+  out["pilot_label"] = plan.label.empty() ? Json(nullptr) : Json(plan.label);
   out["settings"] = {{"power", settings.power},
                      {"alpha", settings.simulation.alpha},
                      {"goal", settings.goal == Goal::all ? "all" : "any"},
@@ -202,6 +203,10 @@ std::string plan_svg(const Plan& plan) {
   const auto y_of = [](double power) { return kBottom - power * (kBottom - kTop); };
 
   const std::string title = "Power to " + goal(plan);
+  if (!plan.label.empty()) {
+    svg.text(kWidth - 20, kHeight - 12, plan.label + " IN THE PILOT",
+             {12, kInk, Svg::Anchor::end, true});
+  }
   double line_y = 26;
   for (const std::string& line : lines_of(title, kWidth - 40, 15, true)) {
     svg.text(20, line_y, line, {15, kInk, Svg::Anchor::start, true});

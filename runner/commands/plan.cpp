@@ -327,9 +327,10 @@ int plan_command(const std::vector<std::string>& args) {
   settings.simulation.progress = [&progress, studies](std::size_t done) {
     progress.show(static_cast<double>(done) / studies);
   };
-  const Plan plan =
+  Plan plan =
       make_plan(std::move(model), std::move(settings), std::move(pilot.notes),
                 [&progress](std::size_t curve, std::size_t point) { progress.at(curve, point); });
+  plan.label = std::move(pilot.label);
   if (!options.json.empty()) write_whole(options.json, plan_json(plan));
   if (!options.figure.empty()) write_whole(options.figure, plan_svg(plan));
   std::cout << plan_text(plan);

@@ -75,8 +75,11 @@ class Plan(unittest.TestCase):
         self.assertEqual(json.loads(out.read_text("utf-8"))["model"]["gain_sd"], 0.5)
 
     def test_simulated_pilots_are_named(self):
-        done = self.run_palpate("--csv", FIXTURES / "full.csv", *QUICK)
-        self.assertIn("SIMULATED PARTICIPANTS", done.stdout)
+        figure, out = self.dir / "power.svg", self.dir / "plan.json"
+        done = self.run_palpate("--csv", FIXTURES / "full.csv", *QUICK, "--figure", figure,
+                                "--json", out)
+        for text in (done.stdout, figure.read_text("utf-8"), out.read_text("utf-8")):
+            self.assertIn("SIMULATED PARTICIPANTS", text)
 
     def test_refuses_with_the_reason(self):
         self.refused("--residual-sd", "--gain-sd", "0.1")
