@@ -1,10 +1,12 @@
 #include "runner/realtime.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -38,6 +40,20 @@ void RealClock::wait_until(std::int64_t when_ns) noexcept {
   const timespec when{when_ns / kSecond_ns, when_ns % kSecond_ns};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR) {
   }
+}
+
+AwakeProcessors::AwakeProcessors(bool wanted) noexcept {
+  if (!wanted) return;
+  file_ = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
+  const std::int32_t longest_us = 0;
+  if (file_ >= 0 && write(file_, &longest_us, sizeof longest_us) != sizeof longest_us) {
+    close(file_);
+    file_ = -1;
+  }
+}
+
+AwakeProcessors::~AwakeProcessors() {
+  if (file_ >= 0) close(file_);
 }
 
 RealtimeRights request_realtime(const RealtimeWish& wish) {

@@ -24,7 +24,22 @@ struct RealtimeWish {
 struct RealtimeRights {
   bool fifo = false, locked_memory = false;
   int core = -1;
+  bool awake = false;   ///< idle processors wake at once (AwakeProcessors)
   std::string missing;  ///< what was asked for and not granted, and what that costs; empty: nothing
+};
+
+/// While it lives, idle processors do not fall so deep asleep that waking takes time (the kernel's
+/// PM QoS, /dev/cpu_dma_latency), where that is allowed. Costs power.
+class AwakeProcessors {
+ public:
+  explicit AwakeProcessors(bool wanted) noexcept;
+  ~AwakeProcessors();
+  AwakeProcessors(const AwakeProcessors&) = delete;
+  AwakeProcessors& operator=(const AwakeProcessors&) = delete;
+  bool granted() const noexcept { return file_ >= 0; }
+
+ private:
+  int file_ = -1;
 };
 
 /// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.

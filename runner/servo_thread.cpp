@@ -20,6 +20,7 @@ constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as
 ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& settings)
     : wish_(settings.realtime),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
+      awake_(settings.realtime.priority > 0),
       ring_(settings.ring) {
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
@@ -28,6 +29,7 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
     run();
   });
   rights_ = granted.get_future().get();
+  rights_.awake = awake_.granted();
 }
 
 ServoThread::~ServoThread() {

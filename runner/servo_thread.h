@@ -66,6 +66,7 @@ class ServoThread final : public TickSource {
 
   const RealtimeWish wish_;
   Servo servo_;
+  const AwakeProcessors awake_;
   RealtimeRights rights_;
   ServoHealth health_;
 

@@ -121,6 +121,7 @@ Json to_json(const ServoTiming& t) {
        {{"fifo", t.rights.fifo},
         {"locked_memory", t.rights.locked_memory},
         {"core", t.rights.core},
+        {"awake", t.rights.awake},
         {"missing", t.rights.missing}}},
       {"verdict", kVerdicts[static_cast<int>(t.verdict())]},
       {"sentence", t.sentence()}};
