@@ -233,10 +233,13 @@ TEST(FalconUsb, TwoAtOnce) {
     bus.with(index, [](Emulator& emulator) { emulator.preload(true); });
   }
   std::vector<std::unique_ptr<FalconArm>> arms;
+  arms.reserve(2);
   for (const char* serial : {"TIP", "TAIL"}) {
     auto line = open_usb(serial);
     boot(*line, nullptr);
-    arms.push_back(std::make_unique<FalconArm>(std::move(line), ArmSettings{}));
+    ArmSettings settings;
+    settings.silence_ns = 500'000'000;
+    arms.push_back(std::make_unique<FalconArm>(std::move(line), settings));
   }
   run(
       *arms[0], 50, [](const Vec3&) { return Vec3(0, 0, 1); },
