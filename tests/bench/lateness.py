@@ -123,7 +123,7 @@ def main():
                 ours, theirs = ([run[figure] for run in runs[name]] for name in ("palpate", "cyclictest"))
                 ratio, low, high = ratio_of_medians(ours, theirs)
                 row["ratios"][figure] = {"ratio": ratio, "low": low, "high": high}
-                said = "undefined (zero in cyclictest)" if ratio is None else f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
+                said = "undefined (zero in too many runs)" if ratio is None else f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
                 print(f"  {figure:24} palpate {statistics.median(ours):.6g}  cyclictest {statistics.median(theirs):.6g}"
                       f"  ratio of medians {said}")
             compute = [run["compute_cpu_p99.9_us"] for run in runs["palpate"]]
