@@ -74,9 +74,10 @@ void ConsoleView::draw_view(const Modifiers& modifiers) {
       scene_.draw(state_.objects, state_.sample, camera_, static_cast<int>(width * scale.x),
                   static_cast<int>(height * scale.y));
   // OpenGL's pictures begin at the bottom.
-  ImGui::GetWindowDrawList()->AddImageRounded(
-      reinterpret_cast<ImTextureID>(std::uintptr_t{texture}), at, {at.x + width, at.y + height},
-      {0, 1}, {1, 0}, IM_COL32_WHITE, 6);
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): the identity that the OpenGL back end asks for
+  const auto picture = reinterpret_cast<ImTextureID>(std::uintptr_t{texture});
+  ImGui::GetWindowDrawList()->AddImageRounded(picture, at, {at.x + width, at.y + height}, {0, 1},
+                                              {1, 0}, IM_COL32_WHITE, 6);
   ImGui::InvisibleButton("view", {width, height},
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
   const ImGuiIO& io = ImGui::GetIO();

@@ -52,7 +52,7 @@ DrawnMesh drawn(const std::vector<ObjectSpec>& objects) {
 
 DrawnMesh unit_cylinder() {
   DrawnMesh out;
-  out.reserve(6 * kSides);
+  out.reserve(std::size_t{6} * kSides);
   const glm::vec3 up(0, 0, 1);
   for (int i = 0; i < kSides; ++i) {
     const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
@@ -66,7 +66,7 @@ DrawnMesh unit_cylinder() {
 
 DrawnMesh unit_cone() {
   DrawnMesh out;
-  out.reserve(6 * kSides);
+  out.reserve(std::size_t{6} * kSides);
   const glm::vec3 apex(0, 0, 1), down(0, 0, -1);
   for (int i = 0; i < kSides; ++i) {
     const glm::vec3 a = on_rim(i), b = on_rim(i + 1);

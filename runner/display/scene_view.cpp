@@ -114,8 +114,9 @@ SceneView::Shape SceneView::upload(const DrawnMesh& mesh) {
   glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.size() * sizeof(DrawnCorner)),
                mesh.data(), GL_STATIC_DRAW);
   glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnCorner), nullptr);
-  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnCorner),
-                        reinterpret_cast<const void*>(offsetof(DrawnCorner, normal)));
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): an offset, as OpenGL asks for it
+  const void* const normals = reinterpret_cast<const void*>(offsetof(DrawnCorner, normal));
+  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnCorner), normals);
   glEnableVertexAttribArray(0);
   glEnableVertexAttribArray(1);
   glBindVertexArray(0);

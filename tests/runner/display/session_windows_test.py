@@ -70,6 +70,9 @@ class SessionTest(unittest.TestCase):
                 [PALPATE, "run", self.folder / "protocol.json", "--db", self.database,
                  "--participant", "P01", "--device", device],
                 env=self.screen.environment, stdout=messages, stderr=messages)
+        wait_for("the windows", lambda: self.program.poll() is not None or
+                 self.screen.do("search", "--onlyvisible", "--name", "^windows, P01$"))
+        self.assertIsNone(self.program.poll(), self.messages())
         self.participant = self.screen.window("windows, P01")
         self.console = self.screen.window("windows, P01 - console")
         wait_for("the instructions",
