@@ -1,6 +1,6 @@
 """palpate run from outside, on a terminal: a session, and what breaks one.
 
-Usage: run_test.py PALPATE
+Usage: run_test.py PALPATE FOLDER_OF_FAKE_LIBLSL
 """
 
 import contextlib
@@ -17,10 +17,11 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 from terminal import Terminal
 
-PALPATE = sys.argv.pop(1)
+PALPATE, FAKE_LSL = sys.argv.pop(1), sys.argv.pop(1)
 
 PROTOCOL = {
     "version": 1, "name": "two", "renderers": ["ray"], "seed": 7,
@@ -429,6 +430,24 @@ class Marks(Live):
         for line in lines:
             self.assertGreaterEqual(line["sent_ns"], line["time_ns"])
         self.assertIn("markers were not taken", terminal.text)
+
+    def test_lab_streaming_layer(self):
+        said = self.dir / "lsl.txt"
+        here = {"LD_LIBRARY_PATH": FAKE_LSL, "PALPATE_FAKE_LSL": str(said)}
+        with unittest.mock.patch.dict(os.environ, here):
+            terminal = self.begin("--markers", "lsl:touch", repetitions=1, blocks_per_renderer=1)
+        terminal.type("1")
+        self.finish(terminal)
+        stream, *samples, outlet, info = said.read_text().splitlines()
+        self.assertEqual(stream, "stream touch Markers 1 0 3 palpate-touch")
+        self.assertEqual((outlet, info), ("outlet gone", "info gone"))
+        kinds = []
+        for sample in samples:
+            at, text = sample.split(" ", 1)
+            marker = json.loads(text)
+            kinds.append(marker["marker"])
+            self.assertAlmostEqual(float(at), marker["time_ns"] / 1e9, delta=0.05)
+        self.assertEqual([kind for kind in kinds if kind != "first_contact"], ["trial_start", "response"] * 2)
 
     def test_what_cannot_be_opened_is_said_before_anything_else(self):
         for where in ("serial:/dev/null", "serial:" + str(self.dir / "none"), "udp:no.such.host.invalid:9"):

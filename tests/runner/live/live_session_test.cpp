@@ -1,0 +1,233 @@
+// A live session in this process: a device that fails, a person who is a script, a console
+// likewise.
+
+#include "runner/live_session.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+
+#include "protocols/parse.h"
+#include "runner/realtime.h"
+#include "tests/runner/fake_device.h"
+
+namespace palpate {
+namespace {
+
+using testing::FakeDevice;
+
+// 100 Hz: on a busy machine no five ticks are missed in a row.
+constexpr const char* kProtocol = R"({"version": 1, "name": "live", "renderers": ["point"],
+  "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+              {"name": "box", "shape": "cube", "edge_m": 0.03}],
+  "repetitions": 1, "servo": {"rate_hz": 100}, "home": {"rest_s": 0.05},
+  "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 30}})";
+
+/// Answers "1" as soon as a trial may be answered, again and again.
+class Screen final : public ParticipantScreen {
+ public:
+  explicit Screen(Clock& clock) : clock_(clock) {}
+  void show(const Page& page) override { kind = page.kind; }
+  std::vector<KeyPress> keys() override {
+    if (kind == Page::Kind::neutral && answers) return {{"1", clock_.now_ns()}};
+    return {};
+  }
+  bool open() const override { return is_open; }
+  Page::Kind kind = Page::Kind::message;
+  std::atomic<bool> answers{true};
+  bool is_open = true;
+
+ private:
+  Clock& clock_;
+};
+
+/// Clears every fault and goes on.
+class Console final : public ExperimenterConsole {
+ public:
+  explicit Console(Clock& clock) : clock_(clock) {}
+  void show(const ConsoleState& state) override { last = state; }
+  std::vector<ConsoleCommand> commands() override {
+    std::vector<ConsoleCommand> out = std::exchange(next, {});
+    if (last.state == "fault") {
+      ++faults;
+      if (repair) repair();
+      out.push_back({ConsoleCommand::Kind::clear_fault, "", clock_.now_ns()});
+      out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+    }
+    return out;
+  }
+  ConsoleState last;
+  std::vector<ConsoleCommand> next;
+  std::function<void()> repair;
+  int faults = 0;
+
+ private:
+  Clock& clock_;
+};
+
+class Collected final : public MarkerSink {
+ public:
+  explicit Collected(std::vector<Marker>& to) : to_(to) {}
+  bool send(const Marker& marker) noexcept override {
+    to_.push_back(marker);
+    return true;
+  }
+
+ private:
+  std::vector<Marker>& to_;
+};
+
+class LiveSessions : public ::testing::Test {
+ protected:
+  LiveSessions() {
+    std::string pattern = ::testing::TempDir() + "live-XXXXXX";
+    folder_ = mkdtemp(pattern.data());
+    store_.emplace(Store::open(folder_ / "live.db", Store::Mode::write_or_create));
+    participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P01");
+  }
+  ~LiveSessions() override {
+    store_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  LiveSession::Outcome run(Device& device, AnswerBy by = AnswerBy::keys) {
+    ServoSettings settings;
+    settings.rate = protocol_.servo_rate;
+    settings.realtime.lock_memory = false;
+    ServoThread servo(device, clock_, settings);
+    RunInfo info;
+    info.program_version = "0.0.0";
+    info.device = "fake";
+    SessionPlan plan(protocol_, participant_.number, 1);
+    for (const TrialRecord& r : store_->progress(participant_, 1).completed)
+      plan.answered(r.correct);
+    std::vector<std::unique_ptr<MarkerSink>> sinks;
+    sinks.push_back(std::make_unique<Collected>(markers_));
+    Markers markers(std::move(sinks));
+    LiveSession session({protocol_, library_, servo, nullptr, clock_, *store_, screen_, console_,
+                         markers, by, [this] { return signal_; }},
+                        participant_, store_->begin_run(participant_, info), {0, 0}, plan);
+    return session.run();
+  }
+
+  std::vector<TrialRecord> records() { return store_->progress(participant_, 1).completed; }
+  std::vector<std::string> cut_off_reasons() {
+    std::vector<std::string> out;
+    store_->for_each_cut_off([&](const StoredTrial& t) { out.push_back(t.cut_off_reason); });
+    return out;
+  }
+
+  Protocol protocol_ = parse_protocol_text(kProtocol, "live.json");
+  StimulusLibrary library_{protocol_};
+  RealClock clock_;
+  Screen screen_{clock_};
+  Console console_{clock_};
+  std::vector<Marker> markers_;
+  int signal_ = 0;
+  std::filesystem::path folder_;
+  std::optional<Store> store_;
+  Participant participant_;
+};
+
+DeviceReading at(double x, bool lost = false, std::uint8_t buttons = 0) {
+  DeviceReading reading{{{x, 0, 0}, {x, 0, 0.12}}, buttons, lost};
+  if (lost) reading.trouble = DeviceTrouble::unplugged;
+  return reading;
+}
+
+TEST_F(LiveSessions, ALostDeviceCutsTheTrialOffAndItIsShownAgainOnceCleared) {
+  std::atomic<bool> plugged{true};
+  FakeDevice device([&](int tick) {
+    if (tick == 30) plugged = false;  // in the first trial
+    return at(0.1, !plugged);
+  });
+  screen_.answers = false;
+  console_.repair = [&] { plugged = screen_.answers = true; };
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.recorded, 2u);
+  EXPECT_GE(console_.faults, 1);
+  ASSERT_GE(cut_off_reasons().size(), 1u);
+  EXPECT_NE(cut_off_reasons()[0].find("the device is unplugged"), std::string::npos);
+  ASSERT_EQ(records().size(), 2u);
+  EXPECT_GE(records()[0].attempt, 2);
+  EXPECT_EQ(device.force, Vec3(0));
+}
+
+TEST_F(LiveSessions, FirstContactIsMarkedAndAnAnswerBeforeItHasNone) {
+  screen_.answers = false;
+  FakeDevice device([&](int tick) {
+    if (tick == 60) screen_.answers = true;
+    return at(tick < 30 || tick > 64 ? 0.1 : 0.019);
+  });
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  const std::vector<TrialRecord> both = records();
+  ASSERT_EQ(both.size(), 2u);
+  ASSERT_TRUE(both[0].first_contact_time.has_value());
+  EXPECT_LT(*both[0].first_contact_time, both[0].response_time);
+  EXPECT_FALSE(both[1].first_contact_time.has_value());
+  EXPECT_EQ(both[1].response, "ball");
+  std::string kinds;
+  for (const Marker& marker : markers_) kinds += std::string(to_string(marker.kind)) + " ";
+  EXPECT_EQ(kinds, "trial_start first_contact response trial_start response ");
+  EXPECT_EQ(markers_[1].time_ns - markers_[0].time_ns,
+            std::llround(*both[0].first_contact_time * 1e9));
+}
+
+TEST_F(LiveSessions, ButtonsAnswerAtTheirTickAndOneHeldFromBeforeDoesNot) {
+  FakeDevice device([](int tick) {  // button 1 is stuck, button 2 is pressed every 40 ticks
+    return at(0.1, false, static_cast<std::uint8_t>(1 + (tick % 40 > 35 ? 2 : 0)));
+  });
+  screen_.answers = false;
+  EXPECT_EQ(run(device, AnswerBy::buttons).end, RunEnd::done);
+  ASSERT_EQ(records().size(), 2u);
+  for (const TrialRecord& record : records()) EXPECT_EQ(record.response, "box");
+}
+
+TEST_F(LiveSessions, AClosedScreenASignalAndAQuitEndItResumably) {
+  FakeDevice device([](int) { return at(0.1); });
+  screen_.answers = screen_.is_open = false;
+  LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_TRUE(outcome.failed);
+  screen_.is_open = true;
+  signal_ = 15;
+  outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_TRUE(outcome.failed);
+  signal_ = 0;
+  console_.next = {{ConsoleCommand::Kind::quit, "tired", 0}};
+  outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_FALSE(outcome.failed);
+  EXPECT_EQ(outcome.reason, "ended by the experimenter: tired");
+  screen_.answers = true;
+  outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.recorded, 2u);
+}
+
+TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
+  protocol_.sessions.max_minutes = 1e-6;
+  FakeDevice device([](int) { return at(0.1); });
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::paused);
+  EXPECT_LT(outcome.recorded, 2u);
+}
+
+TEST_F(LiveSessions, MarkersThatNobodyTakesAreCountedAndHoldNobodyUp) {
+  struct Never final : MarkerSink {
+    bool send(const Marker&) noexcept override { return false; }
+  };
+  std::vector<std::unique_ptr<MarkerSink>> sinks;
+  sinks.push_back(std::make_unique<Never>());
+  std::optional<Markers> markers(std::in_place, std::move(sinks));
+  for (int i = 0; i < 10; ++i) markers->send({});
+  while (markers->dropped() < 10) clock_.wait_until(clock_.now_ns() + 1'000'000);
+  EXPECT_EQ(markers->dropped(), 10u);
+}
+
+}  // namespace
+}  // namespace palpate
