@@ -25,7 +25,7 @@ using testing::Emulator;
 
 constexpr std::int64_t kLimitNs = 20'000'000;
 // The machine that runs the tests may itself keep the guard from running now and then.
-constexpr int kAttempts = 5;
+constexpr int kAttempts = 10;
 
 /// Pushes with 1.5 N until it is ended.
 int be_runner() {
