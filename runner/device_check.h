@@ -27,7 +27,8 @@ struct ShowableMaterial {
 ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
                           double scale, bool passivity_controller);
 
-/// `palpate stability` measures more than this on every scene.
+/// `palpate stability` measures far more than this on every scene, as long as a force is written in
+/// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).
 inline constexpr double kPassivityExtension = 2;
 
 /// Where the protocol asks for limits (servo.material_limit), scales down what the device cannot
