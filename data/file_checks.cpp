@@ -22,6 +22,14 @@ void quick_check(SQLite::Database& db, const std::string& path) {
   if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
     throw StoreRefused(path + ": is damaged: rows refer to others that are gone; restore a backup");
   }
+  if (!db.tableExists("attempts") || !db.tableExists("runs")) return;
+  SQLite::Statement strays(db,
+                           "SELECT 1 FROM attempts a JOIN runs r ON r.id = a.run_id WHERE "
+                           "r.session_id <> a.session_id LIMIT 1");
+  if (strays.executeStep()) {
+    throw StoreRefused(path +
+                       ": is damaged: an attempt is of a run of another session; restore a backup");
+  }
 }
 
 std::string immutable_uri(const std::string& file) {

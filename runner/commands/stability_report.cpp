@@ -107,21 +107,24 @@ void put_wrapped(std::ostream& out, const std::string& text) {
   }
 }
 
-const std::vector<std::string>& how_to_read() {
-  static const std::vector<std::string> kNotes = {
+std::vector<std::string> how_to_read() {
+  std::vector<std::string> notes;
+  notes.emplace_back(
       "Each end of the stylus is a mass that moves along the direction of pressing, with the "
       "device's damping and friction and the hand's impedance; exactly (matrix exponential) under "
       "a force that is held over the tick. The renderers are the program's own. It is let go 0.1 "
       "mm off its rest, 1 mm deep; it is unstable when what the springs feel swings wider in the "
       "last quarter of 40 periods than in the second (and wider than three counts of the "
-      "resolution).",
+      "resolution).");
+  notes.emplace_back(
       "Theory: b > K (T/2 + t_d) + |B| (Colgate & Schenkel 1997; t_d: delay), as long as friction "
       "holds each count of the resolution, K <= 2 f_c / Delta (Abbott & Okamura 2005). It bounds "
       "passivity: below it no hand, however it holds on, can make the loop buzz. A given loop may "
-      "be stable far beyond.",
+      "be stable far beyond.");
+  notes.emplace_back(
       "Where two objects are touched, or the side of the stylus, the theory is that of one contact "
-      "at one end: the ends share the load."};
-  return kNotes;
+      "at one end: the ends share the load.");
+  return notes;
 }
 
 Json loop_json(const LoopCase& loop) {

@@ -15,8 +15,9 @@ KeyboardRespondent::KeyboardRespondent(const Protocol& protocol, ParticipantScre
                                        Attendant& attendant, Clock& clock, AnswerBy by)
     : protocol_(protocol), screen_(screen), attendant_(attendant), clock_(clock), by_(by) {
   for (const auto& [key, name] : protocol.response.keys) {
-    const auto stimulus = std::find_if(protocol.stimuli.begin(), protocol.stimuli.end(),
-                                       [&name](const StimulusSpec& s) { return s.name == name; });
+    const auto stimulus =
+        std::find_if(protocol.stimuli.begin(), protocol.stimuli.end(),
+                     [&wanted = name](const StimulusSpec& s) { return s.name == wanted; });
     stimuli_.push_back(static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
     keys_.emplace_back(by == AnswerBy::keys ? key : "button " + std::to_string(keys_.size() + 1),
                        name);

@@ -140,8 +140,9 @@ TEST(ContinuityOfTorque, ThroughSegmentFaceOnEachSideOfEpsilon) {
   struct Stick {
     double start, length;  // m
   };
-  for (const auto [start, length] : {Stick{-0.06, 0.12}, Stick{-0.01, 0.12}, Stick{-0.1, 0.12},
-                                     Stick{-0.02, 0.12}, Stick{-0.01, 0.03}, Stick{-0.04, 0.03}}) {
+  for (const Stick stick : {Stick{-0.06, 0.12}, Stick{-0.01, 0.12}, Stick{-0.1, 0.12},
+                            Stick{-0.02, 0.12}, Stick{-0.01, 0.03}, Stick{-0.04, 0.03}}) {
+    const double start = stick.start, length = stick.length;
     for (const double direction : {1.0, -1.0}) {
       Bench bench(ray_renderer(), std::make_shared<const ConvexMesh>(cube(2 * kHalf)));
       const auto probe_at = [&](double theta) {

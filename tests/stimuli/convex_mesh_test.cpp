@@ -201,9 +201,11 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
 TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
   Random random(10);
   for (int i = 0; i < 300; ++i) {
-    const Vec3 axes(1, 0.03 + 0.97 * random.unit(), 0.03 + 0.97 * random.unit());
-    PolygonSoup soup = placed(cut(testing::random_polyhedron(random, 5 + i % 30, axes), i % 4),
-                              uniform_rotation(random), 0.06, Vec3(0.1));
+    // One after the other: compilers differ in the order of arguments.
+    const double thin = 0.03 + 0.97 * random.unit(), flat = 0.03 + 0.97 * random.unit();
+    const Quat turn = uniform_rotation(random);
+    const PolygonSoup hull = testing::random_polyhedron(random, 5 + i % 30, Vec3(1, flat, thin));
+    PolygonSoup soup = placed(cut(hull, i % 4), turn, 0.06, Vec3(0.1));
     for (Vec3& vertex : soup.vertices) vertex = testing::single_precision(vertex);
     soup.coordinate_error = 0.2 * 0x1p-24;
     const ConvexMesh mesh(soup);
