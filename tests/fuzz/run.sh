@@ -8,8 +8,8 @@ shift || true
 targets=("$@")
 [ ${#targets[@]} -gt 0 ] || targets=(protocol scene csv obj stl packets)
 
-cmake --preset fuzz > /dev/null
-cmake --build --preset fuzz --target "${targets[@]/#/fuzz_}"
+cmake --preset asan > /dev/null
+cmake --build --preset asan --target "${targets[@]/#/fuzz_}"
 [ ! -w /dev/shm ] || export TMPDIR=/dev/shm  # targets that read files write them first
 found="$PWD/.build/fuzz/found"
 mkdir -p "$found"
@@ -17,12 +17,12 @@ run() {
   local target="$1" corpora=("tests/fuzz/corpus/$1")
   [ "$target" != protocol ] || corpora+=(tests/protocols/good tests/protocols/bad)
   mkdir -p ".build/fuzz/corpus/$target"
-  ".build/fuzz/tests/fuzz/fuzz_$target" ".build/fuzz/corpus/$target" "${corpora[@]}" -max_total_time="$seconds" \
+  ".build/asan/tests/fuzz/fuzz_$target" ".build/fuzz/corpus/$target" "${corpora[@]}" -max_total_time="$seconds" \
     -max_len=4096 -timeout=20 -rss_limit_mb=2048 -print_final_stats=1 -artifact_prefix="$found/$target-" \
     > ".build/fuzz/$target.log" 2>&1 ||
     { tail -n 40 ".build/fuzz/$target.log"; echo "fuzz $target: an input fails, see $found" >&2; return 1; }
   echo "$target: $(grep -E 'number_of_executed_units' ".build/fuzz/$target.log" | tr -s ' ' | cut -d' ' -f2) inputs, none fails"
 }
-failed=0
-for target in "${targets[@]}"; do run "$target" || failed=1; done
-exit "$failed"
+export -f run
+export seconds found
+printf '%s\n' "${targets[@]}" | xargs -P "$(nproc)" -I{} bash -c 'run {}'
