@@ -5,4 +5,7 @@ cd "$(dirname "$0")/.."
 runner/install_packages.sh tests
 cmake --preset release -DPALPATE_TESTS=ON > /dev/null
 cmake --build --preset release
-ctest --preset release -j "$(nproc)"
+# What waits for the machine's clock (a guard process that must act within 20 ms, windows, live sessions)
+# runs alone and last, and may try three times: a shared machine that stood still has shown nothing.
+ctest --preset release -j "$(nproc)" -LE '^clock$'
+ctest --preset release -L '^clock$' --repeat until-pass:3

@@ -67,9 +67,10 @@ std::string stability_figure(const StabilityReport& report) {
       "triangle at the bottom: stable without any damping.",
       {13, kSoft, Svg::Anchor::start, false, 0});
   for (std::size_t i = 0; i < panels.size(); ++i) {
+    const std::size_t row = i / kColumns, column = i % kColumns;
     LogPanel panel;
-    panel.left = kLeft + static_cast<double>(i % kColumns) * (kPanel + kGap);
-    panel.top = kTop + static_cast<double>(i / kColumns) * (kHeight + kBetween);
+    panel.left = kLeft + static_cast<double>(column) * (kPanel + kGap);
+    panel.top = kTop + static_cast<double>(row) * (kHeight + kBetween);
     panel.width = kPanel;
     panel.height = kHeight;
     panel.x_low = 10;

@@ -89,7 +89,7 @@ class Procedure {
     guide_.say("  measuring; do not touch it");
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
       const long interrupted = interrupted_, saturated = holder_->saturated();
-      const Weighing weighing{weight, mean_force(settings)};
+      Weighing weighing{weight, mean_force(settings)};
       if (holder_->saturated() > saturated) {
         throw GuideError("the motors were at their limit: take lighter weights");
       }

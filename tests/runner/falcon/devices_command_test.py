@@ -40,7 +40,7 @@ class Bench:
         path.unlink(missing_ok=True)
         self.tell(f"state {path}")
         self.wait_until(lambda: path.exists() or self.process.poll() is not None)
-        return json.loads(path.read_text())
+        return json.loads(path.read_text()) if path.exists() else None
 
     @staticmethod
     def wait_until(done):
@@ -166,8 +166,7 @@ class Devices(unittest.TestCase):
                 else:
                     bench.process.stdin.close()
                     bench.process.stdin = None
-                bench.wait_until(lambda: bench.process.poll() is not None or
-                                 bench.state()[0]["torque_is_zero"])
+                bench.wait_until(lambda: (state := bench.state()) is None or state[0]["torque_is_zero"])
                 status, _, messages = bench.finish()
                 self.assertEqual(status, 1, messages)
                 self.assertIn("nothing was stored", messages)
