@@ -1,6 +1,7 @@
 #include "runner/preflight.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace palpate {
 namespace {
@@ -8,9 +9,7 @@ namespace {
 constexpr int kHomedLongEnough = 20;  // samples in a row
 constexpr const char* kSides[] = {"left", "right", "down", "up", "away from you", "towards you"};
 
-std::string millimetres(double metres) {
-  return std::to_string(static_cast<int>(metres * 1e3 + 0.5)) + " mm";
-}
+std::string millimetres(double metres) { return std::to_string(std::lround(metres * 1e3)) + " mm"; }
 
 }  // namespace
 
