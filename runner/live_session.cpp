@@ -62,8 +62,7 @@ LiveSession::Outcome LiveSession::run() {
   outcome.trials = session_.plan().size();
   const std::int64_t now = parts_.clock.now_ns();
   if (!outcome.reason.empty()) parts_.store.add_note(run_, now, "ended: " + outcome.reason);
-  parts_.store.add_note(run_, now,
-                        to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
+  parts_.store.add_note(run_, now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
   parts_.store.end_run(run_, outcome.end, now);
   if (outcome.end != RunEnd::done) respondent_.show_message(parts_.protocol.texts.end);
   return outcome;
