@@ -18,13 +18,14 @@ struct RealtimeWish {
   int priority = 80;        ///< of SCHED_FIFO, 1 to 99; 0: leave the ordinary scheduler
   bool lock_memory = true;  ///< no page of this program is swapped out or fetched late
   int core = -1;            ///< run on this processor alone; -1: any
+  bool awake = true;        ///< idle processors wake at once (AwakeProcessors)
 };
 
 /// What was granted.
 struct RealtimeRights {
   bool fifo = false, locked_memory = false;
   int core = -1;
-  bool awake = false;   ///< idle processors wake at once (AwakeProcessors)
+  bool awake = false;
   std::string missing;  ///< what was asked for and not granted, and what that costs; empty: nothing
 };
 

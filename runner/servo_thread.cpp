@@ -20,7 +20,7 @@ constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as
 ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& settings)
     : wish_(settings.realtime),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
-      awake_(settings.realtime.priority > 0),
+      awake_(settings.realtime.awake),
       ring_(settings.ring) {
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;

@@ -153,7 +153,9 @@ int timing(const po::variables_map& values, const DeviceOrder& order, Json& repo
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
   if (settings.realtime.core < -1 || settings.realtime.core >= cores)
     throw UsageError("--core: this machine has the processors 0 to " + std::to_string(cores - 1));
-  if (values.count("no-realtime") > 0) settings.realtime = {0, false, settings.realtime.core};
+  if (values.count("no-fifo") > 0) settings.realtime.priority = 0;
+  if (values.count("no-realtime") > 0)
+    settings.realtime = {0, false, settings.realtime.core, false};
   if (isatty(STDERR_FILENO) != 0)
     std::fprintf(stderr, "Measuring for %g s ...\n", settings.seconds);
   const ServoTiming result = measure_servo(settings);
@@ -199,7 +201,8 @@ int devices_command(const std::vector<std::string>& args) {
       ("timing", "measure this machine; exit status 1 when it is not fit")                       //
       ("seconds", po::value<double>()->default_value(10)->value_name("S"), "--timing: so long")  //
       ("guarded", "--timing: with the device in a guard process, as a Falcon is")                //
-      ("no-realtime", "--timing: without real-time priority and locked memory")                  //
+      ("no-fifo", "--timing: without real-time priority")                                        //
+      ("no-realtime", "--timing: with no right that an ordinary program has not")                //
       ("core", po::value<int>()->default_value(-1)->value_name("N"),
        "--timing: on this processor alone")            //
       ("calibrate", "guided calibration of a device")  //

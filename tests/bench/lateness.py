@@ -1,13 +1,17 @@
 """How late this program's servo is against cyclictest (Debian: rt-tests), in alternating runs.
 
-Usage: lateness.py PALPATE [--pairs 10] [--seconds 60] [--load idle,hog] [--rights fifo,none] [--json FILE]
+Usage: lateness.py PALPATE [--condition fifo-idle,other-idle,fifo-hog,other-hog] [--pairs 10] [--seconds 60]
+                   [--json FILE]
 
-Lateness above 2000 us counts as 2000 us on both sides, since cyclictest keeps no more.
-Both sleep by absolute time at 1 kHz and ask when they woke. cyclictest runs as
-`cyclictest -m -p 80 -i 1000 -h 2000` (without SCHED_FIFO: `--policy other`); what it counts above
-2000 us is in its overflow list. The ratio of medians over the runs has an interval by bootstrap
-over pairs of runs (percentiles 2.5 and 97.5 of 10,000 draws). Two processes that do nothing but
-count are the hog: one for each processor.
+Both sleep by absolute time at 1 kHz and ask when they woke, with locked memory and idle processors
+kept awake (/dev/cpu_dma_latency, where the system lets them). fifo: cyclictest runs as
+`cyclictest -m -p 80 -i 1000 -h 2000`, this program with the same priority. other: both on the
+ordinary scheduler (`--policy other`; `--no-fifo`). hog: one process for each processor that does
+nothing but count; idle: nothing else of ours runs. Which of the two goes first alternates.
+Lateness above 2000 us counts as 2000 us on both sides, since cyclictest keeps no more; how many
+there were is in its overflow list. The ratio of medians over the runs has an interval by bootstrap
+over pairs of runs (percentiles 2.5 and 97.5 of 10,000 draws). FILE is written after every run, with
+what the host took of the machine meanwhile ("steal", of all processor time).
 """
 
 import argparse
@@ -20,9 +24,11 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import time
 
 PERIOD_US = 1000
 LONGEST_US = 2000  # that cyclictest counts one by one
+CONDITIONS = ("fifo-idle", "other-idle", "fifo-hog", "other-hog")
 FIGURES = ("p99", "p99.9", "share_above_one_period")
 
 
@@ -55,7 +61,7 @@ def servo(palpate, seconds, fifo):
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "timing.json"
         command = [palpate, "devices", "--timing", "--seconds", str(seconds), "--json", str(out)]
-        done = subprocess.run(command + ([] if fifo else ["--no-realtime"]), capture_output=True, text=True)
+        done = subprocess.run(command + ([] if fifo else ["--no-fifo"]), capture_output=True, text=True)
         if done.returncode not in (0, 1):  # 1: not fit
             sys.exit(f"{' '.join(command)}: {done.stderr}")
         timing = json.loads(out.read_text())["timing"]
@@ -91,48 +97,85 @@ def hogs():
     return [subprocess.Popen([sys.executable, "-c", loop]) for _ in range(os.cpu_count() or 1)]
 
 
+def processor_time():
+    """All of it, and what the host took, in clock ticks since the machine began."""
+    times = [int(word) for word in pathlib.Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
+    return sum(times), times[7]
+
+
+def one_run(name, palpate, seconds, fifo):
+    load, before = os.getloadavg()[0], processor_time()
+    began = time.time()
+    run = servo(palpate, seconds, fifo) if name == "palpate" else cyclictest(seconds, fifo)
+    after = processor_time()
+    run["began"] = time.strftime("%H:%M:%S", time.gmtime(began))
+    run["load_before"] = load
+    run["steal"] = (after[1] - before[1]) / max(1, after[0] - before[0])
+    return run
+
+
+def measure(condition, args, keep):
+    """Calls `keep` with the condition's row, as far as it is known, after each run."""
+    rights, load = condition.split("-")
+    row = {"condition": condition, "pairs": args.pairs, "seconds": args.seconds,
+           "runs": {"palpate": [], "cyclictest": []}, "ratios": {}}
+    loaded = hogs() if load == "hog" else []
+    try:
+        for pair in range(args.pairs):
+            for name in ("palpate", "cyclictest") if pair % 2 == 0 else ("cyclictest", "palpate"):
+                run = one_run(name, args.palpate, args.seconds, rights == "fifo")
+                row["runs"][name].append(run)
+                print(f"{run['began']} {condition}, pair {pair + 1} of {args.pairs}, {name:10} "
+                      + "  ".join(f"{figure} {run[figure]:.4g}" for figure in FIGURES)
+                      + f"  steal {run['steal']:.2g}", file=sys.stderr, flush=True)
+                keep(row)
+    finally:
+        for process in loaded:
+            process.kill()
+            process.wait()
+    for figure in FIGURES:
+        ratio, low, high = ratio_of_medians(*([run[figure] for run in row["runs"][name]]
+                                              for name in ("palpate", "cyclictest")))
+        row["ratios"][figure] = {"ratio": ratio, "low": low, "high": high}
+    keep(row)
+    return row
+
+
+def report(row):
+    runs = row["runs"]
+    print(f"{row['condition']}: {row['pairs']} pairs of {row['seconds']} s")
+    for figure in FIGURES:
+        ours, theirs = (statistics.median(run[figure] for run in runs[name]) for name in ("palpate", "cyclictest"))
+        ratio, low, high = row["ratios"][figure].values()
+        said = "undefined (zero in too many runs)" if ratio is None else f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
+        print(f"  {figure:24} palpate {ours:.6g}  cyclictest {theirs:.6g}  ratio of medians {said}")
+    by_clock, compute = (statistics.median(run[name] for run in runs["palpate"])
+                         for name in ("compute_p99.9_us", "compute_cpu_p99.9_us"))
+    print(f"  compute p99.9, median of runs: {by_clock:.2f} us by the clock, {compute:.2f} us of the thread's own time",
+          flush=True)
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("palpate")
+    options.add_argument("--condition", default=",".join(CONDITIONS))
     options.add_argument("--pairs", type=int, default=10)
     options.add_argument("--seconds", type=int, default=60)
-    options.add_argument("--load", default="idle,hog")
-    options.add_argument("--rights", default="fifo,none")
     options.add_argument("--json")
     args = options.parse_args()
-    report = []
-    for load in args.load.split(","):
-        for rights in args.rights.split(","):
-            loaded = hogs() if load == "hog" else []
-            runs = {"palpate": [], "cyclictest": []}
-            try:
-                for pair in range(args.pairs):
-                    order = ["palpate", "cyclictest"] if pair % 2 == 0 else ["cyclictest", "palpate"]
-                    for name in order:
-                        fifo = rights == "fifo"
-                        runs[name].append(
-                            servo(args.palpate, args.seconds, fifo) if name == "palpate" else cyclictest(args.seconds, fifo))
-            finally:
-                for process in loaded:
-                    process.kill()
-                    process.wait()
-            print(f"{load}, {'SCHED_FIFO 80' if rights == 'fifo' else 'ordinary scheduler'}, "
-                  f"{args.pairs} pairs of {args.seconds} s")
-            row = {"load": load, "rights": rights, "runs": runs, "ratios": {}}
-            for figure in FIGURES:
-                ours, theirs = ([run[figure] for run in runs[name]] for name in ("palpate", "cyclictest"))
-                ratio, low, high = ratio_of_medians(ours, theirs)
-                row["ratios"][figure] = {"ratio": ratio, "low": low, "high": high}
-                said = "undefined (zero in too many runs)" if ratio is None else f"{ratio:.2f} [{low:.2f}, {high:.2f}]"
-                print(f"  {figure:24} palpate {statistics.median(ours):.6g}  cyclictest {statistics.median(theirs):.6g}"
-                      f"  ratio of medians {said}")
-            compute = [run["compute_cpu_p99.9_us"] for run in runs["palpate"]]
-            by_clock = [run["compute_p99.9_us"] for run in runs["palpate"]]
-            print(f"  compute p99.9, median of runs: {statistics.median(by_clock):.2f} us by the clock, "
-                  f"{statistics.median(compute):.2f} us of the thread's own time", flush=True)
-            report.append(row)
-    if args.json:
-        pathlib.Path(args.json).write_text(json.dumps(report, indent=2) + "\n")
+    conditions = args.condition.split(",")
+    if not set(conditions) <= set(CONDITIONS):
+        sys.exit(f"--condition: some of {', '.join(CONDITIONS)} were expected")
+    rows = []
+
+    def keep(row):
+        if args.json:
+            pathlib.Path(args.json).write_text(json.dumps(rows + [row], indent=2) + "\n")
+
+    for condition in conditions:
+        row = measure(condition, args, keep)
+        rows.append(row)
+        report(row)
 
 
 if __name__ == "__main__":
