@@ -69,6 +69,7 @@ struct TrialName {
 struct StoredNote {
   Participant participant;
   int session = 1;
+  ClockStamp run_clock;  ///< of the run that it belongs to
   std::string utc, text;
 };
 

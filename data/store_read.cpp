@@ -261,6 +261,7 @@ std::vector<StoredNote> Store::notes() {
       row >> note.participant >> note.session >> note.text >> at_ns >> clock.utc_ns >>
           clock.monotonic_ns;
       note.utc = format_utc(to_unix_ns(clock, at_ns));
+      note.run_clock = clock;
     }
     return all;
   });
