@@ -32,7 +32,8 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
 /// (DeviceTrouble::late); a guard that has ended is a lost device.
 class GuardedDevice final : public Device {
  public:
-  /// Forks: call it before there are other threads. `factory` runs in the guard.
+  /// Forks: call it before there are other threads. `factory` runs in the guard. Returns once the
+  /// device has been read for the first time, whatever that reading says.
   /// \throws std::runtime_error with what the factory threw, or why there is no guard
   GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings);
   /// Zero force; the device is closed and the guard ends.

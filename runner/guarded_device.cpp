@@ -66,6 +66,13 @@ GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& 
     throw std::runtime_error(channel_->message.data());
   }
   capabilities_ = channel_->capabilities.numbers();
+  // From here on a reading that is late has one before it to stand for it.
+  for (read(); unanswered_ > 0; read()) {
+    if (!ended() && std::chrono::steady_clock::now() < give_up) continue;
+    kill(guard_, SIGKILL);
+    end();
+    throw std::runtime_error("the guard process gave no reading of the device");
+  }
 }
 
 GuardedDevice::~GuardedDevice() { end(); }

@@ -1,13 +1,16 @@
 #include "runner/realtime.h"
 
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -15,17 +18,26 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
 
 void add(std::string& list, const std::string& sentence) {
   list += (list.empty() ? "" : " ") + sentence;
 }
 
-/// Locks what there is; what will be asked for later only where no limit can make that fail.
+bool may_lock_any_memory() {
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> sets{};
+  return syscall(SYS_capget, &header, sets.data()) == 0 &&
+         (sets[CAP_TO_INDEX(CAP_IPC_LOCK)].effective & CAP_TO_MASK(CAP_IPC_LOCK)) != 0;
+}
+
+/// Locks what there is, and what comes later as it is touched where no limit can make that fail.
 bool lock_memory() {
+  if (mlockall(MCL_CURRENT) != 0) return false;
   rlimit limit{};
   const bool unlimited = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
-  return mlockall(unlimited ? MCL_CURRENT | MCL_FUTURE : MCL_CURRENT) == 0;
+  if (unlimited || may_lock_any_memory()) mlockall(MCL_FUTURE | MCL_ONFAULT);
+  return true;
 }
 
 }  // namespace
@@ -33,11 +45,11 @@ bool lock_memory() {
 std::int64_t RealClock::now_ns() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kSecond_ns + now.tv_nsec;
+  return now.tv_sec * kOneSecond_ns + now.tv_nsec;
 }
 
 void RealClock::wait_until(std::int64_t when_ns) noexcept {
-  const timespec when{when_ns / kSecond_ns, when_ns % kSecond_ns};
+  const timespec when{when_ns / kOneSecond_ns, when_ns % kOneSecond_ns};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR) {
   }
 }

@@ -36,6 +36,12 @@ void Servo::prepare(const Scene& scene, const Renderer& renderer, const HomeZone
   sample_.time_ns = 0;  // the first period is the nominal one
 }
 
+void Servo::start() noexcept {
+  const std::int64_t now = clock_.now_ns();
+  due_ns_ = now - now % period_ns_ + period_ns_ / 2;
+  if (due_ns_ < now) due_ns_ += period_ns_;
+}
+
 void Servo::begin(Stage& stage) noexcept {
   stage_ = &stage;
   rested_ = 0;

@@ -62,8 +62,10 @@ class Servo final : public TickSource {
     passivity_.emplace(PassivitySettings{0.5 * kLightestEnd / period_}, period_);
   }
 
-  /// The next tick is due now.
-  void start() noexcept { due_ns_ = clock_.now_ns(); }
+  /// The next tick is due within a period, as all are half a period off the multiples of the
+  /// period: at some of these the kernel has a tick of its own (Linux 6.4 and later), and a servo's
+  /// tick that begins just before is interrupted for some 30 us, time and again.
+  void start() noexcept;
 
   double period() const { return period_; }  ///< s
   std::int64_t period_ns() const { return period_ns_; }

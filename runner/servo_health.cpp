@@ -65,10 +65,20 @@ std::vector<std::pair<std::int64_t, std::uint64_t>> TimeHistogram::steps() const
 void ServoHealth::add(const Sample& sample, std::int64_t period_ns) noexcept {
   lateness_.add(sample.lateness_ns);
   compute_.add(sample.compute_ns);
-  increase(missed_, static_cast<std::uint64_t>(sample.lateness_ns / period_ns));
+  if (counted_.ticks++ == 0) first_due_ns_ = sample.time_ns - sample.lateness_ns;
+  counted_.missed_ticks += static_cast<std::uint64_t>(sample.lateness_ns / period_ns);
+  counted_.elapsed_ns = sample.time_ns - first_due_ns_;
+  time_kept_.write(counted_);
   faults_.store(faults() | sample.faults, std::memory_order_relaxed);
   if (sample.period_ns > longest_period_ns())
     longest_period_.store(sample.period_ns, std::memory_order_relaxed);
+}
+
+TimeKept ServoHealth::time_kept() const noexcept {
+  TimeKept kept;
+  while (!time_kept_.read(kept)) {
+  }
+  return kept;
 }
 
 void ServoHealth::add_lost_sample() noexcept {
@@ -85,11 +95,13 @@ std::string to_json_text(const ServoHealth& health, double rate) {
                                   {"up_to_and_count", histogram.steps()}};
   };
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
+  const TimeKept kept = health.time_kept();
   const nlohmann::ordered_json json{
       {"servo",
        {{"rate_hz", rate},
-        {"ticks", health.ticks()},
-        {"missed_ticks", health.missed_ticks()},
+        {"ticks", kept.ticks},
+        {"missed_ticks", kept.missed_ticks},
+        {"elapsed_ns", kept.elapsed_ns},
         {"late_by_a_period_share", health.lateness().share_above(period_ns)},
         {"lost_samples", health.lost_samples()},
         {"faults", health.faults()},

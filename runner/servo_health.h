@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runner/sample.h"
+#include "runner/shared_value.h"
 
 namespace palpate {
 
@@ -37,6 +38,14 @@ class TimeHistogram {
   std::atomic<std::int64_t> longest_{0};
 };
 
+/// Ticks against the clock: elapsed_ns / period = ticks - 1 + missed_ticks, whole numbers all.
+struct TimeKept {
+  std::uint64_t ticks = 0;
+  std::uint64_t missed_ticks = 0;  ///< whole periods that passed without a tick
+  /// By the clock, from the time when the first tick was due to the start of the last one.
+  std::int64_t elapsed_ns = 0;
+};
+
 /// Of all ticks of a servo thread.
 class ServoHealth {
  public:
@@ -44,9 +53,10 @@ class ServoHealth {
   void add(const Sample& sample, std::int64_t period_ns) noexcept;
   void add_lost_sample() noexcept;
 
+  /// All three of the same moment.
+  TimeKept time_kept() const noexcept;
   std::uint64_t ticks() const noexcept { return lateness_.count(); }
-  /// Whole periods that passed without a tick.
-  std::uint64_t missed_ticks() const noexcept { return missed_.load(std::memory_order_relaxed); }
+  std::uint64_t missed_ticks() const noexcept { return time_kept().missed_ticks; }
   std::uint64_t lost_samples() const noexcept { return lost_.load(std::memory_order_relaxed); }
   std::uint32_t faults() const noexcept { return faults_.load(std::memory_order_relaxed); }
   std::int64_t longest_period_ns() const noexcept {
@@ -57,7 +67,10 @@ class ServoHealth {
 
  private:
   TimeHistogram lateness_, compute_;
-  std::atomic<std::uint64_t> missed_{0}, lost_{0};
+  TimeKept counted_;               ///< the servo's own
+  std::int64_t first_due_ns_ = 0;  ///< likewise
+  SharedValue<TimeKept> time_kept_;
+  std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::uint32_t> faults_{0};
   std::atomic<std::int64_t> longest_period_{0};
 };

@@ -76,6 +76,7 @@ class MeteredDevice final : public Device {
       : device_(device), skip_(skip) {
     compute_.reserve(ticks);
     tick_.reserve(ticks);
+    asking_.reserve(ticks);
   }
   const DeviceCapabilities& capabilities() const override { return device_.capabilities(); }
   DeviceReading read() noexcept override {
@@ -94,8 +95,12 @@ class MeteredDevice final : public Device {
       compute_.push_back(last_compute_);
     }
     device_.write(device1, device2);
+    const std::int64_t asked = thread_time_ns();
     written_ = thread_time_ns();
+    if (asking_.size() < asking_.capacity()) asking_.push_back(written_ - asked);
   }
+  /// Between two questions for the time with nothing between them.
+  const std::vector<std::int64_t>& asking() const { return asking_; }
   const std::vector<std::int64_t>& compute() const { return compute_; }
   /// From one command to the next reading and from that to its command.
   const std::vector<std::int64_t>& whole() const { return tick_; }
@@ -104,7 +109,7 @@ class MeteredDevice final : public Device {
   Device& device_;
   std::size_t skip_;
   std::int64_t read_ = 0, written_ = 0, last_compute_ = 0;
-  std::vector<std::int64_t> compute_, tick_;
+  std::vector<std::int64_t> compute_, tick_, asking_;
 };
 
 std::int64_t quantile(const std::vector<std::int64_t>& sorted, double p) {
@@ -194,6 +199,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
       out.lateness.end() - std::upper_bound(out.lateness.begin(), out.lateness.end(), period_ns);
   if (out.ticks > 0) out.late_share = static_cast<double>(late) / static_cast<double>(out.ticks);
   const auto compute = sorted(device.compute()), whole = sorted(device.whole());
+  out.asking_median = quantile(sorted(device.asking()), 0.5);
   by_clock = sorted(std::move(by_clock));
   out.clock_median = quantile(by_clock, 0.5);
   out.clock_p999 = quantile(by_clock, 0.999);

@@ -30,9 +30,11 @@ struct ServoTiming {
   /// By the clock, from the device's reading to the command: with what others took of it.
   std::int64_t clock_median = 0, clock_p999 = 0, clock_max = 0;
   /// Of the servo's thread itself: the same, and the whole tick but for the device's own transfer.
-  /// With what it costs to ask the system for that time, and interrupts that came meanwhile.
+  /// With what it costs to ask the system for that time (asking_median, once in each), and with
+  /// interrupts that came meanwhile.
   std::int64_t compute_median = 0, compute_p999 = 0, compute_max = 0;
   std::int64_t tick_median = 0, tick_p999 = 0, tick_max = 0;
+  std::int64_t asking_median = 0;
   std::vector<std::int64_t> lateness;  ///< of every tick, sorted
 
   enum class Verdict { fit, fit_with_losses, unfit };

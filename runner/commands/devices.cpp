@@ -116,6 +116,7 @@ Json to_json(const ServoTiming& t) {
       {"compute_ns", {{"median", t.clock_median}, {"p99.9", t.clock_p999}, {"max", t.clock_max}}},
       {"compute_cpu_ns",
        {{"median", t.compute_median}, {"p99.9", t.compute_p999}, {"max", t.compute_max}}},
+      {"asking_cpu_ns", {{"median", t.asking_median}}},
       {"tick_cpu_ns", {{"median", t.tick_median}, {"p99.9", t.tick_p999}, {"max", t.tick_max}}},
       {"rights",
        {{"fifo", t.rights.fifo},
@@ -136,6 +137,7 @@ void print(const ServoTiming& t) {
               us(t.clock_median), "", us(t.clock_p999), us(t.clock_max));
   std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "rendering and limits, thread's own time",
               us(t.compute_median), "", us(t.compute_p999), us(t.compute_max));
+  std::printf("%-44s%10.2f\n", "  of which asking for that time", us(t.asking_median));
   std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "whole tick but the device's transfer",
               us(t.tick_median), "", us(t.tick_p999), us(t.tick_max));
   std::printf("later than a period: %.4g %% of ticks\n%s\n", t.late_share * 100,

@@ -1,7 +1,7 @@
 """How late this program's servo is against cyclictest (Debian: rt-tests), in alternating runs.
 
 Usage: lateness.py PALPATE [--condition fifo-idle,other-idle,fifo-hog,other-hog] [--pairs 10] [--seconds 60]
-                   [--json FILE]
+                   [--hog-nice 0] [--json FILE]
 
 Both sleep by absolute time at 1 kHz and ask when they woke, with locked memory and idle processors
 kept awake (/dev/cpu_dma_latency, where the system lets them). fifo: cyclictest runs as
@@ -92,9 +92,9 @@ def ratio_of_medians(ours, theirs, draws=10_000):
     return ratio(pairs), drawn[int(0.025 * len(drawn))], drawn[int(0.975 * len(drawn))]
 
 
-def hogs():
-    loop = "while True: pass"
-    return [subprocess.Popen([sys.executable, "-c", loop]) for _ in range(os.cpu_count() or 1)]
+def hogs(niceness):
+    command = ["nice", "-n", str(niceness), sys.executable, "-c", "while True: pass"]
+    return [subprocess.Popen(command) for _ in range(os.cpu_count() or 1)]
 
 
 def processor_time():
@@ -117,9 +117,9 @@ def one_run(name, palpate, seconds, fifo):
 def measure(condition, args, keep):
     """Calls `keep` with the condition's row, as far as it is known, after each run."""
     rights, load = condition.split("-")
-    row = {"condition": condition, "pairs": args.pairs, "seconds": args.seconds,
+    row = {"condition": condition, "pairs": args.pairs, "seconds": args.seconds, "hog_nice": args.hog_nice,
            "runs": {"palpate": [], "cyclictest": []}, "ratios": {}}
-    loaded = hogs() if load == "hog" else []
+    loaded = hogs(args.hog_nice) if load == "hog" else []
     try:
         for pair in range(args.pairs):
             for name in ("palpate", "cyclictest") if pair % 2 == 0 else ("cyclictest", "palpate"):
@@ -161,6 +161,7 @@ def main():
     options.add_argument("--condition", default=",".join(CONDITIONS))
     options.add_argument("--pairs", type=int, default=10)
     options.add_argument("--seconds", type=int, default=60)
+    options.add_argument("--hog-nice", type=int, default=0)
     options.add_argument("--json")
     args = options.parse_args()
     conditions = args.condition.split(",")

@@ -102,7 +102,8 @@ def main():
           f"timing beside it: {timing['ticks']} ticks, {timing['missed_ticks']} missed\n"
           f"  lateness us          {us(timing['lateness_ns'], 'median', 'p99', 'p99.9', 'max')}\n"
           f"  compute us, clock    {us(timing['compute_ns'], 'median', 'p99.9', 'max')}\n"
-          f"  compute us, own time {us(cpu, 'median', 'p99.9', 'max')}")
+          f"  compute us, own time {us(cpu, 'median', 'p99.9', 'max')}"
+          f"  of which asking for it {us(timing['asking_cpu_ns'], 'median')}")
     if args.json:
         pathlib.Path(args.json).write_text(json.dumps({"session": live, "timing": timing}, indent=2) + "\n")
 

@@ -253,6 +253,33 @@ TEST(Guard, WhatTheDeviceSaysComesThrough) {
   EXPECT_TRUE(homing_lost);
 }
 
+TEST(Guard, OpeningWaitsForATrueReading) {
+  Stage stage;
+  GuardedDevice device(
+      [&] {
+        return std::make_unique<RecordingDevice>(stage.shared->record, [](int tick) {
+          nap(tick == 0 ? 100 : 0);
+          return stylus_at(0.1);
+        });
+      },
+      no_rights());
+  EXPECT_EQ(device.read().stylus.tip.z, 0.1) << "no reading is late before there was one";
+  const auto dying = [&] {
+    return std::make_unique<RecordingDevice>(stage.shared->record,
+                                             [](int) -> DeviceReading { _exit(1); });
+  };
+  EXPECT_THROW(GuardedDevice(dying, no_rights()), std::runtime_error);
+  const auto hanging = [&] {
+    return std::make_unique<RecordingDevice>(stage.shared->record, [](int) {
+      nap(100'000);
+      return stylus_at(0);
+    });
+  };
+  GuardSettings hasty = no_rights();
+  hasty.patience = 0.1;
+  EXPECT_THROW(GuardedDevice(hanging, hasty), std::runtime_error);
+}
+
 TEST(Guard, NoForceBeforeAZeroCommandAndNoneAfterAnEmergency) {
   Stage stage;
   GuardSettings settings = no_rights();

@@ -94,6 +94,41 @@ TEST(ServoThread, TicksComeAtTheRateOfTheMachinesClock) {
   EXPECT_GT(periods, 0);
 }
 
+TEST(ServoThread, ItsTicksAndTheMissedOnesAreTheTimeThatHasPassed) {
+  FakeDevice device([](int tick) {
+    if (tick % 50 == 0) std::this_thread::sleep_for(std::chrono::microseconds(1700));
+    return stylus_at(0.1);
+  });
+  RealClock clock;
+  const std::int64_t before = clock.now_ns();
+  TimeKept kept;
+  {
+    ServoThread servo(device, clock, fast());
+    while (servo.health().ticks() < 300) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(3));
+      kept = servo.health().time_kept();
+      if (kept.ticks == 0) continue;
+      ASSERT_EQ(kept.elapsed_ns / 500'000,
+                static_cast<std::int64_t>(kept.ticks - 1 + kept.missed_ticks));
+    }
+  }
+  EXPECT_GE(kept.missed_ticks, 2 * (kept.ticks / 50)) << "more than three periods each time";
+  EXPECT_GT(kept.elapsed_ns, 0);
+  EXPECT_LT(kept.elapsed_ns, clock.now_ns() - before);
+}
+
+TEST(ServoThread, ItsTicksAreHalfAPeriodOffTheKernels) {
+  FakeDevice device([](int) { return stylus_at(0.1); });
+  UnhurriedClock clock;
+  clock.wait_until(123'456'789);
+  ServoThread servo(device, clock, fast());
+  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  for (int i = 0; i < 20; ++i) {
+    const Sample& sample = servo.next();
+    ASSERT_EQ((sample.time_ns - sample.lateness_ns) % 500'000, 250'000);
+  }
+}
+
 TEST(ServoThread, AFullRingIsAFaultOnRecordAndTheServoGoesOn) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
