@@ -195,6 +195,14 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
     section.choice("material_limit", protocol.material_limit,
                    {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
   });
+  reader.section("masking_noise", [&](ObjectReader& section) {
+    MaskingNoise& noise = protocol.masking_noise.emplace();
+    section.choice("kind", noise.kind,
+                   {{to_string(NoiseKind::white), NoiseKind::white},
+                    {to_string(NoiseKind::pink), NoiseKind::pink}});
+    // Louder, pink noise would be clipped; softer, it would be lost in 16 bits.
+    section.number("level_db", noise.level_db, {-80, -12, "dB"});
+  });
   reader.section("home", [&](ObjectReader& section) {
     section.number("rest_s", protocol.home.rest, {0, 60, "s"});
     section.number("margin_m", protocol.home.margin, {0, 1, "m"});

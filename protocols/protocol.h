@@ -21,6 +21,16 @@ enum class OrientationKind { uniform, fixed, listed };
 /// What becomes of a material that the device cannot show without feeding energy to the hand.
 enum class MaterialLimit { refuse, limit };
 
+enum class NoiseKind { white, pink };
+const char* to_string(NoiseKind kind);  ///< "white", "pink"
+
+/// In the participant's headphones while trials follow one another, so that the device's own sound
+/// tells nothing. Loudness is set at the amplifier.
+struct MaskingNoise {
+  NoiseKind kind = NoiseKind::pink;
+  double level_db = -24;  ///< root mean square, dB re full scale (an amplitude of 1)
+};
+
 struct StimulusSpec {
   std::string name;   ///< unique within the protocol
   ObjectSpec object;  ///< material already resolved against the protocol's default
@@ -80,6 +90,7 @@ struct Protocol {
   struct Texts {
     std::string instructions, practice, break_text, end;
   } texts;
+  std::optional<MaskingNoise> masking_noise;
   bool samples = false;
   std::uint64_t seed = 0;
 

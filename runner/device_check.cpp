@@ -3,10 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 
 namespace palpate {
 namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr const char* kLimitedEvent = "material_limited";
 
 template <class... Parts>
 std::string sentence(const Parts&... parts) {
@@ -27,6 +32,29 @@ template <class Object, class Visit>
 void visit_materials(Object& object, const Visit& visit) {
   visit(object.material);
   for (auto& part : object.parts) visit_materials(part, visit);
+}
+
+void scale_down(Material& material, double share) {
+  material.stiffness *= share;
+  material.damping *= share;
+  for (Layer& layer : material.layers) layer.stiffness *= share;
+}
+
+/// \throws std::invalid_argument
+Material& material_of(Protocol& protocol, const std::string& stimulus, int part) {
+  Material* found = nullptr;
+  for (StimulusSpec& candidate : protocol.stimuli) {
+    if (candidate.name != stimulus) continue;
+    int at = 0;
+    visit_materials(candidate.object, [&](Material& material) {
+      if (at++ == part) found = &material;
+    });
+  }
+  if (found == nullptr)
+    throw std::invalid_argument("the protocol has no part " + std::to_string(part) +
+                                " of a stimulus '" + stimulus +
+                                "', which the record says was limited");
+  return *found;
 }
 
 /// The device runs no faster than it can, whatever the protocol asks (another misfit).
@@ -68,25 +96,62 @@ ShowableMaterial showable(const Material& material, const DeviceCapabilities& de
   return out;
 }
 
-std::vector<std::string> limit_materials(Protocol& protocol, const DeviceCapabilities& device) {
-  std::vector<std::string> out;
+std::vector<LimitedMaterial> limit_materials(Protocol& protocol, const DeviceCapabilities& device) {
+  std::vector<LimitedMaterial> out;
   if (protocol.material_limit != MaterialLimit::limit || device.actuated_freedom == 0) return out;
   for (StimulusSpec& stimulus : protocol.stimuli) {
+    int part = -1;
     visit_materials(stimulus.object, [&](Material& material) {
+      ++part;
       const ShowableMaterial can =
           showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
                    protocol.passivity_controller);
       if (can.reason.empty() || can.share == 0) return;  // nothing to show: a misfit
       const double shown = can.share * (1 - 1e-12);      // rounding stays below the bound
-      out.push_back(sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
-                             material.stiffness * shown, " N/m and ", material.damping * shown,
-                             " N s/m"));
-      material.stiffness *= shown;
-      material.damping *= shown;
-      for (Layer& layer : material.layers) layer.stiffness *= shown;
+      out.push_back(
+          {stimulus.name, part, shown, material.stiffness, material.damping,
+           sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
+                    material.stiffness * shown, " N/m and ", material.damping * shown, " N s/m")});
+      scale_down(material, shown);
     });
   }
   return out;
+}
+
+std::string to_json_text(const std::vector<LimitedMaterial>& limited,
+                         const DeviceCapabilities& device, double rate) {
+  Json materials = Json::array();
+  for (const LimitedMaterial& one : limited) {
+    materials.push_back({{"stimulus", one.stimulus},
+                         {"part", one.part},
+                         {"share", one.share},
+                         {"asked_stiffness_n_per_m", one.stiffness},
+                         {"asked_damping_ns_per_m", one.damping},
+                         {"shown_stiffness_n_per_m", one.stiffness * one.share},
+                         {"shown_damping_ns_per_m", one.damping * one.share}});
+  }
+  return Json{{kLimitedEvent, std::move(materials)}, {"device", device.name}, {"rate_hz", rate}}
+      .dump();
+}
+
+bool limit_as_recorded(Protocol& protocol, const std::string& event) {
+  const Json json = Json::parse(event, nullptr, false);
+  if (!json.is_object() || !json.contains(kLimitedEvent)) return false;
+  try {
+    for (const Json& one : json.at(kLimitedEvent)) {
+      Material& material =
+          material_of(protocol, one.at("stimulus").get<std::string>(), one.at("part").get<int>());
+      if (material.stiffness != one.at("asked_stiffness_n_per_m").get<double>() ||
+          material.damping != one.at("asked_damping_ns_per_m").get<double>()) {
+        throw std::invalid_argument("the record limits another material than the protocol has");
+      }
+      scale_down(material, one.at("share").get<double>());
+    }
+  } catch (const Json::exception& error) {
+    throw std::invalid_argument(std::string("the record of limited materials is damaged: ") +
+                                error.what());
+  }
+  return true;
 }
 
 std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary& library,

@@ -31,8 +31,26 @@ ShowableMaterial showable(const Material& material, const DeviceCapabilities& de
 /// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).
 inline constexpr double kPassivityExtension = 2;
 
+/// A material that was scaled down to what a device can show.
+struct LimitedMaterial {
+  std::string stimulus;
+  int part = 0;      ///< of a compound: 0 itself, then its parts with theirs, in order
+  double share = 1;  ///< of stiffness and damping that is left
+  double stiffness = 0, damping = 0;  ///< N/m and N s/m, as the protocol asks
+  std::string text;                   ///< a sentence
+};
+
 /// Where the protocol asks for limits (servo.material_limit), scales down what the device cannot
-/// show; to be called before its stimuli are made. A sentence for each material that was.
-std::vector<std::string> limit_materials(Protocol& protocol, const DeviceCapabilities& device);
+/// show; to be called before its stimuli are made. What was, in order.
+std::vector<LimitedMaterial> limit_materials(Protocol& protocol, const DeviceCapabilities& device);
+
+/// An event for the session's record, one line of JSON: which materials, as asked and as shown, on
+/// which device and at which rate.
+std::string to_json_text(const std::vector<LimitedMaterial>& limited,
+                         const DeviceCapabilities& device, double rate);
+
+/// Limits the protocol again, to the bit, as an event of to_json_text says; false: it is another
+/// note. \throws std::invalid_argument: it is not of this protocol, or damaged
+bool limit_as_recorded(Protocol& protocol, const std::string& event);
 
 }  // namespace palpate

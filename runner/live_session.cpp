@@ -60,6 +60,7 @@ LiveSession::Outcome LiveSession::run() {
   }
   outcome.recorded = session_.plan().done();
   outcome.trials = session_.plan().size();
+  stop_noise();
   const std::int64_t now = parts_.clock.now_ns();
   if (!outcome.reason.empty()) parts_.store.add_note(run_, now, "ended: " + outcome.reason);
   parts_.store.add_note(run_, now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
@@ -78,6 +79,7 @@ LiveSession::Outcome LiveSession::go_through() {
         return {RunEnd::aborted, std::string("signal: ") + strsignal(signal), 0, 0, true};
       }
       faulted_ = paused_ = true;
+      stop_noise();
       say(fault.what());
     } catch (const EndOfSession& end) {
       if (session_.plan().finished()) break;
@@ -100,11 +102,15 @@ void LiveSession::between_trials() {
   if (longest && elapsed > *longest * 60)
     throw EndOfSession(RunEnd::paused, "the session has lasted as long as the protocol allows");
   state_.state = word(now);
-  wait_while_held();
+  if (now != Session::State::trial) stop_noise();  // a page to read, and perhaps to talk about
+  do {
+    wait_while_held();
+  } while (now == Session::State::trial && !start_noise());
 }
 
 void LiveSession::wait_while_held() {
   if (!paused_) return;
+  stop_noise();
   respondent_.show_message(parts_.protocol.texts.break_text);
   while (paused_) {
     state_.state = faulted_ ? "fault" : "paused";
@@ -123,6 +129,7 @@ void LiveSession::attend() {
     commands_.pop_front();
     obey(command);
   }
+  watch_noise();
   if (!parts_.screen.open())
     throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
   if (parts_.clock.now_ns() - shown_ns_ >= kFrame_ns) show_console();
@@ -179,6 +186,38 @@ void LiveSession::obey(const ConsoleCommand& command) {
 void LiveSession::zero_force() {
   if (parts_.guard != nullptr) parts_.guard->emergency_zero();
   parts_.servo.emergency_zero();
+}
+
+bool LiveSession::start_noise() {
+  if (parts_.noise == nullptr || noise_noted_) return true;
+  try {
+    parts_.noise->turn_on();
+  } catch (const SoundError& error) {
+    say(error.what());
+    paused_ = true;
+    return false;
+  }
+  noise_noted_ = true;
+  parts_.store.add_note(run_, parts_.clock.now_ns(), to_json_text(*parts_.noise));
+  return true;
+}
+
+void LiveSession::stop_noise() {
+  if (!noise_noted_) return;
+  noise_noted_ = false;
+  parts_.noise->turn_off();
+  const NoiseReport heard = parts_.noise->report();
+  parts_.store.add_note(run_, parts_.clock.now_ns(), to_json_text(heard));
+  if (heard.underruns > 0)
+    say("the masking noise had " + std::to_string(heard.underruns) + " gaps");
+}
+
+void LiveSession::watch_noise() {
+  if (!noise_noted_ || !parts_.noise->failed()) return;
+  say(parts_.noise->report().trouble);
+  stop_noise();
+  paused_ = true;
+  if (in_trial_) throw TrialCutOff("the masking noise stopped");
 }
 
 void LiveSession::note(std::int64_t at_ns, const std::string& text) {

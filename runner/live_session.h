@@ -13,6 +13,7 @@
 #include "runner/participants/keyboard.h"
 #include "runner/servo_thread.h"
 #include "runner/session.h"
+#include "runner/sound/masking_noise.h"
 
 namespace palpate {
 
@@ -40,6 +41,7 @@ class LiveSession final : public Attendant, private SessionEvents {
     Markers& markers;
     AnswerBy answer_by;
     std::function<int()> end_requested;  ///< the signal that asked for the end; 0: none
+    NoisePlayer* noise = nullptr;        ///< may be none
   };
 
   /// What became of it.
@@ -67,6 +69,9 @@ class LiveSession final : public Attendant, private SessionEvents {
   void wait_while_held();
   void obey(const ConsoleCommand& command);
   void zero_force();
+  bool start_noise();  ///< false: it cannot be had, and the session is paused
+  void stop_noise();
+  void watch_noise();
   void note(std::int64_t at_ns, const std::string& text);
   void show_console();
 
@@ -88,6 +93,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   std::int64_t started_ns_, began_ns_ = 0, shown_ns_ = 0;
   double seconds_per_trial_ = 0;  ///< mean, of this run
   int timed_trials_ = 0;
+  bool noise_noted_ = false;  ///< its start is on record, its end is not
   bool in_trial_ = false, feeling_ = false, paused_ = false, faulted_ = false;
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 namespace palpate {
 namespace {
@@ -11,11 +12,18 @@ constexpr const char* kSides[] = {"left", "right", "down", "up", "away from you"
 
 std::string millimetres(double metres) { return std::to_string(std::lround(metres * 1e3)) + " mm"; }
 
+std::string newtons(double force) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f N", force);
+  return text;
+}
+
 }  // namespace
 
 void Preflight::finish(const std::string& finding) {
   findings_.push_back(finding);
   step_ = static_cast<Step>(static_cast<int>(step_) + 1);
+  if (step_ == Step::limits && needs_.push == nullptr) step_ = Step::range;
   if (step_ == Step::range && needs_.reach <= 0) step_ = Step::buttons;
   if (step_ == Step::buttons && needs_.buttons == 0) step_ = Step::done;
 }
@@ -24,13 +32,18 @@ void Preflight::add(const Sample& sample) {
   const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
   if (lost) {  // also later: a device that was lost has to be homed again
     homed_ = 0;
-    if (step_ != Step::done) step_ = Step::homing;
+    if (step_ == Step::done) return;
+    step_ = Step::homing;
+    if (push_ != Push::not_yet) push_fault_ = "the device was lost";
+    push_ = Push::not_yet;
     return;
   }
   switch (step_) {
     case Step::homing:
       least_ = most_ = sample.probe.tip;
       if (++homed_ >= kHomedLongEnough) finish("device homed");
+      break;
+    case Step::limits:
       break;
     case Step::range:
       add_range(sample.probe.tip);
@@ -71,7 +84,32 @@ int Preflight::missing_button() const {
   return 0;
 }
 
+std::string Preflight::limits_in_words() const {
+  const ForceLimits& limits = needs_.push->limits();
+  return "forces of up to " + newtons(limits.max_force) +
+         " at each end (the device's own limit: " + newtons(needs_.device_limit) + "), " +
+         newtons(limits.max_change) + " of change a tick";
+}
+
+void Preflight::repeat() {
+  if (step_ == Step::limits) push_ = Push::due;
+}
+
+void Preflight::pushed(const std::string& fault) {
+  push_fault_ = fault;
+  push_ = fault.empty() ? Push::given : Push::not_yet;
+}
+
 void Preflight::skip() {
+  if (step_ == Step::limits) {
+    if (push_ == Push::given) {
+      finish("a push of " + newtons(needs_.push->force()) +
+             " to the right was felt; limits: " + limits_in_words());
+    } else {
+      push_ = Push::due;
+    }
+    return;
+  }
   if (step_ == Step::range) finish("range NOT checked: not reached: " + missing_sides());
   if (step_ == Step::buttons)
     finish("button " + std::to_string(missing_button()) + " and those after it NOT checked");
@@ -81,6 +119,13 @@ std::string Preflight::instruction() const {
   switch (step_) {
     case Step::homing:
       return "home the device: pull the grip fully out, then push it straight in";
+    case Step::limits:
+      if (push_ == Push::given)
+        return "was a feeble push to the right felt? (go: yes; repeat: once more; quit: no)";
+      return (push_fault_.empty() ? "limits: " + limits_in_words()
+                                  : "the push was not as it should be: " + push_fault_) +
+             "; hold the grip: a push of " + newtons(needs_.push->force()) +
+             " to the right comes for a second (go: push)";
     case Step::range:
       return "move the stylus " + millimetres(needs_.reach) +
              " from the centre; still to come: " + missing_sides() + " (go: leave it unchecked)";

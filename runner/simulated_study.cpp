@@ -161,8 +161,8 @@ std::vector<Work> unfinished_work(const Protocol& protocol, Store& store,
 /// The store's side: begins a run with its first record, ends it when its session is complete.
 class Recorder {
  public:
-  Recorder(const Protocol& protocol, Store& store, std::vector<Work>& work)
-      : store_(store), work_(work) {
+  Recorder(const Protocol& protocol, Store& store, std::vector<Work>& work, std::string event)
+      : store_(store), work_(work), event_(std::move(event)) {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
   }
 
@@ -172,8 +172,9 @@ class Recorder {
     for (auto& [index, records] : by_work) {
       auto run = runs_.find(index);
       if (run == runs_.end()) {
-        run = runs_.emplace(index, store_.begin_run(work_[index].participant, work_[index].info))
-                  .first;
+        const RunInfo& info = work_[index].info;
+        run = runs_.emplace(index, store_.begin_run(work_[index].participant, info)).first;
+        if (!event_.empty()) store_.add_note(run->second, info.clock.monotonic_ns, event_);
       }
       store_.record_simulated(run->second, records);
       SessionPlan& plan = plans_[index];
@@ -202,6 +203,7 @@ class Recorder {
  private:
   Store& store_;
   std::vector<Work>& work_;
+  const std::string event_;
   std::vector<SessionPlan> plans_;
   std::map<std::size_t, Run> runs_;
 };
@@ -231,7 +233,7 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
 
   StudyProgress progress;
   std::vector<Work> work = unfinished_work(protocol, store, settings, plan, progress);
-  Recorder recorder(protocol, store, work);
+  Recorder recorder(protocol, store, work, plan.event);
   const std::vector<Work> sessions =
       work;  // the workers' own copy: the recorder moves its clocks on
   Queue queue(protocol.samples ? 8 : 4096);

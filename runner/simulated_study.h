@@ -17,6 +17,7 @@ struct StudyPlan {
   int participants = 7;
   std::uint64_t seed = 1;  ///< of the participants; the schedule has the protocol's own
   int jobs = 1;            ///< threads
+  std::string event = {};  ///< for each session's record; empty: none
 };
 
 struct StudyProgress {

@@ -13,6 +13,7 @@
 #include "data/store.h"
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/device_check.h"
 
 namespace palpate {
 namespace {
@@ -73,6 +74,25 @@ StoredTrial find_trial(Store& store, const TrialName& name, const std::string& p
                      "keeps them");
   }
   return std::move(*found);
+}
+
+/// Scales the materials down to what the device of the trial's run could show. True: there were
+/// any.
+bool limit_as_recorded(Protocol& protocol, Store& store, const StoredTrial& trial) {
+  for (const StoredNote& note : store.notes()) {
+    const ClockStamp &noted = note.run_clock, &shown = trial.run.clock;
+    if (note.participant.id != trial.participant.id || note.session != trial.record.session ||
+        noted.utc_ns != shown.utc_ns || noted.monotonic_ns != shown.monotonic_ns) {
+      continue;
+    }
+    try {
+      // A simulated session that was gone on with has the same event again.
+      if (palpate::limit_as_recorded(protocol, note.text)) return true;
+    } catch (const std::invalid_argument& error) {
+      throw StoreRefused(store.path() + ": " + error.what());
+    }
+  }
+  return false;
 }
 
 RendererKind kind_of(const std::string& renderer) {
@@ -250,8 +270,9 @@ int replay_command(const std::vector<std::string>& args) {
   for (const ProtocolInfo& info : store.protocols()) {
     if (info.sha256 == stored.protocol_sha256) text = info.text;
   }
-  const Protocol protocol = parse_protocol_text(
+  Protocol protocol = parse_protocol_text(
       text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string());
+  const bool limited = limit_as_recorded(protocol, store, stored);
   const bool compare = values->count("compare") > 0;
   const Outcome outcome = replay_stored(protocol, record, compare, !out.empty());
 
@@ -267,6 +288,7 @@ int replay_command(const std::vector<std::string>& args) {
                    {"ticks", outcome.ticks},
                    {"equal_ticks", outcome.equal},
                    {"periods_on_record", outcome.periods_known},
+                   {"material_limited", limited},
                    {"recorded", shown_json(outcome.recorded, outcome.ticks)}};
     if (compare) {
       result["other"] = shown_json(outcome.other, outcome.ticks);
@@ -286,6 +308,8 @@ int replay_command(const std::vector<std::string>& args) {
   char time[40];
   std::snprintf(time, sizeof time, " after %.3f s", record.response_time);
   std::cout << time << "\n";
+  if (limited)
+    std::cout << "With the materials as they were limited to what the device can show.\n";
   if (equal) {
     std::cout << "Rendered again: all " << outcome.ticks
               << " ticks equal the record, bit by bit.\n";

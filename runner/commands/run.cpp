@@ -29,11 +29,12 @@ namespace po = boost::program_options;
 struct RunSettings {
   std::string protocol, database, participant, device;
   std::optional<int> number, session;
-  std::string consent, hand, firmware, calibration;
+  std::string consent, hand, firmware, calibration, sound_device = "default";
   std::vector<std::string> serials, markers;
   std::optional<double> response_latency;
   int participant_monitor = 0, console_monitor = 0;
-  bool no_window = false, full_screen = false, buttons = false, without_calibration = false;
+  bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
+       without_noise = false;
 };
 
 /// Stands for a device whether it is in this process or in a guard's.
@@ -108,6 +109,13 @@ std::vector<std::unique_ptr<MarkerSink>> open_markers(const std::vector<std::str
     }
   }
   return sinks;
+}
+
+/// None where the protocol wants none, or the experimenter. \throws SoundError
+std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings, const Protocol& protocol) {
+  if (!protocol.masking_noise || settings.without_noise) return nullptr;
+  return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
+                                       settings.sound_device);
 }
 
 ClockStamp stamp_now(Clock& clock) {
@@ -207,14 +215,24 @@ struct Station {
   FaultSignals& signals;
   Participant participant;
   int session;
+  NoisePlayer* noise;  ///< may be none
+  const std::vector<LimitedMaterial>& limited;
+  const FeeblePush& push;
+};
+
+struct PreflightRecord {
+  std::vector<std::string> findings;
+  std::vector<std::string> messages;  ///< that the console has shown
 };
 
 /// \throws EndOfSession
-std::vector<std::string> go_through_preflight(const Station& at) {
+PreflightRecord go_through_preflight(const Station& at) {
   PreflightNeeds needs;
   if (at.kind.pushes) {
     for (std::size_t i = 0; i < at.protocol.stimuli.size(); ++i)
       needs.reach = std::max(needs.reach, at.library.reach(static_cast<int>(i)));
+    needs.push = &at.push;
+    needs.device_limit = at.device.max_force;
     if (at.settings.buttons) needs.buttons = static_cast<int>(at.protocol.response.keys.size());
   }
   Preflight preflight(needs);
@@ -223,13 +241,18 @@ std::vector<std::string> go_through_preflight(const Station& at) {
   state.participant = at.participant.code;
   state.session = at.session;
   state.state = "pre-flight";
+  for (const LimitedMaterial& one : at.limited) state.messages.push_back(one.text);
   std::string told;
   std::int64_t told_ns = at.clock.now_ns() - 500'000'000;  // what is well need not be said
+  std::int64_t pushed_ns = 0;
   while (preflight.step() != Preflight::Step::done) {
     at.clock.wait_until(at.clock.now_ns() + 5'000'000);
     if (at.servo.latest(state.sample)) preflight.add(state.sample);
     for (const ConsoleCommand& command : at.display.console().commands()) {
-      if (command.kind == ConsoleCommand::Kind::go_on) preflight.skip();
+      // What was pressed while it pushed does not tell that it was felt.
+      if (command.kind == ConsoleCommand::Kind::go_on && command.time_ns >= pushed_ns)
+        preflight.skip();
+      if (command.kind == ConsoleCommand::Kind::repeat_trial) preflight.repeat();
       if (command.kind == ConsoleCommand::Kind::quit)
         throw EndOfSession(RunEnd::aborted, "ended by the experimenter");
     }
@@ -237,6 +260,11 @@ std::vector<std::string> go_through_preflight(const Station& at) {
       throw EndOfSession(RunEnd::aborted, "a signal asked for the end", true);
     if (!at.display.participant().open())
       throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
+    if (preflight.push_due()) {
+      at.servo.clear_fault();  // before homing there were no readings
+      preflight.pushed(at.push.give(at.servo, [&] { return at.signals.end_requested() != 0; }));
+      pushed_ns = at.clock.now_ns();
+    }
     const std::string instruction = preflight.instruction();
     const std::int64_t now = at.clock.now_ns();
     // What is missing changes while the stylus moves: no more often than one can read.
@@ -248,7 +276,8 @@ std::vector<std::string> go_through_preflight(const Station& at) {
     at.display.console().show(state);
   }
   at.servo.clear_fault();  // before homing there were no readings
-  return preflight.findings();
+  at.display.console().show(state);
+  return {preflight.findings(), state.messages};
 }
 
 SessionPlan plan_of(const Station& at, const SessionProgress& before) {
@@ -258,7 +287,7 @@ SessionPlan plan_of(const Station& at, const SessionProgress& before) {
 }
 
 LiveSession::Outcome run_session(const Station& at) {
-  const std::vector<std::string> findings = go_through_preflight(at);
+  const PreflightRecord preflight = go_through_preflight(at);
   const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
   const ClockStamp stamp = stamp_now(at.clock);
   const Run run =
@@ -266,14 +295,23 @@ LiveSession::Outcome run_session(const Station& at) {
   LiveSession session(
       {at.protocol, at.library, at.servo, at.guard, at.clock, at.store, at.display.participant(),
        at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
-       [&at] { return at.signals.end_requested(); }},
+       [&at] { return at.signals.end_requested(); }, at.noise},
       at.participant, run, stamp, plan);
+  for (const std::string& message : preflight.messages) session.say(message);  // it shows on
   if (at.kind.pushes) {
     std::string text = "pre-flight: ";
-    for (const std::string& finding : findings) text += finding + "; ";
+    for (const std::string& finding : preflight.findings) text += finding + "; ";
     at.store.add_note(
         run, stamp.monotonic_ns,
         text + (at.settings.without_calibration ? "WITHOUT calibration" : "calibration stored"));
+  }
+  if (!at.limited.empty()) {
+    at.store.add_note(run, stamp.monotonic_ns,
+                      to_json_text(at.limited, at.device, at.protocol.servo_rate));
+  }
+  if (at.protocol.masking_noise && at.noise == nullptr) {
+    session.say("WITHOUT the protocol's masking noise");
+    at.store.add_note(run, stamp.monotonic_ns, R"({"masking_noise":"left out"})");
   }
   const std::string& missing = at.servo.rights().missing;
   if (!missing.empty()) session.say(missing);
@@ -327,10 +365,10 @@ int run_station(const RunSettings& settings) {
   const OpenDevice open = open_device(kind, settings, protocol);
   const Watch guard_watch(signals, open.guard);
   const DeviceCapabilities& able = open.device->capabilities();
-  for (const std::string& limited : limit_materials(protocol, able))
-    std::fprintf(stderr, "%s\n", limited.c_str());
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, able);
   const StimulusLibrary library(protocol);
   check_fitness(kind, *open.device, settings, protocol, library);
+  const auto noise = open_noise(settings, protocol);  // after the guard's fork: it has a thread
 
   Store store = Store::open(settings.database, Store::Mode::write_or_create);
   RealClock clock;
@@ -351,6 +389,9 @@ int run_station(const RunSettings& settings) {
   servo_settings.rate = protocol.servo_rate;
   servo_settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
   servo_settings.passivity_controller = protocol.passivity_controller;
+  ForceLimits limits = servo_settings.limits;
+  limits.max_force = std::min(limits.max_force, able.max_force);
+  const FeeblePush push(limits, able.sensed_freedom >= 5);
   const std::int64_t started_ns = clock.now_ns();
   ServoThread servo(*open.device, clock, servo_settings);
   const Watch servo_watch(signals, &servo);
@@ -359,8 +400,9 @@ int run_station(const RunSettings& settings) {
     servo.emergency_zero();
   };
   const auto display = open_display(settings, protocol, clock, *open.device, emergency);
-  const Station station{settings, protocol, library,  kind,    open.guard, able,        servo,
-                        clock,    store,    *display, markers, signals,    participant, session};
+  const Station station{settings,    protocol, library,     kind,     open.guard, able,
+                        servo,       clock,    store,       *display, markers,    signals,
+                        participant, session,  noise.get(), limited,  push};
   LiveSession::Outcome outcome;
   std::exception_ptr failure;
   std::jthread session_thread([&] {
@@ -431,7 +473,11 @@ int run_command(const std::vector<std::string>& args) {
       ("calibration", po::value(&settings.calibration)->value_name("FILE"),
        "what 'palpate devices --calibrate' stored")  //
       ("without-calibration", po::bool_switch(&settings.without_calibration),
-       "run although the calibration is missing or stale");
+       "run although the calibration is missing or stale")  //
+      ("sound-device", po::value(&settings.sound_device)->value_name("NAME"),
+       "ALSA device of the headphones, where the protocol has masking noise; default: default")  //
+      ("without-noise", po::bool_switch(&settings.without_noise),
+       "run without the protocol's masking noise");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return 0;

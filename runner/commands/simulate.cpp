@@ -105,15 +105,18 @@ int simulate_command(const std::vector<std::string>& args) {
   const SimulatedSettings settings = load_simulated_settings(settings_patch);
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
                                protocol.stylus.grip, 1 / protocol.servo_rate);
-  for (const std::string& limited : limit_materials(protocol, stylus.capabilities()))
-    std::fprintf(stderr, "%s\n", limited.c_str());
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
+  for (const LimitedMaterial& one : limited) std::fprintf(stderr, "%s\n", one.text.c_str());
+  StudyPlan plan{participants, seed, jobs, ""};
+  if (!limited.empty())
+    plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
   Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
   watch_signals();
   const auto start = std::chrono::steady_clock::now();
   ProgressLine progress_line;
   StudyProgress progress;
   try {
-    progress = simulate_study(protocol, store, settings, {participants, seed, jobs}, stop_asked,
+    progress = simulate_study(protocol, store, settings, plan, stop_asked,
                               [&](const StudyProgress& p) { progress_line.show(p); });
   } catch (const std::invalid_argument& error) {
     progress_line.clear();

@@ -51,6 +51,15 @@ std::string minutes(double seconds) {
   return out.str();
 }
 
+/// A line, or nothing.
+std::string masking(const Protocol& protocol) {
+  if (!protocol.masking_noise) return "";
+  std::ostringstream out;
+  out << "  noise       " << to_string(protocol.masking_noise->kind) << ", "
+      << protocol.masking_noise->level_db << " dB re full scale, through headphones\n";
+  return out.str();
+}
+
 void print_summary(const Protocol& protocol, std::ostream& out) {
   const std::vector<Trial> trials = schedule(protocol, 1);
   const long long counted = main_trials(protocol);
@@ -73,7 +82,7 @@ void print_summary(const Protocol& protocol, std::ostream& out) {
       << (sessions == 1 ? " session\n" : " sessions\n") << "  duration    about "
       << minutes(n * (kTypicalTrial + rest)) << " at " << kTypicalTrial << " s a trial, at most "
       << minutes(n * (protocol.response.time_out + rest)) << "; breaks besides\n"
-      << "  seed        " << protocol.seed << "\n"
+      << masking(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
 }
 

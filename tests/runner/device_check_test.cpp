@@ -94,12 +94,50 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
   protocol.material_limit = MaterialLimit::limit;
   const auto limited = limit_materials(protocol, some_device());
   ASSERT_EQ(limited.size(), 1u);
-  EXPECT_NE(limited[0].find("limited to 1851.85 N/m and 0.0740741 N s/m"), std::string::npos)
-      << limited[0];
+  EXPECT_NE(limited[0].text.find("limited to 1851.85 N/m and 0.0740741 N s/m"), std::string::npos)
+      << limited[0].text;
   const Material& shown = protocol.stimuli[0].object.material;
   EXPECT_NEAR(shown.stiffness / 2000 + shown.damping, 1, 1e-9);
   EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), some_device()).empty());
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing is left to do
+}
+
+TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
+  const auto compound = [] {
+    Protocol protocol = some_protocol(of(2500, 0.1));
+    ObjectSpec part;
+    part.material = of(7777, 0.3);
+    part.material.layers = {{1e-3, 9876.5}};
+    protocol.stimuli[0].object.parts = {ObjectSpec{}, part};
+    protocol.material_limit = MaterialLimit::limit;
+    return protocol;
+  };
+  Protocol limited = compound();
+  const auto materials = limit_materials(limited, some_device());
+  ASSERT_EQ(materials.size(), 2u);
+  const std::string event = to_json_text(materials, some_device(), 1000);
+  EXPECT_NE(event.find("\"asked_stiffness_n_per_m\":2500.0"), std::string::npos) << event;
+  EXPECT_NE(event.find("\"rate_hz\":1000.0"), std::string::npos) << event;
+
+  Protocol again = compound();
+  EXPECT_FALSE(limit_as_recorded(again, "a note {"));
+  EXPECT_FALSE(limit_as_recorded(again, R"({"masking_noise":"on"})"));
+  EXPECT_EQ(again.stimuli[0].object.material.stiffness, 2500);
+  EXPECT_TRUE(limit_as_recorded(again, event));
+  const ObjectSpec &was = limited.stimuli[0].object, &is = again.stimuli[0].object;
+  EXPECT_EQ(is.material.stiffness, was.material.stiffness);
+  EXPECT_EQ(is.material.damping, was.material.damping);
+  EXPECT_EQ(is.parts[0].material.stiffness, was.parts[0].material.stiffness);
+  EXPECT_EQ(is.parts[1].material.stiffness, was.parts[1].material.stiffness);
+  EXPECT_EQ(is.parts[1].material.layers[0].stiffness, was.parts[1].material.layers[0].stiffness);
+  EXPECT_NE(is.parts[1].material.stiffness, 7777);
+
+  EXPECT_THROW(limit_as_recorded(again, event), std::invalid_argument) << "it is limited already";
+  Protocol other = some_protocol(of(2500, 0.1));  // no parts
+  EXPECT_THROW(limit_as_recorded(other, event), std::invalid_argument);
+  Protocol whole = compound();
+  EXPECT_THROW(limit_as_recorded(whole, R"({"material_limited":[{"stimulus":"ball"}]})"),
+               std::invalid_argument);
 }
 
 TEST(DeviceCheck, ADeviceThatDoesNotPushShowsNothingAndRefusesNothing) {

@@ -57,6 +57,36 @@ class Replay(unittest.TestCase):
                 self.assertGreater(result["recorded"]["share_in_contact"], 0)
                 self.assertEqual(result["recorded"]["renderer"], renderer)
 
+    def test_a_material_that_was_limited_to_the_device_is_limited_again(self):
+        stiff = {"stiffness_n_per_m": 60000, "damping_ns_per_m": 0.3}
+        path, db = self.dir / "stiff.json", self.dir / "stiff.db"
+        path.write_text(json.dumps(protocol(**stiff) | {"servo": {"material_limit": "limit"}}))
+        said = self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3).stderr
+        self.assertIn("limited to", said)
+        with sqlite3.connect(db) as base:
+            events = [json.loads(text) for (text,) in base.execute("SELECT text FROM notes")]
+        base.close()
+        (event,) = events
+        self.assertEqual([one["stimulus"] for one in event["material_limited"]], ["sphere", "cube"])
+        for one in event["material_limited"]:
+            self.assertEqual((one["asked_stiffness_n_per_m"], one["asked_damping_ns_per_m"]), (60000, 0.3))
+            self.assertLess(one["shown_stiffness_n_per_m"], 60000)
+            self.assertAlmostEqual(one["shown_damping_ns_per_m"], 0.3 * one["shown_stiffness_n_per_m"] / 60000)
+        self.assertEqual(event["rate_hz"], 1000)
+        out = self.dir / "out.json"
+        for trial in range(1, 5):
+            done = self.palpate("replay", "--db", db, "--trial", f"S001/1/{trial}", "--json", out, "--force")
+            self.assertIn("equal the record, bit by bit", done.stdout)
+            self.assertIn("as they were limited", done.stdout)
+            result = json.loads(out.read_text())
+            self.assertTrue(result["material_limited"])
+            self.assertGreater(result["recorded"]["max_force_n"], 0)
+        with sqlite3.connect(db) as base:
+            base.execute("UPDATE notes SET text = replace(text, '60000', '50000')")
+        base.close()
+        refused = self.palpate("replay", "--db", db, "--trial", "S001/1/1", status=2)
+        self.assertIn("limits another material", refused.stderr)
+
     def test_compares_with_the_other_renderer_tick_by_tick(self):
         db, trials = self.study()
         trial = next(trial for trial, renderer in trials if renderer == "ray")

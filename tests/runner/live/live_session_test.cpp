@@ -50,6 +50,11 @@ class Console final : public ExperimenterConsole {
   void show(const ConsoleState& state) override { last = state; }
   std::vector<ConsoleCommand> commands() override {
     std::vector<ConsoleCommand> out = std::exchange(next, {});
+    if (last.state == "paused" && goes_on) {
+      ++pauses;
+      if (repair) repair();
+      out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+    }
     if (last.state == "fault") {
       ++faults;
       if (repair) repair();
@@ -61,6 +66,8 @@ class Console final : public ExperimenterConsole {
   ConsoleState last;
   std::vector<ConsoleCommand> next;
   std::function<void()> repair;
+  bool goes_on = false;  ///< after a pause
+  int pauses = 0;
   int faults = 0;
 
  private:
@@ -107,7 +114,7 @@ class LiveSessions : public ::testing::Test {
     sinks.push_back(std::make_unique<Collected>(markers_));
     Markers markers(std::move(sinks));
     LiveSession session({protocol_, library_, servo, nullptr, clock_, *store_, screen_, console_,
-                         markers, by, [this] { return signal_; }},
+                         markers, by, [this] { return signal_; }, noise_.get()},
                         participant_, store_->begin_run(participant_, info), {0, 0}, plan);
     return session.run();
   }
@@ -126,6 +133,7 @@ class LiveSessions : public ::testing::Test {
   Console console_{clock_};
   std::vector<Marker> markers_;
   int signal_ = 0;
+  std::unique_ptr<NoisePlayer> noise_;
   std::filesystem::path folder_;
   std::optional<Store> store_;
   Participant participant_;
@@ -215,6 +223,52 @@ TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
   const LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.end, RunEnd::paused);
   EXPECT_LT(outcome.recorded, 2u);
+}
+
+/// Takes everything, until it is pulled out.
+class Headphones final : public SoundOutput {
+ public:
+  explicit Headphones(const std::atomic<bool>& plugged) : plugged_(plugged) {}
+  double rate() const override { return 8000; }
+  int write(std::span<const std::int16_t>) override {
+    if (!plugged_) throw SoundError("pulled out");
+    return 0;
+  }
+  double latency() override { return 0; }
+
+ private:
+  const std::atomic<bool>& plugged_;
+};
+
+TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack) {
+  std::atomic<bool> plugged{true};
+  noise_ = std::make_unique<NoisePlayer>(MaskingNoise{}, 1, "headphones",
+                                         [&](const std::string&) -> std::unique_ptr<SoundOutput> {
+                                           if (!plugged) throw SoundError("no headphones");
+                                           return std::make_unique<Headphones>(plugged);
+                                         });
+  FakeDevice device([&](int tick) {
+    if (tick == 30) plugged = false;  // in the first trial
+    return at(0.1);
+  });
+  screen_.answers = false;
+  console_.goes_on = true;
+  console_.repair = [&] {  // at the second try
+    if (console_.pauses == 2) plugged = screen_.answers = true;
+  };
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_GE(console_.pauses, 2);
+  ASSERT_GE(cut_off_reasons().size(), 1u);
+  EXPECT_EQ(cut_off_reasons()[0], "the masking noise stopped");
+  std::vector<std::string> events;
+  for (const StoredNote& note : store_->notes()) {
+    if (note.text.find("masking_noise") != std::string::npos) events.push_back(note.text);
+  }
+  ASSERT_EQ(events.size(), 4u);
+  EXPECT_NE(events[0].find("\"on\",\"kind\":\"pink\",\"level_db\":-24.0"), std::string::npos);
+  EXPECT_NE(events[1].find("\"trouble\":\"pulled out\""), std::string::npos);
+  EXPECT_NE(events[2].find("\"on\""), std::string::npos);
+  EXPECT_EQ(events[3].find("trouble"), std::string::npos);
 }
 
 TEST_F(LiveSessions, MarkersThatNobodyTakesAreCountedAndHoldNobodyUp) {

@@ -3,9 +3,11 @@
 Usage: run_test.py PALPATE FOLDER_OF_FAKE_LIBLSL
 """
 
+import array
 import contextlib
 import csv
 import json
+import math
 import os
 import pathlib
 import pty
@@ -16,6 +18,7 @@ import stat
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import unittest.mock
 
@@ -374,6 +377,79 @@ class Usage(Live):
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn(missing[2:], done.stderr)
         self.assertEqual([path.name for path in self.dir.iterdir()], ["protocol.json"])
+
+
+class Noise(Live):
+    NOISE = {"masking_noise": {"kind": "pink", "level_db": -24}}
+
+    def setUp(self):
+        super().setUp()
+        done = subprocess.run([PALPATE, "run", self.protocol(**self.NOISE), "--db", self.db, "--participant", "P01",
+                               "--device", "simulated", "--no-window", "--sound-device", "none such"],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+        if "built without" in done.stderr:
+            self.skipTest("no ALSA")
+        self.refusal = done
+
+    def events(self):
+        texts = [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id")]
+        return [json.loads(text) for text in texts if text.startswith('{"masking_noise"')]
+
+    def test_without_a_sound_device_the_session_is_refused_before_it_starts(self):
+        self.assertEqual(self.refusal.returncode, 1, self.refusal.stderr)
+        self.assertIn("no sound from 'none such'", self.refusal.stderr)
+        self.assertIn("--without-noise", self.refusal.stderr)
+        self.assertIn("--sound-device", self.refusal.stderr)
+        self.assertFalse(self.db.exists())
+
+    def test_told_so_it_runs_without_and_that_is_on_record(self):
+        terminal = self.begin("--without-noise", "--sound-device", "none such", **self.NOISE)
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertEqual(self.events(), [{"masking_noise": "left out"}])
+
+    def test_a_protocol_without_noise_asks_for_no_sound_device(self):
+        terminal = self.begin("--sound-device", "none such")
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertEqual(self.events(), [])
+
+    def test_noise_is_heard_in_trials_and_faded_out_for_pages(self):
+        sound = self.dir / "sound.raw"
+        terminal = self.begin("--sound-device", f"file:{sound},raw", breaks={"min_seconds": 1}, **self.NOISE)
+        rate = 48000
+        while sound.stat().st_size < 4 * 4 * rate:  # seconds of two channels of two bytes
+            time.sleep(0.05)
+        terminal.type("1")
+        self.finish(terminal)
+        left = array.array("h", sound.read_bytes())
+        right = left[1::2]
+        left = left[0::2]
+        self.assertEqual(left, right)
+        runs, start = [], 0  # of sound, in samples
+        parts = [left[i:i + 480] for i in range(0, len(left), 480)]
+        loud = [any(part) for part in parts] + [False]  # nothing follows: whatever sounds must have faded out
+        for i in range(1, len(loud)):
+            if loud[i] and not loud[i - 1]:
+                start = i
+            if loud[i - 1] and not loud[i]:
+                runs.append((start * 480, i * 480))
+        self.assertFalse(loud[0], "silence at first")
+        self.assertEqual(len(runs), 2, "one for each block: the break is a page to read")
+        first, last = runs[0]
+        fade = int(0.2 * rate)
+        steady = left[first + fade + 480:last - fade - 480]
+        level = 10 * math.log10(sum(x * x for x in steady) / len(steady) / 32767 ** 2)
+        self.assertAlmostEqual(level, -24, delta=0.5)
+        largest = max(map(abs, steady))
+        for edge in (left[first:first + 960], left[last - 960:last]):
+            self.assertLess(max(map(abs, edge)), 0.05 * largest, "no click")
+        on, off, again, end = self.events()
+        self.assertEqual((on["masking_noise"], on["kind"], on["level_db"], on["device"], on["seed"]),
+                         ("on", "pink", -24, f"file:{sound},raw", PROTOCOL["seed"]))
+        self.assertEqual((off["masking_noise"], again["masking_noise"], end["masking_noise"]), ("off", "on", "off"))
+        self.assertAlmostEqual(off["seconds"], (last - first) / rate - 0.2, delta=0.1)
+        self.assertEqual(off["underruns"], 0)
 
 
 class Marks(Live):

@@ -1,0 +1,109 @@
+#include "runner/sound/masking_noise.h"
+
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+namespace {
+
+constexpr double kPiece = 0.02;  // s, written at a time
+
+// An output without a clock of its own (a file) takes everything at once: it gets no more than a
+// little ahead. A sound card's clock, which may differ by much less, keeps its own pace.
+constexpr double kAhead = 0.9;
+
+}  // namespace
+
+NoisePlayer::NoisePlayer(const MaskingNoise& noise, std::uint64_t seed, const std::string& device,
+                         Opener open)
+    : noise_(noise), seed_(seed), device_(device), open_(std::move(open)), output_(open_(device_)) {
+  start();
+}
+
+NoisePlayer::~NoisePlayer() {
+  asked_ = false;
+  quit_ = true;
+}
+
+void NoisePlayer::start() {
+  thread_ = std::jthread([this] { play(); });
+}
+
+void NoisePlayer::turn_on() {
+  if (failed_) {
+    if (thread_.joinable()) thread_.join();
+    output_ = open_(device_);
+    failed_ = false;
+    trouble_.clear();
+    start();
+  }
+  if (asked_) return;
+  frames_before_ = frames_;
+  underruns_before_ = underruns_;
+  asked_ = true;
+}
+
+void NoisePlayer::turn_off() { asked_ = false; }
+
+NoiseReport NoisePlayer::report() const {
+  return {static_cast<double>(frames_ - frames_before_) / output_->rate(),
+          underruns_ - underruns_before_, failed_ ? trouble_ : ""};
+}
+
+void NoisePlayer::play() noexcept {
+  using Clock = std::chrono::steady_clock;
+  const double rate = output_->rate();
+  NoiseSignal signal(noise_, rate, seed_);
+  std::vector<double> samples(static_cast<std::size_t>(kPiece * rate));
+  std::vector<std::int16_t> frames(2 * samples.size());
+  const auto pace =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kAhead * kPiece));
+  Clock::time_point due = Clock::now();
+  try {
+    while (!quit_ || !signal.silent()) {
+      signal.sound(asked_);
+      const bool heard = !signal.silent();
+      signal.fill(samples);
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        frames[2 * i] = frames[2 * i + 1] =
+            static_cast<std::int16_t>(std::lround(32767 * samples[i]));
+      }
+      const int ran_dry = output_->write(frames);
+      if (heard) {
+        frames_ += samples.size();
+        underruns_ += ran_dry;
+      }
+      latency_ = output_->latency();
+      due = std::max(due + pace, Clock::now());
+      std::this_thread::sleep_until(due);
+    }
+  } catch (const std::exception& error) {
+    trouble_ = error.what();
+    asked_ = false;
+    failed_ = true;
+  }
+}
+
+std::string to_json_text(const NoisePlayer& player) {
+  const nlohmann::ordered_json event = {{"masking_noise", "on"},
+                                        {"kind", to_string(player.noise().kind)},
+                                        {"level_db", player.noise().level_db},
+                                        {"seed", player.seed()},
+                                        {"device", player.device()},
+                                        {"rate_hz", player.rate()},
+                                        {"latency_s", player.latency()},
+                                        {"fade_s", kNoiseFade}};
+  return event.dump();
+}
+
+std::string to_json_text(const NoiseReport& report) {
+  nlohmann::ordered_json event = {
+      {"masking_noise", "off"}, {"seconds", report.seconds}, {"underruns", report.underruns}};
+  if (!report.trouble.empty()) event["trouble"] = report.trouble;
+  return event.dump();
+}
+
+}  // namespace palpate

@@ -1,0 +1,54 @@
+#include "runner/sound/noise_signal.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kLowest = 10;          // Hz, of the first pole: below it pink noise is flat
+constexpr double kLongEnough = 1;       // s; the slowest pole has decayed to e^-60
+constexpr double kEvenPower = 1.0 / 3;  // mean square of uniform numbers in -1..1
+
+double in_z_plane(double frequency, double rate) { return std::exp(-2 * kPi * frequency / rate); }
+
+}  // namespace
+
+NoiseSignal::NoiseSignal(const MaskingNoise& noise, double rate, std::uint64_t seed)
+    : random_(seed), fade_step_(1 / (kNoiseFade * rate)) {
+  if (noise.kind == NoiseKind::pink) {
+    // Half of each octave falls by 6 dB, which makes 3 dB an octave with less than 0.05 dB of
+    // ripple; sampling adds half a decibel at a quarter of the rate.
+    for (double pole = kLowest; pole < rate / 2; pole *= 2) {
+      slopes_.push_back({in_z_plane(pole, rate), in_z_plane(pole * std::sqrt(2.0), rate)});
+    }
+  }
+  double power = 0;  // that the filter gives to each unit of power, from its impulse response
+  const auto length = static_cast<int>(kLongEnough * rate);
+  for (int i = 0; i < length; ++i) {
+    const double response = filtered(i == 0 ? 1 : 0);
+    power += response * response;
+  }
+  for (Slope& slope : slopes_) slope.out = slope.in = 0;
+  gain_ = std::pow(10.0, noise.level_db / 20) / std::sqrt(power * kEvenPower);
+}
+
+double NoiseSignal::filtered(double value) {
+  for (Slope& slope : slopes_) {
+    slope.out = value - slope.zero * slope.in + slope.pole * slope.out;
+    slope.in = value;
+    value = slope.out;
+  }
+  return value;
+}
+
+void NoiseSignal::fill(std::span<double> samples) {
+  for (double& sample : samples) {
+    loudness_ = std::clamp(loudness_ + (on_ ? fade_step_ : -fade_step_), 0.0, 1.0);
+    const double level = 0.5 - 0.5 * std::cos(kPi * loudness_);
+    sample = std::clamp(level * gain_ * filtered(2 * random_.unit() - 1), -1.0, 1.0);
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,157 @@
+// The player's thread, with an output that is a script.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "runner/sound/masking_noise.h"
+
+namespace palpate {
+namespace {
+
+/// What came out, and what goes wrong; outlives the outputs.
+struct Ear {
+  std::mutex mutex;
+  std::vector<std::int16_t> heard;
+  std::atomic<bool> pulled{false};   ///< the headphones
+  std::atomic<int> gaps{0};          ///< to be reported by the next write
+  std::atomic<bool> held_up{false};  ///< takes nothing
+  int opened = 0;
+
+  std::size_t count() {
+    const std::lock_guard lock(mutex);
+    return heard.size();
+  }
+  bool sounds() {  // lately
+    const std::lock_guard lock(mutex);
+    const std::size_t part = std::min<std::size_t>(heard.size(), 200);
+    return std::any_of(heard.end() - static_cast<std::ptrdiff_t>(part), heard.end(),
+                       [](std::int16_t x) { return x != 0; });
+  }
+};
+
+class Headphones final : public SoundOutput {
+ public:
+  explicit Headphones(Ear& ear) : ear_(ear) {}
+  double rate() const override { return 8000; }
+  int write(std::span<const std::int16_t> samples) override {
+    while (true) {
+      if (ear_.pulled) throw SoundError("pulled out");
+      if (ear_.held_up) continue;
+      const std::lock_guard lock(ear_.mutex);
+      ear_.heard.insert(ear_.heard.end(), samples.begin(), samples.end());
+      return ear_.gaps.exchange(0);
+    }
+  }
+  double latency() override { return 0.01; }
+
+ private:
+  Ear& ear_;
+};
+
+template <class Condition>
+void wait_for(const Condition& condition) {
+  while (!condition()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
+
+class Players : public ::testing::Test {
+ protected:
+  std::unique_ptr<NoisePlayer> player() {
+    return std::make_unique<NoisePlayer>(MaskingNoise{NoiseKind::white, -20}, 1, "ear",
+                                         [this](const std::string&) {
+                                           ++ear_.opened;
+                                           if (ear_.pulled) throw SoundError("pulled out");
+                                           return std::make_unique<Headphones>(ear_);
+                                         });
+  }
+  Ear ear_;
+};
+
+TEST_F(Players, PlaySilenceUntilTheyAreTurnedOn) {
+  const auto noise = player();
+  wait_for([&] { return ear_.count() > 2000; });
+  EXPECT_FALSE(ear_.sounds());
+  noise->turn_on();
+  wait_for([&] { return ear_.sounds(); });
+  wait_for([&] { return noise->report().seconds > 0.3; });
+  noise->turn_off();
+  wait_for([&] { return !ear_.sounds(); });
+  const double seconds = noise->report().seconds;
+  EXPECT_GT(seconds, 0.3 + kNoiseFade - 0.03);
+  EXPECT_EQ(noise->report().underruns, 0);
+}
+
+TEST_F(Players, GiveBothEarsTheSame) {
+  const auto noise = player();
+  noise->turn_on();
+  wait_for([&] { return noise->report().seconds > 0.1; });
+  const std::lock_guard lock(ear_.mutex);
+  for (std::size_t i = 0; i < ear_.heard.size(); i += 2)
+    ASSERT_EQ(ear_.heard[i], ear_.heard[i + 1]);
+}
+
+TEST_F(Players, FadeOutWhenTheyEnd) {
+  {
+    const auto noise = player();
+    noise->turn_on();
+    wait_for([&] { return noise->report().seconds > 0.3; });
+  }
+  EXPECT_FALSE(ear_.sounds());
+  int loudest = 0, last = 0;  // of the last 2 ms before the silence
+  const auto sound =
+      std::find_if(ear_.heard.rbegin(), ear_.heard.rend(), [](std::int16_t x) { return x != 0; });
+  for (int i = 0; i < 32; ++i) last = std::max(last, std::abs(int{*(sound + i)}));
+  for (const std::int16_t x : ear_.heard) loudest = std::max(loudest, std::abs(int{x}));
+  EXPECT_LT(last, loudest / 100);
+}
+
+TEST_F(Players, CountGapsWhileTheySound) {
+  const auto noise = player();
+  ear_.gaps = 1;
+  wait_for([&] { return ear_.gaps == 0; });
+  noise->turn_on();
+  wait_for([&] { return ear_.sounds(); });
+  EXPECT_EQ(noise->report().underruns, 0);
+  ear_.gaps = 2;
+  wait_for([&] { return noise->report().underruns == 2; });
+}
+
+TEST_F(Players, TellThatTheyFailedAndOpenAgain) {
+  const auto noise = player();
+  noise->turn_on();
+  wait_for([&] { return ear_.sounds(); });
+  ear_.pulled = true;
+  wait_for([&] { return noise->failed(); });
+  EXPECT_EQ(noise->report().trouble, "pulled out");
+  EXPECT_THROW(noise->turn_on(), SoundError);
+  EXPECT_TRUE(noise->failed());
+  ear_.pulled = false;
+  const std::size_t before = ear_.count();
+  noise->turn_on();
+  EXPECT_FALSE(noise->failed());
+  wait_for([&] { return ear_.count() > before && ear_.sounds(); });
+  EXPECT_EQ(noise->report().trouble, "");
+  EXPECT_EQ(ear_.opened, 3);
+}
+
+TEST_F(Players, KeepNobodyWaitingWhenTheOutputHangs) {
+  const auto noise = player();
+  ear_.held_up = true;
+  noise->turn_on();  // all return at once, or this test never ends
+  noise->turn_off();
+  noise->turn_on();
+  EXPECT_LT(noise->report().seconds, 1);
+  ear_.held_up = false;
+}
+
+TEST(NoisePlayer, WithoutAnOutputThereIsNone) {
+  EXPECT_THROW(NoisePlayer({}, 1, "no such device"), SoundError);
+}
+
+}  // namespace
+}  // namespace palpate
