@@ -228,6 +228,38 @@ class SessionTest(unittest.TestCase):
         self.assertEqual(self.rows("SELECT end_reason FROM runs ORDER BY id"),
                          [("interrupted",), ("done",)])
 
+    def test_the_disk_is_full_in_mid_trial(self):
+        disk = self.folder / "disk"
+        disk.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "none", disk],
+                          stderr=subprocess.DEVNULL).returncode:
+            self.skipTest("nothing can be mounted here")
+        self.addCleanup(subprocess.run, ["umount", "-l", disk], check=True)
+        self.database = disk / "study.db"
+        self.start()
+        self.answer(2)
+        self.wait_for_trial()
+        before = self.attempts()
+        ballast = disk / "ballast"
+        with open(ballast, "wb", buffering=0) as file:
+            try:
+                while True:
+                    file.write(bytes(512))
+            except OSError:
+                pass
+        # Also the note of a fault, on a busy machine, finds no room: the end in any case.
+        self.press_until("2", lambda: self.program.poll() is not None)
+        self.assertEqual(self.program.returncode, 1, self.messages())
+        self.assertRegex(self.messages(), "disk|space")
+        ballast.unlink()
+        self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
+        self.assertEqual(self.attempts(), before, "the trial in hand is not said to be saved")
+        self.start()
+        self.finish()
+        self.check_whole(cut_off=1)
+        self.assertEqual(self.rows("SELECT end_reason FROM runs ORDER BY id"),
+                         [("interrupted",), ("done",)])
+
     def test_a_signal_ends_it_in_order(self):
         self.start()
         self.answer(1)

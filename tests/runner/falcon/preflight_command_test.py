@@ -1,0 +1,202 @@
+"""palpate run with an emulated Falcon: what is asked and checked before the first trial, and refused.
+
+Usage: preflight_command_test.py EMULATED_FALCONS PALPATE
+"""
+
+import contextlib
+import datetime
+import json
+import os
+import pathlib
+import re
+import sqlite3
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "live"))
+from terminal import Terminal  # noqa: E402
+
+EMULATED, PALPATE = sys.argv[1:3]
+PATIENCE = 120  # s; only a hang reaches it
+
+PROTOCOL = {
+    "version": 1, "name": "touch", "renderers": ["point"], "seed": 3,
+    "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 100},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+    "repetitions": 1, "home": {"rest_s": 0.1, "margin_m": 0.005},
+    "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 600},
+}
+AWAY = (0.036, 0, 0)  # m, in the home zone of every stimulus
+
+
+class Preflight(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.database = self.folder / "study.db"
+        (self.folder / "protocol.json").write_text(json.dumps(PROTOCOL))
+        fifo = self.folder / "control"
+        os.mkfifo(fifo)
+        self.control = os.open(fifo, os.O_RDWR)
+        self.addCleanup(os.close, self.control)
+
+    def calibration(self, days_ago, serial="EMU1"):
+        made = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(days=days_ago)
+        path = self.folder / "lab.json"
+        path.write_text(json.dumps({"version": 1, "forces": [
+            {"serial": serial, "counts_per_newton_metre": -10000, "weights_kg": [0.1],
+             "made_utc": made.strftime("%Y-%m-%dT%H:%M:%SZ")}]}))
+        return path
+
+    def run_session(self, *options, emulator=()):
+        terminal = Terminal([EMULATED, *emulator, "--control", self.folder / "control", PALPATE, "run",
+                             self.folder / "protocol.json", "--db", self.database, "--participant", "P01",
+                             "--device", "falcon", "--no-window", *options], patience=PATIENCE)
+        self.addCleanup(terminal.__exit__)
+        return terminal
+
+    def tell(self, line):
+        os.write(self.control, (line + "\n").encode())
+
+    def hand(self, x, y, z):
+        """The hand takes the grip there: m from the centre, in the Falcon's own frame."""
+        self.tell(f"hand 1 {x} {y} {0.125 + z} 400 10")
+
+    def state(self):
+        path = self.folder / "state.json"
+        path.unlink(missing_ok=True)
+        self.tell(f"state {path}")
+        self.wait_until(path.exists)
+        return json.loads(path.read_text())[0]
+
+    @staticmethod
+    def wait_until(done):
+        end = time.monotonic() + PATIENCE
+        while not done():
+            if time.monotonic() > end:
+                raise AssertionError("nothing came of it")
+            time.sleep(0.01)
+
+    def press(self, bit):
+        """Down and up, each for many ticks."""
+        for bits in (bit, 0):
+            self.tell(f"buttons 1 {bits}")
+            time.sleep(0.3)
+
+    def pushed_and_felt(self, terminal):
+        """Asks for the push until it came whole: a starved machine's guard takes it off."""
+        self.hand(0, 0, 0)
+        self.wait_until(lambda: abs(self.state()["position_m"][0]) < 0.001)
+        while True:
+            self.assertTrue(self.state()["torque_is_zero"], "no force before somebody says so")
+            terminal.type(":go\n")
+            farthest, torque = 0, False
+            end = time.monotonic() + PATIENCE
+            while True:
+                state = self.state()
+                farthest = max(farthest, state["position_m"][0])
+                torque = torque or not state["torque_is_zero"]
+                if torque and state["torque_is_zero"]:
+                    break
+                self.assertLess(time.monotonic(), end, "no push came\n" + terminal.text)
+            came = terminal.wait_for("was a feeble push to the right felt?", "the push was not as it should be")
+            if came.startswith("was"):
+                return farthest
+            terminal.wait_for("(go: push)")
+
+    def notes(self):
+        with contextlib.closing(sqlite3.connect(self.database)) as db:
+            return [text for (text,) in db.execute("SELECT text FROM notes ORDER BY id")]
+
+    def test_from_homing_to_the_first_answer(self):
+        terminal = self.run_session("--calibration", self.calibration(1), "--buttons", emulator=["--unhomed"])
+        terminal.wait_for("home the device: pull the grip fully out")
+        self.assertFalse(self.state()["torque_before_homing"])
+        self.tell("shake 1 0.035")
+        terminal.wait_for("limits: forces of up to ")
+        limits = re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)", terminal.text)
+        terminal.wait_for("(go: push)")
+        limits = limits or re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)",
+                                     terminal.text)
+        self.assertEqual(float(limits[1]), min(6.0, float(limits[2])))
+        farthest = self.pushed_and_felt(terminal)
+        # 1 N against 400 N/m; the scale of force is the emulator's own.
+        self.assertAlmostEqual(farthest, 0.0025, delta=0.0015)
+        terminal.type(":go\n")
+        terminal.wait_for("move the stylus 26 mm from the centre")
+        for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
+            self.hand(*place)
+            self.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
+                self.state()["position_m"], (place[0], place[1], 0.125 + place[2]))))
+            time.sleep(0.1)  # some ticks
+        terminal.wait_for("press button 1 of the device")
+        self.hand(*AWAY)
+        self.press(1)
+        self.press(2)
+        while True:
+            came = terminal.wait_for("[space bar: go on]", "[trial, ", "[fault, ", "on record; ", "press button")
+            if came == "on record; ":
+                break
+            if came in ("[trial, ", "press button"):
+                self.press(2)
+            else:
+                terminal.type(":clear\n:go\n" if came == "[fault, " else " ")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+        found = next(note for note in self.notes() if note.startswith("pre-flight: "))
+        for part in ("device homed", "a push of 1.0 N to the right was felt; limits: forces of up to",
+                     "range of 26 mm to each side", "buttons 1 to 2 work", "calibration stored"):
+            self.assertIn(part, found)
+        with contextlib.closing(sqlite3.connect(self.database)) as db:
+            (calibration,) = db.execute("SELECT device_calibration FROM runs").fetchone()
+            self.assertEqual(db.execute("SELECT DISTINCT response FROM attempts WHERE state = 'completed'").fetchall(),
+                             [("box",)])
+        self.assertIn("EMU1", calibration)
+        self.assertIn("1 days ago", calibration)
+
+    def test_a_push_that_is_not_felt_ends_it_before_anything_is_recorded(self):
+        terminal = self.run_session("--calibration", self.calibration(0))
+        terminal.wait_for("(go: push)")
+        self.pushed_and_felt(terminal)
+        terminal.type(":quit\n")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+        self.assertIn("ended by the experimenter", terminal.text)
+        self.assertEqual(self.notes(), [])
+
+    def test_a_missing_or_stale_calibration_is_refused_unless_told_so(self):
+        for options, word in ([(), "is missing"],
+                              [("--calibration", self.folder / "none.json"), "is missing"],
+                              [("--calibration", self.calibration(1, serial="OTHER")), "is missing"]):
+            terminal = self.run_session(*options)
+            self.assertEqual(terminal.finish(), 2, terminal.text)
+            self.assertIn("the calibration of 'falcon' " + word, terminal.text)
+            self.assertIn("--without-calibration", terminal.text)
+            self.assertFalse(self.database.exists())
+        stale = self.calibration(91)
+        terminal = self.run_session("--calibration", stale)
+        self.assertEqual(terminal.finish(), 2, terminal.text)
+        self.assertIn("is stale: force of the Falcon EMU1", terminal.text)
+        self.assertIn("91 days ago", terminal.text)
+        self.assertFalse(self.database.exists())
+        for options in (("--calibration", stale), ()):
+            terminal = self.run_session("--without-calibration", *options)
+            terminal.wait_for("(go: push)")
+            self.pushed_and_felt(terminal)
+            terminal.type(":go\n")
+            terminal.wait_for("move the stylus")
+            terminal.type(":go\n")  # left unchecked
+            terminal.wait_for("[instructions", "[block begins", "[trial", "[homing")
+            terminal.type(":quit\n")
+            self.assertEqual(terminal.finish(), 0, terminal.text)
+        texts = [note for note in self.notes() if note.startswith("pre-flight: ")]
+        self.assertEqual(len(texts), 2)
+        for text in texts:
+            self.assertIn("range NOT checked", text)
+            self.assertIn("WITHOUT calibration", text)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])
