@@ -10,25 +10,33 @@
 
 namespace palpate {
 
-void quick_check(SQLite::Database& db, const std::string& path) {
+void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later) {
   for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
                             "exports", "export_participants", "tombstones", "tombstone_exports"}) {
     if (!db.tableExists(table)) continue;  // of a later version
+    const bool later = attempts_later && std::string_view(table) == "attempts";
+    db.exec(later ? "PRAGMA ignore_check_constraints = ON"
+                  : "PRAGMA ignore_check_constraints = OFF");
     SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
     if (!check.executeStep()) continue;
     const std::string found = check.getColumn(0).getString();
     if (found != "ok") throw SQLite::Exception(table + (": " + found), SQLITE_CORRUPT);
   }
+  db.exec("PRAGMA ignore_check_constraints = OFF");
   if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
     throw StoreRefused(path + ": is damaged: rows refer to others that are gone; restore a backup");
   }
   if (!db.tableExists("attempts") || !db.tableExists("runs")) return;
   SQLite::Statement strays(db,
-                           "SELECT 1 FROM attempts a JOIN runs r ON r.id = a.run_id WHERE "
-                           "r.session_id <> a.session_id LIMIT 1");
+                           "SELECT r.session_id <> a.session_id FROM attempts a JOIN runs r ON "
+                           "r.id = a.run_id WHERE r.session_id <> a.session_id OR a.state NOT IN "
+                           "('running', 'completed', 'cut_off') LIMIT 1");
   if (strays.executeStep()) {
-    throw StoreRefused(path +
-                       ": is damaged: an attempt is of a run of another session; restore a backup");
+    throw StoreRefused(path + ": is damaged: an attempt is " +
+                       (strays.getColumn(0).getInt() != 0
+                            ? "of a run of another session"
+                            : "neither running nor completed nor cut off") +
+                       "; restore a backup");
   }
 }
 

@@ -20,7 +20,9 @@ void require_ours(const std::string& file, const std::string& path);
 void require_whole_pages(const std::string& file);
 
 /// Cheap damage is found before a participant sits down. Not the samples: they may be gigabytes,
-/// and carry their own checksums. \throws SQLite::Exception, StoreRefused.
-void quick_check(SQLite::Database& db, const std::string& path);
+/// and carry their own checksums. \param attempts_later the CHECKs of attempts, which take a second
+/// for every million, are left to the reader of each (for_each_attempt).
+/// \throws SQLite::Exception, StoreRefused.
+void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later = false);
 
 }  // namespace palpate

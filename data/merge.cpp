@@ -46,6 +46,19 @@ std::deque<Station> open_stations(const std::vector<std::string>& inputs,
   return stations;
 }
 
+/// A value that the tables refuse is damage of the file that it came from.
+template <class Work>
+void take_from(const Station& station, Work&& work) {
+  guarded(station.path(), [&] {
+    try {
+      work();
+    } catch (const SQLite::Exception& error) {
+      if (error.getErrorCode() != SQLITE_CONSTRAINT) throw;
+      throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
+    }
+  });
+}
+
 /// Fills a new database in the order of the plan, so that it does not depend on that of the inputs.
 void fill(SQLite::Database& db, const MergePlan& plan,
           const std::function<void(std::int64_t, std::int64_t)>& progress) {
@@ -60,10 +73,10 @@ void fill(SQLite::Database& db, const MergePlan& plan,
                               "INSERT INTO participants (protocol_id, code, number, simulated, "
                               "seed) VALUES (?, ?, ?, ?, ?)");
       Binder(enrol) << protocol_id << person.code << number << person.simulated << person.seed;
-      enrol.exec();
+      take_from(*person.station, [&] { enrol.exec(); });
       const std::int64_t participant = db.getLastInsertRowid();
       for (const auto& [session_number, session] : person.sessions) {
-        guarded(session.station->path(), [&, &theirs = session] {
+        take_from(*session.station, [&, &theirs = session] {
           copy_session(theirs.station->db(), theirs.id, db, participant);
         });
         if (progress) progress(++sessions, plan.sessions);

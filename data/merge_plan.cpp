@@ -50,10 +50,10 @@ struct Span {
 Span span_of(const PlannedSession& session) {
   SQLite::Statement find(
       session.station->db(),
-      "SELECT min(r.started_utc_ns / 1e9), max(r.started_utc_ns / 1e9 + (max(coalesce(r.ended_ns, "
-      "r.started_ns), coalesce((SELECT max(max(a.began_ns, coalesce(a.response_ns, a.began_ns))) "
-      "FROM attempts a WHERE a.run_id = r.id), r.started_ns)) - r.started_ns) / 1e9) FROM runs r "
-      "WHERE r.session_id = ?");
+      "SELECT coalesce(min(r.started_utc_ns / 1e9), 0), coalesce(max(r.started_utc_ns / 1e9 + "
+      "(max(coalesce(r.ended_ns, r.started_ns), coalesce((SELECT max(max(a.began_ns, "
+      "coalesce(a.response_ns, a.began_ns))) FROM attempts a WHERE a.run_id = r.id), "
+      "r.started_ns)) - r.started_ns) / 1e9), 0) FROM runs r WHERE r.session_id = ?");
   Binder(find) << session.id;
   find.executeStep();
   Span span;

@@ -96,33 +96,45 @@ class Binder {
 /// The columns of a statement, made once for all its rows. Valid after the first step.
 std::vector<SQLite::Column> columns_of(SQLite::Statement& statement);
 
-/// Reads the columns of a row one after the other, whatever their types.
+/// Reads the columns of a row one after the other, whatever their types. Only an optional may be
+/// missing. \throws SQLite::Exception (damage).
 class Row {
  public:
-  explicit Row(SQLite::Statement& statement, int first = 0)
-      : statement_(&statement), index_(first) {}
+  explicit Row(SQLite::Statement& statement) : statement_(&statement) {}
   explicit Row(const std::vector<SQLite::Column>& columns) : columns_(&columns) {}
 
   Row& operator>>(std::string& value) {
     return next([&](const SQLite::Column& column) {
       const void* const text = column.getBlob();  // before its length
       value.assign(static_cast<const char*>(text), static_cast<std::size_t>(column.getBytes()));
+      return !value.empty() || !column.isNull();
     });
   }
   Row& operator>>(double& value) {
-    return next([&](const SQLite::Column& column) { value = column.getDouble(); });
+    return next([&](const SQLite::Column& column) {
+      value = column.getDouble();
+      return value != 0 || !column.isNull();
+    });
   }
   Row& operator>>(int& value) { return integer(value); }
   Row& operator>>(std::uint32_t& value) { return integer(value); }
   Row& operator>>(std::int64_t& value) { return integer(value); }
   Row& operator>>(std::uint64_t& value) { return integer(value); }
   Row& operator>>(bool& value) {
-    return next([&](const SQLite::Column& column) { value = column.getInt64() != 0; });
+    return next([&](const SQLite::Column& column) {
+      const std::int64_t stored = column.getInt64();
+      if (stored != 0 && stored != 1) out_of_range(stored);
+      value = stored != 0;
+      return value || !column.isNull();
+    });
   }
   template <class T>
   Row& operator>>(std::optional<T>& value) {
     bool null = false;
-    next([&](const SQLite::Column& column) { null = column.isNull(); });
+    next([&](const SQLite::Column& column) {
+      null = column.isNull();
+      return true;
+    });
     if (null) {
       value.reset();
       return *this;
@@ -132,26 +144,27 @@ class Row {
   }
 
  private:
+  /// \param read returns whether there was a value; asked of SQLite only where it read 0 or "".
   template <class Read>
   Row& next(const Read& read) {
-    if (columns_ != nullptr) {
-      read((*columns_)[static_cast<std::size_t>(index_++)]);
-    } else {
-      read(statement_->getColumn(index_++));
-    }
+    const bool there = columns_ != nullptr ? read((*columns_)[static_cast<std::size_t>(index_)])
+                                           : read(statement_->getColumn(index_));
+    if (!there) missing();
+    ++index_;
     return *this;
   }
   template <class T>
   Row& integer(T& value) {
     return next([&](const SQLite::Column& column) {
       const std::int64_t stored = column.getInt64();
-      if (!std::in_range<T>(stored)) {
-        throw SQLite::Exception("a number is out of its range: " + std::to_string(stored),
-                                SQLITE_CORRUPT);
-      }
+      if (!std::in_range<T>(stored)) out_of_range(stored);
       value = static_cast<T>(stored);
+      return stored != 0 || !column.isNull();
     });
   }
+  [[noreturn]] void missing() const;
+  [[noreturn]] void out_of_range(std::int64_t stored) const;
+  std::string column_name() const;
   SQLite::Statement* statement_ = nullptr;
   const std::vector<SQLite::Column>* columns_ = nullptr;
   int index_ = 0;

@@ -154,7 +154,7 @@ Store Store::open(const std::string& path, Mode mode) {
       }
       db.exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
     }
-    quick_check(db, path);
+    quick_check(db, path, !writes);
     if (writes) mark_dead_runs(db);
   });
   impl->identity = identity_of(impl->file);

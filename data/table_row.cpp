@@ -8,8 +8,10 @@ namespace palpate {
 namespace {
 
 bool quotes_needed(std::string_view text) {
-  return std::any_of(text.begin(), text.end(),
-                     [](char c) { return c == ',' || c == '"' || c == '\r' || c == '\n'; });
+  // Without a way out: compilers make that 16 characters and more at a time.
+  bool needed = false;
+  for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
+  return needed;
 }
 
 bool fits_tsv(std::string_view text) {

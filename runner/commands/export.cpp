@@ -36,7 +36,11 @@ void watch_signals() {
 /// Shows how far the export is, on a terminal, and ends it when that was asked for.
 class Progress {
  public:
-  explicit Progress(std::int64_t all) : all_(all), on_terminal_(isatty(STDERR_FILENO) == 1) {}
+  explicit Progress(Store& store) : on_terminal_(isatty(STDERR_FILENO) == 1) {
+    if (!on_terminal_) return;  // counting a million takes a while
+    const StoreCounts counts = store.counts();
+    all_ = counts.completed + counts.cut_off;
+  }
   ~Progress() {
     if (on_terminal_) std::fprintf(stderr, "\r\x1b[K");
   }
@@ -53,7 +57,7 @@ class Progress {
   }
 
  private:
-  std::int64_t all_, shown_ = -1;
+  std::int64_t all_ = 0, shown_ = -1;
   bool on_terminal_;
 };
 
@@ -123,8 +127,7 @@ int export_command(const std::vector<std::string>& args) {
     watch_signals();
     ExportDone done;
     {
-      const StoreCounts counts = store.counts();
-      Progress progress(counts.completed + counts.cut_off);
+      Progress progress(store);
       settings.progress = [&](std::int64_t trials) { progress.show(trials); };
       done = export_as(format, store, out, settings);
     }
