@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/reml.h"
+#include "analysis/reml_data.h"
 
 namespace palpate {
 
@@ -16,158 +17,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The non-empty cells are the columns of X: any coding of renderer * shape spans the same.
-struct Cells {
-  std::vector<std::size_t> renderers, shapes;  ///< those with a time, in order
-  /// [renderer][shape] of these: column of X, -1 for an empty cell
-  std::vector<std::vector<Index>> column;
-  Index n = 0;
-};
-
-Cells cells_of(const People& people) {
-  const std::size_t n_shapes = people.empty() ? 0 : people[0].size();
-  const auto used = [&](std::size_t r, std::size_t s) {
-    return std::any_of(people[r][s].begin(), people[r][s].end(),
-                       [](const ParticipantCell& cell) { return cell.n_used > 0; });
-  };
-  Cells out;
-  for (std::size_t r = 0; r < people.size(); ++r) {
-    for (std::size_t s = 0; s < n_shapes; ++s) {
-      if (!used(r, s)) continue;
-      if (out.renderers.empty() || out.renderers.back() != r) out.renderers.push_back(r);
-      if (std::find(out.shapes.begin(), out.shapes.end(), s) == out.shapes.end()) {
-        out.shapes.push_back(s);
-      }
-    }
-  }
-  std::sort(out.shapes.begin(), out.shapes.end());
-  for (const std::size_t r : out.renderers) {
-    auto& row = out.column.emplace_back();
-    for (const std::size_t s : out.shapes) row.push_back(used(r, s) ? out.n++ : -1);
-  }
-  return out;
-}
-
-/// Everything that the criterion needs, from one pass over participants' cells.
-struct Prepared {
-  RemlData data;
-  VectorXd centre;          ///< what was subtracted from y, by cell
-  double freedom = 0;       ///< trials less the rank of X and Z together
-  double least_square = 0;  ///< residual sum of squares with participants as fixed effects
-  double scale = 0;         ///< largest |mean log|
-  bool shared = true;       ///< every pair of renderers has a participant who has both
-};
-
-/// A participant's cells with one renderer, relative to a centre.
-struct Level {
-  std::vector<Index> columns;
-  VectorXd counts, means;
-  double squares = 0;  ///< within the cells
-};
-
-Level level_of(const People& people, const Cells& cells, std::size_t r, std::size_t participant) {
-  Level out;
-  std::vector<double> counts, means;
-  for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
-    const ParticipantCell& cell = people[cells.renderers[r]][cells.shapes[s]][participant];
-    if (cell.n_used == 0) continue;
-    out.columns.push_back(cells.column[r][s]);
-    counts.push_back(static_cast<double>(cell.n_used));
-    means.push_back(cell.mean_log);
-    out.squares += cell.squares_log;
-  }
-  out.counts = Eigen::Map<const VectorXd>(counts.data(), static_cast<Index>(counts.size()));
-  out.means = Eigen::Map<const VectorXd>(means.data(), static_cast<Index>(means.size()));
-  return out;
-}
-
-Prepared prepare(const People& people, const Cells& cells) {
-  Prepared out;
-  RemlData& data = out.data;
-  const std::size_t q = cells.renderers.size(), n_people = people[0][0].size();
-  data.levels = static_cast<Index>(q);
-  data.xx = MatrixXd::Zero(cells.n, cells.n);
-  data.xy = VectorXd::Zero(cells.n);
-
-  std::vector<std::vector<Level>> levels(n_people);  // [participant][renderer]
-  VectorXd totals = VectorXd::Zero(cells.n), counts = totals;
-  MatrixXd together = MatrixXd::Zero(data.levels, data.levels);
-  Index n_levels = 0;
-  for (std::size_t i = 0; i < n_people; ++i) {
-    VectorXd has = VectorXd::Zero(data.levels);
-    for (std::size_t r = 0; r < q; ++r) {
-      const Level& level = levels[i].emplace_back(level_of(people, cells, r, i));
-      if (level.columns.empty()) continue;
-      has(static_cast<Index>(r)) = 1;
-      ++n_levels;
-      totals(level.columns) += level.counts.cwiseProduct(level.means);
-      counts(level.columns) += level.counts;
-      out.scale = std::max(out.scale, level.means.cwiseAbs().maxCoeff());
-    }
-    together += has * has.transpose();
-  }
-  out.shared = (together.array() > 0).all();
-  data.observations = counts.sum();
-
-  // Centred at the fit with participants x renderers as fixed effects: what is left is of the size
-  // of the noise, so no digits are lost to the squares of the means. Twice: once to the cells'
-  // means, then to the rest of that fit.
-  out.centre = totals.cwiseQuotient(counts);
-  for (int pass = 0; pass < 2; ++pass) {
-    data.xx.setZero();
-    data.xy.setZero();
-    data.yy = 0;
-    data.groups.clear();
-    for (std::size_t i = 0; i < n_people; ++i) {
-      RemlGroup group;
-      const auto present = static_cast<Index>(
-          std::count_if(levels[i].begin(), levels[i].end(),
-                        [](const Level& level) { return !level.columns.empty(); }));
-      if (present == 0) continue;
-      group.counts.resize(present);
-      group.y.resize(present);
-      group.x = MatrixXd::Zero(present, cells.n);
-      for (std::size_t r = 0; r < q; ++r) {
-        const Level& level = levels[i][r];
-        if (level.columns.empty()) continue;
-        const auto row = static_cast<Index>(group.levels.size());
-        group.levels.push_back(static_cast<Index>(r));
-        const double n = level.counts.sum();
-        const VectorXd share = level.counts / n, y = level.means - out.centre(level.columns);
-        const double mean_y = share.dot(y);
-        const VectorXd rest = y.array() - mean_y;
-        group.counts(row) = n;
-        group.y(row) = mean_y;
-        group.x(row, level.columns) = share.transpose();
-        MatrixXd xx = -n * share * share.transpose();
-        xx.diagonal() += level.counts;
-        data.xx(level.columns, level.columns) += xx;
-        data.xy(level.columns) += level.counts.cwiseProduct(rest);
-        data.yy += level.squares + level.counts.dot(rest.cwiseAbs2());
-      }
-      data.groups.push_back(std::move(group));
-    }
-    const Eigen::CompleteOrthogonalDecomposition<MatrixXd> fit(data.xx);
-    if (pass == 0) {
-      out.centre += fit.solve(data.xy);
-      out.freedom = data.observations - static_cast<double>(n_levels + fit.rank());
-    }
-  }
-  out.least_square = data.yy;
-  return out;
-}
-
 /// Treatment coding: its columns in R's order, each as values at the non-empty cells.
 struct Columns {
   std::vector<std::string> names, left_out;
   MatrixXd values;  ///< cells x columns, square
 };
 
-Columns treatment_columns(const Cells& cells, const std::vector<std::string>& renderers,
+Columns treatment_columns(const ModelCells& cells, const std::vector<std::string>& renderers,
                           const std::vector<std::string>& shapes) {
   Columns out;
-  out.values.resize(cells.n, 0);
-  MatrixXd basis(cells.n, 0);
+  out.values.resize(cells.n, cells.n);
+  MatrixXd basis(cells.n, cells.n);
+  Index rank = 0;
   const auto add = [&](const std::string& name, std::size_t renderer, std::size_t shape) {
     VectorXd column = VectorXd::Zero(cells.n);
     for (std::size_t r = 0; r < cells.renderers.size(); ++r) {
@@ -180,16 +41,17 @@ Columns treatment_columns(const Cells& cells, const std::vector<std::string>& re
     }
     // As R does: a column that follows from those before it is left out.
     VectorXd rest = column;
-    for (int again = 0; again < 2; ++again) rest -= basis * (basis.transpose() * rest);
+    for (int again = 0; again < 2; ++again) {
+      const VectorXd known = basis.leftCols(rank).transpose() * rest;
+      rest.noalias() -= basis.leftCols(rank) * known;
+    }
     if (rest.norm() <= 1e-7 * column.norm()) {
       out.left_out.push_back(name);
       return;
     }
     out.names.push_back(name);
-    out.values.conservativeResize(Eigen::NoChange, out.values.cols() + 1);
-    out.values.rightCols(1) = column;
-    basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
-    basis.rightCols(1) = rest.normalized();
+    out.values.col(rank) = column;
+    basis.col(rank++) = rest.normalized();
   };
   const auto renderer_name = [&](std::size_t r) {
     return "renderer" + renderers[cells.renderers[r]];
@@ -221,9 +83,10 @@ MatrixXd inverse_of_curved(const MatrixXd& hessian) {
 /// Estimates and tests linear functions of the cells' means.
 class Tester {
  public:
-  Tester(const RemlPoint& point, VectorXd means)
-      : point_(point),
-        means_(std::move(means)),
+  Tester(const ModelData& data, const RemlPoint& point)
+      : data_(data),
+        point_(point),
+        means_(data.cell_means(point.beta)),
         spread_(2 * inverse_of_curved(point.full_hessian)) {}
 
   /// Satterthwaite (1946) as in lmerTest (Kuznetsova et al. 2017): the variance's own variance by
@@ -231,8 +94,9 @@ class Tester {
   ModelEstimate operator()(const VectorXd& weights) const {
     ModelEstimate out;
     out.estimate = weights.dot(means_);
-    const VectorXd loaded = point_.inverse_xx * weights;
-    const double variance = point_.sigma_squared * weights.dot(loaded);
+    const ModelData::Loading load = data_.load(weights);
+    const VectorXd loaded = point_.inverse_xx * load.inside;
+    const double variance = point_.sigma_squared * (load.inside.dot(loaded) + load.outside);
     out.se = std::sqrt(variance);
     const auto n_theta = static_cast<Index>(point_.information_loss.size());
     VectorXd slope(n_theta + 1);
@@ -262,6 +126,7 @@ class Tester {
   }
 
  private:
+  const ModelData& data_;
   const RemlPoint& point_;
   VectorXd means_;
   MatrixXd spread_;
@@ -308,7 +173,7 @@ void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& r
   }
 }
 
-std::string why_no_fit(const People& people, const Cells& cells) {
+std::string why_no_fit(const People& people, const ModelCells& cells) {
   if (people.size() < 2) return "only one renderer in the data";
   if (cells.n == 0) return "no trial can be used for times";
   if (cells.renderers.size() < people.size())
@@ -321,7 +186,7 @@ std::string why_no_fit(const People& people, const Cells& cells) {
 MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes) {
   MixedModel out;
-  const Cells cells = cells_of(people);
+  const ModelCells cells = model_cells(people);
   for (const auto& renderer : people) {
     for (const auto& shape : renderer) {
       for (const ParticipantCell& cell : shape) out.n_observations += cell.n_used;
@@ -335,7 +200,7 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
     return out;
   };
   if (const std::string reason = why_no_fit(people, cells); !reason.empty()) return refuse(reason);
-  const Prepared prepared = prepare(people, cells);
+  const ModelData prepared(people, cells);
   out.n_participants = prepared.data.groups.size();
   if (out.n_participants < 2) return refuse("one participant cannot tell chance from effect");
   if (!prepared.shared) return refuse("no participant has times for both renderers");
@@ -354,14 +219,14 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
   if (!optimum.converged) return refuse("the fit did not converge");
 
   const Columns columns = treatment_columns(cells, renderers, shapes);
-  const Eigen::FullPivLU<MatrixXd> lu(columns.values);
-  const MatrixXd from_cells = lu.inverse();
-  out.log_likelihood_reml =
-      -(optimum.point.deviance + 2 * std::log(std::fabs(lu.determinant()))) / 2;
+  // Incidences of a graph and unit vectors: the determinant is 1 or -1, and nothing of it is in the
+  // likelihood.
+  const MatrixXd from_cells = columns.values.inverse();
+  out.log_likelihood_reml = -(optimum.point.deviance + prepared.log_determinant()) / 2;
   out.left_out = columns.left_out;
   put_variances(optimum, renderers, out);
 
-  const Tester tested(optimum.point, prepared.centre + optimum.point.beta);
+  const Tester tested(prepared, optimum.point);
   for (Index i = 0; i < cells.n; ++i) {
     out.fixed_effects.push_back(
         {columns.names[static_cast<std::size_t>(i)], tested(from_cells.row(i).transpose())});

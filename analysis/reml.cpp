@@ -43,7 +43,7 @@ struct Sums {
 void put_derivatives(const RemlData& data, const MatrixXd& coding, const VectorXd& theta,
                      const std::vector<Part>& parts, double y_p_y, RemlPoint& out) {
   const Index q = data.levels, p = out.beta.size();
-  const double freedom = data.observations - static_cast<double>(p);
+  const double freedom = data.freedom;
   const MatrixXd lambda = lower_triangle(theta, q);
   const MatrixXd& c = out.inverse_xx;
   const auto place = places(q);
@@ -58,12 +58,19 @@ void put_derivatives(const RemlData& data, const MatrixXd& coding, const VectorX
   }
 
   out.slope = MatrixXd::Zero(q, q);
-  std::vector<Sums> sums(n_theta, {MatrixXd::Zero(p, p), VectorXd::Zero(p), 0, 0});
+  std::vector<Sums> sums(n_theta, {{}, VectorXd::Zero(p), 0, 0});
   MatrixXd second_trace = MatrixXd::Zero(static_cast<Index>(n_theta), static_cast<Index>(n_theta));
   MatrixXd second_squares = second_trace;  // of u' E u, its first part
-  for (std::size_t i = 0; i < parts.size(); ++i) {
+  Index n_rows = 0;
+  for (const Part& part : parts) n_rows += part.f.rows();
+  // All participants' F and E F, one below the other: large products are fast ones.
+  MatrixXd all_f(n_rows, p);
+  std::vector<MatrixXd> all_ef(n_theta, MatrixXd(n_rows, p));
+  for (std::size_t i = 0, row = 0; i < parts.size(); row += data.groups[i++].levels.size()) {
     const Part& part = parts[i];
     const auto& levels = data.groups[i].levels;
+    const auto rows = Eigen::seqN(static_cast<Index>(row), part.f.rows());
+    all_f(rows, Eigen::all) = part.f;
     const MatrixXd fixed = part.f * c * part.f.transpose();
     const MatrixXd gap = part.k - fixed;
     out.slope(levels, levels) += gap - part.u * part.u.transpose() * (freedom / y_p_y);
@@ -71,7 +78,7 @@ void put_derivatives(const RemlData& data, const MatrixXd& coding, const VectorX
     for (std::size_t k = 0; k < n_theta; ++k) {
       e[k] = rows_and_columns(direction[k], levels);
       ke[k] = part.k * e[k];
-      sums[k].loss.noalias() += part.f.transpose() * (e[k] * part.f);
+      all_ef[k](rows, Eigen::all) = e[k] * part.f;
       sums[k].mixed.noalias() += part.f.transpose() * (e[k] * part.u);
       sums[k].squares += part.u.dot(e[k] * part.u);
       sums[k].traces += gap.cwiseProduct(e[k]).sum();
@@ -91,7 +98,10 @@ void put_derivatives(const RemlData& data, const MatrixXd& coding, const VectorX
   out.hessian.resize(m, m);
   out.full_hessian.resize(m + 1, m + 1);
   std::vector<MatrixXd> c_loss(n_theta);
-  for (std::size_t k = 0; k < n_theta; ++k) c_loss[k] = c * sums[k].loss;
+  for (std::size_t k = 0; k < n_theta; ++k) {
+    sums[k].loss.noalias() = all_f.transpose() * all_ef[k];
+    c_loss[k].noalias() = c * sums[k].loss;
+  }
   const double sigma = std::sqrt(out.sigma_squared);
   for (std::size_t k = 0; k < n_theta; ++k) {
     const auto a = static_cast<Index>(k);
@@ -131,12 +141,12 @@ RemlPoint reml_point(const RemlData& data, const MatrixXd& coding, const VectorX
                      bool with_derivatives) {
   const MatrixXd half = coding * lower_triangle(theta, data.levels);
   const MatrixXd psi = half * half.transpose();
-  const Index p = data.xx.rows();
-  const double freedom = data.observations - static_cast<double>(p);
+  const Index p = data.within.size();
+  const double freedom = data.freedom;
 
   RemlPoint out;
   std::vector<Part> parts(data.groups.size());
-  MatrixXd xx = data.xx;
+  MatrixXd xx = data.within.asDiagonal();
   VectorXd xy = data.xy;
   double log_determinant = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -155,7 +165,8 @@ RemlPoint reml_point(const RemlData& data, const MatrixXd& coding, const VectorX
   }
   const Eigen::LLT<MatrixXd> factor(xx);
   out.beta = factor.solve(xy);
-  double y_p_y = data.yy - 2 * out.beta.dot(data.xy) + out.beta.dot(data.xx * out.beta);
+  double y_p_y =
+      data.yy - 2 * out.beta.dot(data.xy) + out.beta.dot(data.within.cwiseProduct(out.beta));
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const VectorXd rest = data.groups[i].y - data.groups[i].x * out.beta;
     parts[i].u = parts[i].k * rest;

@@ -5,7 +5,8 @@
 // y = X beta + Z b + e, b ~ N(0, sigma^2 Psi) for each participant, e ~ N(0, sigma^2). Z has a
 // column for each level, so what a participant says about b are the means of y and X at each level:
 // the rest of the trials (their deviations from these means) enters through sums that do not depend
-// on Psi. An evaluation costs O(participants x columns^2), whatever the number of trials.
+// on Psi. An evaluation costs O(participants x columns^2 + columns^3), whatever the number of
+// trials.
 
 #include <Eigen/Dense>
 #include <vector>
@@ -22,8 +23,8 @@ struct RemlGroup {
 
 struct RemlData {
   Eigen::Index levels = 0;  ///< q
-  double observations = 0;  ///< n
-  Eigen::MatrixXd xx;       ///< X'X of the deviations from the means
+  double freedom = 0;       ///< trials less all fixed effects, also those without a column here
+  Eigen::VectorXd within;   ///< X'X of the deviations from the means, made diagonal
   Eigen::VectorXd xy;       ///< X'y of them
   double yy = 0;            ///< y'y of them
   std::vector<RemlGroup> groups;

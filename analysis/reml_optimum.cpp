@@ -139,9 +139,9 @@ MatrixXd by_moments(const RemlData& data) {
   const Index q = data.levels;
   const RemlPoint flat =
       reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
-  const double within =
-      std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) + flat.beta.dot(data.xx * flat.beta)) /
-                           std::max(1.0, data.observations));
+  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
+                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
+                                             std::max(1.0, data.freedom));
   MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
   for (const RemlGroup& group : data.groups) {
     const VectorXd rest = group.y - group.x * flat.beta;
