@@ -31,6 +31,7 @@ struct Sample {
   std::int64_t time_ns = 0;      ///< session clock, at the start of the tick
   std::int64_t period_ns = 0;    ///< since the tick before
   std::int64_t lateness_ns = 0;  ///< time_ns less the time at which the tick was due
+  std::int64_t warm_up_ns = 0;   ///< from there to the device's reading, by the clock
   std::int64_t compute_ns = 0;   ///< from the device's reading to the command for it, by the clock
   std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
   Phase phase = Phase::idle;

@@ -38,7 +38,7 @@ void Servo::prepare(const Scene& scene, const Renderer& renderer, const HomeZone
 
 void Servo::start() noexcept {
   const std::int64_t now = clock_.now_ns();
-  due_ns_ = now - now % period_ns_ + period_ns_ / 2;
+  due_ns_ = now - now % period_ns_ + period_ns_ / 4 + now % period_ns_ / 2;
   if (due_ns_ < now) due_ns_ += period_ns_;
 }
 
@@ -86,6 +86,12 @@ void Servo::keep_time() noexcept {
   if (sample_.phase != Phase::feeling) return;
   quality_.missed_ticks += static_cast<std::uint64_t>(late);
   quality_.longest_period_ns = std::max(quality_.longest_period_ns, sample_.period_ns);
+}
+
+void Servo::warm_up() noexcept {
+  if (!warm_ || sample_.phase != Phase::feeling) return;
+  stage_->renderer->tick(stage_->scene, stage_->shadow, sample_.probe, period_);
+  sample_.warm_up_ns = clock_.now_ns() - sample_.time_ns;
 }
 
 void Servo::check(const DeviceReading& reading) noexcept {
@@ -138,6 +144,7 @@ DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexc
 
 const Sample& Servo::tick() noexcept {
   keep_time();
+  warm_up();
   const DeviceReading reading = device_.read();
   read_ns_ = clock_.now_ns();
   check(reading);

@@ -28,11 +28,16 @@ struct WorkspaceMap {
 /// What one trial puts before the stylus, with the memory that rendering it needs.
 struct Stage {
   Stage(const Scene& what, const Renderer& how, const HomeZone& where)
-      : scene(what), renderer(&how), state(scene.initial_state()), home(where) {}
+      : scene(what),
+        renderer(&how),
+        state(scene.initial_state()),
+        shadow(scene.initial_state()),
+        home(where) {}
 
   const Scene scene;
   const Renderer* renderer;
-  RenderState state;  ///< the servo's alone while it has the stage
+  RenderState state;   ///< the servo's alone while it has the stage
+  RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
 };
 
@@ -62,9 +67,15 @@ class Servo final : public TickSource {
     passivity_.emplace(PassivitySettings{0.5 * kLightestEnd / period_}, period_);
   }
 
-  /// The next tick is due within a period, as all are half a period off the multiples of the
-  /// period: at some of these the kernel has a tick of its own (Linux 6.4 and later), and a servo's
-  /// tick that begins just before is interrupted for some 30 us, time and again.
+  /// Each tick renders the last one again, for nobody, before it reads the device: what other
+  /// programs have put out of the processor's caches meanwhile is back when the reading comes, and
+  /// the command follows it sooner. For ticks with sleep between them. Before start().
+  void keep_warm() noexcept { warm_ = true; }
+
+  /// The next tick is due within a period, and all are a quarter to three quarters of a period past
+  /// its multiples, as chance has it: at some of these the kernel has a tick of its own (Linux 6.4
+  /// and later), and a servo's tick that begins just before is interrupted for some 30 us, time and
+  /// again.
   void start() noexcept;
 
   double period() const { return period_; }  ///< s
@@ -73,6 +84,7 @@ class Servo final : public TickSource {
  private:
   bool at_home(const LineProbe& probe) noexcept;
   void keep_time() noexcept;
+  void warm_up() noexcept;
   void check(const DeviceReading& reading) noexcept;
   void command(const Vec3& device1, const Vec3& device2) noexcept;
   DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
@@ -91,6 +103,7 @@ class Servo final : public TickSource {
   std::unique_ptr<Stage> own_;  ///< of prepare()
   Stage* stage_ = nullptr;
   Vec3 rest_tip_;
+  bool warm_ = false;
   int rested_ = 0;  ///< ticks
   int late_in_a_row_ = 0;
   Sample sample_;

@@ -22,6 +22,7 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
       awake_(settings.realtime.awake),
       ring_(settings.ring) {
+  servo_.keep_warm();
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
   thread_ = std::jthread([this, &granted] {

@@ -126,7 +126,8 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
 
 /// One long trial; what came of each tick with forces on.
 void feel(ServoThread& servo, double rate, std::size_t wanted, const std::function<bool()>& wait,
-          ServoTiming& out, std::vector<std::int64_t>& compute) {
+          ServoTiming& out, std::vector<std::int64_t>& compute,
+          std::vector<std::int64_t>& warm_up) {
   const Scene scene({{std::make_shared<const ConvexMesh>(icosphere(kRadius, 3)), Pose{}, Material{},
                       0, nullptr}});
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
@@ -146,6 +147,7 @@ void feel(ServoThread& servo, double rate, std::size_t wanted, const std::functi
     if (sample.phase != Phase::feeling) continue;
     out.lateness.push_back(sample.lateness_ns);
     compute.push_back(sample.compute_ns);
+    warm_up.push_back(sample.warm_up_ns);
     const auto missed = sample.lateness_ns / period_ns;
     out.missed_ticks += static_cast<std::uint64_t>(missed);
     run = missed > 0 ? run + static_cast<int>(missed) : 0;
@@ -181,12 +183,13 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   ServoTiming out;
   out.rate = rate;
   out.lateness.reserve(wanted);
-  std::vector<std::int64_t> by_clock;
+  std::vector<std::int64_t> by_clock, warm_up;
   by_clock.reserve(wanted);
+  warm_up.reserve(wanted);
   {
     ServoThread servo(device, clock, servo_settings);
     out.rights = servo.rights();
-    feel(servo, rate, wanted, wait, out, by_clock);
+    feel(servo, rate, wanted, wait, out, by_clock, warm_up);
   }
   std::sort(out.lateness.begin(), out.lateness.end());
   out.ticks = out.lateness.size();
@@ -201,6 +204,10 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   const auto compute = sorted(device.compute()), whole = sorted(device.whole());
   out.asking_median = quantile(sorted(device.asking()), 0.5);
   by_clock = sorted(std::move(by_clock));
+  warm_up = sorted(std::move(warm_up));
+  out.warm_up_median = quantile(warm_up, 0.5);
+  out.warm_up_p999 = quantile(warm_up, 0.999);
+  out.warm_up_max = quantile(warm_up, 1);
   out.clock_median = quantile(by_clock, 0.5);
   out.clock_p999 = quantile(by_clock, 0.999);
   out.clock_max = quantile(by_clock, 1);

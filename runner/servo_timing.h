@@ -27,6 +27,8 @@ struct ServoTiming {
   double late_share = 0;    ///< of ticks, more than a period late
   int worst_run = 0;        ///< missed ticks in a row, at most
   std::uint64_t trips = 0;  ///< times that this cut the forces off
+  /// By the clock, of bringing back what the tick needs (Servo::keep_warm).
+  std::int64_t warm_up_median = 0, warm_up_p999 = 0, warm_up_max = 0;
   /// By the clock, from the device's reading to the command: with what others took of it.
   std::int64_t clock_median = 0, clock_p999 = 0, clock_max = 0;
   /// Of the servo's thread itself: the same, and the whole tick but for the device's own transfer.

@@ -113,6 +113,8 @@ Json to_json(const ServoTiming& t) {
         {"p99.9", t.lateness_p999},
         {"max", t.lateness_max},
         {"share_above_one_period", t.late_share}}},
+      {"warm_up_ns",
+       {{"median", t.warm_up_median}, {"p99.9", t.warm_up_p999}, {"max", t.warm_up_max}}},
       {"compute_ns", {{"median", t.clock_median}, {"p99.9", t.clock_p999}, {"max", t.clock_max}}},
       {"compute_cpu_ns",
        {{"median", t.compute_median}, {"p99.9", t.compute_p999}, {"max", t.compute_max}}},
@@ -133,6 +135,8 @@ void print(const ServoTiming& t) {
   std::printf("%-44s%10s%10s%10s%10s\n", "us", "median", "p99", "p99.9", "max");
   std::printf("%-44s%10.1f%10.1f%10.1f%10.1f\n", "lateness of ticks", us(t.lateness_median),
               us(t.lateness_p99), us(t.lateness_p999), us(t.lateness_max));
+  std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "warming the caches up, by the clock",
+              us(t.warm_up_median), "", us(t.warm_up_p999), us(t.warm_up_max));
   std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "rendering and limits, by the clock",
               us(t.clock_median), "", us(t.clock_p999), us(t.clock_max));
   std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "rendering and limits, thread's own time",

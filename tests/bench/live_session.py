@@ -101,6 +101,7 @@ def main():
           f"  compute us, clock    {us(live['compute_ns'], 'median', 'p99', 'p99.9', 'max')}\n"
           f"timing beside it: {timing['ticks']} ticks, {timing['missed_ticks']} missed\n"
           f"  lateness us          {us(timing['lateness_ns'], 'median', 'p99', 'p99.9', 'max')}\n"
+          f"  warm-up us, clock    {us(timing['warm_up_ns'], 'median', 'p99.9', 'max')}\n"
           f"  compute us, clock    {us(timing['compute_ns'], 'median', 'p99.9', 'max')}\n"
           f"  compute us, own time {us(cpu, 'median', 'p99.9', 'max')}"
           f"  of which asking for it {us(timing['asking_cpu_ns'], 'median')}")

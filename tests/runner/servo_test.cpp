@@ -51,6 +51,35 @@ TEST(Servo, ForcesGoOnAfterTheRestInTheHomeZoneAndShowTheWall) {
   EXPECT_EQ(device.force, Vec3(0));
 }
 
+TEST(Servo, KeepingWarmChangesNoTick) {
+  const auto slide = [](int tick) {
+    DeviceReading reading = come_down(tick, 0.028);
+    reading.stylus.tip.x = reading.stylus.tail.x = 0.01 * std::sin(0.005 * tick);
+    return reading;
+  };
+  FakeDevice device(slide), other_device(slide);
+  VirtualClock clock, other_clock;
+  Servo servo(device, clock, 1000, ForceLimits{}), other(other_device, other_clock, 1000, {});
+  other.keep_warm();
+  for (int trial = 0; trial < 2; ++trial) {
+    servo.prepare(cube_scene(), ray_renderer(), HomeZone{});
+    other.prepare(cube_scene(), ray_renderer(), HomeZone{});
+    bool touched = false;
+    for (int tick = 0; tick < 3000; ++tick) {
+      const Sample& sample = servo.tick();
+      const Sample& warm = other.tick();
+      ASSERT_EQ(warm.phase, sample.phase);
+      ASSERT_EQ(warm.rendering.force, sample.rendering.force);
+      ASSERT_EQ(warm.rendering.torque, sample.rendering.torque);
+      ASSERT_EQ(warm.device1, sample.device1);
+      ASSERT_EQ(warm.faults, sample.faults);
+      touched = touched || sample.rendering.contacts > 0;
+    }
+    EXPECT_EQ(touched, trial == 0);
+    EXPECT_EQ(servo.stop().ticks, other.stop().ticks);
+  }
+}
+
 TEST(Servo, NoForceBeforeTheStylusHasRested) {
   // Pressed into the cube from the start: never in the home zone.
   FakeDevice device([](int) { return stylus_at(0.02); });
