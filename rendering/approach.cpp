@@ -14,7 +14,7 @@ using namespace minkowski;
 
 constexpr int kSteps = 400;         // a longer way round is left to the trees
 constexpr double kSameTime = 1e-9;  // of a tick; closer times differ by rounding
-constexpr double kOff = 1e-9;       // of the size; a probe that is farther off does not touch
+constexpr double kApart = 1e-9;     // of the size; a probe that is farther off does not touch
 constexpr double kNever = HUGE_VAL;
 
 /// Both ends move linearly; t from 0 to 1.
@@ -41,8 +41,8 @@ double fall(double before, double after) {
 double fall_on_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, const Motion& m,
                     double t) {
   const Edge& edge = mesh.edges()[index];
-  const Vec3& v0 = mesh.vertices()[edge.v0];
-  const Vec3 e = (left_ahead ? -1.0 : 1.0) * (mesh.vertices()[edge.v1] - v0);
+  const Vec3& v0 = edge.from;
+  const Vec3 e = (left_ahead ? -1.0 : 1.0) * (edge.to - v0);
   const Vec3 w = m.tip - v0;
   const double c0 = glm::dot(glm::cross(w, m.d), e);
   const double c1 = glm::dot(glm::cross(m.tip_motion, m.d) + glm::cross(w, m.d_motion), e);
@@ -149,7 +149,7 @@ Stage over_edge(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
   if (!measure_edge(mesh, index, left_ahead, m.tip_at(time), d, measured)) return {};
   if (falls == kNever) {
     if (!(measured.depth < 0)) return {};
-    return separated(at, measured.normal, glm::dot(measured.normal, mesh.vertices()[edge.v0]));
+    return separated(at, measured.normal, glm::dot(measured.normal, edge.from));
   }
   if (measured.place < 0 || measured.place > 1) {
     const bool to_left = (measured.place < 0) == left_ahead;
@@ -176,7 +176,7 @@ Approach checked(const ConvexMesh& mesh, const Approach& entry, const Motion& m)
     return {};
   }
   const double way = glm::length(m.tip_motion) + glm::length(m.d_motion);
-  const double most = kOff * (mesh.size() + glm::length(d)) + kSameTime * way;
+  const double most = kApart * (mesh.size() + glm::length(d)) + kSameTime * way;
   const bool on = std::abs(at.depth) <= most && off_facet<kSegment>(mesh, at, tip, d) <= most;
   return on ? entry : Approach{};
 }

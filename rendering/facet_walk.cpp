@@ -222,8 +222,6 @@ void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at) {
   for (const std::uint32_t facet : {mesh.edges()[at.index].left, mesh.edges()[at.index].right}) {
     for (const Neighbour& next : mesh.facets()[facet].triangle) {
       if (next.edge == at.index) continue;
-      __builtin_prefetch(&mesh.vertices()[mesh.edges()[next.edge].v0]);
-      __builtin_prefetch(&mesh.vertices()[mesh.edges()[next.edge].v1]);
       fetch_beyond<true>(mesh, next.across);
     }
   }

@@ -83,8 +83,8 @@ struct MovingSegment {
 void meet_edge(const ConvexMesh& mesh, std::uint32_t index, const MovingSegment& probe,
                double tolerance, FirstContact& first) {
   const Edge& edge = mesh.edges()[index];
-  const Vec3& v0 = mesh.vertices()[edge.v0];
-  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3& v0 = edge.from;
+  const Vec3 e = edge.to - v0;
   const Vec3 w = probe.tip - v0;
   // (w(t) x d(t)) . e = 0: probe and edge in one plane
   const double c0 = glm::dot(glm::cross(w, probe.d), e);
@@ -156,7 +156,7 @@ ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t 
     std::vector<Box> boxes;
     boxes.reserve(mesh.edges().size());
     for (const Edge& edge : mesh.edges()) {
-      const Vec3 &a = mesh.vertices()[edge.v0], &b = mesh.vertices()[edge.v1];
+      const Vec3 &a = edge.from, &b = edge.to;
       boxes.push_back({glm::min(a, b), glm::max(a, b)});
     }
     edges_ = BoundingTree(boxes);

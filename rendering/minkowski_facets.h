@@ -20,9 +20,10 @@ inline constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below th
 inline constexpr double kNearlyParallel =
     1e-3;  // below this the direction of e x d has lost digits
 
-inline std::uint32_t corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
+/// Where a side of the facet begins.
+inline const Vec3& corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
   const Edge& edge = mesh.edges()[side.edge];
-  return edge.left == facet ? edge.v0 : edge.v1;
+  return edge.left == facet ? edge.from : edge.to;
 }
 
 inline bool outside(const Side& side, const Vec3& p) {
@@ -38,12 +39,12 @@ inline Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const 
   const auto beyond = [&](std::uint32_t i) { return Neighbour{sides[i].edge, sides[i].across}; };
   if (outside(sides[0], p)) return beyond(0);
   if (outside(sides[count - 1], p)) return beyond(count - 1);
-  const Vec3 apex = mesh.vertices()[corner(mesh, index, sides[0])];
+  const Vec3 apex = corner(mesh, index, sides[0]);
   const Vec3 turn = glm::cross(facet.normal, p - apex);  // in-plane, a quarter turn ahead of p
   std::uint32_t low = 1, high = count - 1;  // p lies between the rays to corner low and corner high
   while (high - low > 1) {
     const std::uint32_t middle = (low + high) / 2;
-    const Vec3 ray = mesh.vertices()[corner(mesh, index, sides[middle])] - apex;
+    const Vec3 ray = corner(mesh, index, sides[middle]) - apex;
     (glm::dot(ray, turn) <= 0 ? low : high) = middle;
   }
   return outside(sides[low], p) ? beyond(low) : Neighbour{kNone, kNone};
@@ -131,8 +132,8 @@ inline Slopes slopes_at(const ConvexMesh& mesh, const Edge& edge, const Vec3& d)
 inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
                          const Vec3& tip, const Vec3& d, Measured& m) {
   const Edge& edge = mesh.edges()[index];
-  const Vec3& v0 = mesh.vertices()[edge.v0];
-  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3& v0 = edge.from;
+  const Vec3 e = edge.to - v0;
   const Vec3 c = glm::cross(e, d);
   const double c2 = glm::dot(c, c);
   const double right_angle2 = glm::dot(e, e) * glm::dot(d, d);
@@ -236,8 +237,8 @@ double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, con
 /// How far the ideal probe is off an edge that it should cross, m.
 inline double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
   const Edge& edge = mesh.edges()[at.index];
-  const Vec3& v0 = mesh.vertices()[edge.v0];
-  const Vec3 e = mesh.vertices()[edge.v1] - v0;
+  const Vec3& v0 = edge.from;
+  const Vec3 e = edge.to - v0;
   const Vec3 ideal = tip + at.depth * at.normal;
   return std::min(distance_to(ideal + std::clamp(at.place, 0.0, 1.0) * d, v0, e),
                   distance_to(v0 + std::clamp(at.along_edge, 0.0, 1.0) * e, ideal, d));

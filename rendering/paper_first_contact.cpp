@@ -97,8 +97,8 @@ bool crosses_polygon(const ConvexMesh& mesh, std::uint32_t index, const Vec3& be
 bool crosses_edge(const ConvexMesh& mesh, std::uint32_t index, const LineProbe& before,
                   const LineProbe& after) {
   const Edge& edge = mesh.edges()[index];
-  const Vec3& c = mesh.vertices()[edge.v0];
-  const Vec3 e = mesh.vertices()[edge.v1] - c;
+  const Vec3& c = edge.from;
+  const Vec3 e = edge.to - c;
   const Nearest n0 = nearest(c, e, before), n1 = nearest(c, e, after);
   const auto no_end = [](double share) { return share > 0 && share < 1; };
   return glm::dot(n0.apart, n1.apart) < 0 && no_end(n0.on_edge) && no_end(n1.on_edge) &&

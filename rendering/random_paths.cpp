@@ -172,7 +172,7 @@ struct Way {
     const auto pick = [&](const auto& items) { return items[random.below(items.size())]; };
     while (!full()) {
       const Edge edge = pick(mesh.edges());
-      const Vec3 &v0 = mesh.vertices()[edge.v0], &v1 = mesh.vertices()[edge.v1];
+      const Vec3 &v0 = edge.from, &v1 = edge.to;
       const Vec3 along = glm::normalize(v1 - v0);
       const Vec3 normal = mesh.facets()[edge.left].normal;
       const Vec3 across = glm::cross(normal, along);

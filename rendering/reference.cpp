@@ -88,8 +88,8 @@ ReferenceDepth reference_depth(const ConvexMesh& mesh, const LineProbe& probe) {
     const double left_slope = glm::dot(left, d);
     const double right_slope = glm::dot(right, d);
     if ((left_slope >= 0) == (right_slope >= 0)) continue;
-    const Vec3& v0 = mesh.vertices()[edge.v0];
-    const Vec3 e = mesh.vertices()[edge.v1] - v0;
+    const Vec3& v0 = edge.from;
+    const Vec3 e = edge.to - v0;
     if (glm::length(glm::cross(e, d)) <= kParallelSine * glm::length(e) * glm::length(d)) continue;
     // The direction e x d, turned outside, as the mixture of the two facet normals that is at right
     // angles to d: it cannot leave the arc between them, however small e x d is.
@@ -107,8 +107,7 @@ double reference_gap(const ConvexMesh& mesh, const LineProbe& probe) {
   // end of the probe and the inside of a facet.
   double gap = std::numeric_limits<double>::infinity();
   for (const Edge& edge : mesh.edges()) {
-    gap = std::min(gap, segment_distance(probe.tip, probe.tail, mesh.vertices()[edge.v0],
-                                         mesh.vertices()[edge.v1]));
+    gap = std::min(gap, segment_distance(probe.tip, probe.tail, edge.from, edge.to));
   }
   for (const Facet& facet : mesh.facets()) {
     for (const Vec3& end : {probe.tip, probe.tail}) {

@@ -58,7 +58,7 @@ std::optional<ReferenceDepth> facet_of_sum(const ConvexMesh& mesh, bool is_edge,
   const double left_slope = glm::dot(left, d), right_slope = glm::dot(right, d);
   if ((left_slope >= 0) == (right_slope >= 0)) return std::nullopt;
   const Vec3 normal = glm::normalize(std::abs(right_slope) * left + std::abs(left_slope) * right);
-  return ReferenceDepth{glm::dot(normal, mesh.vertices()[edge.v0] - probe.tip), normal};
+  return ReferenceDepth{glm::dot(normal, edge.from - probe.tip), normal};
 }
 
 /// The one facet of M that the probe comes in by, where it is plain which one.

@@ -361,8 +361,8 @@ std::vector<WayOut> ways_out(const ConvexMesh& mesh, const LineProbe& probe, con
     const Vec3 n =
         glm::normalize(std::abs(right_slope) * left.normal + std::abs(left_slope) * right.normal);
     if (glm::dot(n, towards) < least_cosine) continue;
-    const Vec3& v0 = mesh.vertices()[edge.v0];
-    const Vec3 line = mesh.vertices()[edge.v1] - v0;
+    const Vec3& v0 = edge.from;
+    const Vec3 line = edge.to - v0;
     const Vec3 c = glm::cross(line, d);
     const double c2 = glm::dot(c, c);
     if (c2 <= 1e-18 * glm::dot(line, line) * length * length) continue;  // no width

@@ -17,7 +17,6 @@ namespace palpate {
 namespace {
 
 using Index = std::uint32_t;
-constexpr Index kNone = HalfEdges::kNone;
 
 // Folds, thickness and orientation, face by face, before anything is merged.
 void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, MeshFaults& faults) {
@@ -27,7 +26,8 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
     volume += glm::dot(shape.middle - mesh.points[0], shape.normal) * shape.area / 3;
     area += shape.area;
   }
-  const bool closed = std::find(mesh.twin.begin(), mesh.twin.end(), kNone) == mesh.twin.end();
+  const bool closed =
+      std::find(mesh.twin.begin(), mesh.twin.end(), HalfEdges::kNone) == mesh.twin.end();
   if (closed && !(std::abs(volume) > 2 * mesh.error * area)) {
     faults.add("flat", [] { return "expected a solid, found no volume"; });
     return;
@@ -40,7 +40,7 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
   const double outward = volume < 0 ? -1 : 1;
   for (Index h = 0; h < mesh.count(); ++h) {
     const Index twin = mesh.twin[h];
-    if (twin == kNone || twin < h) continue;
+    if (twin == HalfEdges::kNone || twin < h) continue;
     if (shapes[mesh.face[h]].thin || shapes[mesh.face[twin]].thin) continue;
     if (outward * fold_at(mesh, shapes, h) >= -kCoplanar) continue;
     faults.add("not convex", [&] {
@@ -108,8 +108,8 @@ class ConvexMesh::Builder {
         outlines_(outlines),
         number_of_(outlines.region_count()),
         side_of_(outlines.side_count()),
-        edge_of_(outlines.side_count(), kNone),
-        vertex_of_(mesh.points.size(), kNone) {}
+        edge_of_(outlines.side_count(), HalfEdges::kNone),
+        vertex_of_(mesh.points.size(), HalfEdges::kNone) {}
 
   void build() {
     const std::vector<Index> order = order_in_space(mesh_, outlines_);
@@ -128,7 +128,7 @@ class ConvexMesh::Builder {
  private:
   Index vertex(Index outline_side) {
     const Index point = mesh_.origin[outlines_.start[outline_side]];
-    if (vertex_of_[point] == kNone) {
+    if (vertex_of_[point] == HalfEdges::kNone) {
       vertex_of_[point] = static_cast<Index>(out_.vertices_.size());
       out_.vertices_.push_back(mesh_.points[point]);
       soup_vertex_.push_back(mesh_.soup_vertex[point]);
@@ -159,9 +159,10 @@ class ConvexMesh::Builder {
     const Index opposite = outlines_.opposite[s];
     const Index across = number_of_[outlines_.region[opposite]];
     const Index v0 = vertex(s), v1 = vertex(next);
-    if (edge_of_[opposite] == kNone) {
+    if (edge_of_[opposite] == HalfEdges::kNone) {
       edge_of_[s] = static_cast<Index>(out_.edges_.size());
-      out_.edges_.push_back({v0, v1, static_cast<Index>(out_.facets_.size() - 1), across});
+      out_.edges_.push_back({v0, v1, static_cast<Index>(out_.facets_.size() - 1), across,
+                             out_.vertices_[v0], out_.vertices_[v1]});
     } else {
       edge_of_[s] = edge_of_[opposite];
     }
@@ -176,7 +177,8 @@ class ConvexMesh::Builder {
   // Counter-clockwise round a vertex: from the side that leaves it, over the facet on the left, to
   // the side that arrives at it, which leaves it on the other side of that edge.
   void add_fans() {
-    std::vector<Index> opposite(out_.sides_.size()), leaving(out_.vertices_.size(), kNone);
+    std::vector<Index> opposite(out_.sides_.size()),
+        leaving(out_.vertices_.size(), HalfEdges::kNone);
     for (Index s = 0; s < outlines_.side_count(); ++s) {
       opposite[side_of_[s]] = side_of_[outlines_.opposite[s]];
     }

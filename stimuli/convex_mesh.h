@@ -58,10 +58,12 @@ struct alignas(64) Facet {
 };
 
 /// An edge between two facets that are not coplanar. Seen from outside, with v0 below and v1 above,
-/// `left` and `right` are the facets on those hands: v0 -> v1 is counter-clockwise in `left`.
-struct Edge {
+/// `left` and `right` are the facets on those hands: v0 -> v1 is counter-clockwise in `left`. One
+/// cache line with its ends, so that a step to an edge reads no vertices.
+struct alignas(64) Edge {
   std::uint32_t v0, v1;
   std::uint32_t left, right;
+  Vec3 from, to;  ///< m; where v0 and v1 are
 };
 
 /// Immutable after construction. Facets, edges and vertices that are near each other in space are

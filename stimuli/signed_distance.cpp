@@ -78,8 +78,8 @@ bool above_polygon(const ConvexMesh& mesh, const Facet& facet, const Vec3& point
 }
 
 Vec3 nearest_on(const ConvexMesh& mesh, const Edge& edge, const Vec3& point) {
-  const Vec3& from = mesh.vertices()[edge.v0];
-  const Vec3 along = mesh.vertices()[edge.v1] - from;
+  const Vec3& from = edge.from;
+  const Vec3 along = edge.to - from;
   const double share = glm::dot(point - from, along) / glm::dot(along, along);
   return from + std::clamp(share, 0.0, 1.0) * along;
 }

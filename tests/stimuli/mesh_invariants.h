@@ -55,6 +55,8 @@ inline void expect_convex_mesh(const ConvexMesh& mesh, double stands_out) {
       const Side& side = sides[facet.first_side + k];
       const Edge& edge = edges[side.edge];
       ASSERT_TRUE(edge.left == f || edge.right == f);
+      ASSERT_EQ(edge.from, vertices[edge.v0]);
+      ASSERT_EQ(edge.to, vertices[edge.v1]);
       ASSERT_EQ(side.across, edge.left == f ? edge.right : edge.left);
       ASSERT_NE(side.across, f);
       const std::uint32_t here = corner_of(mesh, f, k), next = corner_of(mesh, f, k + 1);
