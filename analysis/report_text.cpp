@@ -12,7 +12,7 @@ namespace palpate {
 
 namespace {
 
-constexpr std::size_t kColumns = 100;
+constexpr std::size_t kPageWidth = 100;
 constexpr std::size_t kNameColumns = 24;   // of a name in a table
 constexpr std::size_t kValueColumns = 70;  // of a text in the last table
 
@@ -22,9 +22,9 @@ std::string repeated(const char* what, std::size_t times) {
   return out;
 }
 
-/// Paragraph in lines of at most kColumns; a word that is longer is cut.
+/// Paragraph in lines of at most kPageWidth; a word that is longer is cut.
 void put_wrapped(std::string& out, const std::string& text, const std::string& indent) {
-  const std::size_t room = kColumns - indent.size();
+  const std::size_t room = kPageWidth - indent.size();
   const auto fits = [&](std::string_view line) { return width(line) <= room; };
   for (const std::string& line : wrapped(text, fits)) {
     out += indent + shortened(line, room) + "\n";
@@ -66,7 +66,7 @@ void put_table(std::string& out, const Table& table) {
   std::size_t first = 1;
   while (first < widths.size()) {
     std::size_t last = first, used = 2 + widths[0];
-    while (last < widths.size() && (last == first || used + 2 + widths[last] <= kColumns)) {
+    while (last < widths.size() && (last == first || used + 2 + widths[last] <= kPageWidth)) {
       used += 2 + widths[last++];
     }
     if (first > 1) out += "  (continued)\n";
@@ -82,14 +82,14 @@ std::string report_text(const Analysis& analysis) {
   std::string out;
   const std::string label = simulated_label(analysis.table.simulated);
   if (!label.empty()) {
-    out += repeated("═", kColumns) + "\n";
+    out += repeated("═", kPageWidth) + "\n";
     put_wrapped(
         out,
         label + (analysis.table.simulated == Simulated::yes
                      ? ": every figure below comes from a model of a person, not from people."
                      : ": the figures below mix a model of a person with people."),
         "  ");
-    out += repeated("═", kColumns) + "\n\n";
+    out += repeated("═", kPageWidth) + "\n\n";
   }
   put_wrapped(out, answer(analysis), "");
   const Counts& counts = analysis.description.counts;

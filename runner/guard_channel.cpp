@@ -10,7 +10,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 template <std::size_t kSize>
 void keep(std::array<char, kSize>& to, const std::string& from) {
@@ -60,7 +60,7 @@ void FixedCapabilities::set(const DeviceCapabilities& from) {
 void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
                 std::int64_t for_ns) noexcept {
   if (for_ns <= 0) return;
-  const timespec time{for_ns / kSecond_ns, for_ns % kSecond_ns};
+  const timespec time{for_ns / kNsPerSecond, for_ns % kNsPerSecond};
   syscall(SYS_futex, &word, FUTEX_WAIT, value, &time, nullptr, 0);
 }
 

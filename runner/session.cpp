@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr double kSecond_ns = 1e9;
+constexpr double kPerSecond_ns = 1e9;
 
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -85,7 +85,7 @@ TrialRecord Session::planned_record(const Trial& trial) const {
 
 void Session::end_rest() {
   const std::int64_t until =
-      parts_.clock.now_ns() + std::llround(parts_.protocol.breaks.min_seconds * kSecond_ns);
+      parts_.clock.now_ns() + std::llround(parts_.protocol.breaks.min_seconds * kPerSecond_ns);
   parts_.participant.rest(parts_.protocol.texts.break_text, until);
   parts_.clock.wait_until(until);
 }
@@ -96,7 +96,7 @@ void Session::cut_off(const std::string& reason) {
 }
 
 std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& trouble) {
-  const std::int64_t limit_ns = std::llround(parts_.protocol.response.time_out * kSecond_ns);
+  const std::int64_t limit_ns = std::llround(parts_.protocol.response.time_out * kPerSecond_ns);
   while (true) {
     const Sample& sample = parts_.servo.next();
     faults = sample.faults;
@@ -150,7 +150,7 @@ bool Session::run_trial() {
   if (answer) {
     record_.response_ns = answer->time_ns;
     record_.response_time =
-        static_cast<double>(record_.response_ns - record_.onset_ns) / kSecond_ns;
+        static_cast<double>(record_.response_ns - record_.onset_ns) / kPerSecond_ns;
     record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
@@ -178,7 +178,7 @@ void Session::note(const Sample& sample) {
   const Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
     record_.first_contact_time =
-        static_cast<double>(sample.time_ns - record_.onset_ns) / kSecond_ns;
+        static_cast<double>(sample.time_ns - record_.onset_ns) / kPerSecond_ns;
     if (parts_.events != nullptr) parts_.events->first_contact(record_, sample.time_ns);
   }
 }

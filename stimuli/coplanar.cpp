@@ -13,7 +13,6 @@ namespace palpate {
 namespace {
 
 using Index = HalfEdges::Index;
-constexpr Index kNone = HalfEdges::kNone;
 
 Reach reach_of(const HalfEdges& mesh, Index h) {
   const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
@@ -76,7 +75,7 @@ void grow(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index see
     border.pop_front();
     for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
       const Index beyond = mesh.face[mesh.twin[h]];
-      if (region_of[beyond] != kNone || shapes[beyond].thin) continue;
+      if (region_of[beyond] != HalfEdges::kNone || shapes[beyond].thin) continue;
       if (std::abs(fold_at(mesh, shapes, h)) > kCoplanar || !region.holds(h)) continue;
       region.add(shapes[beyond], beyond);
       region_of[beyond] = number;
@@ -108,7 +107,7 @@ void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
       for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
         if (only_longest && h != longest) continue;
         const Index beyond = region_of[mesh.face[mesh.twin[h]]];
-        if (beyond == kNone) continue;
+        if (beyond == HalfEdges::kNone) continue;
         region_of[face] = beyond;
         return true;
       }
@@ -174,18 +173,18 @@ std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<Fac
     }
   }
   std::sort(seeds.begin(), seeds.end());
-  std::vector<Index> region_of(mesh.face_count(), kNone);
+  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone);
   count = 0;
   for (const auto& [area, face] : seeds) {
-    if (region_of[face] == kNone) grow(mesh, shapes, face, count++, region_of);
+    if (region_of[face] == HalfEdges::kNone) grow(mesh, shapes, face, count++, region_of);
   }
   if (count == 0) return region_of;
   place_thin_faces(mesh, std::move(thin), region_of);
   // Numbered as the faces come: what follows then walks through memory and does not jump.
-  std::vector<Index> number(count, kNone);
+  std::vector<Index> number(count, HalfEdges::kNone);
   Index next = 0;
   for (Index& region : region_of) {
-    if (number[region] == kNone) number[region] = next++;
+    if (number[region] == HalfEdges::kNone) number[region] = next++;
     region = number[region];
   }
   return region_of;

@@ -4,7 +4,6 @@ namespace palpate {
 namespace {
 
 using Index = HalfEdges::Index;
-constexpr Index kNone = HalfEdges::kNone;
 
 class Outliner {
  public:
@@ -13,8 +12,8 @@ class Outliner {
         region_of_(region_of),
         borders_at_(mesh.points.size(), 0),
         border_length_(region_count, 0),
-        begin_(region_count, kNone),
-        side_at_(mesh.count(), kNone) {
+        begin_(region_count, HalfEdges::kNone),
+        side_at_(mesh.count(), HalfEdges::kNone) {
     for (Index h = 0; h < mesh.count(); ++h) {
       if (!is_border(h)) continue;
       ++borders_at_[mesh.origin[h]];
@@ -51,7 +50,7 @@ class Outliner {
     outlines_.first.push_back(outlines_.side_count());
     const Index begin = begin_[region];
     Index walked = 0;
-    if (begin != kNone) {
+    if (begin != HalfEdges::kNone) {
       Index h = begin;
       do {
         if (is_corner(mesh_.origin[h])) {

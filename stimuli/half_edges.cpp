@@ -14,7 +14,6 @@ namespace palpate {
 namespace {
 
 using Index = HalfEdges::Index;
-constexpr Index kNone = HalfEdges::kNone;
 
 std::string corner_list(const std::vector<Index>& corners) {
   constexpr std::size_t kShown = 8;
@@ -60,7 +59,7 @@ void check_numbers(const PolygonSoup& soup) {
       break;
     }
   }
-  if (corners >= kNone / 2 || soup.vertices.size() >= kNone / 2) {
+  if (corners >= HalfEdges::kNone / 2 || soup.vertices.size() >= HalfEdges::kNone / 2) {
     faults.add("too large", [] { return "expected fewer than 2^31 corners"; });
   }
   faults.throw_if_any();
@@ -91,7 +90,7 @@ void take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& p
       std::max({soup.coordinate_error, 1e-11 * mesh.size,
                 8 * std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
   const std::vector<Index> kept = weld(points, 4 * mesh.error);
-  point_of.assign(soup.vertices.size(), kNone);
+  point_of.assign(soup.vertices.size(), HalfEdges::kNone);
   for (Index i = 0; i < kept.size(); ++i) {
     if (kept[i] == i) {
       point_of[soup_vertex[i]] = static_cast<Index>(mesh.points.size());
@@ -146,14 +145,14 @@ void report_pieces(const HalfEdges& mesh, std::vector<Index>& parent, MeshFaults
 }
 
 void link_twins(HalfEdges& mesh, MeshFaults& faults) {
-  mesh.twin.assign(mesh.count(), kNone);
+  mesh.twin.assign(mesh.count(), HalfEdges::kNone);
   std::vector<Index> parent(mesh.face_count());
   std::iota(parent.begin(), parent.end(), Index{0});
   std::vector<char> matched(mesh.count(), 0);
   PairMap first_of(mesh.count() / 2);
   for (Index h = 0; h < mesh.count(); ++h) {
     Index& other = first_of(mesh.origin[h], mesh.origin[mesh.next(h)]);
-    if (other == kNone) {
+    if (other == HalfEdges::kNone) {
       other = h;
       continue;
     }
@@ -185,13 +184,13 @@ void link_twins(HalfEdges& mesh, MeshFaults& faults) {
 
 // Two bodies that touch in one corner share the vertex but not the fan of faces round it.
 void check_fans(const HalfEdges& mesh, MeshFaults& faults) {
-  std::vector<Index> degree(mesh.points.size(), 0), some(mesh.points.size(), kNone);
+  std::vector<Index> degree(mesh.points.size(), 0), some(mesh.points.size(), HalfEdges::kNone);
   for (Index h = 0; h < mesh.count(); ++h) {
     ++degree[mesh.origin[h]];
     some[mesh.origin[h]] = h;
   }
   for (Index v = 0; v < mesh.points.size(); ++v) {
-    if (some[v] == kNone) continue;
+    if (some[v] == HalfEdges::kNone) continue;
     Index turned = 0, h = some[v];
     do {
       h = mesh.twin[mesh.previous(h)];

@@ -12,7 +12,7 @@ namespace {
 constexpr float kDistance = 0.62F;           // m; shows a device's workspace with room around
 constexpr float kFieldOfView = 0.45F;        // rad, upright
 constexpr float kNear = 0.02F, kFar = 5.0F;  // m
-constexpr float kSteepest = 1.5F;            // rad
+constexpr float kSteepestPitch = 1.5F;       // rad
 
 }  // namespace
 
@@ -23,7 +23,7 @@ void Camera::resize(float width, float height) {
 
 void Camera::orbit(float right, float up) {
   yaw_ = std::remainder(yaw_ + right, 2 * static_cast<float>(M_PI));
-  pitch_ = std::clamp(pitch_ + up, -kSteepest, kSteepest);
+  pitch_ = std::clamp(pitch_ + up, -kSteepestPitch, kSteepestPitch);
 }
 
 glm::vec3 Camera::towards_viewer() const {

@@ -17,7 +17,7 @@ struct Colour {
 // Dark and even: a bright screen tires, and a trial must not light up the hand.
 constexpr Colour kGround{0.118, 0.137, 0.161};
 constexpr Colour kText{0.918, 0.902, 0.863};
-constexpr Colour kQuiet{0.639, 0.663, 0.690};
+constexpr Colour kQuietInk{0.639, 0.663, 0.690};
 constexpr Colour kCap{0.184, 0.212, 0.247};
 constexpr Colour kCapEdge{0.361, 0.400, 0.443};
 
@@ -151,7 +151,8 @@ class KeyMap {
       const Size key = item.key.size(), answer = item.answer.size();
       item.key.draw(canvas, centre - key.width / 2, y + (kCapHeight * unit_ - key.height) / 2,
                     kText);
-      item.answer.draw(canvas, centre - answer.width / 2, y + (kCapHeight + 0.45) * unit_, kQuiet);
+      item.answer.draw(canvas, centre - answer.width / 2, y + (kCapHeight + 0.45) * unit_,
+                       kQuietInk);
     }
   }
 
@@ -173,7 +174,7 @@ void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {
   const double width = 9 * unit, height = 1.9 * unit;
   cap(canvas, std::round(middle - width / 2), std::round(top), std::round(width),
       std::round(height));
-  set_colour(canvas, kQuiet);
+  set_colour(canvas, kQuietInk);
   cairo_set_line_width(canvas, std::max(1.0, 0.1 * unit));
   // The bar's usual mark, and an arrow: on.
   const double base = top + 0.62 * height, left = middle - 1.9 * unit;

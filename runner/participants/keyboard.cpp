@@ -6,7 +6,7 @@
 namespace palpate {
 namespace {
 
-constexpr std::int64_t kNap_ns = 5'000'000;
+constexpr std::int64_t kPause_ns = 5'000'000;
 constexpr std::int64_t kFeedback_ns = 1'000'000'000;
 
 }  // namespace
@@ -31,7 +31,7 @@ void KeyboardRespondent::show_message(const std::string& text) {
 void KeyboardRespondent::wait_until(std::int64_t when_ns) {
   while (clock_.now_ns() < when_ns) {
     attendant_.attend();
-    clock_.wait_until(std::min(when_ns, clock_.now_ns() + kNap_ns));
+    clock_.wait_until(std::min(when_ns, clock_.now_ns() + kPause_ns));
   }
 }
 
@@ -42,7 +42,7 @@ void KeyboardRespondent::wait_for_space() {
       if (press.time_ns >= shown_ns && (press.key == "space" || press.key == "enter")) return;
     }
     attendant_.attend();
-    clock_.wait_until(clock_.now_ns() + kNap_ns);
+    clock_.wait_until(clock_.now_ns() + kPause_ns);
   }
 }
 

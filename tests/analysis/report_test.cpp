@@ -32,7 +32,7 @@ struct Study {
   double lost_with_ray = 0;  ///< share of time-outs
 };
 
-Analysis analysis_of(const Study& study) {
+Analysis analysis_of_study(const Study& study) {
   TrialTableBuilder builder;
   Random random(11);
   for (std::size_t p = 0; p < study.people.size(); ++p) {
@@ -76,42 +76,42 @@ bool holds(const std::string& text, const std::string& part) {
 TEST(Answer, NamesWhatIsFasterSlowerAndNeither) {
   Study study;
   EXPECT_TRUE(
-      answer(analysis_of(study)).starts_with("The ray is faster than the point for cone (4"))
-      << answer(analysis_of(study));
+      answer(analysis_of_study(study)).starts_with("The ray is faster than the point for cone (4"))
+      << answer(analysis_of_study(study));
   EXPECT_TRUE(
-      holds(answer(analysis_of(study)), "no clear difference for sphere, cylinder and cube"));
+      holds(answer(analysis_of_study(study)), "no clear difference for sphere, cylinder and cube"));
   study.cone_ratio = 1.6;
   EXPECT_TRUE(
-      answer(analysis_of(study)).starts_with("The ray is slower than the point for cone (5"))
-      << answer(analysis_of(study));
+      answer(analysis_of_study(study)).starts_with("The ray is slower than the point for cone (5"))
+      << answer(analysis_of_study(study));
   study.cone_ratio = 1;
-  EXPECT_EQ(answer(analysis_of(study)),
+  EXPECT_EQ(answer(analysis_of_study(study)),
             "No clear difference between ray and point for sphere, cone, cylinder and cube.");
 }
 
 TEST(Answer, SaysWhyNothingCanBeSaid) {
   Study study;
   study.people = {"A"};
-  EXPECT_TRUE(holds(answer(analysis_of(study)), "cannot say"));
+  EXPECT_TRUE(holds(answer(analysis_of_study(study)), "cannot say"));
   study.people = {"A", "B", "C"};
   study.renderers = {"ray"};
-  EXPECT_TRUE(holds(answer(analysis_of(study)), "cannot say"));
+  EXPECT_TRUE(holds(answer(analysis_of_study(study)), "cannot say"));
 }
 
 TEST(Reports, SaySimulatedWhereverAFigureStands) {
   Study study;
   for (const auto& write : {report_text, page, drawings}) {
     study.simulated = Simulated::no;
-    EXPECT_FALSE(holds(write(analysis_of(study)), "SIMULATED"));
+    EXPECT_FALSE(holds(write(analysis_of_study(study)), "SIMULATED"));
     study.simulated = Simulated::yes;
-    EXPECT_TRUE(holds(write(analysis_of(study)), "SIMULATED PARTICIPANTS"));
+    EXPECT_TRUE(holds(write(analysis_of_study(study)), "SIMULATED PARTICIPANTS"));
     study.simulated = Simulated::mixed;
-    EXPECT_TRUE(holds(write(analysis_of(study)), "PARTLY SIMULATED PARTICIPANTS"));
+    EXPECT_TRUE(holds(write(analysis_of_study(study)), "PARTLY SIMULATED PARTICIPANTS"));
   }
   using Json = nlohmann::json;
-  EXPECT_EQ(Json::parse(report_json(analysis_of(study)))["simulated"], "mixed");
+  EXPECT_EQ(Json::parse(report_json(analysis_of_study(study)))["simulated"], "mixed");
   study.simulated = Simulated::yes;
-  EXPECT_EQ(Json::parse(report_json(analysis_of(study)))["simulated"], true);
+  EXPECT_EQ(Json::parse(report_json(analysis_of_study(study)))["simulated"], true);
 }
 
 TEST(Text, StaysWithinAHundredColumns) {
@@ -120,7 +120,7 @@ TEST(Text, StaysWithinAHundredColumns) {
   study.repetitions = 2;
   for (int i = 0; i < 40; ++i) study.shapes.push_back(std::string(60, 'x') + std::to_string(i));
   study.shapes.push_back("Würfel mit sehr langem Namen und Umlauten äöü");
-  std::istringstream lines(report_text(analysis_of(study)));
+  std::istringstream lines(report_text(analysis_of_study(study)));
   for (std::string line; std::getline(lines, line);) {
     EXPECT_LE(width(line), 100U) << line;
     EXPECT_TRUE(is_plain_utf8(line)) << line;
@@ -129,9 +129,9 @@ TEST(Text, StaysWithinAHundredColumns) {
 
 TEST(Text, WarnsOfExclusions) {
   Study study;
-  EXPECT_FALSE(holds(report_text(analysis_of(study)), "Warning"));
+  EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "Warning"));
   study.lost_with_ray = 0.3;
-  const std::string text = report_text(analysis_of(study));
+  const std::string text = report_text(analysis_of_study(study));
   EXPECT_TRUE(holds(text, "of the trials with ray are not in the times"));
   EXPECT_TRUE(holds(text, "Exclusions differ between renderers"));
   EXPECT_FALSE(holds(text, "of the trials with point are not"));
@@ -144,7 +144,7 @@ TEST(Reports, NeverPrintNanOrInfinity) {
       study.people.resize(people);
       study.renderers = renderers;
       study.lost_with_ray = 1;
-      const Analysis analysis = analysis_of(study);
+      const Analysis analysis = analysis_of_study(study);
       for (const auto& write : {report_text, drawings, report_json}) {
         const std::string text = write(analysis);
         for (const char* bad : {"nan", "NaN", "inf ", "inf\"", "inf%", "Infinity"}) {
@@ -156,9 +156,9 @@ TEST(Reports, NeverPrintNanOrInfinity) {
 }
 
 TEST(Json, IsTheSameAgainAndReadsBackExactly) {
-  const Analysis analysis = analysis_of({});
+  const Analysis analysis = analysis_of_study({});
   const std::string text = report_json(analysis);
-  EXPECT_EQ(text, report_json(analysis_of({})));
+  EXPECT_EQ(text, report_json(analysis_of_study({})));
   const auto json = nlohmann::json::parse(text);
   EXPECT_EQ(json["paired_by_shape"]["cone"]["t_test"]["p"].get<double>(),
             analysis.shapes[1].t_test.p.value());
@@ -173,12 +173,12 @@ TEST(Escaping, NothingFromAFileIsMarkup) {
   study.renderers = {"point", "ray"};
   study.shapes = {"cone", "<script>", "</script>"};
   for (const auto& write : {page, drawings}) {
-    const std::string text = write(analysis_of(study));
+    const std::string text = write(analysis_of_study(study));
     EXPECT_FALSE(holds(text, "<script>alert"));
     EXPECT_TRUE(holds(text, "&lt;script&gt;"));
   }
   // Three scripts at most, each with its end: data, Vega, ours.
-  const std::string text = page(analysis_of(study));
+  const std::string text = page(analysis_of_study(study));
   std::size_t begins = 0, ends = 0;
   for (std::size_t at = 0; (at = text.find("<script", at)) != std::string::npos; ++at) ++begins;
   for (std::size_t at = 0; (at = text.find("</script", at)) != std::string::npos; ++at) ++ends;

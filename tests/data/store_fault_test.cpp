@@ -20,7 +20,9 @@ namespace {
 using namespace palpate::testing;
 namespace fs = std::filesystem;
 
-Store write(const std::string& path) { return Store::open(path, Store::Mode::write_or_create); }
+Store open_to_write(const std::string& path) {
+  return Store::open(path, Store::Mode::write_or_create);
+}
 
 /// Shows trials with samples until the store throws. \return the trial that was not saved.
 int show_until_full(Store& store, const Run& run, std::string& error) {
@@ -74,7 +76,7 @@ TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionGoesOnAfterwards) {
   const bool possible = on_a_small_disk(folder.path(), [&] {
     const std::string path = folder / "study.db";
     write_file(folder / "ballast", std::string(300'000, 'x'));
-    Store store = write(path);
+    Store store = open_to_write(path);
     const Participant person = store.enrol(a_protocol(), "A");
     const palpate::Run run = store.begin_run(person, a_run());
     std::string error;
@@ -106,7 +108,7 @@ TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
   const bool possible = on_a_small_disk(folder.path(), [&] {
     const std::string path = folder / "study.db";
     {
-      Store store = write(path);
+      Store store = open_to_write(path);
       const palpate::Run run =
           store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
       store.record_simulated(run, {a_record(1)});
@@ -114,8 +116,8 @@ TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
     ASSERT_EQ(::mount("none", folder.path().c_str(), nullptr, MS_REMOUNT | MS_RDONLY, nullptr), 0);
     Store reader = Store::open(path, Store::Mode::read_only);
     EXPECT_EQ(reader.counts().completed, 1);
-    EXPECT_TRUE(contains(error_of([&] { write(path); }), "may write there"));
-    EXPECT_TRUE(contains(error_of([&] { write(folder / "new.db"); }), "may write there"));
+    EXPECT_TRUE(contains(error_of([&] { open_to_write(path); }), "may write there"));
+    EXPECT_TRUE(contains(error_of([&] { open_to_write(folder / "new.db"); }), "may write there"));
     EXPECT_TRUE(contains(error_of([&] { export_csv(reader, folder / "t.csv", false); }),
                          "cannot be created"));
   });
@@ -124,7 +126,7 @@ TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
 
 TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
   const TemporaryFolder folder;
-  Store store = write(folder / "study.db");
+  Store store = open_to_write(folder / "study.db");
   const Participant person = store.enrol(a_protocol(), "A");
   const palpate::Run run = store.begin_run(person, a_run());
   rlimit before{};
@@ -146,7 +148,7 @@ TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
 void expect_not_saved_after(const std::function<void(const std::string& path)>& mishap) {
   const TemporaryFolder folder;
   const std::string path = folder / "study.db";
-  Store store = write(path);
+  Store store = open_to_write(path);
   const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   store.begin_attempt(run, a_record(1), 1);
   mishap(path);
@@ -189,9 +191,10 @@ class Unprivileged {
 TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
   const TemporaryFolder folder;
   const Unprivileged unprivileged(folder.path());
-  write(folder / "study.db");
+  open_to_write(folder / "study.db");
   fs::permissions(folder / "study.db", fs::perms::owner_read);
-  EXPECT_TRUE(contains(error_of([&] { write(folder / "study.db"); }), "may not be written"));
+  EXPECT_TRUE(
+      contains(error_of([&] { open_to_write(folder / "study.db"); }), "may not be written"));
   EXPECT_EQ(Store::open(folder / "study.db", Store::Mode::read_only).counts().runs, 0);
 }
 

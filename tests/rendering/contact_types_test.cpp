@@ -13,12 +13,12 @@ namespace {
 using testing::Bench;
 using testing::kBlendAngle;
 
-constexpr double kHalf = 0.025;   // m, half edge of the cube
-constexpr double kDepth = 0.001;  // m
+constexpr double kHalfEdge = 0.025;  // m, half edge of the cube
+constexpr double kDepth = 0.001;     // m
 
 Bench cube_bench(const Renderer& renderer) {
   return Bench(renderer,
-               std::make_shared<const ConvexMesh>(testing::triangulated(cube(2 * kHalf))));
+               std::make_shared<const ConvexMesh>(testing::triangulated(cube(2 * kHalfEdge))));
 }
 
 /// Comes down onto the cube from 10 mm above where it ends.
@@ -27,7 +27,7 @@ Rendering lowered(Bench& bench, const LineProbe& end) {
   return bench.tick(end);
 }
 
-void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
+void expect_vector(const Vec3& a, const Vec3& b, double tolerance) {
   EXPECT_LE(glm::length(a - b), tolerance) << "(" << a.x << " " << a.y << " " << a.z << ") is not ("
                                            << b.x << " " << b.y << " " << b.z << ")";
 }
@@ -35,31 +35,31 @@ void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
 TEST(ContactTypes, TipOnAFace) {
   for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
     Bench bench = cube_bench(*renderer);
-    const LineProbe probe{{0.004, 0.003, kHalf - kDepth}, {0.02, 0.05, 0.12}};
+    const LineProbe probe{{0.004, 0.003, kHalfEdge - kDepth}, {0.02, 0.05, 0.12}};
     const Rendering r = lowered(bench, probe);
     EXPECT_EQ(r.deepest.type, ContactType::point_polygon);
     EXPECT_NEAR(r.deepest.depth, kDepth, 1e-16);
     EXPECT_EQ(r.deepest.along, 0);
-    expect_near(r.deepest.normal, {0, 0, 1}, 1e-15);
-    expect_near(r.deepest.point, {0.004, 0.003, kHalf}, 1e-16);
-    expect_near(r.force, {0, 0, 800 * kDepth}, 1e-12);
-    expect_near(r.torque, Vec3(), 1e-16);
-    expect_near(r.device1, r.force, 1e-15);
-    expect_near(r.device2, Vec3(), 1e-15);
+    expect_vector(r.deepest.normal, {0, 0, 1}, 1e-15);
+    expect_vector(r.deepest.point, {0.004, 0.003, kHalfEdge}, 1e-16);
+    expect_vector(r.force, {0, 0, 800 * kDepth}, 1e-12);
+    expect_vector(r.torque, Vec3(), 1e-16);
+    expect_vector(r.device1, r.force, 1e-15);
+    expect_vector(r.device2, Vec3(), 1e-15);
     EXPECT_EQ(testing::faults_of_tick(bench, probe, r), "");
   }
 }
 
 TEST(ContactTypes, TailOnAFaceLoadsTheOtherDevice) {
   Bench bench = cube_bench(ray_renderer());
-  const LineProbe probe{{0.004, 0.003, 0.1}, {0.002, -0.005, kHalf - kDepth}};
+  const LineProbe probe{{0.004, 0.003, 0.1}, {0.002, -0.005, kHalfEdge - kDepth}};
   const Rendering r = lowered(bench, probe);
   EXPECT_EQ(r.deepest.type, ContactType::point_polygon);
   EXPECT_NEAR(r.deepest.along, glm::length(probe.tail - probe.tip), 1e-16);
-  expect_near(r.deepest.point, {0.002, -0.005, kHalf}, 1e-16);
-  expect_near(r.device1, Vec3(), 1e-15);
-  expect_near(r.device2, {0, 0, 800 * kDepth}, 1e-12);
-  expect_near(r.torque, glm::cross(probe.tail - probe.tip, r.force), 1e-15);
+  expect_vector(r.deepest.point, {0.002, -0.005, kHalfEdge}, 1e-16);
+  expect_vector(r.device1, Vec3(), 1e-15);
+  expect_vector(r.device2, {0, 0, 800 * kDepth}, 1e-12);
+  expect_vector(r.torque, glm::cross(probe.tail - probe.tip, r.force), 1e-15);
   Bench blunt = cube_bench(point_renderer());
   EXPECT_EQ(lowered(blunt, probe).contacts, 0) << "the point renderer feels the tip only";
 }
@@ -67,7 +67,7 @@ TEST(ContactTypes, TailOnAFaceLoadsTheOtherDevice) {
 TEST(ContactTypes, SideAcrossAnEdge) {
   Bench bench = cube_bench(ray_renderer());
   const Vec3 out = glm::normalize(Vec3(1, 0, 1));
-  const Vec3 touch = Vec3(kHalf, 0.003, kHalf);
+  const Vec3 touch = Vec3(kHalfEdge, 0.003, kHalfEdge);
   const Vec3 u = glm::normalize(Vec3(-1, 0, 1));
   const double along = 0.03;
   const LineProbe ideal{touch - along * u, touch + 0.07 * u};
@@ -77,23 +77,23 @@ TEST(ContactTypes, SideAcrossAnEdge) {
   EXPECT_EQ(r.deepest.type, ContactType::segment_edge);
   EXPECT_NEAR(r.deepest.depth, kDepth, 1e-16);
   EXPECT_NEAR(r.deepest.along, along, 1e-15);
-  expect_near(r.deepest.normal, out, 1e-14);
-  expect_near(r.deepest.point, touch, 1e-15);
-  expect_near(r.force, 800 * kDepth * out, 1e-12);
-  expect_near(r.torque, glm::cross(touch - probe.tip, r.force), 1e-15);
-  expect_near(r.device1, 0.7 * r.force, 1e-13);
-  expect_near(r.device2, 0.3 * r.force, 1e-13);
+  expect_vector(r.deepest.normal, out, 1e-14);
+  expect_vector(r.deepest.point, touch, 1e-15);
+  expect_vector(r.force, 800 * kDepth * out, 1e-12);
+  expect_vector(r.torque, glm::cross(touch - probe.tip, r.force), 1e-15);
+  expect_vector(r.device1, 0.7 * r.force, 1e-13);
+  expect_vector(r.device2, 0.3 * r.force, 1e-13);
 }
 
 TEST(ContactTypes, AProbeOfZeroLengthIsAPointAndLoadsDeviceOne) {
   Bench bench = cube_bench(ray_renderer());
-  const Vec3 p(0.001, 0.002, kHalf - kDepth);
+  const Vec3 p(0.001, 0.002, kHalfEdge - kDepth);
   const Rendering r = lowered(bench, {p, p});
   EXPECT_EQ(r.deepest.type, ContactType::point_polygon);
-  expect_near(r.force, {0, 0, 800 * kDepth}, 1e-12);
-  expect_near(r.device1, r.force, 0);
-  expect_near(r.device2, Vec3(), 0);
-  expect_near(r.torque, Vec3(), 1e-16);
+  expect_vector(r.force, {0, 0, 800 * kDepth}, 1e-12);
+  expect_vector(r.device1, r.force, 0);
+  expect_vector(r.device2, Vec3(), 0);
+  expect_vector(r.torque, Vec3(), 1e-16);
 }
 
 // A stick over the cube's top, its tip to the left; positive theta has the tip deeper.
@@ -102,7 +102,7 @@ struct Stick {
 };
 
 LineProbe tilted(const Stick& stick, double theta) {
-  const Vec3 middle(0, 0.004, kHalf);
+  const Vec3 middle(0, 0.004, kHalfEdge);
   const Vec3 u(std::cos(theta), 0, std::sin(theta));
   const double centre = stick.from + stick.length / 2;
   const Vec3 at = middle + Vec3(centre, 0, 0);
@@ -114,7 +114,7 @@ std::pair<double, double> touching_portion(const LineProbe& ideal, double theta,
   const auto at = [&](double x) {
     return std::clamp((x - ideal.tip.x) / std::cos(theta), 0.0, length);
   };
-  return {at(-kHalf), at(kHalf)};
+  return {at(-kHalfEdge), at(kHalfEdge)};
 }
 
 TEST(SegmentFace, ContactFollowsEquationTwo) {
@@ -142,9 +142,9 @@ TEST(SegmentFace, FlatStickIsHeldInTheMiddleOfWhatTouches) {
   Bench bench = cube_bench(ray_renderer());
   const LineProbe probe = testing::moved(tilted({-0.01, 0.12}, 0), {0, 0, -kDepth});
   const Rendering r = lowered(bench, probe);
-  EXPECT_NEAR(r.deepest.along, (0 + 0.01 + kHalf) / 2, 1e-15);
-  expect_near(r.force, {0, 0, 800 * kDepth}, 1e-12);
-  expect_near(r.deepest.point, {(-0.01 + kHalf) / 2, 0.004, kHalf}, 1e-15);
+  EXPECT_NEAR(r.deepest.along, (0 + 0.01 + kHalfEdge) / 2, 1e-15);
+  expect_vector(r.force, {0, 0, 800 * kDepth}, 1e-12);
+  expect_vector(r.deepest.point, {(-0.01 + kHalfEdge) / 2, 0.004, kHalfEdge}, 1e-15);
 }
 
 TEST(SegmentFace, OutsideTheBlendTheTypesAreThoseOfTheCorners) {
@@ -162,7 +162,7 @@ TEST(SegmentFace, OutsideTheBlendTheTypesAreThoseOfTheCorners) {
       const Rendering r =
           lowered(bench, testing::moved(tilted({-0.06, 0.12}, theta), {0, 0, -0.003}));
       EXPECT_EQ(r.deepest.type, ContactType::segment_edge);
-      EXPECT_NEAR(r.deepest.point.x, -sign * kHalf, 1e-12);
+      EXPECT_NEAR(r.deepest.point.x, -sign * kHalfEdge, 1e-12);
     }
   }
 }

@@ -11,7 +11,7 @@ namespace {
 using testing::kTick;
 using testing::placed_object;
 
-constexpr double kStiffness = 800;  // N/m
+constexpr double kSpring = 800;  // N/m
 
 std::shared_ptr<const ConvexMesh> box(const Vec3& low, const Vec3& high) {
   PolygonSoup soup = cube(1);
@@ -27,7 +27,7 @@ Scene slab_cut_at(const std::vector<double>& cuts, double overlap = 0) {
     const double to = i < cuts.size() ? cuts[i] : 0.05;
     const double extra = i < cuts.size() ? overlap : 0;
     parts.push_back(
-        placed_object(box({from, -0.05, -0.04}, {to + extra, 0.05, 0}), {}, kStiffness, 0));
+        placed_object(box({from, -0.05, -0.04}, {to + extra, 0.05, 0}), {}, kSpring, 0));
     from = to;
   }
   return Scene(parts);
@@ -54,7 +54,7 @@ TEST_P(SeveralParts, SlidingOverASeamNeitherDoublesNorTraps) {
           tick(scene, state, upright(-0.03 * direction, -0.01));
           for (double gone = -0.03 - 0.37 * pace; gone < 0.03; gone += pace) {
             const Rendering r = tick(scene, state, upright(gone * direction, depth));
-            ASSERT_LE(glm::length(r.force - Vec3(0, 0, kStiffness * depth)), 1e-9)
+            ASSERT_LE(glm::length(r.force - Vec3(0, 0, kSpring * depth)), 1e-9)
                 << "overlap " << overlap << " pace " << pace << " depth " << depth << " at "
                 << gone * direction << ": " << r.force.x << " " << r.force.y << " " << r.force.z;
             ASSERT_GE(r.contacts, 1);
@@ -136,8 +136,8 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
 
 TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
   const Scene corner(
-      {placed_object(box({-0.05, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kStiffness, 0),
-       placed_object(box({-0.09, -0.05, -0.04}, {-0.05, 0.05, 0.05}), {}, kStiffness, 0)});
+      {placed_object(box({-0.05, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kSpring, 0),
+       placed_object(box({-0.09, -0.05, -0.04}, {-0.05, 0.05, 0.05}), {}, kSpring, 0)});
   RenderState state = corner.initial_state();
   const auto at = [](double x, double z) {
     return LineProbe{{-0.05 + x, 0.002, z}, {-0.05 + x + 0.05, 0.003, z + 0.08}};
@@ -147,12 +147,12 @@ TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
   Rendering r;
   for (int i = 0; i <= 120; ++i) r = tick(corner, state, at(0.01 - 1e-4 * i, -0.001));
   EXPECT_EQ(r.contacts, 2);
-  EXPECT_LE(glm::length(r.force - kStiffness * Vec3(0.002, 0, 0.001)), 1e-8)
+  EXPECT_LE(glm::length(r.force - kSpring * Vec3(0.002, 0, 0.001)), 1e-8)
       << r.force.x << " " << r.force.y << " " << r.force.z;
   // And back out of it.
   for (int i = 0; i <= 40; ++i) r = tick(corner, state, at(-0.002 + 1e-4 * i, -0.001));
   EXPECT_EQ(r.contacts, 1);
-  EXPECT_LE(glm::length(r.force - kStiffness * Vec3(0, 0, 0.001)), 1e-8);
+  EXPECT_LE(glm::length(r.force - kSpring * Vec3(0, 0, 0.001)), 1e-8);
 }
 
 TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
@@ -163,7 +163,7 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
     for (std::uint64_t i = 0; i < 2 + seed % 3; ++i) {
       parts.push_back(placed_object(std::make_shared<const ConvexMesh>(testing::random_polyhedron(
                                         random, 12, Vec3(0.04, 0.03, 0.02))),
-                                    testing::random_pose(random, 0.025), kStiffness, 0));
+                                    testing::random_pose(random, 0.025), kSpring, 0));
     }
     const Scene scene(parts);
     RenderState state = scene.initial_state();

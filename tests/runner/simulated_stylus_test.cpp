@@ -10,12 +10,12 @@
 namespace palpate {
 namespace {
 
-constexpr double kTick = 1e-3;
+constexpr double kStep = 1e-3;
 
 /// x'' = -(k x + b x') / m in 1000 small steps a tick (semi-implicit Euler).
 void small_steps(double m, double b, double k, double& x, double& v) {
   constexpr int kSteps = 20000;
-  const double h = kTick / kSteps;
+  const double h = kStep / kSteps;
   for (int i = 0; i < kSteps; ++i) {
     v += h * -(k * x + b * v) / m;
     x += h * v;
@@ -28,7 +28,7 @@ TEST(SpringDamper, AgreesWithSmallSteps) {
   for (const auto& [m, b, k] : cases) {
     double x = 0.01, v = -0.3;
     Vec3 px(x, 0, 0), pv(v, 0, 0);
-    SpringDamper(m, b, k, kTick).advance(px, pv);
+    SpringDamper(m, b, k, kStep).advance(px, pv);
     small_steps(m, b, k, x, v);
     EXPECT_NEAR(px.x, x, 2e-4 * (std::abs(x) + 0.01)) << m << " " << b << " " << k;
     EXPECT_NEAR(pv.x, v, 2e-4 * (std::abs(v) + 1)) << m << " " << b << " " << k;
@@ -37,7 +37,7 @@ TEST(SpringDamper, AgreesWithSmallSteps) {
 
 TEST(SpringDamper, IsStableForAnyStiffness) {
   for (double k = 1; k < 1e12; k *= 10) {
-    const SpringDamper spring(0.1, 1, k, kTick);
+    const SpringDamper spring(0.1, 1, k, kStep);
     Vec3 x(1, 0, 0), v(0);
     for (int i = 0; i < 100000; ++i) spring.advance(x, v);
     ASSERT_LT(std::abs(x.x), 1e-6) << k;
@@ -53,7 +53,7 @@ SimulatedDeviceSettings ideal_device() {
 
 TEST(SimulatedStylus, SettlesWhereHandAndForceBalance) {
   const HandImpedance hand;
-  SimulatedStylus stylus(ideal_device(), hand, 0.12, 0.06, kTick);
+  SimulatedStylus stylus(ideal_device(), hand, 0.12, 0.06, kStep);
   stylus.reset({{0, 0, 0.1}, {0, 0, 0}, {0, 0, 1}});
   const Vec3 force1(0.4, 0, 1), force2(-0.2, 0.1, 0.2);
   DeviceReading reading;
@@ -74,12 +74,12 @@ TEST(SimulatedStylus, SettlesWhereHandAndForceBalance) {
 TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagOfTheHandsDamper) {
   SimulatedDeviceSettings device = ideal_device();
   device.damping = 0;
-  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);
   stylus.reset({{0, 0, 0}, {0, 0, 0}, {0, 0, 1}});
   Vec3 target(0);
   const Vec3 velocity(0.06, 0, 0);
   for (int i = 0; i < 2000; ++i) {
-    target += kTick * velocity;
+    target += kStep * velocity;
     stylus.set_target({target, velocity, {0, 0, 1}});
     stylus.read();
   }
@@ -89,7 +89,7 @@ TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagOfTheHandsDamper) {
 TEST(SimulatedStylus, CoulombFrictionStopsASlowMotion) {
   SimulatedDeviceSettings device = ideal_device();
   device.friction = 0.5;
-  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);
   stylus.reset({{0, 0, 0}, {0, 0, 0}, {0, 0, 1}});
   stylus.set_target({{0.001, 0, 0}, {0, 0, 0}, {0, 0, 1}});  // 0.4 N pull: less than the friction
   for (int i = 0; i < 2000; ++i) stylus.read();
@@ -98,7 +98,7 @@ TEST(SimulatedStylus, CoulombFrictionStopsASlowMotion) {
 
 TEST(SimulatedStylus, EndsAreRoundedToTheResolutionAndStayInTheWorkspace) {
   SimulatedDeviceSettings device;
-  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kTick);
+  SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);
   stylus.reset({{0.01234567, 0.02, -0.03}, {0, 0, 0}, glm::normalize(Vec3(1, 2, 3))});
   const LineProbe probe = stylus.read().stylus;
   for (const Vec3& end : {probe.tip, probe.tail}) {

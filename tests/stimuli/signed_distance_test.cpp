@@ -19,7 +19,7 @@ using testing::placed;
 constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
                                  ShapeKind::cube};
 
-ObjectSpec spec_of(ShapeKind shape, double radius = 0.03, double height = 0.06) {
+ObjectSpec solid_of(ShapeKind shape, double radius = 0.03, double height = 0.06) {
   ObjectSpec spec;
   spec.shape = shape;
   spec.radius = radius;
@@ -101,17 +101,17 @@ void expect_lipschitz(const Shape& shape, double reach, Random& random) {
 TEST(SignedDistance, OfPrimitivesIsTheNearestPoint) {
   Random random(1);
   for (const ShapeKind shape : kShapes) {
-    expect_nearest(spec_of(shape), 0.1, random);
-    expect_nearest(spec_of(shape, 0.05, 0.02), 0.1, random);
+    expect_nearest(solid_of(shape), 0.1, random);
+    expect_nearest(solid_of(shape, 0.05, 0.02), 0.1, random);
   }
 }
 
 TEST(SignedDistance, OfPrimitivesHasTheNormalAsGradient) {
   Random random(2);
   for (const ShapeKind shape : kShapes) {
-    expect_gradient(spec_of(shape), 0.08, random);
-    expect_gradient(spec_of(shape, 0.02, 0.1), 0.08, random);
-    expect_lipschitz(spec_of(shape), 0.08, random);
+    expect_gradient(solid_of(shape), 0.08, random);
+    expect_gradient(solid_of(shape, 0.02, 0.1), 0.08, random);
+    expect_lipschitz(solid_of(shape), 0.08, random);
   }
 }
 
@@ -123,23 +123,23 @@ void expect_distance(const ObjectSpec& spec, const Vec3& point, double distance,
 }
 
 TEST(SignedDistance, AtPlacesThatAreKnown) {
-  expect_distance(spec_of(ShapeKind::sphere), {0, 0, 0.05}, 0.02, {0, 0, 1});
-  expect_distance(spec_of(ShapeKind::sphere), {0, 0, 0}, -0.03, {0, 0, 1});
+  expect_distance(solid_of(ShapeKind::sphere), {0, 0, 0.05}, 0.02, {0, 0, 1});
+  expect_distance(solid_of(ShapeKind::sphere), {0, 0, 0}, -0.03, {0, 0, 1});
 
-  expect_distance(spec_of(ShapeKind::cube), {0.04, 0, 0}, 0.01, {1, 0, 0});
-  expect_distance(spec_of(ShapeKind::cube), {0, -0.02, 0}, -0.01, {0, -1, 0});
-  expect_distance(spec_of(ShapeKind::cube), {-0.06, 0.07, 0}, 0.05, {-0.6, 0.8, 0});
-  expect_distance(spec_of(ShapeKind::cube), {0, 0, 0}, -0.03, {1, 0, 0});
+  expect_distance(solid_of(ShapeKind::cube), {0.04, 0, 0}, 0.01, {1, 0, 0});
+  expect_distance(solid_of(ShapeKind::cube), {0, -0.02, 0}, -0.01, {0, -1, 0});
+  expect_distance(solid_of(ShapeKind::cube), {-0.06, 0.07, 0}, 0.05, {-0.6, 0.8, 0});
+  expect_distance(solid_of(ShapeKind::cube), {0, 0, 0}, -0.03, {1, 0, 0});
 
-  const ObjectSpec rod = spec_of(ShapeKind::cylinder);
+  const ObjectSpec rod = solid_of(ShapeKind::cylinder);
   expect_distance(rod, {0, 0.05, 0.01}, 0.02, {0, 1, 0});
   expect_distance(rod, {0, 0, -0.05}, 0.02, {0, 0, -1});
   expect_distance(rod, {0, 0.06, 0.07}, 0.05, {0, 0.6, 0.8});
   expect_distance(rod, {0, 0, 0}, -0.03, {1, 0, 0});
 
-  const ObjectSpec hat = spec_of(ShapeKind::cone, 0.03, 0.04);  // slant 0.05
-  expect_distance(hat, {0, 0, 0.03}, 0.01, {0, 0, 1});          // over the apex
-  expect_distance(hat, {0, 0, 0.02}, 0, {0.8, 0, 0.6});         // the apex: a side's normal
+  const ObjectSpec hat = solid_of(ShapeKind::cone, 0.03, 0.04);  // slant 0.05
+  expect_distance(hat, {0, 0, 0.03}, 0.01, {0, 0, 1});           // over the apex
+  expect_distance(hat, {0, 0, 0.02}, 0, {0.8, 0, 0.6});          // the apex: a side's normal
   expect_distance(hat, {0.01, 0, -0.03}, 0.01, {0, 0, -1});
   expect_distance(hat, {-0.06, 0, -0.06}, 0.05, {-0.6, 0, -0.8});  // off the rim
   expect_distance(hat, {0.015 + 0.008, 0, 0.006}, 0.01, {0.8, 0, 0.6});
@@ -147,8 +147,8 @@ TEST(SignedDistance, AtPlacesThatAreKnown) {
 }
 
 TEST(SignedDistance, OfAMeshOrCompoundSpecIsRefused) {
-  EXPECT_THROW(signed_distance(spec_of(ShapeKind::mesh), Vec3(0)), std::invalid_argument);
-  EXPECT_THROW(signed_distance(spec_of(ShapeKind::compound), Vec3(0)), std::invalid_argument);
+  EXPECT_THROW(signed_distance(solid_of(ShapeKind::mesh), Vec3(0)), std::invalid_argument);
+  EXPECT_THROW(signed_distance(solid_of(ShapeKind::compound), Vec3(0)), std::invalid_argument);
 }
 
 TEST(SignedDistance, OfPolyhedraIsTheNearestPoint) {
@@ -169,7 +169,7 @@ TEST(SignedDistance, OfACubeMeshIsThatOfTheCube) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3 point = random_point(random, 0.08);
     const SurfaceDistance of_mesh = signed_distance(mesh, point);
-    const SurfaceDistance exact = signed_distance(spec_of(ShapeKind::cube), point);
+    const SurfaceDistance exact = signed_distance(solid_of(ShapeKind::cube), point);
     EXPECT_NEAR(of_mesh.distance, exact.distance, 1e-16);
     EXPECT_NEAR(glm::distance(of_mesh.normal, exact.normal), 0, 1e-10);
   }
@@ -215,7 +215,7 @@ TEST(SignedDistance, OfFinerMeshesTendsToThatOfTheShape) {
     return gap;
   };
   for (const ShapeKind shape : {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder}) {
-    ObjectSpec coarse = spec_of(shape), fine = spec_of(shape);
+    ObjectSpec coarse = solid_of(shape), fine = solid_of(shape);
     coarse.subdivisions = 1;
     fine.subdivisions = 3;
     coarse.segments = 16;
