@@ -74,12 +74,17 @@ ConsoleWindow::~ConsoleWindow() {
     static_cast<void>(view_.release());
     return;
   }
+  destroy();
+}
+
+void ConsoleWindow::destroy() {
   glfwMakeContextCurrent(window_);
   view_.reset();
   ImGui_ImplOpenGL3_Shutdown();
   ImGui_ImplGlfw_Shutdown();
   ImGui::DestroyContext(context_);
   glfwDestroyWindow(window_);
+  window_ = nullptr;
 }
 
 void ConsoleWindow::ask(ConsoleCommand::Kind kind, std::string text) {

@@ -28,6 +28,8 @@ class ConsoleWindow final : public ExperimenterConsole {
   void draw();
   /// From a key of either window or a button.
   void ask(ConsoleCommand::Kind kind, std::string text = {});
+  /// As the participant's window.
+  void destroy();
   void abandon() noexcept { window_ = nullptr; }
 
  private:

@@ -20,7 +20,12 @@ ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place
 }
 
 ParticipantWindow::~ParticipantWindow() {
-  if (window_ != nullptr) glfwDestroyWindow(window_);
+  if (window_ != nullptr) destroy();
+}
+
+void ParticipantWindow::destroy() {
+  glfwDestroyWindow(window_);
+  window_ = nullptr;
 }
 
 void ParticipantWindow::abandon() noexcept {

@@ -34,6 +34,9 @@ class ParticipantWindow final : public ParticipantScreen {
   /// What is on the screen was covered: draw it again.
   void refresh() { stale_ = true; }
   void close() noexcept { open_.store(false); }
+  /// Takes it off the screen; nothing may be drawn after that. May throw LostDisplay, which a
+  /// destructor must not.
+  void destroy();
   /// The display is gone: the destructor must not ask it for anything.
   void abandon() noexcept;
 

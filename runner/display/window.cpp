@@ -32,12 +32,16 @@ class GlfwLibrary {
   GlfwLibrary(const GlfwLibrary&) = delete;
   GlfwLibrary& operator=(const GlfwLibrary&) = delete;
   ~GlfwLibrary() {
-    if (!abandoned_) glfwTerminate();
+    if (!closed_) glfwTerminate();
   }
-  void abandon() { abandoned_ = true; }
+  void close() {
+    glfwTerminate();
+    closed_ = true;
+  }
+  void abandon() { closed_ = true; }
 
  private:
-  bool abandoned_ = false;
+  bool closed_ = false;
 };
 
 class Windows final : public DisplayLoop {
@@ -70,6 +74,10 @@ class Windows final : public DisplayLoop {
         step();
       }
       if (window_gone_) participant_.close();
+      // Here, not in destructors, the display may still die.
+      console_.destroy();
+      participant_.destroy();
+      library_.close();
     } catch (const LostDisplay&) {
       participant_.abandon();
       console_.abandon();

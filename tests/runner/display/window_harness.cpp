@@ -5,6 +5,7 @@
 //   where               answers "tip x y z axis x y z" of the mouse's stylus
 //   ping                answers "pong"
 //   end
+//   end slowly          answers "over", and takes everything down after another line
 
 #include <algorithm>
 #include <atomic>
@@ -121,6 +122,7 @@ int show() {
   const std::unique_ptr<DisplayLoop> windows = make_windows(settings);
   Talk talk(*windows, mouse);
   std::atomic<bool> over{false};
+  bool slowly = false;
   std::thread listener([&] {
     while (!over.load()) {
       talk.report();
@@ -128,7 +130,9 @@ int show() {
     }
   });
   std::thread session([&] {
-    for (std::string line; std::getline(std::cin, line) && line != "end";) talk.obey(line);
+    std::string line;
+    while (std::getline(std::cin, line) && line.rfind("end", 0) != 0) talk.obey(line);
+    slowly = line == "end slowly";
     windows->end();
   });
   talk.say("ready");
@@ -137,6 +141,11 @@ int show() {
   over.store(true);
   listener.join();
   talk.report();
+  if (slowly) {
+    talk.say("over");
+    std::string line;
+    std::getline(std::cin, line);
+  }
   return 0;
 }
 

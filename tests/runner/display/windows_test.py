@@ -206,6 +206,13 @@ class WindowsTest(unittest.TestCase):
         self.windows.say("end")
         self.assertEqual(self.windows.program.wait(PATIENCE), 0)
 
+    def test_the_display_server_dies_while_everything_is_taken_down(self):
+        self.windows.say("end slowly")
+        self.windows.expect("over")
+        self.screen.kill()
+        self.windows.say("go on")
+        self.assertEqual(self.windows.program.wait(PATIENCE), 0)
+
     def test_ends_when_asked(self):
         self.windows.say("end")
         self.assertEqual(self.windows.program.wait(PATIENCE), 0)

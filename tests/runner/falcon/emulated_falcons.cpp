@@ -1,10 +1,10 @@
 // Runs a command with emulated Falcons on its USB bus:
 //
-//   emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] COMMAND...
+//   emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] [--last PATH] COMMAND...
 //
 // Their serial numbers are EMU1, EMU2, ... Firmware is loaded unless --bare; they are homed unless
-// --bare or --unhomed. Exits as COMMAND does. Lines written to FIFO do something to Falcon K (from
-// 1), vectors in its own frame:
+// --bare or --unhomed. Exits as COMMAND does; what they are at then is written to PATH, as by
+// state. Lines written to FIFO do something to Falcon K (from 1), vectors in its own frame:
 //
 //   unplug K | plug K | lose_homing K | buttons K BITS | firmware_file PATH
 //   hand K X Y Z STIFFNESS DAMPING     the hand wants the grip there (m, N/m, N s/m)
@@ -139,17 +139,18 @@ void listen(EmulatedBus& bus, int falcons, const std::string& fifo) {
 int run(int argc, char** argv) {
   int falcons = 1, at = 1;
   bool bare = false, homed = true;
-  std::string fifo;
+  std::string fifo, last;
   for (; at < argc && std::strncmp(argv[at], "--", 2) == 0; ++at) {
     const std::string option = argv[at];
     if (option == "--bare") bare = true;
     if (option == "--unhomed") homed = false;
     if (option == "--falcons" && at + 1 < argc) falcons = std::atoi(argv[++at]);
     if (option == "--control" && at + 1 < argc) fifo = argv[++at];
+    if (option == "--last" && at + 1 < argc) last = argv[++at];
   }
   if (at >= argc) {
     std::cerr << "usage: emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] "
-                 "COMMAND...\n";
+                 "[--last PATH] COMMAND...\n";
     return 2;
   }
   EmulatedBus bus;
@@ -168,6 +169,7 @@ int run(int argc, char** argv) {
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
   }
+  if (!last.empty()) write_state(bus, falcons, last);
   std::cout.flush();
   // The listener has no end of its own.
   std::_Exit(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));

@@ -10,6 +10,7 @@ import os
 import pathlib
 import re
 import sqlite3
+import subprocess
 import sys
 import tempfile
 import time
@@ -165,6 +166,43 @@ class Preflight(unittest.TestCase):
         self.assertEqual(terminal.finish(), 0, terminal.text)
         self.assertIn("ended by the experimenter", terminal.text)
         self.assertEqual(self.notes(), [])
+
+    def test_a_full_disk_in_contact_leaves_no_force(self):
+        disk = self.folder / "disk"
+        disk.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "none", disk], capture_output=True).returncode:
+            self.skipTest("nothing can be mounted here")
+        self.addCleanup(subprocess.run, ["umount", "-l", disk], check=True)
+        self.database = disk / "study.db"
+        last = self.folder / "last.json"
+        terminal = self.run_session("--calibration", self.calibration(0), emulator=["--last", last])
+        terminal.wait_for("(go: push)")
+        self.pushed_and_felt(terminal)
+        terminal.type(":go\n")
+        terminal.wait_for("move the stylus")
+        terminal.type(":go\n")  # left unchecked
+        while True:  # a starved machine's guard takes the force off and cuts the trial off
+            self.hand(*AWAY)
+            came = terminal.wait_for("[trial, ", "[fault, ")
+            if came == "[fault, ":
+                terminal.type(":clear\n:go\n")
+                continue
+            self.hand(0.01, 0, 0)  # within the shape
+            self.wait_until(lambda: not self.state()["torque_is_zero"] or terminal.text.count("[fault, ") > 0)
+            if not self.state()["torque_is_zero"]:
+                break
+        ballast = disk / "ballast"
+        with open(ballast, "wb", buffering=0) as file, contextlib.suppress(OSError):
+            while True:
+                file.write(bytes(512))
+        terminal.type("2")
+        terminal.wait_for("disk", "space")
+        self.assertEqual(terminal.finish(), 1, terminal.text)
+        self.assertTrue(json.loads(last.read_text())[0]["torque_is_zero"])
+        ballast.unlink()
+        with contextlib.closing(sqlite3.connect(self.database)) as db:
+            self.assertEqual(db.execute("PRAGMA integrity_check").fetchone(), ("ok",))
+            self.assertEqual(db.execute("SELECT count(*) FROM attempts WHERE state = 'completed'").fetchone(), (0,))
 
     def test_a_missing_or_stale_calibration_is_refused_unless_told_so(self):
         for options, word in ([(), "is missing"],
