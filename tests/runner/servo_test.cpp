@@ -58,12 +58,17 @@ TEST(Servo, KeepingWarmChangesNoTick) {
     return reading;
   };
   FakeDevice device(slide), other_device(slide);
+  Material rough;  // where it sticks is remembered from tick to tick
+  rough.damping = 1;
+  rough.friction_static = 0.6;
+  rough.friction_dynamic = 0.4;
+  const Scene scene({{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, rough, 0, nullptr}});
   VirtualClock clock, other_clock;
   Servo servo(device, clock, 1000, ForceLimits{}), other(other_device, other_clock, 1000, {});
   other.keep_warm();
   for (int trial = 0; trial < 2; ++trial) {
-    servo.prepare(cube_scene(), ray_renderer(), HomeZone{});
-    other.prepare(cube_scene(), ray_renderer(), HomeZone{});
+    servo.prepare(scene, ray_renderer(), HomeZone{});
+    other.prepare(scene, ray_renderer(), HomeZone{});
     bool touched = false;
     for (int tick = 0; tick < 3000; ++tick) {
       const Sample& sample = servo.tick();
