@@ -32,22 +32,36 @@ def wait_for(what, condition):
 
 
 class VirtualScreen:
+    next_number = 1000 + 100 * (os.getpid() % 10000)
+
     def __init__(self, size="1600x1000"):
-        reading, writing = os.pipe()
-        self.server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp"],
-            pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        os.close(writing)
-        with os.fdopen(reading) as pipe:
-            number = pipe.readline().strip()
-        if not number:
+        # A number of this process's own. Where the server chooses, it takes one as soon as another
+        # test's server has given it up, and that one then removes the socket of both on its way out.
+        for number in range(self.next_number, self.next_number + 20):
+            if self.start(number, size):
+                break
+        else:
             raise AssertionError("Xvfb did not start")
-        self.name = ":" + number
+        VirtualScreen.next_number = number + 1
+        self.name = f":{number}"
         # One thread of software drawing: the tests share their machine with a servo.
         self.environment = dict(os.environ, DISPLAY=self.name, LP_NUM_THREADS="1")
         # Graphics drivers keep memory until the end, all the more after their display died.
         options = os.environ.get("ASAN_OPTIONS", "")
         self.environment["ASAN_OPTIONS"] = (options + ":" if options else "") + "detect_leaks=0"
+
+    def start(self, number, size):
+        """False: the number is taken."""
+        reading, writing = os.pipe()
+        self.server = subprocess.Popen(
+            ["Xvfb", f":{number}", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp"],
+            pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            ready = pipe.readline().strip() == str(number)
+        if not ready:
+            self.server.wait()
+        return ready
 
     def close(self):
         if self.server.poll() is None:
