@@ -155,7 +155,7 @@ void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& r
     }
     for (Index k = 0; k < i; ++k) {
       const double both = std::sqrt(psi(i, i) * psi(k, k));
-      if (both == 0) {
+      if (sd < kZero || psi(k, k) < kZero * kZero) {
         out.random_correlations.emplace_back();
         continue;
       }

@@ -22,7 +22,7 @@ using Eigen::VectorXd;
 constexpr std::size_t kRenderers = 2;
 
 /// Trials of a study and their model's matrices; X is treatment coding.
-struct Study {
+struct DenseStudy {
   std::vector<std::string> shapes;
   People people;
   MatrixXd x, intercepts, slopes;  // same participant; same participant and both with the ray
@@ -31,11 +31,12 @@ struct Study {
 };
 
 /// \param trials of (participant, renderer, shape)
-Study study_of(std::size_t n_people, std::size_t n_shapes,
-               const std::function<std::size_t(std::size_t, std::size_t, std::size_t)>& trials,
-               std::uint64_t seed) {
+DenseStudy dense_study(
+    std::size_t n_people, std::size_t n_shapes,
+    const std::function<std::size_t(std::size_t, std::size_t, std::size_t)>& trials,
+    std::uint64_t seed) {
   Random random(seed);
-  Study out;
+  DenseStudy out;
   for (std::size_t s = 0; s < n_shapes; ++s) out.shapes.push_back("s" + std::to_string(s));
   out.people.assign(kRenderers, {n_shapes, std::vector<ParticipantCell>(n_people)});
   std::vector<std::array<std::size_t, 3>> rows;
@@ -86,23 +87,23 @@ Study study_of(std::size_t n_people, std::size_t n_shapes,
 /// (intercept variance, covariance, slope variance, residual variance).
 using Variances = Eigen::Vector4d;
 
-MatrixXd covariance(const Study& study, const Variances& at) {
+MatrixXd covariance(const DenseStudy& study, const Variances& at) {
   const Index n = study.y.size();
   return at(0) * study.intercepts + at(1) * study.either + at(2) * study.slopes +
          at(3) * MatrixXd::Identity(n, n);
 }
 
-struct Fit {
+struct DenseFit {
   double log_likelihood = 0;
   VectorXd beta;
   MatrixXd vcov;
 };
 
-Fit fit_of(const Study& study, const Variances& at) {
+DenseFit dense_fit(const DenseStudy& study, const Variances& at) {
   const Eigen::LLT<MatrixXd> v(covariance(study, at));
   const MatrixXd weighted = v.solve(study.x);
   const Eigen::LLT<MatrixXd> information(study.x.transpose() * weighted);
-  Fit out;
+  DenseFit out;
   out.beta = information.solve(weighted.transpose() * study.y);
   const Index p = study.x.cols();
   out.vcov = information.solve(MatrixXd::Identity(p, p));
@@ -136,12 +137,12 @@ Variances gradient(const std::function<double(const Variances&)>& f, const Varia
 
 /// Satterthwaite's degrees of freedom of weights' beta by differences. They do not depend on the
 /// parameters, so variances do for theta and sigma.
-double satterthwaite(const Study& study, const Variances& at, const VectorXd& weights) {
+double satterthwaite(const DenseStudy& study, const Variances& at, const VectorXd& weights) {
   constexpr double kStep = 1e-4;
   const auto variance = [&](const Variances& v) {
-    return weights.dot(fit_of(study, v).vcov * weights);
+    return weights.dot(dense_fit(study, v).vcov * weights);
   };
-  const auto likelihood = [&](const Variances& v) { return fit_of(study, v).log_likelihood; };
+  const auto likelihood = [&](const Variances& v) { return dense_fit(study, v).log_likelihood; };
   Eigen::Matrix4d hessian;
   for (Index i = 0; i < 4; ++i) {
     const Variances by = Variances::Unit(i) * kStep;
@@ -153,15 +154,15 @@ double satterthwaite(const Study& study, const Variances& at, const VectorXd& we
   return 2 * value * value / slope.dot((-hessian).inverse() * slope);
 }
 
-void expect_by_definition(const Study& study) {
+void expect_by_definition(const DenseStudy& study) {
   const MixedModel model = mixed_model(study.people, {"point", "ray"}, study.shapes);
   ASSERT_EQ(model.undefined, "");
   ASSERT_EQ(model.singular, "");
   EXPECT_EQ(model.n_observations, static_cast<std::size_t>(study.y.size()));
   const Variances at = variances_of(model);
-  const Fit fit = fit_of(study, at);
+  const DenseFit fit = dense_fit(study, at);
   EXPECT_NEAR(*model.log_likelihood_reml, fit.log_likelihood, 1e-8);
-  const auto likelihood = [&](const Variances& v) { return fit_of(study, v).log_likelihood; };
+  const auto likelihood = [&](const Variances& v) { return dense_fit(study, v).log_likelihood; };
   EXPECT_LT(gradient(likelihood, at, 1e-5).norm(), 1e-4) << "the optimum";
 
   const auto k = static_cast<Index>(study.shapes.size());
@@ -184,23 +185,23 @@ void expect_by_definition(const Study& study) {
 }
 
 TEST(MixedModelByDefinition, Balanced) {
-  expect_by_definition(study_of(
+  expect_by_definition(dense_study(
       6, 3, [](auto...) { return 3; }, 1));
 }
 
 TEST(MixedModelByDefinition, UnbalancedWithGaps) {
-  expect_by_definition(study_of(
+  expect_by_definition(dense_study(
       8, 3, [](std::size_t p, std::size_t r, std::size_t s) { return (p * p + 3 * r + 2 * s) % 4; },
       2));
 }
 
 TEST(MixedModelByDefinition, MoreShapesThanParticipants) {
-  expect_by_definition(study_of(
+  expect_by_definition(dense_study(
       9, 12, [](std::size_t p, std::size_t r, std::size_t s) { return (p + r + s * s) % 3; }, 3));
 }
 
 TEST(MixedModelByDefinition, OneRendererOnly) {
-  expect_by_definition(study_of(
+  expect_by_definition(dense_study(
       9, 2, [](std::size_t p, std::size_t r, std::size_t s) { return p > 6 && r == 1 ? 0 : 3 + s; },
       4));
 }
