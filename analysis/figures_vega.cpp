@@ -14,9 +14,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFont =
+constexpr const char* kVegaFont =
     "system-ui, Helvetica Neue, Arial, Liberation Sans, DejaVu Sans, sans-serif";
-constexpr std::size_t kLongestName = 18;
+constexpr std::size_t kLongestLabel = 18;
 
 Json signal(const std::string& expression) { return {{"signal", expression}}; }
 
@@ -136,7 +136,7 @@ void add_points(Json& group, const Panel& panel, Mark::Kind kind, const std::str
     type = "text";
     update.erase("tooltip");
     update["text"] = {{"field", "t"}};
-    update["font"] = {{"value", kFont}};
+    update["font"] = {{"value", kVegaFont}};
     update["fontSize"] = {{"field", "s"}};
     update["align"] = {{"field", "a"}};
     update["fontWeight"] = signal("datum.b ? 'bold' : 'normal'");
@@ -195,7 +195,7 @@ Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& 
   Json values = Json::array(), labels = Json::array();
   for (const Tick& tick : axis.ticks) {
     values.push_back(digits(tick.at));
-    labels.push_back(shortened(tick.label, kLongestName));
+    labels.push_back(shortened(tick.label, kLongestLabel));
   }
   const std::string scale = lower ? "x" : "y";
   scales.push_back({{"name", scale + "_labels"},
@@ -210,7 +210,7 @@ Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& 
               {"domain", false},
               {"ticks", false},
               {"labelPadding", 8},
-              {"labelFont", kFont},
+              {"labelFont", kVegaFont},
               {"labelFontSize", lower && axis.names ? 13 : 12},
               {"labelColor", colour(lower && axis.names ? Role::ink : Role::soft)},
               {"labelOverlap", !axis.names},
@@ -218,7 +218,7 @@ Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& 
               {"zindex", 0}};
   if (!axis.title.empty()) {
     out["title"] = axis.title;
-    out["titleFont"] = kFont;
+    out["titleFont"] = kVegaFont;
     out["titleFontSize"] = 12;
     out["titleFontWeight"] = "normal";
     out["titleColor"] = colour(Role::soft);
@@ -229,7 +229,7 @@ Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& 
     // Turned where the slots are too narrow for the longest name.
     std::size_t longest = 1;
     for (const Tick& tick : axis.ticks) {
-      longest = std::max(longest, width(shortened(tick.label, kLongestName)));
+      longest = std::max(longest, width(shortened(tick.label, kLongestLabel)));
     }
     const std::string narrow = wide + " / " + std::to_string(axis.ticks.size()) + " < " +
                                fixed(7.2 * static_cast<double>(longest) + 8, 1);
@@ -244,7 +244,7 @@ double left_room(const Panel& panel) {
   double widest = 0;
   for (const Tick& tick : panel.y.ticks) {
     widest =
-        std::max(widest, 7.0 * static_cast<double>(width(shortened(tick.label, kLongestName))));
+        std::max(widest, 7.0 * static_cast<double>(width(shortened(tick.label, kLongestLabel))));
   }
   return widest + (panel.y.title.empty() ? 20 : 44);
 }
@@ -289,7 +289,7 @@ Json panel_group(const Panel& panel, std::size_t number) {
       {"axes", std::move(axes)},
       {"marks", Json::array()}};
   if (!panel.title.empty()) {
-    group["title"] = {{"text", panel.title},  {"anchor", "start"}, {"font", kFont},
+    group["title"] = {{"text", panel.title},  {"anchor", "start"}, {"font", kVegaFont},
                       {"fontSize", 14},       {"frame", "group"},  {"color", colour(Role::ink)},
                       {"fontWeight", "bold"}, {"offset", 10},      {"aria", false}};
   }
@@ -332,7 +332,7 @@ void add_legend(Json& spec, const Figure& figure) {
                                   {"rowPadding", 6},
                                   {"offset", 22},
                                   {"symbolSize", 95},
-                                  {"labelFont", kFont},
+                                  {"labelFont", kVegaFont},
                                   {"labelFontSize", 13},
                                   {"labelColor", colour(Role::ink)},
                                   {"labelLimit", 240},
@@ -384,7 +384,7 @@ Json vega_spec(const Figure& figure) {
   }
   if (!figure.label.empty()) {
     spec["title"] = {{"text", figure.label}, {"anchor", "start"},
-                     {"frame", "bounds"},    {"font", kFont},
+                     {"frame", "bounds"},    {"font", kVegaFont},
                      {"fontSize", 12.5},     {"fontWeight", "bold"},
                      {"offset", 14},         {"color", colour(Role::amber)},
                      {"aria", false}};

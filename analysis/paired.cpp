@@ -18,7 +18,7 @@ constexpr std::size_t kManyPairs =
     1000;  // from here a bootstrap takes longer than a thread's start
 constexpr const char* kOnePair = "one participant cannot tell chance from effect";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
-constexpr const char* kNoVariance = "no variance: all differences are alike";
+constexpr const char* kAllAlike = "no variance: all differences are alike";
 
 /// Why differences do not allow inference; empty where they do.
 std::string no_inference(const std::vector<double>& differences) {
@@ -69,7 +69,7 @@ TTest t_test(const std::vector<double>& differences) {
   test.se = *test.sd / std::sqrt(n);
   test.df = n - 1;
   if (no_variance(*test.sd, m)) {
-    test.undefined = kNoVariance;
+    test.undefined = kAllAlike;
     return test;
   }
   const boost::math::students_t distribution(n - 1);
@@ -86,7 +86,7 @@ EffectSize effect_size(const std::vector<double>& differences) {
   if (!effect.undefined.empty()) return effect;
   const double sd = *standard_deviation(differences), m = mean(differences);
   if (no_variance(sd, m)) {
-    effect.undefined = kNoVariance;
+    effect.undefined = kAllAlike;
     return effect;
   }
   effect.dz = m / sd;

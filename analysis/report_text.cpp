@@ -51,7 +51,7 @@ void put_columns(std::string& out, const std::vector<std::vector<std::string>>& 
   }
 }
 
-void put_table(std::string& out, const Table& table) {
+void put_text_table(std::string& out, const Table& table) {
   const bool text_only = table.n_names == table.header.size();  // its last column may be long
   std::vector<std::vector<std::string>> rows{table.header};
   rows.insert(rows.end(), table.rows.begin(), table.rows.end());
@@ -104,7 +104,7 @@ std::string report_text(const Analysis& analysis) {
   }
   for (const Table& table : all_tables(analysis)) {
     out += "\n";
-    put_table(out, table);
+    put_text_table(out, table);
   }
   return out;
 }

@@ -29,7 +29,7 @@ std::vector<std::string> stimuli_of(const std::string& protocol_text) {
   return names;
 }
 
-void remember(const std::string& value, std::vector<std::string>& known) {
+void note(const std::string& value, std::vector<std::string>& known) {
   if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end()) {
     known.push_back(value);
   }
@@ -43,7 +43,7 @@ TrialTable read_trials_store(const std::string& path) {
   provenance.source = path;
   std::vector<std::string> listed, protocol_names, observers;
   for (const ProtocolInfo& protocol : store.protocols()) {
-    for (const std::string& name : stimuli_of(protocol.text)) remember(name, listed);
+    for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
   }
   TrialTableBuilder builder;
   store.for_each_trial([&](const StoredTrial& trial) {
@@ -67,10 +67,10 @@ TrialTable read_trials_store(const std::string& path) {
     raw.simulated = trial.participant.simulated;
     raw.response_time = record.response_time;
     builder.add(raw);
-    remember(trial.protocol_name, protocol_names);
-    remember(trial.protocol_sha256, provenance.protocol_sha256);
-    remember(trial.run.program_version, provenance.program_versions);
-    remember(trial.run.observer_sha256, observers);
+    note(trial.protocol_name, protocol_names);
+    note(trial.protocol_sha256, provenance.protocol_sha256);
+    note(trial.run.program_version, provenance.program_versions);
+    note(trial.run.observer_sha256, observers);
   });
   const auto join = [](const std::vector<std::string>& parts) {
     std::string all;

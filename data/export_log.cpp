@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-constexpr int kBusyTimeoutMs = 5000;
+constexpr int kBusyMs = 5000;
 
 }  // namespace
 
@@ -22,11 +22,11 @@ void log_export(const std::string& database, const ExportRecord& made,
   const std::string file = std::filesystem::weakly_canonical(database).string();
   guarded(database, [&] {
     std::optional<SQLite::Database> db;
-    db.emplace(file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+    db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     if (checked_version(*db, database) < kSchemaVersion) {
       db.reset();
       Store::open(database, Store::Mode::write_or_create);
-      db.emplace(file, SQLite::OPEN_READWRITE, kBusyTimeoutMs);
+      db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     }
     db->exec("PRAGMA trusted_schema = OFF; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON");
     SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);

@@ -37,7 +37,7 @@ std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
   return kept;
 }
 
-Index root_of(std::vector<Index>& kept, Index i) {
+Index kept_for(std::vector<Index>& kept, Index i) {
   while (kept[i] != i) i = kept[i] = kept[kept[i]];
   return i;
 }
@@ -59,11 +59,11 @@ std::vector<Index> weld(const std::vector<Vec3>& points, double tolerance) {
       if (order[j].first - order[i].first > tolerance) break;
       const Vec3 apart = points[order[j].second] - points[order[i].second];
       if (glm::dot(apart, apart) > tolerance * tolerance) continue;
-      const Index a = root_of(kept, order[i].second), b = root_of(kept, order[j].second);
+      const Index a = kept_for(kept, order[i].second), b = kept_for(kept, order[j].second);
       kept[std::max(a, b)] = std::min(a, b);
     }
   }
-  for (Index i = 0; i < kept.size(); ++i) kept[i] = root_of(kept, i);
+  for (Index i = 0; i < kept.size(); ++i) kept[i] = kept_for(kept, i);
   return kept;
 }
 
