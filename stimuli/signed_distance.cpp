@@ -77,7 +77,7 @@ bool above_polygon(const ConvexMesh& mesh, const Facet& facet, const Vec3& point
   return true;
 }
 
-Vec3 nearest_on(const ConvexMesh& mesh, const Edge& edge, const Vec3& point) {
+Vec3 nearest_on(const Edge& edge, const Vec3& point) {
   const Vec3& from = edge.from;
   const Vec3 along = edge.to - from;
   const double share = glm::dot(point - from, along) / glm::dot(along, along);
@@ -118,7 +118,7 @@ SurfaceDistance signed_distance(const ConvexMesh& mesh, const Vec3& point) {
   if (most <= 0) return {most, front->normal};
   SurfaceDistance nearest{std::numeric_limits<double>::infinity(), front->normal};
   for (const Edge& edge : mesh.edges()) {
-    const Vec3 apart = point - nearest_on(mesh, edge, point);
+    const Vec3 apart = point - nearest_on(edge, point);
     const double distance = glm::length(apart);
     if (distance >= nearest.distance) continue;
     nearest = {distance, distance > 1e-12 * mesh.size() ? apart / distance : front->normal};
