@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <regex>
 
-#include "data/attempts_file.h"
 #include "data/bids_recording.h"
 #include "data/dataset.h"
-#include "data/draft_folder.h"
-#include "data/export_log.h"
+#include "data/export_dataset.h"
 #include "data/table_fields.h"
 #include "data/text_sink.h"
 #include "data/utc.h"
@@ -72,9 +70,13 @@ class BidsWriter {
   BidsWriter(Store& store, const std::string& path, const ExportSettings& settings)
       : store_(store), labels_(label_protocols(store, settings)), folder_(path) {}
 
+  /// Whether an export of ours has such a file.
+  static bool has_file(const std::string& name);
+
   DraftFolder& folder() { return folder_; }
+  static std::string begin_attempts() { return "sourcedata/attempts.csv"; }
   void add(const StoredTrial& trial);
-  void end_session();
+  void end_table();
   void describe_dataset(const std::string& version, bool all_simulated);
   std::int64_t samples() const { return samples_; }
 
@@ -117,7 +119,7 @@ void BidsWriter::add(const StoredTrial& trial) {
   const std::string who = "sub-" + trial.participant.code;
   const std::string when = "ses-" + std::to_string(record.session);
   if (trial.participant.id != participant_ || record.session != session_) {
-    end_session();
+    end_table();
     participant_ = trial.participant.id;
     session_ = record.session;
     sampled_ = store_.has_samples(trial.participant, session_);
@@ -156,7 +158,7 @@ void BidsWriter::add_row(Table& table, const StoredTrial& trial) {
   }
 }
 
-void BidsWriter::end_session() {
+void BidsWriter::end_table() {
   if (!table_.rows.empty()) write_table(table_);
   table_ = {};
 }
@@ -240,8 +242,7 @@ void BidsWriter::describe_dataset(const std::string& version, bool simulated) {
             "trials were\nshown again. They are in no other table.\n");
 }
 
-/// Whether an export of ours has such a file.
-bool is_bids_file(const std::string& name) {
+bool BidsWriter::has_file(const std::string& name) {
   static const std::regex pattern(
       R"(dataset_description\.json|README|participants\.(tsv|json)|)"
       R"(sourcedata/([0-9A-Za-z]+_protocol\.json|attempts\.csv)|)"
@@ -253,32 +254,7 @@ bool is_bids_file(const std::string& name) {
 }  // namespace
 
 ExportDone export_bids(Store& store, const std::string& path, const ExportSettings& settings) {
-  require_replaceable(path, settings.force, is_bids_file);
-  require_exportable(store);
-  ExportDone done;
-  ExportedPeople people;
-  ProgressCounter counter(settings);
-  BidsWriter writer(store, path, settings);
-  store.for_each_trial(
-      [&](const StoredTrial& trial) {
-        writer.add(trial);
-        people.add(trial.participant);
-        ++done.trials;
-        counter.next();
-      },
-      store.counts().sampled > 0);
-  writer.end_session();
-  done.samples = writer.samples();
-  if (store.counts().cut_off > 0) {
-    FileSink file(writer.folder().place("sourcedata/attempts.csv"));
-    done.attempts = write_attempts(store, file, people, counter);
-    file.close(false);
-  }
-  done.simulated = people.any_simulated();
-  writer.describe_dataset(settings.program_version, done.simulated);
-  done.not_recorded = people.record(store.path(), path, "bids");
-  writer.folder().give_name(settings.force);
-  return done;
+  return export_dataset<BidsWriter>(store, path, settings, "bids");
 }
 
 }  // namespace palpate

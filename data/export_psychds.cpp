@@ -5,10 +5,8 @@
 #include <set>
 #include <string_view>
 
-#include "data/attempts_file.h"
 #include "data/dataset.h"
-#include "data/draft_folder.h"
-#include "data/export_log.h"
+#include "data/export_dataset.h"
 #include "data/table_fields.h"
 #include "data/text_sink.h"
 
@@ -24,6 +22,9 @@ class PsychDsWriter {
   PsychDsWriter(Store& store, const std::string& path, const ExportSettings& settings)
       : labels_(label_protocols(store, settings)), folder_(path) {}
 
+  /// Whether an export of ours has such a file.
+  static bool has_file(const std::string& name);
+
   DraftFolder& folder() { return folder_; }
   void add(const StoredTrial& trial);
   void end_table();
@@ -32,7 +33,8 @@ class PsychDsWriter {
   }
   void describe_dataset(const std::string& version, bool simulated);
   /// One table for all: an attempt names its participant and its protocol.
-  std::string attempts_name() const {
+  std::string begin_attempts() {
+    use(attempt_columns());
     return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";
   }
   std::int64_t samples() const { return samples_; }
@@ -155,8 +157,7 @@ void PsychDsWriter::describe_dataset(const std::string& version, bool simulated)
             "`protocol_sha256` is its checksum.\n");
 }
 
-/// Whether an export of ours has such a file.
-bool is_psychds_file(const std::string& name) {
+bool PsychDsWriter::has_file(const std::string& name) {
   static const std::regex pattern(
       R"(dataset_description\.json|README\.md|materials/[0-9A-Za-z]+_protocol\.json|)"
       R"(data/study-[0-9A-Za-z]+_description-attempts_data\.csv|)"
@@ -168,33 +169,7 @@ bool is_psychds_file(const std::string& name) {
 }  // namespace
 
 ExportDone export_psychds(Store& store, const std::string& path, const ExportSettings& settings) {
-  require_replaceable(path, settings.force, is_psychds_file);
-  require_exportable(store);
-  ExportDone done;
-  ExportedPeople people;
-  ProgressCounter counter(settings);
-  PsychDsWriter writer(store, path, settings);
-  store.for_each_trial(
-      [&](const StoredTrial& trial) {
-        writer.add(trial);
-        people.add(trial.participant);
-        ++done.trials;
-        counter.next();
-      },
-      store.counts().sampled > 0);
-  writer.end_table();
-  done.samples = writer.samples();
-  if (store.counts().cut_off > 0) {
-    FileSink file(writer.folder().place(writer.attempts_name()));
-    done.attempts = write_attempts(store, file, people, counter);
-    file.close(false);
-    writer.use(attempt_columns());
-  }
-  done.simulated = people.any_simulated();
-  writer.describe_dataset(settings.program_version, done.simulated);
-  done.not_recorded = people.record(store.path(), path, "psych-ds");
-  writer.folder().give_name(settings.force);
-  return done;
+  return export_dataset<PsychDsWriter>(store, path, settings, "psych-ds");
 }
 
 }  // namespace palpate
