@@ -272,6 +272,13 @@ int replay_command(const std::vector<std::string>& args) {
   }
   Protocol protocol = parse_protocol_text(
       text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string());
+  const auto& stimuli = protocol.stimuli;
+  if (std::none_of(stimuli.begin(), stimuli.end(),
+                   [&](const auto& stimulus) { return stimulus.name == record.shape; })) {
+    throw StoreRefused(db + ": trial " + trial + " shows '" + record.shape +
+                       "', which its protocol " + stored.protocol_name +
+                       " does not have; expected one of its stimuli");
+  }
   const bool limited = limit_as_recorded(protocol, store, stored);
   const bool compare = values->count("compare") > 0;
   const Outcome outcome = replay_stored(protocol, record, compare, !out.empty());

@@ -117,6 +117,15 @@ class Replay(unittest.TestCase):
         done = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=1)
         self.assertRegex(done.stdout, r"ticks differ from the record, the first is tick \d+")
 
+    def test_a_shape_that_the_protocol_does_not_have_is_refused(self):
+        db, trials = self.study()
+        with sqlite3.connect(db) as base:
+            base.execute("UPDATE attempts SET shape = 'torus'")
+        base.close()
+        done = self.palpate("replay", "--db", db, "--trial", trials[0][0], status=2)
+        for said in (str(db), trials[0][0], "'torus'"):
+            self.assertIn(said, done.stderr)
+
     def test_says_what_is_missing(self):
         db, trials = self.study()
         bare, names = self.study("bare", samples=False)
