@@ -108,10 +108,10 @@ TEST(Reports, SaySimulatedWhereverAFigureStands) {
     study.simulated = Simulated::mixed;
     EXPECT_TRUE(holds(write(analysis_of_study(study)), "PARTLY SIMULATED PARTICIPANTS"));
   }
-  using Json = nlohmann::json;
-  EXPECT_EQ(Json::parse(report_json(analysis_of_study(study)))["simulated"], "mixed");
+  using Parsed = nlohmann::json;
+  EXPECT_EQ(Parsed::parse(report_json(analysis_of_study(study)))["simulated"], "mixed");
   study.simulated = Simulated::yes;
-  EXPECT_EQ(Json::parse(report_json(analysis_of_study(study)))["simulated"], true);
+  EXPECT_EQ(Parsed::parse(report_json(analysis_of_study(study)))["simulated"], true);
 }
 
 TEST(Text, StaysWithinAHundredColumns) {

@@ -39,10 +39,10 @@ struct Seen {
 };
 
 bool adjacent(const ConvexMesh& mesh, MinkowskiFacet a, MinkowskiFacet b) {
-  using Kind = MinkowskiFacet::Kind;
-  if (a.kind == Kind::edge && b.kind == Kind::face) std::swap(a, b);
-  if (a.kind == Kind::face) {
-    if (b.kind == Kind::edge) {
+  using Of = MinkowskiFacet::Kind;
+  if (a.kind == Of::edge && b.kind == Of::face) std::swap(a, b);
+  if (a.kind == Of::face) {
+    if (b.kind == Of::edge) {
       const Edge& edge = mesh.edges()[b.index];
       return edge.left == a.index || edge.right == a.index;
     }
@@ -136,19 +136,19 @@ INSTANTIATE_TEST_SUITE_P(Both, Continuity, ::testing::Values(&point_renderer(), 
 // ends lie over the face, else (+-h - tip.x) / cos(theta): they move by |change of tip.x| / cos +
 // x tan(theta) |change of theta|.
 TEST(ContinuityOfTorque, ThroughSegmentFaceOnEachSideOfEpsilon) {
-  constexpr double kHalf = 0.025, kDepth = 0.001;
-  struct Stick {
+  constexpr double kHalf = 0.025, kSunk = 0.001;
+  struct Rod {
     double start, length;  // m
   };
-  for (const Stick stick : {Stick{-0.06, 0.12}, Stick{-0.01, 0.12}, Stick{-0.1, 0.12},
-                            Stick{-0.02, 0.12}, Stick{-0.01, 0.03}, Stick{-0.04, 0.03}}) {
-    const double start = stick.start, length = stick.length;
+  for (const Rod rod : {Rod{-0.06, 0.12}, Rod{-0.01, 0.12}, Rod{-0.1, 0.12}, Rod{-0.02, 0.12},
+                        Rod{-0.01, 0.03}, Rod{-0.04, 0.03}}) {
+    const double start = rod.start, length = rod.length;
     for (const double direction : {1.0, -1.0}) {
       Bench bench(ray_renderer(), std::make_shared<const ConvexMesh>(cube(2 * kHalf)));
       const auto probe_at = [&](double theta) {
         const Vec3 u(std::cos(theta), 0, std::sin(theta));
-        // Turned about its middle; the depth of what is over the top is kDepth at theta = 0.
-        const Vec3 middle(start + length / 2, 0.004, kHalf - kDepth);
+        // Turned about its middle; the depth of what is over the top is kSunk at theta = 0.
+        const Vec3 middle(start + length / 2, 0.004, kHalf - kSunk);
         return LineProbe{middle - length / 2 * u, middle + length / 2 * u};
       };
       bench.tick(testing::moved(probe_at(0.05 * direction), {0, 0, 0.02}));

@@ -66,8 +66,8 @@ TEST(Random, EveryElementOfAStreamItsPlaceAndTheirNumberCount) {
 TEST(Random, BelowIsUniformAndStaysBelow) {
   Random random(11);
   std::array<int, 7> counts{};
-  constexpr int kDraws = 70000;
-  for (int i = 0; i < kDraws; ++i) ++counts.at(random.below(7));
+  constexpr int kSamples = 70000;
+  for (int i = 0; i < kSamples; ++i) ++counts.at(random.below(7));
   double chi_square = 0;
   for (const int count : counts) chi_square += (count - 10000.0) * (count - 10000.0) / 10000.0;
   EXPECT_LT(chi_square, 22.5);  // 6 degrees of freedom, p = 0.001
@@ -78,8 +78,8 @@ TEST(Random, BelowIsUniformAndStaysBelow) {
 TEST(Random, UnitFillsTheHalfOpenInterval) {
   Random random(12);
   double low = 1, high = 0, sum = 0;
-  constexpr int kDraws = 100000;
-  for (int i = 0; i < kDraws; ++i) {
+  constexpr int kSamples = 100000;
+  for (int i = 0; i < kSamples; ++i) {
     const double u = random.unit();
     low = std::min(low, u);
     high = std::max(high, u);
@@ -89,14 +89,14 @@ TEST(Random, UnitFillsTheHalfOpenInterval) {
   EXPECT_LT(low, 1e-3);
   EXPECT_LT(high, 1);
   EXPECT_GT(high, 1 - 1e-3);
-  EXPECT_NEAR(sum / kDraws, 0.5, 4 / std::sqrt(12.0 * kDraws));
+  EXPECT_NEAR(sum / kSamples, 0.5, 4 / std::sqrt(12.0 * kSamples));
 }
 
 TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
   Random random(13);
-  constexpr int kDraws = 200000;
+  constexpr int kSamples = 200000;
   double sum = 0, squares = 0, fourth = 0, neighbours = 0, last = 0;
-  for (int i = 0; i < kDraws; ++i) {
+  for (int i = 0; i < kSamples; ++i) {
     const double x = random.normal();
     sum += x;
     squares += x * x;
@@ -104,18 +104,18 @@ TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
     neighbours += x * last;
     last = x;
   }
-  const double error = 1 / std::sqrt(static_cast<double>(kDraws));
-  EXPECT_NEAR(sum / kDraws, 0, 4 * error);
-  EXPECT_NEAR(squares / kDraws, 1, 4 * std::sqrt(2.0) * error);
-  EXPECT_NEAR(fourth / kDraws, 3, 4 * std::sqrt(96.0) * error);
-  EXPECT_NEAR(neighbours / kDraws, 0, 4 * error);  // the spare is independent of its sibling
+  const double error = 1 / std::sqrt(static_cast<double>(kSamples));
+  EXPECT_NEAR(sum / kSamples, 0, 4 * error);
+  EXPECT_NEAR(squares / kSamples, 1, 4 * std::sqrt(2.0) * error);
+  EXPECT_NEAR(fourth / kSamples, 3, 4 * std::sqrt(96.0) * error);
+  EXPECT_NEAR(neighbours / kSamples, 0, 4 * error);  // the spare is independent of its sibling
 }
 
 TEST(Random, ShuffleGivesEveryOrderEquallyOften) {
   Random random(14);
   std::array<int, 24> counts{};
-  constexpr int kDraws = 24000;
-  for (int i = 0; i < kDraws; ++i) {
+  constexpr int kSamples = 24000;
+  for (int i = 0; i < kSamples; ++i) {
     std::vector<int> items{0, 1, 2, 3};
     random.shuffle(items);
     int rank = 0;
