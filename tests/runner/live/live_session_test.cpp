@@ -225,36 +225,40 @@ TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
   EXPECT_LT(outcome.recorded, 2u);
 }
 
+/// Shared with the player's thread, which outlives a test's own variables.
+using Plugged = std::shared_ptr<std::atomic<bool>>;
+
 /// Takes everything, until it is pulled out.
 class Headphones final : public SoundOutput {
  public:
-  explicit Headphones(const std::atomic<bool>& plugged) : plugged_(plugged) {}
+  explicit Headphones(Plugged plugged) : plugged_(std::move(plugged)) {}
   double rate() const override { return 8000; }
   int write(std::span<const std::int16_t>) override {
-    if (!plugged_) throw SoundError("pulled out");
+    if (!*plugged_) throw SoundError("pulled out");
     return 0;
   }
   double latency() override { return 0; }
 
  private:
-  const std::atomic<bool>& plugged_;
+  const Plugged plugged_;
 };
 
 TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack) {
-  std::atomic<bool> plugged{true};
-  noise_ = std::make_unique<NoisePlayer>(MaskingNoise{}, 1, "headphones",
-                                         [&](const std::string&) -> std::unique_ptr<SoundOutput> {
-                                           if (!plugged) throw SoundError("no headphones");
-                                           return std::make_unique<Headphones>(plugged);
-                                         });
+  const Plugged plugged = std::make_shared<std::atomic<bool>>(true);
+  noise_ =
+      std::make_unique<NoisePlayer>(MaskingNoise{}, 1, "headphones",
+                                    [plugged](const std::string&) -> std::unique_ptr<SoundOutput> {
+                                      if (!*plugged) throw SoundError("no headphones");
+                                      return std::make_unique<Headphones>(plugged);
+                                    });
   FakeDevice device([&](int tick) {
-    if (tick == 30) plugged = false;  // in the first trial
+    if (tick == 30) *plugged = false;  // in the first trial
     return at(0.1);
   });
   screen_.answers = false;
   console_.goes_on = true;
   console_.repair = [&] {  // at the second try
-    if (console_.pauses == 2) plugged = screen_.answers = true;
+    if (console_.pauses == 2) *plugged = screen_.answers = true;
   };
   EXPECT_EQ(run(device).end, RunEnd::done);
   EXPECT_GE(console_.pauses, 2);
