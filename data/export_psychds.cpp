@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const Column kTime{"time", "Time of the tick, from the first tick with forces on", "s"};
+const Column kTimeOfTick{"time", "Time of the tick, from the first tick with forces on", "s"};
 
 class PsychDsWriter {
  public:
@@ -86,7 +86,7 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
                               std::to_string(record.trial) + "_description-haptic_data.csv"));
   row_ << "participant_id"
        << "session"
-       << "trial" << kTime.name << sample_columns();
+       << "trial" << kTimeOfTick.name << sample_columns();
   file.write(row_.end());
   for (const SampleRecord& sample : record.samples) {
     row_ << trial.participant.code << record.session << record.trial << sample.tick / servo_rate;
@@ -94,7 +94,7 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
     file.write(row_.end());
   }
   file.close(false);
-  use({&kTime, 1});
+  use({&kTimeOfTick, 1});
   use(sample_columns());
   samples_ += static_cast<std::int64_t>(record.samples.size());
 }
@@ -125,7 +125,7 @@ Json PsychDsWriter::variables() const {
   };
   add(trial_columns());
   add(attempt_columns());
-  add({&kTime, 1});
+  add({&kTimeOfTick, 1});
   add(sample_columns());
   return all;
 }

@@ -26,7 +26,7 @@ void visit_columns(int packing, Visitor&& column) {
   constexpr std::uint8_t kByte{};
   constexpr std::uint32_t kWord{};
   constexpr std::int64_t kTime{};
-  constexpr double kNumber{};
+  constexpr double kReal{};
   column(
       [](auto& s) -> auto& { return s.tick; }, kWord);
   if (packing > 1)
@@ -40,24 +40,24 @@ void visit_columns(int packing, Visitor&& column) {
         [](auto& s) -> auto& { return s.compute_ns; }, kTime);
   for (int i = 0; i < 3; ++i)
     column(
-        [i](auto& s) -> auto& { return s.tip[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.tip[i]; }, kReal);
   for (int i = 0; i < 3; ++i)
     column(
-        [i](auto& s) -> auto& { return s.tail[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.tail[i]; }, kReal);
   for (int i = 0; i < 3; ++i)
     column(
-        [i](auto& s) -> auto& { return s.force[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.force[i]; }, kReal);
   for (int i = 0; i < 3; ++i)
     column(
-        [i](auto& s) -> auto& { return s.torque[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.torque[i]; }, kReal);
   for (int i = 0; i < 3 && packing > 2; ++i)
     column(
-        [i](auto& s) -> auto& { return s.device1[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.device1[i]; }, kReal);
   for (int i = 0; i < 3 && packing > 2; ++i)
     column(
-        [i](auto& s) -> auto& { return s.device2[i]; }, kNumber);
+        [i](auto& s) -> auto& { return s.device2[i]; }, kReal);
   column(
-      [](auto& s) -> auto& { return s.depth; }, kNumber);
+      [](auto& s) -> auto& { return s.depth; }, kReal);
   column(
       [](auto& s) -> auto& { return s.contacts; }, kByte);
   column(
