@@ -14,6 +14,10 @@ constexpr std::size_t kBlock = std::size_t{1} << 18;
 constexpr std::string_view kTooLong =
     "record of more than 1 MiB: expected one trial a line (is a quote left open?)";
 
+constexpr std::string_view kBareCr =
+    "holds a CR that no LF follows (do lines end in CR alone?): expected lines that end in LF or "
+    "CRLF";
+
 const char* find(const char* from, const char* to, char what) {
   return static_cast<const char*>(std::memchr(from, what, static_cast<std::size_t>(to - from)));
 }
@@ -57,7 +61,7 @@ bool CsvReader::next() {
     if (!newline) {
       if (end_ - begin_ > kMaxRecord) {
         line_ = next_line_;
-        return end_with(std::string(kTooLong));
+        return end_with(std::string(find(first, last, '\r') ? kBareCr : kTooLong));
       }
       seen = end_ - begin_;
       if (fill()) continue;
@@ -99,6 +103,10 @@ void CsvReader::split_plain(std::string_view text) {
     fault_ = "holds a NUL byte: expected UTF-8 text (UTF-16 is not read)";
     return;
   }
+  if (find(from, to, '\r')) {
+    fault_ = kBareCr;
+    return;
+  }
   while (const char* comma = find(from, to, ',')) {
     fields_.emplace_back(from, static_cast<std::size_t>(comma - from));
     from = comma + 1;
@@ -136,7 +144,9 @@ CsvReader::Quoted CsvReader::split_quoted() {
     std::string_view plain = text.substr(rest, at - rest);
     done = at == text.size() || text[at] == '\n';
     if (done && !plain.empty() && plain.back() == '\r') plain.remove_suffix(1);
-    if (fault_.empty() && quoted && !plain.empty()) {
+    if (fault_.empty() && plain.find('\r') != std::string_view::npos) {
+      fault_ = kBareCr;
+    } else if (fault_.empty() && quoted && !plain.empty()) {
       fault_ = "field " + std::to_string(spans.size() + 1) +
                ": expected a comma or the end of the line after the closing quote";
     } else if (fault_.empty() && plain.find('"') != std::string_view::npos) {
