@@ -1,7 +1,6 @@
 #include "analysis/analysis.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -38,27 +37,33 @@ void warn_of_exclusions(Analysis& analysis) {
                                   " are not in the times (wrong, no response or too fast).");
     }
   }
-  if (renderers.size() == 2) {
-    const double first = analysis.exclusions[0].share_excluded(),
-                 second = analysis.exclusions[1].share_excluded();
-    if (std::fabs(first - second) > kUnequallyExcluded) {
-      analysis.warnings.push_back(
-          "Exclusions differ between renderers (" + fixed(100 * first, 1) + " % with point, " +
-          fixed(100 * second, 1) +
-          " % with ray): the times compare different selections of trials.");
-    }
-  }
+  if (renderers.size() < 2) return;
+  const auto [least, most] =
+      std::ranges::minmax_element(analysis.exclusions, {}, &Exclusions::share_excluded);
+  if (most->share_excluded() - least->share_excluded() <= kUnequallyExcluded) return;
+  const auto share = [&](const Exclusions& one) {
+    return fixed(100 * one.share_excluded(), 1) + " % with " +
+           renderers[static_cast<std::size_t>(&one - analysis.exclusions.data())];
+  };
+  analysis.warnings.push_back("Exclusions differ between renderers (" +
+                              share(*std::min(least, most)) + ", " + share(*std::max(least, most)) +
+                              "): the times compare different selections of trials.");
 }
 
 /// "P3 (point: cone; ray: every shape)" for each participant without a pair somewhere.
 void warn_of_dropped(Analysis& analysis) {
   const TrialTable& table = analysis.table;
   if (table.renderers.size() < 2) return;
-  std::map<std::size_t, std::map<std::string, std::vector<std::string>>> shapes_of;
-  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
-    for (const Dropped& dropped : analysis.shapes[s].dropped) {
-      for (const std::string& renderer : dropped.renderers) {
-        shapes_of[dropped.participant][renderer].push_back(table.shapes[s]);
+  // By participant and renderer; a reference without a time is missed in every comparison.
+  std::map<std::size_t, std::map<std::size_t, std::vector<std::string>>> shapes_of;
+  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+    for (const Comparison& comparison : analysis.comparisons) {
+      for (const Dropped& dropped : comparison.shapes[s].dropped) {
+        for (const std::string& renderer : dropped.renderers) {
+          auto& shapes = shapes_of[dropped.participant][static_cast<std::size_t>(
+              std::ranges::find(table.renderers, renderer) - table.renderers.begin())];
+          if (shapes.empty() || shapes.back() != table.shapes[s]) shapes.push_back(table.shapes[s]);
+        }
       }
     }
   }
@@ -66,7 +71,7 @@ void warn_of_dropped(Analysis& analysis) {
   for (const auto& [participant, renderers] : shapes_of) {
     std::string text;
     for (const auto& [renderer, shapes] : renderers) {
-      text += (text.empty() ? "" : "; ") + renderer + ": " +
+      text += (text.empty() ? "" : "; ") + table.renderers[renderer] + ": " +
               (shapes.size() == table.shapes.size() ? "every shape" : joined(shapes));
     }
     people.push_back(table.participants[participant] + " (" + text + ")");
@@ -90,22 +95,27 @@ void warn_of_times(Analysis& analysis) {
 
 /// A gain that practice may have made.
 void warn_of_practice(Analysis& analysis) {
-  const OrderEffect& order = analysis.practice.all_shapes;
-  const std::size_t point_first = order.point_first.n_participants,
-                    ray_first = order.ray_first.n_participants;
-  if (point_first + ray_first > 0 && (point_first == 0 || ray_first == 0)) {
-    analysis.warnings.push_back(
-        std::string("All participants had the ") + (ray_first == 0 ? "point" : "ray") +
-        " first: what practice does and what the renderer does cannot be told apart.");
-  } else if (order.test.p.value_or(1) < kAlpha) {
-    analysis.warnings.push_back(
-        "The gain depends on which renderer came first (p " + p_text(*order.test.p) +
-        "): see practice; the gain with the two orders balanced stands there.");
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    const bool many = analysis.comparisons.size() > 1;
+    const OrderEffect& order = analysis.practice.pairs[c].all_shapes;
+    const std::size_t reference_first = order.reference_first.n_participants,
+                      renderer_first = order.renderer_first.n_participants;
+    if (reference_first + renderer_first > 0 && (reference_first == 0 || renderer_first == 0)) {
+      const bool reference = renderer_first == 0;
+      analysis.warnings.push_back(
+          "All participants had " + the(reference ? pair.reference : pair.renderer) +
+          (many ? " before " + the(reference ? pair.renderer : pair.reference) : " first") +
+          ": what practice does and what the renderer does cannot be told apart.");
+    } else if (order.test.p.value_or(1) < kAlpha) {
+      analysis.warnings.push_back(
+          (many ? "The gain of " + the(pair.renderer) + " over " + the(pair.reference) +
+                      " depends on which of them came first (p "
+                : "The gain depends on which renderer came first (p ") +
+          p_text(*order.test.p) +
+          "): see practice; the gain with the two orders balanced stands there.");
+    }
   }
-}
-
-std::string with_reduction(const std::string& name, const PairedShape& shape) {
-  return name + " (" + fixed(std::fabs(*shape.percent_reduction_geometric), 0) + " %)";
 }
 
 }  // namespace
@@ -121,10 +131,9 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.settings = settings;
   out.program_version = program_version;
   out.description = describe(table, settings.too_fast);
-  out.shapes = compare_by_shape(table, out.description, settings.seed);
+  out.comparisons = compare_renderers(table, out.description, settings.seed);
   out.rm_anova = rm_anova(out.description.people);
   out.mixed_model = mixed_model(out.description.people, table.renderers, table.shapes);
-  out.speed_accuracy = speed_accuracy(table, out.description, out.shapes);
   out.practice = practice_effects(table, out.description, settings.too_fast);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     out.exclusions.push_back(count_exclusions(out.description, r));
@@ -156,56 +165,6 @@ std::string simulated_label(Simulated simulated) {
     case Simulated::no:
       break;
   }
-  return {};
-}
-
-std::string answer(const Analysis& analysis) {
-  std::vector<std::string> faster, slower, neither, unknown;
-  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
-    const PairedShape& shape = analysis.shapes[s];
-    const std::string& name = analysis.table.shapes[s];
-    if (!shape.t_test.p_holm) {
-      unknown.push_back(name);
-    } else if (*shape.t_test.p_holm >= kAlpha) {
-      neither.push_back(name);
-    } else {
-      (*shape.mean_log_ratio < 0 ? faster : slower).push_back(with_reduction(name, shape));
-    }
-  }
-  if (unknown.size() == analysis.shapes.size()) {
-    return "These data cannot say whether ray or point is faster: " +
-           analysis.shapes.front().t_test.undefined + ".";
-  }
-  constexpr std::size_t kNamed = 6;  // beyond it a sentence of names answers nothing
-  const auto list = [&](const std::vector<std::string>& names) {
-    if (names.size() <= kNamed) return joined(names);
-    return std::to_string(names.size()) + " of " + std::to_string(analysis.shapes.size()) +
-           " shapes";
-  };
-  std::vector<std::string> parts;
-  if (!faster.empty()) parts.push_back("The ray is faster than the point for " + list(faster));
-  if (!slower.empty()) {
-    parts.push_back((parts.empty() ? "The ray is slower than the point for " : "slower for ") +
-                    list(slower));
-  }
-  if (!neither.empty()) {
-    parts.push_back((parts.empty() ? "No clear difference between ray and point for "
-                                   : "no clear difference for ") +
-                    list(neither));
-  }
-  if (!unknown.empty()) parts.push_back("not testable for " + list(unknown));
-  std::string sentence;
-  for (const std::string& part : parts) {
-    if (!sentence.empty()) sentence += "; ";
-    sentence += part;
-  }
-  return sentence + ".";
-}
-
-std::string paper_reduction(const std::string& shape) {
-  if (shape == "cone") return "22 %";
-  if (shape == "cube") return "11 %";
-  if (shape == "sphere" || shape == "cylinder") return "n.s.";
   return {};
 }
 

@@ -7,11 +7,10 @@
 #include <vector>
 
 #include "analysis/anova.h"
+#include "analysis/comparison.h"
 #include "analysis/describe.h"
 #include "analysis/mixed_model.h"
-#include "analysis/paired.h"
 #include "analysis/practice.h"
-#include "analysis/speed_accuracy.h"
 #include "analysis/trials.h"
 
 namespace palpate {
@@ -32,10 +31,9 @@ struct Analysis {
   std::string program_version;  ///< of the program that analyses
   TrialTable table;
   Description description;
-  std::vector<PairedShape> shapes;  ///< one for each of table.shapes
+  std::vector<Comparison> comparisons;  ///< one at least
   RmAnova rm_anova;
   MixedModel mixed_model;
-  std::vector<SpeedAccuracy> speed_accuracy;  ///< one for each of table.shapes
   Practice practice;
   std::vector<Exclusions> exclusions;  ///< one for each of table.renderers
   std::vector<std::string> warnings;   ///< the table's, and what limits the conclusions
@@ -46,12 +44,5 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
 
 /// "SIMULATED PARTICIPANTS", "PARTLY SIMULATED PARTICIPANTS", or empty.
 std::string simulated_label(Simulated simulated);
-
-/// The answer to the paper's question in one sentence: for which shapes the ray is faster, slower,
-/// neither (Holm-adjusted p < 0.05 of the paired t-tests), or why that cannot be said.
-std::string answer(const Analysis& analysis);
-
-/// The paper's percent reduction for a shape (fig. 15): "22 %", "n.s.", or empty where it has none.
-std::string paper_reduction(const std::string& shape);
 
 }  // namespace palpate

@@ -2,7 +2,9 @@
 // The figures of a report as numbers and words, before anything is drawn. Whoever draws them (a
 // static SVG, Vega in a browser) reads the same panels, so both show the same.
 
+#include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/analysis.h"
@@ -10,12 +12,32 @@
 
 namespace palpate {
 
-/// What a colour stands for; each theme has its own value.
-enum class Role { page, ink, soft, grid, point, ray, paper, heat, amber };
-constexpr std::size_t kRoles = 9;
+/// What a colour stands for; each theme has its own value. Those from `third` on are of further
+/// renderers.
+enum class Role {
+  page,
+  ink,
+  soft,
+  grid,
+  point,
+  ray,
+  paper,
+  heat,
+  amber,
+  third,
+  fourth,
+  fifth,
+  sixth
+};
+constexpr std::size_t kRoles = 13, kUsualRoles = 9;
 const char* to_string(Role role);
 
-enum class Shape { circle, square, diamond, up, down, dash };  ///< the diamond is open
+/// The diamond is open. Right and left are triangles, the cross stands upright, the saltire not.
+enum class Shape { circle, square, diamond, up, down, dash, right, cross, left, saltire };
+
+/// Corners of the symbols that are told by them alone, right, cross, left and saltire; y down, the
+/// half width 1. Empty: of the others.
+std::vector<std::pair<double, double>> outline_of(Shape shape);
 
 /// One thing in a panel, in the panel's own units.
 struct Mark {
@@ -72,6 +94,9 @@ struct Figure {
   std::vector<Panel> panels;
 };
 
+/// Roles, from the first on, that a palette needs: the usual ones, and those of further renderers.
+std::size_t roles_in(const Figure& figure);
+
 /// Those that the data allow, in the order of display: figure15, speedup, times, confusion,
 /// speed-accuracy, learning, order, servo, exclusions.
 std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& record);
@@ -79,11 +104,13 @@ std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& rec
 /// Mean time per shape and renderer with 95 % t intervals over participants, and each
 /// participant's line.
 Figure figure15_of(const Analysis& analysis);
-/// Percent reduction per shape with its interval, beside the paper's.
+/// Percent reduction per shape with its interval, beside the paper's; a panel for each comparison.
 Figure speedup_of(const Analysis& analysis);
 
 /// Shapes that a figure has room for; the tables have all.
 constexpr std::size_t kShownShapes = 24;
+/// Renderers likewise: so many are told apart by colour and symbol.
+constexpr std::size_t kShownRenderers = 6;
 /// Participants who get a line of their own.
 constexpr std::size_t kShownPeople = 200;
 

@@ -25,7 +25,8 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
                                                          table.answers.size(), kShownShapes)));
   answers.emplace_back("none");
   Panel panel;
-  panel.title = table.renderers[renderer];
+  const std::string name = short_name(table.renderers[renderer]);
+  panel.title = name;
   panel.x = names_axis(answers, answers.size(), "answered");
   panel.y = names_axis(table.shapes, shapes, "shown");
   for (Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;  // the first on top
@@ -38,10 +39,9 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
       const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
       const double share = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
       const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
-      const std::string text = table.renderers[renderer] + ": " + printable(table.shapes[s], 40) +
-                               " answered as " + printable(answers[a], 40) + " " +
-                               counted(n, "time", "times") + " of " + std::to_string(total) + " (" +
-                               percent_text(n, total) + ")";
+      const std::string text = name + ": " + printable(table.shapes[s], 40) + " answered as " +
+                               printable(answers[a], 40) + " " + counted(n, "time", "times") +
+                               " of " + std::to_string(total) + " (" + percent_text(n, total) + ")";
       panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
                                       n ? 0.08 + 0.9 * share : 0.03, text));
       if (n == 0) continue;
@@ -69,7 +69,8 @@ struct Box {
   }
 };
 
-/// Names beside their points: right or left, above or below, wherever they hide no other.
+/// Names beside their points: right or left, above or below, wherever they hide no other. In a
+/// panel that has others at its sides they stay inside.
 void put_labels(Panel& panel, const std::vector<Label>& labels) {
   constexpr double kSize = 13, kLetter = 7.5, kPoint = 7;  // px
   const auto px = [&](double x) {
@@ -99,8 +100,10 @@ void put_labels(Panel& panel, const std::vector<Label>& labels) {
         const double left = px(label.x) + mark.dx - (anchor > 0 ? wide : 0);
         const double base = py(label.y) + dy;
         const Box box{left, left + wide, base - kSize, base + 3};
+        const bool outside = panel.width < kWide && (box.left < 0 || box.right > panel.width);
         const auto hits =
-            std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); });
+            std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); }) +
+            (outside ? 1 : 0);
         if (hits >= fewest) continue;
         fewest = hits;
         best = std::move(mark);
@@ -112,16 +115,46 @@ void put_labels(Panel& panel, const std::vector<Label>& labels) {
   }
 }
 
+/// One comparison's shapes. \return false where none can be shown
+bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
+                 std::size_t shapes, std::string& description) {
+  panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
+                                  "faster and less accurate: a trade-off"));
+  panel.marks.push_back(rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1,
+                                  "slower and more accurate: a trade-off"));
+  panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
+  panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
+  std::vector<Label> labels;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const SpeedAccuracy& both = comparison.speed_accuracy[s];
+    if (!both.percent_change_time || !both.accuracy_change) continue;
+    const std::string name = printable(names[s], 40);
+    const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
+    const std::string text = (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " +
+                             fixed(x, 1) + " %, accuracy " + fixed(y, 1) + " points" +
+                             (both.reading.empty() ? "" : ", " + both.reading);
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
+    }
+    panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
+    labels.push_back({x, y, name});
+    description += text + ". ";
+  }
+  put_labels(panel, labels);
+  return !labels.empty();
+}
+
 }  // namespace
 
 Figure confusion_of(const Analysis& analysis) {
   Figure figure = new_figure(analysis, "confusion", "What was shown and what was answered");
   const std::size_t shapes = shown_shapes(analysis, figure);
-  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+  const std::size_t renderers = shown_renderers(analysis, figure);
+  for (std::size_t r = 0; r < renderers; ++r) {
     figure.panels.push_back(confusion_panel(analysis, r, shapes));
     for (std::size_t s = 0; s < shapes; ++s) {
       const AccuracyCell& cell = analysis.description.accuracy[r][s];
-      figure.description += analysis.table.renderers[r] + ", " +
+      figure.description += short_name(analysis.table.renderers[r]) + ", " +
                             printable(analysis.table.shapes[s], 40) + ": " +
                             percent_text(cell.n_correct, cell.n_trials) + " correct. ";
     }
@@ -135,60 +168,46 @@ Figure confusion_of(const Analysis& analysis) {
 Figure speed_accuracy_of(const Analysis& analysis) {
   Figure figure =
       new_figure(analysis, "speed-accuracy", "Change of time beside change of accuracy");
-  const std::size_t shapes =
-      std::min(shown_shapes(analysis, figure), analysis.speed_accuracy.size());
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t comparisons = shown_comparisons(analysis, figure);
   double widest = 5, highest = 3;
-  bool any = false;
-  for (std::size_t s = 0; s < shapes; ++s) {
-    const SpeedAccuracy& both = analysis.speed_accuracy[s];
-    if (!both.percent_change_time || !both.accuracy_change) continue;
-    any = true;
-    widest = std::max(widest, std::fabs(*both.percent_change_time));
-    highest = std::max(highest, 100 * std::fabs(*both.accuracy_change));
-    if (const auto& ends = both.test.log_ratio_ci95) {
-      highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->low)));
-      highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->high)));
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const SpeedAccuracy& both = analysis.comparisons[c].speed_accuracy[s];
+      if (!both.percent_change_time || !both.accuracy_change) continue;
+      widest = std::max(widest, std::fabs(*both.percent_change_time));
+      highest = std::max(highest, 100 * std::fabs(*both.accuracy_change));
+      if (const auto& ends = both.test.log_ratio_ci95) {
+        highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->low)));
+        highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->high)));
+      }
     }
   }
-  if (!any) return figure;
-  Panel panel;
-  panel.x = linear_axis(-1.15 * widest, 1.15 * widest, "change of time with the ray (%)");
-  panel.y = linear_axis(-1.05 * highest, 1.05 * highest, "change of accuracy (points)");
-  panel.width = kWide;
-  panel.height = 340;
-  panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
-                                  "faster and less accurate: a trade-off"));
-  panel.marks.push_back(rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1,
-                                  "slower and more accurate: a trade-off"));
-  panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
-  panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
-  std::vector<Label> labels;
-  for (std::size_t s = 0; s < shapes; ++s) {
-    const SpeedAccuracy& both = analysis.speed_accuracy[s];
-    if (!both.percent_change_time || !both.accuracy_change) continue;
-    const std::string name = printable(analysis.table.shapes[s], 40);
-    const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
-    const std::string text = name + ": time " + fixed(x, 1) + " %, accuracy " + fixed(y, 1) +
-                             " points" + (both.reading.empty() ? "" : ", " + both.reading);
-    if (const auto& ends = both.test.log_ratio_ci95) {
-      add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    const Comparison& comparison = analysis.comparisons[c];
+    Panel panel = comparison_panel(analysis, comparison.pair, 0, 0);
+    panel.x = linear_axis(-1.15 * widest, 1.15 * widest,
+                          gain_title(analysis, "change of time", "against"));
+    panel.y = linear_axis(-1.05 * highest, 1.05 * highest, "change of accuracy (points)");
+    panel.height = 340;
+    if (add_changes(panel, comparison, analysis.table.shapes, shapes, figure.description)) {
+      figure.panels.push_back(std::move(panel));
     }
-    panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
-    labels.push_back({x, y, name});
-    figure.description += text + ". ";
   }
-  put_labels(panel, labels);
-  figure.panels.push_back(std::move(panel));
+  if (figure.panels.empty()) return figure;
+  const bool paper =
+      analysis.comparisons.size() == 1 && analysis.comparisons.front().pair.is_ray_minus_point();
   figure.notes.insert(figure.notes.begin(),
-                      "Ray minus point, means over participants; bars: 95 % interval of the change "
-                      "of accuracy. Shaded: speed may have been bought with errors, or accuracy "
-                      "with time.");
+                      std::string(paper ? "Ray minus point" : "Renderer minus reference") +
+                          ", means over participants; bars: 95 % interval of the change of "
+                          "accuracy. Shaded: speed may have been bought with errors, or accuracy "
+                          "with time.");
   return figure;
 }
 
 Figure exclusions_of(const Analysis& analysis) {
   Figure figure = new_figure(analysis, "exclusions", "From trials to times");
-  const std::size_t n = analysis.exclusions.size();
+  const std::size_t n = shown_renderers(analysis, figure);
   if (n == 0) return figure;
   double highest = 10;
   for (const Exclusions& lost : analysis.exclusions) {
@@ -211,22 +230,22 @@ Figure exclusions_of(const Analysis& analysis) {
   panel.width = kWide;
   panel.height = 260;
   panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {10, 10}, 1.4));
-  const double width = 0.6 / static_cast<double>(n);
+  const double group = n < 4 ? 0.6 : 0.88, width = group / static_cast<double>(n);
   for (std::size_t r = 0; r < n; ++r) {
     const Exclusions& lost = analysis.exclusions[r];
-    const std::string& renderer = analysis.table.renderers[r];
-    figure.legend.push_back({renderer, role_of(renderer), Shape::square});
+    const std::string renderer = short_name(analysis.table.renderers[r]);
+    const Role role = look_of(analysis, analysis.table.renderers[r]).role;
+    figure.legend.push_back({printable(analysis.table.renderers[r], 200), role, Shape::square});
     for (std::size_t g = 0; g < kGroups; ++g) {
       const std::size_t count =
           kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;
       const double percent =
           lost.n_trials ? 100 * static_cast<double>(count) / static_cast<double>(lost.n_trials) : 0;
-      const double x = static_cast<double>(g) + 0.2 + static_cast<double>(r) * width;
+      const double x = static_cast<double>(g) + (1 - group) / 2 + static_cast<double>(r) * width;
       const std::string text = renderer + ", " + kReasons[g].name + ": " +
                                counted(count, "trial", "trials") + " of " +
                                std::to_string(lost.n_trials) + " (" + fixed(percent, 1) + " %)";
-      panel.marks.push_back(
-          rect_mark(role_of(renderer), x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
+      panel.marks.push_back(rect_mark(role, x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
       Mark mark = text_mark(Role::soft, x + width / 2, percent, fixed(percent, 1), 12);
       mark.dy = -5;
       panel.marks.push_back(std::move(mark));

@@ -8,6 +8,7 @@
 
 #include "analysis/figures_parts.h"
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
@@ -29,7 +30,7 @@ double place(std::size_t renderer, std::size_t renderers, double spread) {
          spread * (2 * static_cast<double>(renderer) / static_cast<double>(renderers - 1) - 1);
 }
 
-void add_people(Panel& panel, const Analysis& analysis, std::size_t shape) {
+void add_people(Panel& panel, const Analysis& analysis, std::size_t renderers, std::size_t shape) {
   const auto& table = analysis.table;
   const std::size_t n = std::min(table.participants.size(), kShownPeople);
   const double opacity = n <= 10 ? 0.6 : n <= 40 ? 0.4 : 0.2;
@@ -40,14 +41,14 @@ void add_people(Panel& panel, const Analysis& analysis, std::size_t shape) {
     line.person = person;
     line.text = person + ", " + printable(table.shapes[shape], 40) + ":";
     std::vector<Mark> dots;
-    for (std::size_t r = 0; r < table.renderers.size(); ++r) {
+    for (std::size_t r = 0; r < renderers; ++r) {
       const ParticipantCell& cell = analysis.description.people[r][shape][p];
       if (cell.n_used == 0) continue;
-      line.x.push_back(static_cast<double>(shape) + place(r, table.renderers.size(), 0.15));
+      line.x.push_back(static_cast<double>(shape) + place(r, renderers, 0.15));
       line.y.push_back(cell.mean);
-      line.text += " " + table.renderers[r] + " " + seconds_text(cell.mean);
-      dots.push_back(symbol(role_of(table.renderers[r]), shape_of(table.renderers[r]),
-                            line.x.back(), cell.mean, 2.4));
+      line.text += " " + short_name(table.renderers[r]) + " " + seconds_text(cell.mean);
+      const Look look = look_of(analysis, table.renderers[r]);
+      dots.push_back(symbol(look.role, look.shape, line.x.back(), cell.mean, 2.4));
     }
     for (Mark& dot : dots) {
       dot.opacity = opacity;
@@ -60,9 +61,9 @@ void add_people(Panel& panel, const Analysis& analysis, std::size_t shape) {
 }
 
 /// 1.5 times the largest participant's mean cuts intervals: two people's may be ten times as long.
-double highest_time(const Analysis& analysis, std::size_t shapes) {
+double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
   double largest = 0, largest_end = 0;
-  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+  for (std::size_t r = 0; r < renderers; ++r) {
     for (std::size_t s = 0; s < shapes; ++s) {
       for (const ParticipantCell& person : analysis.description.people[r][s]) {
         if (person.n_used > 0) largest = std::max(largest, person.mean);
@@ -77,37 +78,40 @@ double highest_time(const Analysis& analysis, std::size_t shapes) {
 }
 
 /// The paper's percent reduction as a number; none where it found no difference or had no shape.
-std::optional<double> paper_number(const std::string& shape) {
-  const std::string text = paper_reduction(shape);
+std::optional<double> paper_number(const RendererPair& pair, const std::string& shape) {
+  const std::string text = paper_reduction(pair, shape);
   if (text.empty() || text == "n.s.") return std::nullopt;
   return std::stod(text);
 }
 
-FigureAxis reduction_axis(const Analysis& analysis, std::size_t shapes) {
+/// One for all comparisons.
+FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std::size_t shapes) {
   double low = 0, high = 25;  // the paper's largest stays inside
-  for (std::size_t s = 0; s < shapes; ++s) {
-    const PairedShape& shape = analysis.shapes[s];
-    if (!shape.percent_reduction_geometric) continue;
-    low = std::min(low, *shape.percent_reduction_geometric);
-    high = std::max(high, *shape.percent_reduction_geometric);
-    if (!shape.t_test.log_ratio_ci95) continue;
-    const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
-    low = std::min(low, ends.low);
-    high = std::max(high, ends.high);
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const PairedShape& shape = analysis.comparisons[c].shapes[s];
+      if (!shape.percent_reduction_geometric) continue;
+      low = std::min(low, *shape.percent_reduction_geometric);
+      high = std::max(high, *shape.percent_reduction_geometric);
+      if (!shape.t_test.log_ratio_ci95) continue;
+      const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
+      low = std::min(low, ends.low);
+      high = std::max(high, ends.high);
+    }
   }
   // A slowing-down has no end: it is cut.
-  return linear_axis(std::max(low, -150.0), high, "less time with the ray (%)");
+  return linear_axis(std::max(low, -150.0), high, gain_title(analysis, "less time", "than with"));
 }
 
 std::string interval_text(const Interval& percent) {
   return fixed(percent.low, 1) + " to " + fixed(percent.high, 1) + " %";
 }
 
-void add_paper(Panel& panel, const std::string& shape, double x) {
-  if (const auto value = paper_number(shape)) {
+void add_paper(Panel& panel, const RendererPair& pair, const std::string& shape, double x) {
+  if (const auto value = paper_number(pair, shape)) {
     panel.marks.push_back(symbol(Role::paper, Shape::diamond, x, *value, 7,
                                  shape + ", Ho et al. 2000: " + fixed(*value, 0) + " %"));
-  } else if (!paper_reduction(shape).empty()) {
+  } else if (!paper_reduction(pair, shape).empty()) {
     Mark mark = text_mark(Role::paper, x, 0, "n.s.", 12);
     mark.bold = true;
     mark.dy = -6;
@@ -115,70 +119,17 @@ void add_paper(Panel& panel, const std::string& shape, double x) {
   }
 }
 
-}  // namespace
-
-Figure figure15_of(const Analysis& analysis) {
-  Figure figure = new_figure(analysis, "figure15", "Mean time to identify a shape");
-  const auto& table = analysis.table;
-  const std::size_t shapes = shown_shapes(analysis, figure);
-  Panel panel;
-  panel.x = names_axis(table.shapes, shapes, "");
-  panel.y = linear_axis(0, highest_time(analysis, shapes), "time (s)");
-  panel.width = std::max(kWide, 70.0 * static_cast<double>(shapes));
-  panel.height = 380;
-  for (std::size_t s = 0; s < shapes; ++s) {
-    add_people(panel, analysis, s);
-    for (std::size_t r = 0; r < table.renderers.size(); ++r) {
-      const TimesCell& cell = analysis.description.times[r][s];
-      if (!cell.mean_of_participant_means) continue;
-      const std::string& renderer = table.renderers[r];
-      const double x = static_cast<double>(s) + place(r, table.renderers.size(), 0.27);
-      std::string text = printable(table.shapes[s], 40) + ", " + renderer + ": mean " +
-                         seconds_text(*cell.mean_of_participant_means);
-      if (const auto ends = interval_of(cell)) {
-        text += ", 95 % interval " + fixed(ends->low, 2) + " to " + fixed(ends->high, 2) + " s";
-        add_interval(panel, role_of(renderer), x, ends->low, ends->high, text);
-      }
-      figure.description += text + ". ";
-      panel.marks.push_back(symbol(role_of(renderer), shape_of(renderer), x,
-                                   *cell.mean_of_participant_means, renderer == "ray" ? 5.8 : 6.5,
-                                   text));
-    }
-  }
-  figure.panels.push_back(std::move(panel));
-  for (const std::string& renderer : table.renderers) {
-    figure.legend.push_back({renderer, role_of(renderer), shape_of(renderer)});
-  }
-  figure.legend.push_back({"one participant", Role::soft, Shape::dash});
-  figure.notes.insert(
-      figure.notes.begin(),
-      "Correct answers only. Large marks: mean over participants of each one’s mean time; bars: 95 "
-      "% interval of that mean (t). Small marks and thin lines: each participant. Compare with "
-      "fig. "
-      "15 of Ho, Basdogan & Srinivasan (2000).");
-  if (table.participants.size() > kShownPeople) {
-    figure.notes.push_back("Lines of the first " + std::to_string(kShownPeople) + " of " +
-                           std::to_string(table.participants.size()) +
-                           " participants; means and intervals are of all.");
-  }
-  return figure;
-}
-
-Figure speedup_of(const Analysis& analysis) {
-  Figure figure = new_figure(analysis, "speedup", "How much less time with the ray");
-  const std::size_t shapes = shown_shapes(analysis, figure);
-  Panel panel;
-  panel.x = names_axis(analysis.table.shapes, shapes, "");
-  panel.y = reduction_axis(analysis, shapes);
-  panel.width = std::max(kWide, 60.0 * static_cast<double>(shapes));
-  panel.height = 340;
+/// One comparison's shapes. \return false where none can be shown
+bool add_reductions(Panel& panel, const Comparison& comparison,
+                    const std::vector<std::string>& names, std::size_t shapes,
+                    std::string& description) {
+  bool any = false;
   panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
-  bool with_paper = false, any = false;
   for (std::size_t s = 0; s < shapes; ++s) {
-    const PairedShape& shape = analysis.shapes[s];
-    const std::string& name = analysis.table.shapes[s];
+    const PairedShape& shape = comparison.shapes[s];
     const double left = static_cast<double>(s) + 0.42, right = static_cast<double>(s) + 0.62;
-    std::string text = printable(name, 40) + ": ";
+    std::string text =
+        (panel.title.empty() ? "" : panel.title + ", ") + printable(names[s], 40) + ": ";
     text += shape.percent_reduction_geometric ? fixed(*shape.percent_reduction_geometric, 1) + " %"
                                               : std::string("undefined");
     if (shape.t_test.log_ratio_ci95) {
@@ -192,9 +143,8 @@ Figure speedup_of(const Analysis& analysis) {
           std::clamp(*shape.percent_reduction_geometric, panel.y.low, panel.y.high), 6.5, text));
       any = true;
     }
-    add_paper(panel, name, right);
-    const std::string paper = paper_reduction(name);
-    with_paper = with_paper || !paper.empty();
+    add_paper(panel, comparison.pair, names[s], right);
+    const std::string paper = paper_reduction(comparison.pair, names[s]);
     if (!paper.empty()) text += "; paper " + paper;
     if (const auto& p = shape.t_test.p_holm) {
       Mark mark = text_mark(Role::soft, static_cast<double>(s) + 0.5, panel.y.high,
@@ -204,18 +154,98 @@ Figure speedup_of(const Analysis& analysis) {
       panel.marks.push_back(std::move(mark));
       text += "; adjusted p " + p_text(*p);
     }
-    figure.description += text + ". ";
+    description += text + ". ";
   }
-  if (!any) return figure;
+  return any;
+}
+
+}  // namespace
+
+Figure figure15_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "figure15", "Mean time to identify a shape");
+  const auto& table = analysis.table;
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t renderers = shown_renderers(analysis, figure);
+  Panel panel;
+  panel.x = names_axis(table.shapes, shapes, "");
+  panel.y = linear_axis(0, highest_time(analysis, renderers, shapes), "time (s)");
+  panel.width = std::max(
+      kWide, std::max(70.0, 26.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
+  panel.height = 380;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    add_people(panel, analysis, renderers, s);
+    for (std::size_t r = 0; r < renderers; ++r) {
+      const TimesCell& cell = analysis.description.times[r][s];
+      if (!cell.mean_of_participant_means) continue;
+      const Look look = look_of(analysis, table.renderers[r]);
+      const double x = static_cast<double>(s) + place(r, renderers, 0.27);
+      std::string text = printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]) +
+                         ": mean " + seconds_text(*cell.mean_of_participant_means);
+      if (const auto ends = interval_of(cell)) {
+        text += ", 95 % interval " + fixed(ends->low, 2) + " to " + fixed(ends->high, 2) + " s";
+        add_interval(panel, look.role, x, ends->low, ends->high, text);
+      }
+      figure.description += text + ". ";
+      panel.marks.push_back(symbol(look.role, look.shape, x, *cell.mean_of_participant_means,
+                                   look.shape == Shape::square ? 5.8 : 6.5, text));
+    }
+  }
   figure.panels.push_back(std::move(panel));
-  figure.legend = {{"this data", Role::ink, Shape::circle}};
-  if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, Shape::diamond});
+  add_renderers(figure, analysis, renderers);
+  figure.legend.push_back({"one participant", Role::soft, Shape::dash});
   figure.notes.insert(
       figure.notes.begin(),
-      "Above 0 the ray is faster. Geometric reduction over participants with both renderers; bars: "
-      "95 % interval of the paired t-test on log times; p adjusted over the shapes after Holm, "
-      "bold "
-      "below 0.05. n.s.: the paper found no significant difference.");
+      "Correct answers only. Large marks: mean over participants of each one’s mean time; bars: 95 "
+      "% interval of that mean (t). Small marks and thin lines: each participant." +
+          std::string(compares_as_paper(analysis)
+                          ? " Compare with fig. 15 of Ho, Basdogan & Srinivasan (2000)."
+                          : ""));
+  if (table.participants.size() > kShownPeople) {
+    figure.notes.push_back("Lines of the first " + std::to_string(kShownPeople) + " of " +
+                           std::to_string(table.participants.size()) +
+                           " participants; means and intervals are of all.");
+  }
+  return figure;
+}
+
+Figure speedup_of(const Analysis& analysis) {
+  Figure figure =
+      new_figure(analysis, "speedup", "How much less time " + with_renderer(analysis, "than with"));
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t comparisons = shown_comparisons(analysis, figure);
+  const FigureAxis axis = reduction_axis(analysis, comparisons, shapes);
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    const Comparison& comparison = analysis.comparisons[c];
+    Panel panel = comparison_panel(analysis, comparison.pair, shapes, 60);
+    panel.x = names_axis(analysis.table.shapes, shapes, "");
+    panel.y = axis;
+    panel.height = 340;
+    if (add_reductions(panel, comparison, analysis.table.shapes, shapes, figure.description)) {
+      figure.panels.push_back(std::move(panel));
+    }
+  }
+  if (figure.panels.empty()) return figure;
+  const bool with_paper =
+      std::ranges::any_of(analysis.comparisons, [&](const Comparison& comparison) {
+        return std::any_of(analysis.table.shapes.begin(),
+                           analysis.table.shapes.begin() + static_cast<std::ptrdiff_t>(shapes),
+                           [&](const std::string& shape) {
+                             return !paper_reduction(comparison.pair, shape).empty();
+                           });
+      });
+  figure.legend = {{"this data", Role::ink, Shape::circle}};
+  if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, Shape::diamond});
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const bool many = analysis.comparisons.size() > 1;
+  figure.notes.insert(
+      figure.notes.begin(),
+      "Above 0 " +
+          (many ? "it is faster than with " + the(short_name(first.reference))
+                : the(short_name(first.renderer)) + " is faster") +
+          ". Geometric reduction over participants with both renderers; bars: 95 % interval of the "
+          "paired t-test on log times; p adjusted over " +
+          (many ? "all shapes and comparisons" : "the shapes") + " after Holm, bold below 0.05." +
+          (compares_as_paper(analysis) ? " n.s.: the paper found no significant difference." : ""));
   return figure;
 }
 

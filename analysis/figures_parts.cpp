@@ -1,16 +1,19 @@
 #include "analysis/figures_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
 const char* to_string(Role role) {
-  constexpr const char* kNames[kRoles] = {"page", "ink",   "soft", "grid", "point",
-                                          "ray",  "paper", "heat", "amber"};
+  constexpr const char* kNames[kRoles] = {"page",   "ink",   "soft", "grid",  "point",
+                                          "ray",    "paper", "heat", "amber", "third",
+                                          "fourth", "fifth", "sixth"};
   return kNames[static_cast<std::size_t>(role)];
 }
 
@@ -25,13 +28,77 @@ Figure new_figure(const Analysis& analysis, std::string id, std::string title) {
   return figure;
 }
 
-Role role_of(std::string_view renderer) {
-  if (renderer == "point") return Role::point;
-  return renderer == "ray" ? Role::ray : Role::ink;
+std::vector<std::pair<double, double>> outline_of(Shape shape) {
+  constexpr double kArm = 0.36;  // half of a cross's arm's width
+  std::vector<std::pair<double, double>> corners;
+  if (shape == Shape::right || shape == Shape::left) {
+    corners = {{1, 0}, {-0.8, -1}, {-0.8, 1}};
+    if (shape == Shape::left) {
+      for (auto& corner : corners) corner.first = -corner.first;
+    }
+  } else if (shape == Shape::cross || shape == Shape::saltire) {
+    corners = {{kArm, -1}, {kArm, -kArm}, {1, -kArm}, {1, kArm},   {kArm, kArm},   {kArm, 1},
+               {-kArm, 1}, {-kArm, kArm}, {-1, kArm}, {-1, -kArm}, {-kArm, -kArm}, {-kArm, -1}};
+    if (shape == Shape::saltire) {
+      const double turn = std::sqrt(0.5);
+      for (auto& [x, y] : corners) {
+        const double turned = turn * (x - y);
+        y = turn * (x + y);
+        x = turned;
+      }
+    }
+  }
+  return corners;
 }
 
-Shape shape_of(std::string_view renderer) {
-  return renderer == "ray" ? Shape::square : Shape::circle;
+std::size_t roles_in(const Figure& figure) {
+  std::size_t roles = kUsualRoles;
+  for (const Panel& panel : figure.panels) {
+    for (const Mark& mark : panel.marks) {
+      roles = std::max(roles, static_cast<std::size_t>(mark.role) + 1);
+    }
+  }
+  for (const LegendEntry& entry : figure.legend) {
+    roles = std::max(roles, static_cast<std::size_t>(entry.role) + 1);
+  }
+  return roles;
+}
+
+Look look_of(const Analysis& analysis, std::string_view renderer) {
+  constexpr std::array<Look, kShownRenderers> kLooks{{{Role::point, Shape::circle},
+                                                      {Role::ray, Shape::square},
+                                                      {Role::third, Shape::right},
+                                                      {Role::fourth, Shape::cross},
+                                                      {Role::fifth, Shape::left},
+                                                      {Role::sixth, Shape::saltire}}};
+  const auto own = [](std::string_view name) {
+    return name == "point" ? 0U : name == "ray" ? 1U : kShownRenderers;
+  };
+  if (own(renderer) < kShownRenderers) return kLooks[own(renderer)];
+  std::array<bool, kShownRenderers> taken{};
+  std::size_t before = 0;  // others that choose first
+  for (const std::string& name : analysis.table.renderers) {
+    if (name == renderer) break;
+    if (own(name) < kShownRenderers) {
+      taken[own(name)] = true;
+    } else {
+      ++before;
+    }
+  }
+  for (std::size_t i = 0; i < kShownRenderers; ++i) {
+    if (!taken[i] && before-- == 0) return kLooks[i];
+  }
+  return kLooks.back();
+}
+
+std::string short_name(const std::string& renderer) { return printable(renderer, 40); }
+
+void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown) {
+  for (std::size_t r = 0; r < shown; ++r) {
+    const std::string& renderer = analysis.table.renderers[r];
+    const Look look = look_of(analysis, renderer);
+    figure.legend.push_back({printable(renderer, 200), look.role, look.shape});
+  }
 }
 
 std::size_t shown_shapes(const Analysis& analysis, Figure& figure) {
@@ -40,6 +107,33 @@ std::size_t shown_shapes(const Analysis& analysis, Figure& figure) {
   figure.notes.push_back("The first " + std::to_string(kShownShapes) + " of " + std::to_string(n) +
                          " shapes; the tables and the JSON file have all.");
   return kShownShapes;
+}
+
+std::size_t shown_renderers(const Analysis& analysis, Figure& figure) {
+  const std::size_t n = analysis.table.renderers.size();
+  if (n <= kShownRenderers) return n;
+  figure.notes.push_back("The first " + std::to_string(kShownRenderers) + " of " +
+                         std::to_string(n) + " renderers; the tables and the JSON file have all.");
+  return kShownRenderers;
+}
+
+std::size_t shown_comparisons(const Analysis& analysis, Figure& figure) {
+  return std::min(analysis.comparisons.size(),
+                  std::max<std::size_t>(shown_renderers(analysis, figure), 2) - 1);
+}
+
+Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::size_t shapes,
+                       double slot) {
+  const bool alone = analysis.comparisons.size() == 1;
+  Panel panel;
+  if (!alone) panel.title = short_name(pair.renderer) + " − " + short_name(pair.reference);
+  panel.width = std::max(alone ? kWide : kHalfWide, slot * static_cast<double>(shapes));
+  return panel;
+}
+
+std::string gain_title(const Analysis& analysis, const std::string& what,
+                       const std::string& joint) {
+  return shortened(what + " " + with_renderer(analysis, joint), 58) + " (%)";
 }
 
 FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title) {

@@ -10,17 +10,34 @@
 
 namespace palpate {
 
-/// Width of a panel that stands alone, px.
-constexpr double kWide = 850;
+/// Width of a panel that stands alone, and of one of several comparisons, px.
+constexpr double kWide = 850, kHalfWide = 390;
 
 /// Everything that figures have in common: label, subtitle.
 Figure new_figure(const Analysis& analysis, std::string id, std::string title);
 
-Role role_of(std::string_view renderer);    ///< point and ray have their own, others are ink
-Shape shape_of(std::string_view renderer);  ///< told apart without colour, too
+/// How a renderer is drawn: told apart by colour and without.
+struct Look {
+  Role role = Role::ink;
+  Shape shape = Shape::circle;
+};
+/// Point and ray have their own; others, in their order, what these leave.
+Look look_of(const Analysis& analysis, std::string_view renderer);
+/// A renderer's name where there is little room.
+std::string short_name(const std::string& renderer);
+/// Renderers in a legend, the first `shown`.
+void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown);
 
-/// Shapes that are drawn, and a note where there are more.
+/// Shapes, renderers and comparisons that are drawn, and a note where there are more.
 std::size_t shown_shapes(const Analysis& analysis, Figure& figure);
+std::size_t shown_renderers(const Analysis& analysis, Figure& figure);
+std::size_t shown_comparisons(const Analysis& analysis, Figure& figure);
+
+/// A panel for one of the comparisons, `slot` px for each shape: named where there are several.
+Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::size_t shapes,
+                       double slot);
+/// Title of an axis for what a comparison gains or changes: "less time with the ray (%)".
+std::string gain_title(const Analysis& analysis, const std::string& what, const std::string& joint);
 
 /// Slots 0..1, 1..2, ... named in their middles.
 FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);

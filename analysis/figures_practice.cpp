@@ -13,14 +13,55 @@ namespace {
 
 constexpr double kNormal975 = 1.959963984540054;  // of the standard normal distribution
 
+/// One comparison's shapes. \return false where none can be shown
+bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, std::size_t shapes,
+                std::string& description) {
+  const RendererPair& pair = analysis.comparisons[comparison].pair;
+  const std::string before = panel.title.empty() ? "" : panel.title + ", ";
+  bool any = false;
+  panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const OrderEffect& order = analysis.practice.pairs[comparison].shapes[s];
+    const std::string name = before + printable(analysis.table.shapes[s], 40);
+    const double x = static_cast<double>(s) + 0.5;
+    const auto add_group = [&](const OrderGroup& group, const std::string& renderer, double at) {
+      if (!group.mean_log_ratio) return;
+      any = true;
+      const double value = percent_reduction(*group.mean_log_ratio);
+      const Look look = look_of(analysis, renderer);
+      const std::string text = name + ", " + short_name(renderer) + " first: " + fixed(value, 1) +
+                               " %, " +
+                               counted(group.n_participants, "participant", "participants");
+      panel.marks.push_back(symbol(look.role, look.shape, at,
+                                   std::clamp(value, panel.y.low, panel.y.high), 5.5, text));
+      description += text + ". ";
+    };
+    add_group(order.reference_first, pair.reference, x - 0.2);
+    add_group(order.renderer_first, pair.renderer, x - 0.2 + 0.4);
+    if (!order.balanced_log_ratio) continue;
+    const double value = percent_reduction(*order.balanced_log_ratio);
+    std::string text = name + ", orders balanced: " + fixed(value, 1) + " %";
+    if (order.balanced_ci95) {
+      const Interval ends = percent_reduction(*order.balanced_ci95);
+      text += ", 95 % interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) + " %";
+      add_interval(panel, Role::ink, x, ends.low, ends.high, text);
+    }
+    panel.marks.push_back(symbol(Role::ink, Shape::diamond, x,
+                                 std::clamp(value, panel.y.low, panel.y.high), 6, text));
+    description += text + ". ";
+  }
+  return any;
+}
+
 }  // namespace
 
 Figure learning_of(const Analysis& analysis) {
   Figure figure = new_figure(analysis, "learning", "Times over the trials with a renderer");
   const auto& learning = analysis.practice.learning;
   double low = 1e9, high = -1e9;
-  for (const Learning& curve : learning) {
-    for (const LearningBin& bin : curve.bins) {
+  const std::size_t renderers = shown_renderers(analysis, figure);
+  for (std::size_t r = 0; r < renderers; ++r) {
+    for (const LearningBin& bin : learning[r].bins) {
       if (!bin.mean_log) continue;
       const double se = std::min(bin.se_mean_log.value_or(0), 1.0);
       low = std::min(low, *bin.mean_log - kNormal975 * se);
@@ -48,10 +89,11 @@ Figure learning_of(const Analysis& analysis) {
   }
   panel.width = kWide;
   panel.height = 300;
-  for (std::size_t r = 0; r < learning.size(); ++r) {
-    const std::string& renderer = analysis.table.renderers[r];
-    const Role role = role_of(renderer);
-    const double shift = learning.size() < 2 ? 0 : (r == 0 ? -0.06 : 0.06);
+  add_renderers(figure, analysis, renderers);
+  for (std::size_t r = 0; r < renderers; ++r) {
+    const std::string renderer = short_name(analysis.table.renderers[r]);
+    const auto [role, shape] = look_of(analysis, analysis.table.renderers[r]);
+    const double shift = 0.12 * static_cast<double>(r) - 0.06 * static_cast<double>(renderers - 1);
     Mark line = line_mark(role, {}, {}, 2);
     for (std::size_t b = 0; b < kLearningBins; ++b) {
       const LearningBin& bin = learning[r].bins[b];
@@ -66,10 +108,9 @@ Figure learning_of(const Analysis& analysis) {
         const double half = kNormal975 * *bin.se_mean_log / per_decade;
         add_interval(panel, role, x, y - half, y + half, text);
       }
-      panel.marks.push_back(symbol(role, shape_of(renderer), x, y, 5, text));
+      panel.marks.push_back(symbol(role, shape, x, y, 5, text));
     }
     if (line.x.size() > 1) panel.marks.push_back(std::move(line));
-    figure.legend.push_back({renderer, role, shape_of(renderer)});
     if (const auto& slope = learning[r].mean_slope) {
       std::string text = renderer + ": " + fixed(100 * std::expm1(*slope), 1) + " % per 100 trials";
       if (const auto& ends = learning[r].slope.log_ratio_ci95) {
@@ -90,72 +131,50 @@ Figure learning_of(const Analysis& analysis) {
 
 Figure order_of(const Analysis& analysis) {
   Figure figure = new_figure(analysis, "order", "The gain by which renderer came first");
-  const std::size_t shapes =
-      std::min(shown_shapes(analysis, figure), analysis.practice.shapes.size());
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t comparisons = shown_comparisons(analysis, figure);
   double low = 0, high = 10;
-  bool any = false;
-  const auto groups = [&](std::size_t s) {
-    const OrderEffect& order = analysis.practice.shapes[s];
-    return std::array<const OrderGroup*, 2>{&order.point_first, &order.ray_first};
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const OrderEffect& order = analysis.practice.pairs[c].shapes[s];
+      for (const OrderGroup* group : {&order.reference_first, &order.renderer_first}) {
+        if (!group->mean_log_ratio) continue;
+        low = std::min(low, percent_reduction(*group->mean_log_ratio));
+        high = std::max(high, percent_reduction(*group->mean_log_ratio));
+      }
+      if (const auto& ends = order.balanced_ci95) {
+        low = std::min(low, percent_reduction(*ends).low);
+        high = std::max(high, percent_reduction(*ends).high);
+      }
+    }
+  }
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const auto add_entry = [&](const std::string& renderer) {
+    const Look look = look_of(analysis, renderer);
+    figure.legend.push_back({printable(renderer, 200) + " first", look.role, look.shape});
   };
-  for (std::size_t s = 0; s < shapes; ++s) {
-    for (const OrderGroup* group : groups(s)) {
-      if (!group->mean_log_ratio) continue;
-      any = true;
-      low = std::min(low, percent_reduction(*group->mean_log_ratio));
-      high = std::max(high, percent_reduction(*group->mean_log_ratio));
-    }
-    if (const auto& ends = analysis.practice.shapes[s].balanced_ci95) {
-      low = std::min(low, percent_reduction(*ends).low);
-      high = std::max(high, percent_reduction(*ends).high);
-    }
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    Panel panel = comparison_panel(analysis, pair, shapes, 60);
+    panel.x = names_axis(analysis.table.shapes, shapes, "");
+    panel.y =
+        linear_axis(std::max(low, -150.0), high, gain_title(analysis, "less time", "than with"));
+    panel.height = 300;
+    if (!add_orders(panel, analysis, c, shapes, figure.description)) continue;
+    if (figure.panels.empty()) add_entry(pair.reference);
+    add_entry(pair.renderer);
+    figure.panels.push_back(std::move(panel));
   }
-  if (!any) return figure;
-  Panel panel;
-  panel.x = names_axis(analysis.table.shapes, shapes, "");
-  panel.y = linear_axis(std::max(low, -150.0), high, "less time with the ray (%)");
-  panel.width = std::max(kWide, 60.0 * static_cast<double>(shapes));
-  panel.height = 300;
-  panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
-  constexpr const char* kNames[] = {"point first", "ray first"};
-  for (std::size_t s = 0; s < shapes; ++s) {
-    const std::string name = printable(analysis.table.shapes[s], 40);
-    const double x = static_cast<double>(s) + 0.5;
-    const auto both = groups(s);
-    for (std::size_t g = 0; g < both.size(); ++g) {
-      if (!both[g]->mean_log_ratio) continue;
-      const double value = percent_reduction(*both[g]->mean_log_ratio);
-      const std::string text = name + ", " + kNames[g] + ": " + fixed(value, 1) + " %, " +
-                               counted(both[g]->n_participants, "participant", "participants");
-      panel.marks.push_back(symbol(g == 0 ? Role::point : Role::ray,
-                                   g == 0 ? Shape::circle : Shape::square,
-                                   x - 0.2 + 0.4 * static_cast<double>(g),
-                                   std::clamp(value, panel.y.low, panel.y.high), 5.5, text));
-      figure.description += text + ". ";
-    }
-    const OrderEffect& order = analysis.practice.shapes[s];
-    if (!order.balanced_log_ratio) continue;
-    const double value = percent_reduction(*order.balanced_log_ratio);
-    std::string text = name + ", orders balanced: " + fixed(value, 1) + " %";
-    if (order.balanced_ci95) {
-      const Interval ends = percent_reduction(*order.balanced_ci95);
-      text += ", 95 % interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) + " %";
-      add_interval(panel, Role::ink, x, ends.low, ends.high, text);
-    }
-    panel.marks.push_back(symbol(Role::ink, Shape::diamond, x,
-                                 std::clamp(value, panel.y.low, panel.y.high), 6, text));
-    figure.description += text + ". ";
-  }
-  figure.panels.push_back(std::move(panel));
-  figure.legend = {{"point first", Role::point, Shape::circle},
-                   {"ray first", Role::ray, Shape::square},
-                   {"orders balanced", Role::ink, Shape::diamond}};
+  if (figure.panels.empty()) return figure;
+  figure.legend.push_back({"orders balanced", Role::ink, Shape::diamond});
   figure.notes.insert(
       figure.notes.begin(),
       "Practice makes whichever renderer comes second look faster: the gain of those "
-      "who began with the point is then too large, that of the others too small. "
-      "The mean of both groups is free of it (two-period crossover); bars: 95 % "
-      "interval.");
+      "who began with " +
+          the(short_name(first.reference)) +
+          " is then too large, that of the others too small. "
+          "The mean of both groups is free of it (two-period crossover); bars: 95 % "
+          "interval.");
   return figure;
 }
 

@@ -46,7 +46,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
       if (n == 0) continue;
       const double percent = 100 * static_cast<double>(n) / static_cast<double>(servo.n_trials);
       panel.marks.push_back(rect_mark(
-          role_of(servo.renderer), edge(b), 0, edge(b + 1), percent, 0.85,
+          look_of(analysis, servo.renderer).role, edge(b), 0, edge(b + 1), percent, 0.85,
           fixed(std::pow(10, edge(b)), 2) + " to " + fixed(std::pow(10, edge(b + 1)), 2) +
               " ms: " + counted(n, "trial", "trials") + " (" + fixed(percent, 1) + " %)"));
     }

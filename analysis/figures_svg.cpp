@@ -13,7 +13,8 @@ namespace palpate {
 namespace {
 
 constexpr double kMargin = 26, kLeft = 58, kGap = 30, kRow = 1000;
-constexpr std::size_t kLongestName = 18;  // characters of a name below an axis
+constexpr std::size_t kLongestName = 18;   // characters of a name below an axis
+constexpr std::size_t kLongestEntry = 40;  // of one in the legend
 
 class Drawing {
  public:
@@ -98,13 +99,14 @@ class Drawing {
     if (figure_.legend.empty()) return y - 8;
     x = kMargin;
     for (const LegendEntry& entry : figure_.legend) {
-      const double width = 30 + text_width(entry.label, 13) + 22;
+      const std::string label = shortened(entry.label, kLongestEntry);
+      const double width = 30 + text_width(label, 13) + 22;
       if (x + width > total_ && x > kMargin) {
         x = kMargin;
         y += 22;
       }
       draw_symbol(entry.shape, entry.role, x + 9, y - 4.5, entry.shape == Shape::dash ? 9 : 6, 1);
-      svg_.text(x + 24, y, entry.label, {13, colour(Role::ink)});
+      svg_.text(x + 24, y, label, {13, colour(Role::ink)});
       x += width;
     }
     return y + 14;
@@ -129,7 +131,23 @@ class Drawing {
       case Shape::dash:
         svg_.line(x - half, y, x + half, y, fill, 2, opacity);
         break;
+      case Shape::right:
+      case Shape::cross:
+      case Shape::left:
+      case Shape::saltire:
+        draw_outline(shape, fill, x, y, half, opacity);
+        break;
     }
+  }
+
+  void draw_outline(Shape shape, const std::string& fill, double x, double y, double half,
+                    double opacity) {
+    std::vector<double> xs, ys;
+    for (const auto& [corner_x, corner_y] : outline_of(shape)) {
+      xs.push_back(x + half * corner_x);
+      ys.push_back(y + half * corner_y);
+    }
+    svg_.area(xs, ys, fill, opacity, "none", 0);
   }
 
   double draw_row(std::size_t first, std::size_t last, double y) {
@@ -260,13 +278,13 @@ class Drawing {
 }  // namespace
 
 Palette light_palette() {
-  return {"#ffffff", "#1f2328", "#59636e", "#e3e6ea", "#0072b2",
-          "#d55e00", "#00795a", "#0072b2", "#8a5a00"};
+  return {"#ffffff", "#1f2328", "#59636e", "#e3e6ea", "#0072b2", "#d55e00", "#00795a",
+          "#0072b2", "#8a5a00", "#aa3377", "#009e73", "#000000", "#665c00"};
 }
 
 Palette dark_palette() {
-  return {"#171b1f", "#e6e9ec", "#a3adb8", "#30373e", "#56b4e9",
-          "#f28b3c", "#2fbf96", "#56b4e9", "#f0b84a"};
+  return {"#171b1f", "#e6e9ec", "#a3adb8", "#30373e", "#56b4e9", "#f28b3c", "#2fbf96",
+          "#56b4e9", "#f0b84a", "#e08bbf", "#35d0a5", "#ffffff", "#f0e442"};
 }
 
 Palette page_palette() {

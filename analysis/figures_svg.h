@@ -11,7 +11,8 @@ namespace palpate {
 /// Colours by role: what SVG and CSS read.
 using Palette = std::array<std::string, kRoles>;
 
-/// For paper. Okabe & Ito's (2008) colours: told apart with every common colour vision.
+/// For paper. Okabe & Ito's (2008) colours, some darker: told apart with every common colour
+/// vision.
 Palette light_palette();
 Palette dark_palette();
 /// "var(--point)" and so on: a page's style says which.

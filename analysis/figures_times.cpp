@@ -65,45 +65,75 @@ Bins density(const std::vector<float>& sorted, double low, double high) {
   return smooth;
 }
 
-/// The half of a violin that bulges to `side` (-1 or 1) of x.
-void add_half(Panel& panel, Role role, const Bins& share, double x, double side, double scale,
-              const std::string& text) {
+/// Where a cell is drawn: a half of a violin on one side of x, or both halves around it.
+struct Stand {
+  double x = 0;
+  double side = 0;  ///< -1 or 1: the half there; 0: both
+  double scale = 1;
+};
+
+/// A violin, or its half that bulges to one side.
+void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand,
+                const std::string& text) {
   const double step = (panel.y.high - panel.y.low) / kBins;
   Mark area = line_mark(role, {}, {}, 1.2);
   area.kind = Mark::Kind::area;
   area.opacity = 0.4;
   area.text = text;
-  const auto corner = [&](double width, double bin) {
-    area.x.push_back(x + side * (0.02 + width));
+  const auto corner = [&](double offset, double bin) {
+    area.x.push_back(stand.x + offset);
     area.y.push_back(panel.y.low + (bin + 0.5) * step);
   };
   std::size_t first = 0, last = kBins - 1;
-  const double least = 0.004 / scale;
+  const double least = 0.004 / stand.scale;
   while (first < last && share[first] < least) ++first;
   while (last > first && share[last] < least) --last;
-  corner(0, static_cast<double>(first));
-  for (std::size_t b = first; b <= last; ++b) corner(scale * share[b], static_cast<double>(b));
-  corner(0, static_cast<double>(last));
+  if (stand.side != 0) {
+    const auto beside = [&](double width) { return stand.side * (0.02 + width); };
+    corner(beside(0), static_cast<double>(first));
+    for (std::size_t b = first; b <= last; ++b) {
+      corner(beside(stand.scale * share[b]), static_cast<double>(b));
+    }
+    corner(beside(0), static_cast<double>(last));
+  } else {
+    for (std::size_t b = first; b <= last; ++b) {
+      corner(stand.scale * share[b], static_cast<double>(b));
+    }
+    for (std::size_t b = last + 1; b-- > first;) {
+      corner(-stand.scale * share[b], static_cast<double>(b));
+    }
+  }
   panel.marks.push_back(std::move(area));
 }
 
-void add_cell(Panel& panel, const std::string& renderer, const std::vector<float>& times,
-              const Bins& share, double x, double side, double scale, const std::string& text) {
-  const Role role = role_of(renderer);
+void add_cell(Panel& panel, const Look& look, const std::vector<float>& times, const Bins& share,
+              const Stand& stand, const std::string& text) {
   if (times.size() < kFewTimes) {
     for (const float time : times) {
-      panel.marks.push_back(
-          symbol(role, shape_of(renderer), x + side * 0.12, static_cast<double>(time), 3, text));
+      panel.marks.push_back(symbol(look.role, look.shape, stand.x + stand.side * 0.12,
+                                   static_cast<double>(time), 3, text));
     }
     return;
   }
-  add_half(panel, role, share, x, side, scale, text);
-  const double at = x + side * 0.055;
+  add_violin(panel, look.role, share, stand, text);
+  const double at = stand.x + stand.side * 0.055;
   panel.marks.push_back(
-      line_mark(role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
+      line_mark(look.role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
   const double median = quantile_of(times, 0.5);
-  panel.marks.push_back(symbol(role, shape_of(renderer), at, median, 5.2, text));
-  panel.marks.push_back(symbol(Role::page, shape_of(renderer), at, median, 3, text));
+  panel.marks.push_back(symbol(look.role, look.shape, at, median, 5.2, text));
+  panel.marks.push_back(symbol(Role::page, look.shape, at, median, 3, text));
+}
+
+/// Two renderers share a place, back to back; more stand side by side.
+Stand stand_of(const Analysis& analysis, std::size_t renderer, std::size_t renderers,
+               std::size_t shape, double widest) {
+  const double slot = static_cast<double>(shape) + 0.5, scale = 0.4 / std::max(widest, 1e-9);
+  if (renderers <= 2) {
+    const bool right = analysis.table.renderers[renderer] == "ray" || renderer == 1;
+    return {slot, renderers == 2 && renderer == 0 ? -1.0 : right ? 1.0 : -1.0, scale};
+  }
+  const double n = static_cast<double>(renderers);
+  return {slot - 0.45 + 0.9 * (static_cast<double>(renderer) + 0.5) / n, 0, scale / n};
 }
 
 }  // namespace
@@ -112,7 +142,9 @@ Figure times_of(const Analysis& analysis) {
   Figure figure = new_figure(analysis, "times", "Distributions of the times");
   const auto& table = analysis.table;
   const std::size_t shapes = shown_shapes(analysis, figure);
-  const Times times = used_times(analysis);
+  const std::size_t renderers = shown_renderers(analysis, figure);
+  Times times = used_times(analysis);
+  times.resize(renderers);
   double low = 1e9, high = -1e9;
   for (const auto& renderer : times) {
     for (std::size_t s = 0; s < shapes; ++s) {
@@ -125,7 +157,8 @@ Figure times_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
   panel.y = seconds_axis(low - 0.08, high + 0.08, "time (s, logarithmic)");
-  panel.width = std::max(kWide, 70.0 * static_cast<double>(shapes));
+  panel.width = std::max(
+      kWide, std::max(70.0, 35.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
   panel.height = 360;
   std::vector<std::vector<Bins>> shares(times.size(), std::vector<Bins>(shapes));
   double widest = 0;
@@ -139,21 +172,18 @@ Figure times_of(const Analysis& analysis) {
   for (std::size_t s = 0; s < shapes; ++s) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       if (times[r][s].empty()) continue;
-      std::string text = printable(table.shapes[s], 40) + ", " + table.renderers[r] + ": median " +
-                         seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
+      std::string text = printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]) +
+                         ": median " + seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
                          ", middle half " + fixed(std::pow(10, quantile_of(times[r][s], 0.25)), 2) +
                          " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
                          counted(times[r][s].size(), "time", "times");
-      const double side = table.renderers[r] == "ray" ? 1 : -1;
-      add_cell(panel, table.renderers[r], times[r][s], shares[r][s], static_cast<double>(s) + 0.5,
-               side, 0.4 / std::max(widest, 1e-9), text);
+      add_cell(panel, look_of(analysis, table.renderers[r]), times[r][s], shares[r][s],
+               stand_of(analysis, r, renderers, s, widest), text);
       figure.description += text + ". ";
     }
   }
   figure.panels.push_back(std::move(panel));
-  for (const std::string& renderer : table.renderers) {
-    figure.legend.push_back({renderer, role_of(renderer), shape_of(renderer)});
-  }
+  add_renderers(figure, analysis, renderers);
   figure.notes.insert(
       figure.notes.begin(),
       "All correct answers of all participants. Width: share of the trials "

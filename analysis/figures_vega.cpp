@@ -1,6 +1,7 @@
 #include "analysis/figures_vega.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -32,8 +33,29 @@ double digits(double value) {
   return std::round(value * power) / power;
 }
 
-const char* shape_name(Shape shape) {
+/// With a plain minus: what a path reads.
+std::string decimal(double value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, 3).ptr;
+  return std::string(text, end);
+}
+
+/// Vega's name, or a path.
+std::string shape_name(Shape shape) {
   switch (shape) {
+    case Shape::right:
+    case Shape::cross:
+    case Shape::left:
+    case Shape::saltire: {
+      std::string path;
+      for (const auto& [x, y] : outline_of(shape)) {
+        path += path.empty() ? 'M' : 'L';
+        path += decimal(x);
+        path += ',';
+        path += decimal(y);
+      }
+      return path + "Z";
+    }
     case Shape::square:
       return "square";
     case Shape::diamond:
@@ -303,6 +325,19 @@ Json panel_group(const Panel& panel, std::size_t number) {
   return group;
 }
 
+/// One row where there is room for it, or as many entries in a row as there is room for.
+Json legend_columns(const Figure& figure) {
+  constexpr double kShort = 800, kSymbol = 44, kLongest = 240;  // px
+  double all = 0, widest = 0;
+  for (const LegendEntry& entry : figure.legend) {
+    const double wide = kSymbol + std::min(kLongest, 7.2 * static_cast<double>(width(entry.label)));
+    all += wide;
+    widest = std::max(widest, wide);
+  }
+  if (all <= kShort) return signal("room < 480 ? 2 : 0");
+  return signal("max(1, floor(room / " + fixed(widest, 0) + "))");
+}
+
 void add_legend(Json& spec, const Figure& figure) {
   if (figure.legend.empty()) return;
   Json labels = Json::array(), shapes = Json::array();
@@ -327,7 +362,7 @@ void add_legend(Json& spec, const Figure& figure) {
                                   {"stroke", "legend_stroke"},
                                   {"shape", "legend_shape"},
                                   {"symbolStrokeWidth", 2},
-                                  {"columns", signal("room < 480 ? 2 : 0")},
+                                  {"columns", legend_columns(figure)},
                                   {"columnPadding", 18},
                                   {"rowPadding", 6},
                                   {"offset", 22},
@@ -343,7 +378,8 @@ void add_legend(Json& spec, const Figure& figure) {
 
 Json vega_spec(const Figure& figure) {
   Json palette = Json::array();
-  for (const std::string& value : page_palette()) palette.push_back(value);
+  const Palette colours = page_palette();
+  for (std::size_t r = 0; r < roles_in(figure); ++r) palette.push_back(colours[r]);
   Json hovers = Json::array();
   for (std::size_t p = 0; p < figure.panels.size(); ++p) {
     const bool people = std::ranges::any_of(figure.panels[p].marks,

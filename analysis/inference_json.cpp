@@ -46,12 +46,13 @@ Json order_group(const OrderGroup& group) {
           {"mean_log_ratio", number(group.mean_log_ratio)}};
 }
 
-Json order_effect(const OrderEffect& effect) {
+Json order_effect(const OrderEffect& effect, const RendererPair& pair) {
+  const bool paper = pair.is_ray_minus_point();
   Json out;
   put_test(out, effect.test);
   out["difference"] = number(effect.difference);
-  out["point_first"] = order_group(effect.point_first);
-  out["ray_first"] = order_group(effect.ray_first);
+  out[paper ? "point_first" : "reference_first"] = order_group(effect.reference_first);
+  out[paper ? "ray_first" : "renderer_first"] = order_group(effect.renderer_first);
   out["balanced_log_ratio"] = number(effect.balanced_log_ratio);
   std::optional<double> percent, low, high;
   if (effect.balanced_log_ratio) percent = percent_reduction(*effect.balanced_log_ratio);
@@ -77,6 +78,60 @@ Json learning_json(const Learning& learning) {
                     {"mean_log", number(bin.mean_log)},
                     {"se_mean_log", number(bin.se_mean_log)}});
   }
+  return out;
+}
+
+/// A renderer's contrasts with the reference, by shape.
+Json contrasts_json(const std::vector<ModelEstimate>& contrasts, const TrialTable& table) {
+  Json out;
+  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+    const ModelEstimate& contrast = contrasts[s];
+    Json& one = out[table.shapes[s]] = model_estimate(contrast);
+    one["p_holm"] = number(contrast.p_holm);
+    std::optional<double> percent, low, high;
+    if (contrast.estimate) percent = percent_reduction(*contrast.estimate);
+    if (contrast.ci95) {
+      low = percent_reduction(*contrast.ci95).low;
+      high = percent_reduction(*contrast.ci95).high;
+    }
+    one["percent_reduction"] = number(percent);
+    one["percent_reduction_ci95_low"] = number(low);
+    one["percent_reduction_ci95_high"] = number(high);
+  }
+  return out;
+}
+
+/// One slope has names of its own; several stand as lists.
+Json variance_components(const MixedModel& model, const std::vector<std::string>& renderers) {
+  const bool many = model.random_sds.size() > 2;
+  Json out;
+  std::optional<double> intercept, slope, correlation;
+  if (!model.random_sds.empty()) intercept = model.random_sds[0];
+  if (model.random_sds.size() == 2) {
+    slope = model.random_sds[1];
+    correlation = model.random_correlations[0];
+  }
+  put_status(out, !model.undefined.empty() ? model.undefined
+                  : many ? "several slopes: see participant_renderer_slope_sds and correlations"
+                  : !correlation ? "no correlation with what does not vary"
+                                 : "");
+  out["participant_intercept_sd"] = number(intercept);
+  out["participant_renderer_slope_sd"] = number(slope);
+  out["intercept_slope_correlation"] = number(correlation);
+  out["residual_sd"] = number(model.residual_sd);
+  if (!many) return out;
+  Json slopes, correlations = Json::array();
+  const auto name = [&](std::size_t i) { return i == 0 ? Json("intercept") : Json(renderers[i]); };
+  std::size_t next = 0;
+  for (std::size_t i = 1; i < renderers.size(); ++i) {
+    slopes[renderers[i]] = number(model.random_sds[i]);
+    for (std::size_t k = 0; k < i; ++k) {
+      correlations.push_back(
+          {{"of", {name(k), name(i)}}, {"value", number(model.random_correlations[next++])}});
+    }
+  }
+  out["participant_renderer_slope_sds"] = std::move(slopes);
+  out["correlations"] = std::move(correlations);
   return out;
 }
 
@@ -121,7 +176,9 @@ Json anova_json(const RmAnova& anova, const TrialTable& table) {
   return out;
 }
 
-Json mixed_model_json(const MixedModel& model, const TrialTable& table) {
+Json mixed_model_json(const Analysis& analysis) {
+  const MixedModel& model = analysis.mixed_model;
+  const TrialTable& table = analysis.table;
   Json out;
   put_status(out, model.undefined);
   if (model.undefined.empty() && !model.singular.empty()) {
@@ -140,70 +197,60 @@ Json mixed_model_json(const MixedModel& model, const TrialTable& table) {
   out["fixed_effects_tests"] = std::move(tests);
   out["fixed_effects_left_out"] = model.left_out;
 
-  Json& components = out["variance_components"];
-  std::optional<double> intercept, slope, correlation;
-  if (model.random_sds.size() == 2) {
-    intercept = model.random_sds[0];
-    slope = model.random_sds[1];
-    correlation = model.random_correlations[0];
-  }
-  put_status(components, !model.undefined.empty() ? model.undefined
-                         : !correlation           ? "no correlation with what does not vary"
-                                                  : "");
-  components["participant_intercept_sd"] = number(intercept);
-  components["participant_renderer_slope_sd"] = number(slope);
-  components["intercept_slope_correlation"] = number(correlation);
-  components["residual_sd"] = number(model.residual_sd);
-
-  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
-    const ModelEstimate& contrast = model.contrasts.front()[s];
-    Json one = model_estimate(contrast);
-    one["p_holm"] = number(contrast.p_holm);
-    std::optional<double> percent, low, high;
-    if (contrast.estimate) percent = percent_reduction(*contrast.estimate);
-    if (contrast.ci95) {
-      low = percent_reduction(*contrast.ci95).low;
-      high = percent_reduction(*contrast.ci95).high;
+  out["variance_components"] = variance_components(model, table.renderers);
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    Json by_shape = contrasts_json(model.contrasts[c], table);
+    if (pair.is_ray_minus_point()) {
+      out["contrasts_ray_minus_point"] = std::move(by_shape);
+    } else if (pair.in_data()) {
+      out["contrasts"].push_back({{"renderer", pair.renderer},
+                                  {"reference", pair.reference},
+                                  {"by_shape", std::move(by_shape)}});
     }
-    one["percent_reduction"] = number(percent);
-    one["percent_reduction_ci95_low"] = number(low);
-    one["percent_reduction_ci95_high"] = number(high);
-    out["contrasts_ray_minus_point"][table.shapes[s]] = std::move(one);
   }
   out["note"] = kModelNote;
   return out;
 }
 
-Json speed_accuracy_json(const std::vector<SpeedAccuracy>& shapes, const TrialTable& table) {
+Json speed_accuracy_json(const Comparison& comparison, const TrialTable& table) {
+  const bool paper = comparison.pair.is_ray_minus_point();
   Json out;
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
-    const SpeedAccuracy& shape = shapes[s];
+  for (std::size_t s = 0; s < comparison.speed_accuracy.size(); ++s) {
+    const SpeedAccuracy& shape = comparison.speed_accuracy[s];
     Json& one = out[table.shapes[s]];
     put_test(one, shape.test);
     one["n_pairs"] = shape.n_pairs;
     one["percent_change_time"] = number(shape.percent_change_time);
-    one["accuracy_point"] = number(shape.accuracy_point);
-    one["accuracy_ray"] = number(shape.accuracy_ray);
+    one[paper ? "accuracy_point" : "accuracy_reference"] = number(shape.accuracy_reference);
+    one[paper ? "accuracy_ray" : "accuracy_renderer"] = number(shape.accuracy_renderer);
     one["accuracy_change"] = number(shape.accuracy_change);
     one["reading"] = shape.reading.empty() ? Json(nullptr) : Json(shape.reading);
   }
   return out;
 }
 
-Json practice_json(const Practice& practice, const TrialTable& table) {
-  Json out;
-  for (std::size_t r = 0; r < practice.learning.size(); ++r) {
-    out["learning"][table.renderers[r]] = learning_json(practice.learning[r]);
-  }
-  Json& difference = out["slope_difference_ray_minus_point"];
+void put_pair_practice(Json& out, const PairPractice& practice, const RendererPair& pair,
+                       const TrialTable& table) {
+  Json& difference =
+      out[pair.is_ray_minus_point() ? "slope_difference_ray_minus_point" : "slope_difference"];
   put_test(difference, practice.slope_difference);
   difference["mean_per_100_trials"] = number(practice.mean_slope_difference);
   Json& order = out["renderer_order"];
   order["n_interleaved"] = practice.n_interleaved;
-  order["all_shapes"] = order_effect(practice.all_shapes);
+  order["all_shapes"] = order_effect(practice.all_shapes, pair);
   for (std::size_t s = 0; s < practice.shapes.size(); ++s) {
-    order["shapes"][table.shapes[s]] = order_effect(practice.shapes[s]);
+    order["shapes"][table.shapes[s]] = order_effect(practice.shapes[s], pair);
   }
+}
+
+Json practice_json(const Analysis& analysis) {
+  const TrialTable& table = analysis.table;
+  Json out;
+  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
+    out["learning"][table.renderers[r]] = learning_json(analysis.practice.learning[r]);
+  }
+  put_pair_practice(out, analysis.practice.pairs.front(), analysis.comparisons.front().pair, table);
   return out;
 }
 

@@ -19,8 +19,13 @@ Json number(const std::optional<double>& value);
 void put_status(Json& out, const std::string& undefined);
 
 Json anova_json(const RmAnova& anova, const TrialTable& table);
-Json mixed_model_json(const MixedModel& model, const TrialTable& table);
-Json speed_accuracy_json(const std::vector<SpeedAccuracy>& shapes, const TrialTable& table);
-Json practice_json(const Practice& practice, const TrialTable& table);
+Json mixed_model_json(const Analysis& analysis);
+/// By shape.
+Json speed_accuracy_json(const Comparison& comparison, const TrialTable& table);
+/// What practice does to one comparison, into `out`.
+void put_pair_practice(Json& out, const PairPractice& practice, const RendererPair& pair,
+                       const TrialTable& table);
+/// Learning with each renderer, and the first comparison.
+Json practice_json(const Analysis& analysis);
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include "analysis/table_cells.h"
 #include "analysis/tables.h"
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
@@ -35,26 +36,49 @@ std::string learning_note(const std::string& who, const TTest& test,
   return text + ".";
 }
 
+/// Correlations are named where there is one alone; the JSON file has all.
+std::string spread_note(const MixedModel& model, const std::vector<std::string>& renderers) {
+  std::vector<std::string> slopes;
+  for (std::size_t r = 1; r < renderers.size(); ++r) {
+    slopes.push_back(the(renderers[r]) + " " + number(model.random_sds[r], 3));
+  }
+  return "Standard deviations of log time: participants' intercepts " +
+         number(model.random_sds[0], 3) + ", their slopes for " + joined(slopes) +
+         (slopes.size() == 1 ? " (correlation " + number(model.random_correlations[0], 2) + ")"
+                             : "") +
+         ", residual " + number(model.residual_sd, 3) + "; log likelihood (REML) " +
+         number(model.log_likelihood_reml, 3) + ", " +
+         counted(model.n_observations, "trial", "trials") + ".";
+}
+
 }  // namespace
 
 Table speed_accuracy_table(const Analysis& analysis) {
-  Table table;
-  table.caption = caption(analysis, "Speed and accuracy together, ray against point");
-  table.header = {"shape",         "time", "accuracy point", "accuracy ray", "accuracy",
-                  "95 % interval", "p",    "reading"};
-  for (std::size_t s = 0; s < analysis.speed_accuracy.size(); ++s) {
-    const SpeedAccuracy& shape = analysis.speed_accuracy[s];
-    const auto& interval = shape.test.log_ratio_ci95;
-    table.rows.push_back(
-        {analysis.table.shapes[s],
-         shape.percent_change_time ? signed_fixed(*shape.percent_change_time, 1) + " %" : kMissing,
-         percent(hundredfold(shape.accuracy_point)), percent(hundredfold(shape.accuracy_ray)),
-         shape.accuracy_change ? signed_fixed(100 * *shape.accuracy_change, 1) + " points"
-                               : kMissing,
-         interval
-             ? signed_fixed(100 * interval->low, 1) + " to " + signed_fixed(100 * interval->high, 1)
-             : kMissing,
-         p_or_missing(shape.test.p), shape.reading.empty() ? kMissing : shape.reading});
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string who = several(analysis) ? "each renderer" : first.renderer;
+  Table table = comparison_table(
+      analysis, "Speed and accuracy together, " + who + " against " + first.reference,
+      {"time", "accuracy " + first.reference,
+       several(analysis) ? "own accuracy" : "accuracy " + first.renderer, "accuracy",
+       "95 % interval", "p", "reading"});
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.speed_accuracy.size(); ++s) {
+      const SpeedAccuracy& shape = comparison.speed_accuracy[s];
+      const auto& interval = shape.test.log_ratio_ci95;
+      auto& row =
+          table.rows.emplace_back(row_names(analysis, comparison.pair, analysis.table.shapes[s]));
+      row.insert(row.end(),
+                 {shape.percent_change_time ? signed_fixed(*shape.percent_change_time, 1) + " %"
+                                            : kMissing,
+                  percent(hundredfold(shape.accuracy_reference)),
+                  percent(hundredfold(shape.accuracy_renderer)),
+                  shape.accuracy_change ? signed_fixed(100 * *shape.accuracy_change, 1) + " points"
+                                        : kMissing,
+                  interval ? signed_fixed(100 * interval->low, 1) + " to " +
+                                 signed_fixed(100 * interval->high, 1)
+                           : kMissing,
+                  p_or_missing(shape.test.p), shape.reading.empty() ? kMissing : shape.reading});
+    }
   }
   table.notes = {
       "Trade-off possible: faster and less accurate, or slower and more accurate, by more than 1 % "
@@ -105,20 +129,26 @@ Table anova_table(const Analysis& analysis) {
 
 Table mixed_model_table(const Analysis& analysis) {
   const MixedModel& model = analysis.mixed_model;
-  Table table;
-  table.caption = caption(
-      analysis, "Mixed model: log time ~ renderer * shape + (1 + renderer | participant), REML");
-  table.header = {"shape", "reduction", "95 % interval", "ray − point", "se", "df",
-                  "t",     "p",         "p (Holm)"};
-  const auto& contrasts = model.contrasts.front();
-  for (std::size_t s = 0; s < contrasts.size(); ++s) {
-    const ModelEstimate& value = contrasts[s];
-    std::optional<double> reduction;
-    if (value.estimate) reduction = percent_reduction(*value.estimate);
-    table.rows.push_back({analysis.table.shapes[s], percent(reduction),
-                          reduction_interval(value.ci95), number(value.estimate, 4),
-                          number(value.se, 4), number(value.df_satterthwaite, 1),
-                          number(value.t, 2), p_or_missing(value.p), p_or_missing(value.p_holm)});
+  const std::vector<Comparison>& all = analysis.comparisons;
+  Table table = comparison_table(
+      analysis, "Mixed model: log time ~ renderer * shape + (1 + renderer | participant), REML",
+      {"reduction", "95 % interval",
+       several(analysis) ? "− " + all.front().pair.reference : difference_name(all.front().pair),
+       "se", "df", "t", "p", "p (Holm)"});
+  Reasons reasons;
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+      const ModelEstimate& value = model.contrasts[c][s];
+      const std::string& name = analysis.table.shapes[s];
+      std::optional<double> reduction;
+      if (value.estimate) reduction = percent_reduction(*value.estimate);
+      auto& row = table.rows.emplace_back(row_names(analysis, all[c].pair, name));
+      row.insert(row.end(),
+                 {percent(reduction), reduction_interval(value.ci95), number(value.estimate, 4),
+                  number(value.se, 4), number(value.df_satterthwaite, 1), number(value.t, 2),
+                  p_or_missing(value.p), p_or_missing(value.p_holm)});
+      reasons.add(value.undefined, listed_shape(analysis, all[c].pair, name));
+    }
   }
   if (!model.undefined.empty()) {
     table.notes.push_back(sentence("Undefined", model.undefined));
@@ -132,19 +162,7 @@ Table mixed_model_table(const Analysis& analysis) {
         sentence("Singular fit, on the boundary of what variances can be", model.singular) +
         " Its intervals and p are to be taken with care.");
   }
-  if (model.random_sds.size() == 2) {
-    table.notes.push_back("Standard deviations of log time: participants' intercepts " +
-                          number(model.random_sds[0], 3) + ", their slopes for the ray " +
-                          number(model.random_sds[1], 3) + " (correlation " +
-                          number(model.random_correlations[0], 2) + "), residual " +
-                          number(model.residual_sd, 3) + "; log likelihood (REML) " +
-                          number(model.log_likelihood_reml, 3) + ", " +
-                          counted(model.n_observations, "trial", "trials") + ".");
-  }
-  Reasons reasons;
-  for (std::size_t s = 0; s < contrasts.size(); ++s) {
-    reasons.add(contrasts[s].undefined, analysis.table.shapes[s]);
-  }
+  table.notes.push_back(spread_note(model, analysis.table.renderers));
   reasons.put(table.notes);
   return table;
 }
@@ -171,46 +189,61 @@ Table learning_table(const Analysis& analysis) {
     table.notes.push_back(
         learning_note(analysis.table.renderers[r], learning.slope, learning.mean_slope));
   }
-  if (practice.learning.size() == 2) {
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    if (!pair.in_data()) continue;
     table.notes.push_back(
-        learning_note("Ray − point", practice.slope_difference, practice.mean_slope_difference));
+        learning_note(pair.is_ray_minus_point() ? "Ray − point" : difference_name(pair),
+                      practice.pairs[c].slope_difference, practice.pairs[c].mean_slope_difference));
   }
   return table;
 }
 
 Table renderer_order_table(const Analysis& analysis) {
-  const Practice& practice = analysis.practice;
-  Table table;
-  table.caption = caption(analysis, "Does the order of renderers explain the gain?");
-  table.header = {"shape",      "point first", "people",   "ray first",    "people",
-                  "difference", "p",           "balanced", "95 % interval"};
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string renderer = several(analysis) ? "renderer" : first.renderer;
+  Table table = comparison_table(analysis, "Does the order of renderers explain the gain?",
+                                 {first.reference + " first", "people", renderer + " first",
+                                  "people", "difference", "p", "balanced", "95 % interval"});
   Reasons reasons;
-  const auto add = [&](const std::string& name, const OrderEffect& effect) {
+  std::vector<std::string> interleaved;
+  const auto add = [&](const RendererPair& pair, const std::string& name,
+                       const OrderEffect& effect) {
     const auto reduction = [](const std::optional<double>& log_ratio) {
       return log_ratio ? percent(percent_reduction(*log_ratio)) : kMissing;
     };
-    table.rows.push_back({name, reduction(effect.point_first.mean_log_ratio),
-                          std::to_string(effect.point_first.n_participants),
-                          reduction(effect.ray_first.mean_log_ratio),
-                          std::to_string(effect.ray_first.n_participants),
-                          percent_change(effect.difference), p_or_missing(effect.test.p),
-                          reduction(effect.balanced_log_ratio),
-                          reduction_interval(effect.balanced_ci95)});
-    reasons.add(effect.test.undefined, name);
+    auto& row = table.rows.emplace_back(row_names(analysis, pair, name));
+    row.insert(row.end(),
+               {reduction(effect.reference_first.mean_log_ratio),
+                std::to_string(effect.reference_first.n_participants),
+                reduction(effect.renderer_first.mean_log_ratio),
+                std::to_string(effect.renderer_first.n_participants),
+                percent_change(effect.difference), p_or_missing(effect.test.p),
+                reduction(effect.balanced_log_ratio), reduction_interval(effect.balanced_ci95)});
+    reasons.add(effect.test.undefined, listed_shape(analysis, pair, name));
   };
-  for (std::size_t s = 0; s < practice.shapes.size(); ++s) {
-    add(analysis.table.shapes[s], practice.shapes[s]);
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    const PairPractice& practice = analysis.practice.pairs[c];
+    for (std::size_t s = 0; s < practice.shapes.size(); ++s) {
+      add(pair, analysis.table.shapes[s], practice.shapes[s]);
+    }
+    add(pair, "all shapes", practice.all_shapes);
+    if (practice.n_interleaved == 0) continue;
+    interleaved.push_back(counted(practice.n_interleaved, "participant", "participants") +
+                          " did trials of " +
+                          (several(analysis) ? the(first.reference) + " and " + the(pair.renderer)
+                                             : "both renderers") +
+                          " mixed: no order, not counted here.");
   }
-  add("all shapes", practice.all_shapes);
   table.notes = {
       "Percent reductions by which renderer came first. Practice makes the second one look faster: "
-      "a gain is too large with point first and too small with ray first. Difference: ratio of ray "
-      "to point times, point first against ray first; below 0 where practice helps. Balanced: both "
-      "orders with equal weight."};
-  if (practice.n_interleaved > 0) {
-    table.notes.push_back(counted(practice.n_interleaved, "participant", "participants") +
-                          " did trials of both renderers mixed: no order, not counted here.");
-  }
+      "a gain is too large with " +
+      first.reference + " first and too small with " +
+      (several(analysis) ? "the other" : first.renderer) + " first. Difference: ratio of " +
+      renderer + " to " + first.reference + " times, " + first.reference + " first against " +
+      renderer + " first; below 0 where practice helps. Balanced: both orders with equal weight."};
+  table.notes.insert(table.notes.end(), interleaved.begin(), interleaved.end());
   reasons.put(table.notes);
   return table;
 }

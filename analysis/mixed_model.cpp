@@ -17,6 +17,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr std::size_t kMaxModelRenderers = 8;
+
+/// Of one evaluation of the criterion's derivatives: a product of matrices as large as there are
+/// cells for each parameter of the participants' covariance.
+double model_work(std::size_t renderers, Index cells) {
+  const auto q = static_cast<double>(renderers), n = static_cast<double>(cells);
+  return q * (q + 1) / 2 * n * n * n;
+}
+
 /// Treatment coding: its columns in R's order, each as values at the non-empty cells.
 struct Columns {
   std::vector<std::string> names, left_out;
@@ -178,6 +187,10 @@ std::string why_no_fit(const People& people, const ModelCells& cells) {
   if (cells.n == 0) return "no trial can be used for times";
   if (cells.renderers.size() < people.size())
     return "no trial with one of the renderers can be used for times";
+  if (people.size() > kMaxModelRenderers ||
+      model_work(people.size(), cells.n) > model_work(2, 400)) {
+    return "too many renderers and shapes for this model";
+  }
   return {};
 }
 
@@ -203,7 +216,11 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
   const ModelData prepared(people, cells);
   out.n_participants = prepared.data.groups.size();
   if (out.n_participants < 2) return refuse("one participant cannot tell chance from effect");
-  if (!prepared.shared) return refuse("no participant has times for both renderers");
+  if (!prepared.shared) {
+    return refuse(people.size() == 2
+                      ? "no participant has times for both renderers"
+                      : "two of the renderers have no participant with times for both");
+  }
   if (prepared.freedom < 1) {
     return refuse("too few trials: none is left to tell the residual variance");
   }
@@ -232,9 +249,9 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
         {columns.names[static_cast<std::size_t>(i)], tested(from_cells.row(i).transpose())});
   }
   nothing.undefined = "no trial of one of the renderers can be used for times";
+  std::vector<std::optional<double>> p;
   for (std::size_t r = 1; r < people.size(); ++r) {
     std::vector<ModelEstimate> contrasts(shapes.size(), nothing);
-    std::vector<std::optional<double>> p(shapes.size());
     for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
       const Index first = cells.column[0][s], other = cells.column[r][s];
       if (first < 0 || other < 0) continue;
@@ -242,11 +259,14 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
       weights(other) = 1;
       weights(first) = -1;
       contrasts[cells.shapes[s]] = tested(weights);
-      p[cells.shapes[s]] = contrasts[cells.shapes[s]].p;
     }
-    const auto adjusted = holm(p);
-    for (std::size_t s = 0; s < contrasts.size(); ++s) contrasts[s].p_holm = adjusted[s];
+    for (const ModelEstimate& contrast : contrasts) p.push_back(contrast.p);
     out.contrasts.push_back(std::move(contrasts));
+  }
+  const auto adjusted = holm(p);
+  std::size_t test = 0;
+  for (auto& contrasts : out.contrasts) {
+    for (ModelEstimate& contrast : contrasts) contrast.p_holm = adjusted[test++];
   }
   return out;
 }

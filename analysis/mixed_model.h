@@ -16,7 +16,7 @@ struct ModelEstimate {
   std::string undefined;  ///< why it cannot be estimated, or tested; empty: all is there
   std::optional<double> estimate, se, df_satterthwaite, t, p;
   std::optional<Interval> ci95;
-  std::optional<double> p_holm;  ///< contrasts only: over the shapes of one renderer
+  std::optional<double> p_holm;  ///< contrasts only: over all of them
 };
 
 struct FixedEffect {
@@ -45,6 +45,8 @@ struct MixedModel {
 
 /// The true optimum of the REML criterion: Newton's method with exact derivatives from several
 /// starts, on the boundary with the Karush-Kuhn-Tucker condition checked.
+/// Refuses what would take hours: more than 8 renderers, or so many shapes with them that their
+/// cells' matrices are larger than those of 200 shapes with two renderers.
 /// \param people as describe() gives it; \param renderers, shapes names of the levels
 MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes);

@@ -31,27 +31,6 @@ bool no_variance(double sd, double centre) {
   return sd <= 1e-10 * std::max(1.0, std::fabs(centre));
 }
 
-/// Each shape has its own stream of the seed, so threads change nothing but the time it takes.
-void bootstrap_all(std::vector<PairedShape>& shapes, std::uint64_t seed) {
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t s = next++; s < shapes.size(); s = next++) {
-      Random random(seed, {s});
-      shapes[s].bootstrap = bootstrap_mean(shapes[s].differences, random);
-      shapes[s].bootstrap.seed = seed;
-    }
-  };
-  std::size_t pairs = 0;
-  for (const PairedShape& shape : shapes) pairs += shape.n_pairs;
-  std::vector<std::jthread> threads;
-  if (pairs > kManyPairs) {
-    const std::size_t most = std::max(1U, std::thread::hardware_concurrency());
-    threads.reserve(most);
-    while (threads.size() + 1 < std::min(most, shapes.size())) threads.emplace_back(work);
-  }
-  work();
-}
-
 }  // namespace
 
 double percent_reduction(double log_ratio) { return -100 * std::expm1(log_ratio); }
@@ -118,39 +97,33 @@ std::vector<std::optional<double>> holm(const std::vector<std::optional<double>>
 }
 
 std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Description& description,
-                                          std::uint64_t seed) {
+                                          const RendererPair& pair) {
   std::vector<PairedShape> all(table.shapes.size());
-  const auto place = [&](const char* renderer) {
-    return static_cast<std::size_t>(
-        std::find(table.renderers.begin(), table.renderers.end(), renderer) -
-        table.renderers.begin());
-  };
-  const std::size_t point = place("point"), ray = place("ray"), none = table.renderers.size();
   for (std::size_t s = 0; s < all.size(); ++s) {
     PairedShape& shape = all[s];
-    std::vector<double> points, rays;
+    std::vector<double> references, others;
     for (std::size_t p = 0; p < table.participants.size(); ++p) {
       const ParticipantCell nothing;
-      const auto& a = point == none ? nothing : description.people[point][s][p];
-      const auto& b = ray == none ? nothing : description.people[ray][s][p];
+      const auto& a = pair.reference_at ? description.people[*pair.reference_at][s][p] : nothing;
+      const auto& b = pair.renderer_at ? description.people[*pair.renderer_at][s][p] : nothing;
       if (a.n_used > 0 && b.n_used > 0) {
         shape.differences.push_back(b.mean_log - a.mean_log);
-        points.push_back(a.mean);
-        rays.push_back(b.mean);
+        references.push_back(a.mean);
+        others.push_back(b.mean);
       } else if (a.n_trials + b.n_trials > 0) {
         Dropped dropped{p, {}};
-        if (a.n_used == 0) dropped.renderers.emplace_back("point");
-        if (b.n_used == 0) dropped.renderers.emplace_back("ray");
+        if (a.n_used == 0) dropped.renderers.push_back(pair.reference);
+        if (b.n_used == 0) dropped.renderers.push_back(pair.renderer);
         shape.dropped.push_back(std::move(dropped));
       }
     }
     shape.n_pairs = shape.differences.size();
     if (shape.n_pairs == 0) {
-      shape.undefined = point == none || ray == none
-                            ? "only one renderer in the data: nothing to compare"
-                            : kNoPairs;
+      shape.undefined =
+          pair.in_data() ? kNoPairs : "only one renderer in the data: nothing to compare";
     } else {
-      shape.percent_reduction_arithmetic = 100 * (mean(points) - mean(rays)) / mean(points);
+      shape.percent_reduction_arithmetic =
+          100 * (mean(references) - mean(others)) / mean(references);
       shape.mean_log_ratio = mean(shape.differences);
       shape.percent_reduction_geometric = percent_reduction(*shape.mean_log_ratio);
     }
@@ -158,14 +131,36 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
     shape.effect_size = effect_size(shape.differences);
     shape.wilcoxon = wilcoxon(shape.differences);
   }
-  bootstrap_all(all, seed);
-
-  std::vector<std::optional<double>> p;
-  p.reserve(all.size());
-  for (const PairedShape& shape : all) p.push_back(shape.t_test.p);
-  const auto adjusted = holm(p);
-  for (std::size_t s = 0; s < all.size(); ++s) all[s].t_test.p_holm = adjusted[s];
   return all;
+}
+
+void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed) {
+  std::atomic<std::size_t> next{0};
+  // Streams of their own: threads change nothing but the time it takes.
+  const auto work = [&] {
+    for (std::size_t i = next++; i < tests.size(); i = next++) {
+      Random random(seed, {i});
+      tests[i]->bootstrap = bootstrap_mean(tests[i]->differences, random);
+      tests[i]->bootstrap.seed = seed;
+    }
+  };
+  std::size_t pairs = 0;
+  for (const PairedShape* test : tests) pairs += test->n_pairs;
+  std::vector<std::jthread> threads;
+  if (pairs > kManyPairs) {
+    const std::size_t most = std::max(1U, std::thread::hardware_concurrency());
+    threads.reserve(most);
+    while (threads.size() + 1 < std::min(most, tests.size())) threads.emplace_back(work);
+  }
+  work();
+}
+
+void adjust_all(const std::vector<PairedShape*>& tests) {
+  std::vector<std::optional<double>> p;
+  p.reserve(tests.size());
+  for (const PairedShape* test : tests) p.push_back(test->t_test.p);
+  const auto adjusted = holm(p);
+  for (std::size_t i = 0; i < tests.size(); ++i) tests[i]->t_test.p_holm = adjusted[i];
 }
 
 }  // namespace palpate

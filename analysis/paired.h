@@ -1,7 +1,7 @@
 #pragma once
-// Is a shape identified faster with the ray than with the point renderer? Differences over
-// participants, always ray minus point on the natural log scale: negative when the ray is faster.
-// Percent reductions are then positive.
+// Is a shape identified faster with one renderer than with another? Differences over participants,
+// always renderer minus reference (ray minus point) on the natural log scale: negative when the
+// renderer is faster. Percent reductions are then positive.
 
 #include <cstddef>
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "analysis/describe.h"
+#include "analysis/renderers.h"
 #include "analysis/trials.h"
 
 namespace palpate {
@@ -31,7 +32,7 @@ struct TTest {
   std::string undefined;
   std::optional<double> sd, se, t, df, p;  ///< p two-sided
   std::optional<Interval> log_ratio_ci95;
-  std::optional<double> p_holm;  ///< over the shapes with a p
+  std::optional<double> p_holm;  ///< over the shapes and comparisons with a p
 };
 /// Student's paired t-test on differences.
 TTest t_test(const std::vector<double>& differences);
@@ -73,7 +74,7 @@ Bootstrap bca_interval(const std::vector<double>& differences, std::vector<doubl
 /// Holm's (1979) adjustment over those that have a p.
 std::vector<std::optional<double>> holm(const std::vector<std::optional<double>>& p);
 
-/// A participant who has trials of a shape but no time for it in one renderer or both.
+/// A participant who has trials of a shape but no time for it in one renderer of the pair or both.
 struct Dropped {
   std::size_t participant = 0;         ///< index into TrialTable::participants
   std::vector<std::string> renderers;  ///< without a usable time
@@ -92,8 +93,12 @@ struct PairedShape {
   std::vector<Dropped> dropped;
 };
 
-/// One for each of table.shapes. \param seed of the bootstrap
+/// One for each of table.shapes, still without `bootstrap` and `t_test.p_holm`.
 std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Description& description,
-                                          std::uint64_t seed);
+                                          const RendererPair& pair);
+/// Each has its own stream of the seed, by its number.
+void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed);
+/// Holm's adjustment over all of them.
+void adjust_all(const std::vector<PairedShape*>& tests);
 
 }  // namespace palpate

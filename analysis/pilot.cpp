@@ -29,9 +29,9 @@ double variance_in_cells(const People& people, double otherwise) {
   return freedom > 0 ? squares / freedom : otherwise;
 }
 
-/// Interaction of participants and shapes in the differences ray - point, less what single trials
-/// add to it.
-ShapeGain shape_gain(const People& people, double residual_variance) {
+/// Interaction of participants and shapes in the differences renderer - reference, less what single
+/// trials add to it.
+ShapeGain shape_gain(const People& people, const RendererPair& pair, double residual_variance) {
   const std::size_t n_shapes = people[0].size(), n_people = people[0][0].size();
   std::vector<std::vector<double>> rows;
   double noise = 0;
@@ -39,10 +39,11 @@ ShapeGain shape_gain(const People& people, double residual_variance) {
     std::vector<double> row;
     double own = 0;
     for (std::size_t s = 0; s < n_shapes; ++s) {
-      const ParticipantCell &point = people[0][s][p], &ray = people[1][s][p];
-      if (point.n_used == 0 || ray.n_used == 0) break;
-      row.push_back(ray.mean_log - point.mean_log);
-      own += 1 / static_cast<double>(point.n_used) + 1 / static_cast<double>(ray.n_used);
+      const ParticipantCell &a = people[*pair.reference_at][s][p],
+                            &b = people[*pair.renderer_at][s][p];
+      if (a.n_used == 0 || b.n_used == 0) break;
+      row.push_back(b.mean_log - a.mean_log);
+      own += 1 / static_cast<double>(a.n_used) + 1 / static_cast<double>(b.n_used);
     }
     if (row.size() < n_shapes) continue;
     rows.push_back(std::move(row));
@@ -72,6 +73,7 @@ ShapeGain shape_gain(const People& people, double residual_variance) {
 Pilot read_pilot(const Analysis& analysis) {
   Pilot out;
   const MixedModel& fit = analysis.mixed_model;
+  out.pair = analysis.comparisons.front().pair;
   out.undefined = fit.undefined;
   if (!out.undefined.empty()) return out;
   StudyModel& model = out.model;
@@ -89,7 +91,7 @@ Pilot read_pilot(const Analysis& analysis) {
 
   const double in_cells =
       variance_in_cells(analysis.description.people, model.residual_sd * model.residual_sd);
-  const ShapeGain extra = shape_gain(analysis.description.people, in_cells);
+  const ShapeGain extra = shape_gain(analysis.description.people, out.pair, in_cells);
   if (extra.known) {
     const auto k = static_cast<double>(model.shapes.size());
     model.shape_gain_sd = std::sqrt(extra.variance);
@@ -108,6 +110,12 @@ Pilot read_pilot(const Analysis& analysis) {
     out.notes.push_back("Standard deviations from " +
                         counted(fit.n_participants, "participant", "participants") +
                         " are rough: try --gain-sd half as large again as well.");
+  }
+  if (analysis.comparisons.size() > 1) {
+    out.notes.push_back("The pilot has " + std::to_string(analysis.table.renderers.size()) +
+                        " renderers: this plan is of " + difference_name(out.pair) +
+                        " alone, with Holm's adjustment over its shapes; a study of all of them "
+                        "adjusts over more tests and needs more participants.");
   }
   out.label = simulated_label(analysis.table.simulated);
   if (!out.label.empty()) out.notes.push_back(out.label + " in the pilot.");

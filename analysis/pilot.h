@@ -10,6 +10,7 @@
 namespace palpate {
 
 struct Pilot {
+  RendererPair pair;      ///< that it is a pilot of: the study's first comparison
   std::string undefined;  ///< why nothing can be drawn from it; empty: something can
   StudyModel model;       ///< its effects are what the pilot found
   std::string label;      ///< "SIMULATED PARTICIPANTS" and the like; empty: people

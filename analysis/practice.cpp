@@ -116,11 +116,11 @@ Learning learning(const std::vector<PersonSums>& people, const std::optional<dou
   return out;
 }
 
-enum class First { point, ray, mixed };
+enum class First { reference, renderer, mixed };
 
-First first_of(const PersonSums& point, const PersonSums& ray) {
-  if (point.last < ray.first) return First::point;
-  if (ray.last < point.first) return First::ray;
+First first_of(const PersonSums& reference, const PersonSums& renderer) {
+  if (reference.last < renderer.first) return First::reference;
+  if (renderer.last < reference.first) return First::renderer;
   return First::mixed;
 }
 
@@ -138,32 +138,32 @@ double squares(const std::vector<double>& values) {
   return sum;
 }
 
-OrderEffect order_effect(const std::vector<double>& point_first,
-                         const std::vector<double>& ray_first) {
+OrderEffect order_effect(const RendererPair& pair, const std::vector<double>& reference_first,
+                         const std::vector<double>& renderer_first) {
   OrderEffect out;
-  out.point_first = group_of(point_first);
-  out.ray_first = group_of(ray_first);
-  if (point_first.empty() && ray_first.empty()) {
+  out.reference_first = group_of(reference_first);
+  out.renderer_first = group_of(renderer_first);
+  if (reference_first.empty() && renderer_first.empty()) {
     out.undefined = "no participant did one renderer after the other";
-  } else if (point_first.empty() || ray_first.empty()) {
-    out.undefined = point_first.empty() ? "all participants had the ray first"
-                                        : "all participants had the point first";
+  } else if (reference_first.empty() || renderer_first.empty()) {
+    out.undefined = "all participants had " +
+                    the(reference_first.empty() ? pair.renderer : pair.reference) + " first";
   }
   if (!out.undefined.empty()) {
     out.test.undefined = out.undefined;
     return out;
   }
-  const double a = *out.point_first.mean_log_ratio, b = *out.ray_first.mean_log_ratio;
+  const double a = *out.reference_first.mean_log_ratio, b = *out.renderer_first.mean_log_ratio;
   out.difference = a - b;
   out.balanced_log_ratio = (a + b) / 2;
-  const auto n1 = static_cast<double>(point_first.size()),
-             n2 = static_cast<double>(ray_first.size());
+  const auto n1 = static_cast<double>(reference_first.size()),
+             n2 = static_cast<double>(renderer_first.size());
   if (n1 + n2 < 3) {
     out.test.undefined = "one participant in each order cannot tell chance from effect";
     return out;
   }
   const double df = n1 + n2 - 2;
-  const double sd = std::sqrt((squares(point_first) + squares(ray_first)) / df);
+  const double sd = std::sqrt((squares(reference_first) + squares(renderer_first)) / df);
   const double se = sd * std::sqrt(1 / n1 + 1 / n2);
   out.test.sd = sd;
   out.test.se = se;
@@ -182,33 +182,64 @@ OrderEffect order_effect(const std::vector<double>& point_first,
   return out;
 }
 
-void compare_orders(const Description& description, const AllSums& sums, Practice& out) {
+void compare_orders(const Description& description, const AllSums& sums, const RendererPair& pair,
+                    PairPractice& out) {
+  const std::size_t reference = *pair.reference_at, renderer = *pair.renderer_at;
   const std::size_t n_shapes = description.people[0].size();
-  std::vector<std::vector<double>> point_first(n_shapes), ray_first(n_shapes);
-  std::vector<double> all_point_first, all_ray_first;
+  std::vector<std::vector<double>> reference_first(n_shapes), renderer_first(n_shapes);
+  std::vector<double> all_reference_first, all_renderer_first;
   for (std::size_t p = 0; p < sums[0].size(); ++p) {
-    if (sums[0][p].last == 0 || sums[1][p].last == 0) continue;
-    const First first = first_of(sums[0][p], sums[1][p]);
+    const PersonSums &with_reference = sums[reference][p], &with_renderer = sums[renderer][p];
+    if (with_reference.last == 0 || with_renderer.last == 0) continue;
+    const First first = first_of(with_reference, with_renderer);
     if (first == First::mixed) {
       ++out.n_interleaved;
       continue;
     }
     std::vector<double> differences;
     for (std::size_t s = 0; s < n_shapes; ++s) {
-      const ParticipantCell& point = description.people[0][s][p];
-      const ParticipantCell& ray = description.people[1][s][p];
-      if (point.n_used == 0 || ray.n_used == 0) continue;
-      differences.push_back(ray.mean_log - point.mean_log);
-      (first == First::point ? point_first : ray_first)[s].push_back(differences.back());
+      const ParticipantCell& a = description.people[reference][s][p];
+      const ParticipantCell& b = description.people[renderer][s][p];
+      if (a.n_used == 0 || b.n_used == 0) continue;
+      differences.push_back(b.mean_log - a.mean_log);
+      (first == First::reference ? reference_first : renderer_first)[s].push_back(
+          differences.back());
     }
     if (differences.size() == n_shapes) {
-      (first == First::point ? all_point_first : all_ray_first).push_back(mean(differences));
+      (first == First::reference ? all_reference_first : all_renderer_first)
+          .push_back(mean(differences));
     }
   }
-  out.all_shapes = order_effect(all_point_first, all_ray_first);
+  out.all_shapes = order_effect(pair, all_reference_first, all_renderer_first);
   for (std::size_t s = 0; s < n_shapes; ++s) {
-    out.shapes.push_back(order_effect(point_first[s], ray_first[s]));
+    out.shapes.push_back(order_effect(pair, reference_first[s], renderer_first[s]));
   }
+}
+
+PairPractice pair_practice(const Description& description, const AllSums& sums,
+                           const RendererPair& pair) {
+  PairPractice out;
+  if (!pair.in_data()) {
+    out.slope_difference.undefined = out.all_shapes.undefined = out.all_shapes.test.undefined =
+        "only one renderer in the data";
+    out.shapes.assign(description.people[0].size(), out.all_shapes);
+    return out;
+  }
+  std::vector<double> differences;
+  for (std::size_t p = 0; p < sums[0].size(); ++p) {
+    const auto reference = sums[*pair.reference_at][p].slope(),
+               renderer = sums[*pair.renderer_at][p].slope();
+    if (reference && renderer) differences.push_back(*renderer - *reference);
+  }
+  out.slope_difference = t_test(differences);
+  if (differences.empty()) {
+    out.slope_difference.undefined =
+        "no participant has several times for one shape in both renderers";
+  } else {
+    out.mean_slope_difference = mean(differences);
+  }
+  compare_orders(description, sums, pair, out);
+  return out;
 }
 
 }  // namespace
@@ -220,25 +251,9 @@ Practice practice_effects(const TrialTable& table, const Description& descriptio
   for (std::size_t r = 0; r < sums.size(); ++r) {
     out.learning.push_back(learning(sums[r], overall_mean(description.people, r)));
   }
-  if (sums.size() != 2) {
-    out.slope_difference.undefined = out.all_shapes.undefined = out.all_shapes.test.undefined =
-        "only one renderer in the data";
-    out.shapes.assign(table.shapes.size(), out.all_shapes);
-    return out;
+  for (const RendererPair& pair : renderer_pairs(table.renderers)) {
+    out.pairs.push_back(pair_practice(description, sums, pair));
   }
-  std::vector<double> differences;
-  for (std::size_t p = 0; p < sums[0].size(); ++p) {
-    const auto point = sums[0][p].slope(), ray = sums[1][p].slope();
-    if (point && ray) differences.push_back(*ray - *point);
-  }
-  out.slope_difference = t_test(differences);
-  if (differences.empty()) {
-    out.slope_difference.undefined =
-        "no participant has several times for one shape in both renderers";
-  } else {
-    out.mean_slope_difference = mean(differences);
-  }
-  compare_orders(description, sums, out);
   return out;
 }
 

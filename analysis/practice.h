@@ -9,6 +9,7 @@
 
 #include "analysis/describe.h"
 #include "analysis/paired.h"
+#include "analysis/renderers.h"
 #include "analysis/trials.h"
 
 namespace palpate {
@@ -33,18 +34,19 @@ struct Learning {
   std::size_t n_participants = 0;
 };
 
-/// Participants' gains (mean log ray - mean log point) by which renderer came first.
+/// Participants' gains (mean log renderer - mean log reference) by which of the two came first.
 struct OrderGroup {
   std::size_t n_participants = 0;
   std::optional<double> mean_log_ratio;
 };
 
 /// Two-period crossover (Hills & Armitage 1979). Practice makes the second renderer look faster: a
-/// gain is point-first's too large and ray-first's too small by the same amount.
+/// gain is reference-first's too large and renderer-first's too small by the same amount.
 struct OrderEffect {
-  OrderGroup point_first, ray_first;
+  OrderGroup reference_first, renderer_first;
   std::string undefined;  ///< why the two orders cannot be compared
-  /// Mean log ratio of point first minus ray first; pooled variance. Negative: practice helps.
+  /// Mean log ratio of reference first minus renderer first; pooled variance. Negative: practice
+  /// helps.
   std::optional<double> difference;
   TTest test;  ///< of the difference
   /// Mean of the two groups' mean log ratios: the gain with practice balanced.
@@ -52,13 +54,18 @@ struct OrderEffect {
   std::optional<Interval> balanced_ci95;  ///< of log ratio
 };
 
-struct Practice {
-  std::vector<Learning> learning;  ///< one for each of table.renderers
-  TTest slope_difference;          ///< ray - point, participants with both, per 100 trials
+/// What practice does to the gain of a renderer over the reference.
+struct PairPractice {
+  TTest slope_difference;  ///< renderer - reference, participants with both, per 100 trials
   std::optional<double> mean_slope_difference;
-  std::size_t n_interleaved = 0;    ///< participants whose renderers are mixed: no order
+  std::size_t n_interleaved = 0;    ///< participants whose trials of both are mixed: no order
   OrderEffect all_shapes;           ///< mean over shapes, participants with a pair in each
   std::vector<OrderEffect> shapes;  ///< one for each of table.shapes
+};
+
+struct Practice {
+  std::vector<Learning> learning;   ///< one for each of table.renderers
+  std::vector<PairPractice> pairs;  ///< one for each of renderer_pairs()
 };
 
 /// \param too_fast s, as in describe()

@@ -12,15 +12,33 @@
 #include "analysis/figures_svg.h"
 #include "analysis/figures_vega.h"
 #include "analysis/report_assets.h"
+#include "analysis/report_cards.h"
 #include "analysis/report_page.h"
 #include "analysis/tables.h"
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
 namespace {
 
-constexpr std::size_t kMostCards = 12, kMostProtocol = 200'000;  // cards; bytes
+constexpr std::size_t kMostProtocol = 200'000;  // bytes
+
+/// Colours of the roles that the page's style does not know.
+std::string further_colours(std::size_t roles) {
+  if (roles == kUsualRoles) return {};
+  const auto values = [&](const Palette& palette) {
+    std::string out = ":root {";
+    for (std::size_t r = kUsualRoles; r < roles; ++r) {
+      out += " --";
+      out += to_string(static_cast<Role>(r));
+      out += ": " + palette[r] + ";";
+    }
+    return out + " }\n";
+  };
+  return values(light_palette()) + "@media screen and (prefers-color-scheme: dark) {\n" +
+         values(dark_palette()) + "}\n";
+}
 
 /// A section of the page: what it is called there and in the line of links.
 struct Heading {
@@ -74,6 +92,7 @@ class Page {
     if (!label_.empty()) out += label_ + ": ";
     out += answered + "</title>\n<link rel=\"icon\" href=\"data:,\"/>\n<style>";
     out += report_style();
+    out += further_colours(roles());
     return out +
            "</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#content\">To the content</a>\n";
   }
@@ -88,7 +107,7 @@ class Page {
            counted(counts.n_trials, "trial", "trials") + ", " +
            fixed(100 * counts.accuracy.value_or(0), 1) + "\u00a0% correct; " +
            counted(counts.n_used_for_times, "time", "times") + " used.</p>\n";
-    put_cards(out);
+    put_cards(out, analysis_);
     if (!analysis_.warnings.empty()) {
       out += "<ul class=\"warnings\" aria-label=\"Warnings\">\n";
       constexpr std::size_t kMost = 100;
@@ -110,44 +129,6 @@ class Page {
       if (!protocol.title.empty()) return protocol.title;
     }
     return analysis_.table.provenance.protocol_name;
-  }
-
-  void put_cards(std::string& out) const {
-    out += "<ul class=\"cards\" aria-label=\"Reduction of the time with the ray, by shape\">\n";
-    const std::size_t n = std::min(analysis_.shapes.size(), kMostCards);
-    for (std::size_t s = 0; s < n; ++s) {
-      const PairedShape& shape = analysis_.shapes[s];
-      const auto& p = shape.t_test.p_holm;
-      const bool clear = p && *p < 0.05;
-      const bool slower = shape.mean_log_ratio && *shape.mean_log_ratio > 0;
-      out += "<li";
-      if (clear) out += slower ? " class=\"slower\"" : " class=\"clear\"";
-      out +=
-          "><b>" + escaped(printable(analysis_.table.shapes[s], 80)) + "</b><span class=\"value\">";
-      if (const auto& reduction = shape.percent_reduction_geometric) {
-        out += fixed(*reduction < 0 ? -*reduction : *reduction, 1) + "\u00a0%</span> " +
-               (slower ? "slower" : "faster");
-      } else {
-        out += "–</span>";
-      }
-      out += "<small>";
-      if (shape.t_test.log_ratio_ci95) {
-        const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
-        out += "95\u00a0% interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) +
-               "\u00a0%</small><small>";
-      }
-      out += p ? std::string(clear ? "clear" : "no clear difference") + ", adjusted p " +
-                     (*p < 0.001 ? "" : "= ") + escaped(p_text(*p))
-               : "not testable";
-      const std::string paper = paper_reduction(analysis_.table.shapes[s]);
-      if (!paper.empty()) out += "</small><small>paper: " + escaped_sentence(paper);
-      out += "</small></li>\n";
-    }
-    out += "</ul>\n";
-    if (n < analysis_.shapes.size()) {
-      out += "<p class=\"note\">The first " + std::to_string(n) + " of " +
-             std::to_string(analysis_.shapes.size()) + " shapes.</p>\n";
-    }
   }
 
   void begin(Heading heading) {
@@ -209,10 +190,13 @@ class Page {
   }
 
   void sections() {
-    const bool both = analysis_.table.renderers.size() == 2;
+    const bool both = analysis_.table.renderers.size() > 1;
     figure_section({"figure15", "How long people took (figure 15)", "Figure 15"},
                    {times_table(analysis_)}, "No times to show.");
-    begin({"speedup", "How much faster with the ray, beside the paper", "Speed-up"});
+    begin({"speedup",
+           "How much faster " + with_renderer(analysis_, "than with") +
+               (compares_as_paper(analysis_) ? ", beside the paper" : ""),
+           "Speed-up"});
     if (!put_figure("speedup")) {
       put_missing("No participant has times with both renderers, so there is nothing to compare.");
     }
@@ -324,10 +308,17 @@ class Page {
     return cut ? out + "…" : out;
   }
 
+  /// That the figures have colours of.
+  std::size_t roles() const {
+    std::size_t most = kUsualRoles;
+    for (const Figure& drawn : figures_) most = std::max(most, roles_in(drawn));
+    return most;
+  }
+
   std::string data() const {
     nlohmann::ordered_json json;
     const Palette light = light_palette();
-    for (std::size_t r = 0; r < kRoles; ++r) {
+    for (std::size_t r = 0; r < roles(); ++r) {
       json["palette"][to_string(static_cast<Role>(r))] = light[r];
     }
     json["figures"] = nlohmann::ordered_json::object();

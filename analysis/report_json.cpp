@@ -106,6 +106,35 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   return out;
 }
 
+Json paired_shapes(const Comparison& comparison, const TrialTable& table) {
+  Json out;
+  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+    out[table.shapes[s]] = paired(comparison.shapes[s], table);
+  }
+  return out;
+}
+
+/// The first comparison, of ray with point where both are there, under its own key; what it is of
+/// where it is not that; the others with all that there is of them.
+void put_comparisons(Json& out, const Analysis& analysis) {
+  const TrialTable& table = analysis.table;
+  const std::vector<Comparison>& all = analysis.comparisons;
+  const auto of = [](const RendererPair& pair) {
+    return Json{{"renderer", pair.renderer}, {"reference", pair.reference}};
+  };
+  if (!all.front().pair.is_ray_minus_point()) {
+    out["paired_by_shape_of"] = all.front().pair.in_data() ? of(all.front().pair) : Json(nullptr);
+  }
+  out["paired_by_shape"] = paired_shapes(all.front(), table);
+  for (std::size_t c = 1; c < all.size(); ++c) {
+    Json one = of(all[c].pair);
+    one["by_shape"] = paired_shapes(all[c], table);
+    one["speed_accuracy"] = speed_accuracy_json(all[c], table);
+    put_pair_practice(one["practice"], analysis.practice.pairs[c], all[c].pair, table);
+    out["further_comparisons"].push_back(std::move(one));
+  }
+}
+
 Json provenance(const Provenance& from) {
   const auto text = [](const std::string& value) {
     return value.empty() ? Json(nullptr) : Json(value);
@@ -148,13 +177,11 @@ std::string report_json(const Analysis& analysis) {
       out["times"][renderer][shape] = times(description.times[r][s]);
     }
   }
-  for (std::size_t s = 0; s < table.shapes.size(); ++s) {
-    out["paired_by_shape"][table.shapes[s]] = paired(analysis.shapes[s], table);
-  }
+  put_comparisons(out, analysis);
   out["rm_anova"] = anova_json(analysis.rm_anova, table);
-  out["mixed_model"] = mixed_model_json(analysis.mixed_model, table);
-  out["speed_accuracy"] = speed_accuracy_json(analysis.speed_accuracy, table);
-  out["practice"] = practice_json(analysis.practice, table);
+  out["mixed_model"] = mixed_model_json(analysis);
+  out["speed_accuracy"] = speed_accuracy_json(analysis.comparisons.front(), table);
+  out["practice"] = practice_json(analysis);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     const Exclusions& lost = analysis.exclusions[r];
     out["exclusions"][table.renderers[r]] = {{"n_trials", lost.n_trials},

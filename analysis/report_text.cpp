@@ -7,6 +7,7 @@
 
 #include "analysis/tables.h"
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
@@ -31,23 +32,21 @@ void put_wrapped(std::string& out, const std::string& text, const std::string& i
   }
 }
 
-/// Columns first..last-1 with the names before them.
+/// Columns first..last-1 with the names in front, of which there are `n_front`.
 void put_columns(std::string& out, const std::vector<std::vector<std::string>>& rows,
                  const std::vector<std::size_t>& widths, std::size_t first, std::size_t last,
-                 std::size_t n_names) {
+                 std::size_t n_front, std::size_t n_names) {
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    std::string line = "  " + pad_right(rows[r][0], widths[0]);
-    for (std::size_t c = first; c < last; ++c) {
+    std::string line;
+    std::size_t rule = 0;
+    for (std::size_t c = 0; c < last; c = c + 1 == n_front ? first : c + 1) {
       line += "  ";
       line += c < n_names ? pad_right(rows[r][c], widths[c]) : pad_left(rows[r][c], widths[c]);
+      rule += widths[c] + 2;
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out += line + "\n";
-    if (r == 0) {
-      std::size_t rule = widths[0];
-      for (std::size_t c = first; c < last; ++c) rule += widths[c] + 2;
-      out += "  " + repeated("─", rule) + "\n";
-    }
+    if (r == 0) out += "  " + repeated("─", rule - 2) + "\n";
   }
 }
 
@@ -63,14 +62,17 @@ void put_text_table(std::string& out, const Table& table) {
     }
   }
   put_wrapped(out, table.caption, "");
-  std::size_t first = 1;
+  const std::size_t n_front = text_only ? 1 : table.n_names;
+  std::size_t front = 0;
+  for (std::size_t c = 0; c < n_front; ++c) front += 2 + widths[c];
+  std::size_t first = n_front;
   while (first < widths.size()) {
-    std::size_t last = first, used = 2 + widths[0];
+    std::size_t last = first, used = front;
     while (last < widths.size() && (last == first || used + 2 + widths[last] <= kPageWidth)) {
       used += 2 + widths[last++];
     }
-    if (first > 1) out += "  (continued)\n";
-    put_columns(out, rows, widths, first, last, table.n_names);
+    if (first > n_front) out += "  (continued)\n";
+    put_columns(out, rows, widths, first, last, n_front, table.n_names);
     first = last;
   }
   for (const std::string& note : table.notes) put_wrapped(out, note, "  ");

@@ -19,23 +19,25 @@ std::string read(double percent_change_time, double accuracy_change) {
 }  // namespace
 
 std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Description& description,
+                                          const RendererPair& pair,
                                           const std::vector<PairedShape>& shapes) {
   std::vector<SpeedAccuracy> out(table.shapes.size());
   for (std::size_t s = 0; s < out.size(); ++s) {
     SpeedAccuracy& one = out[s];
-    if (table.renderers.size() != 2) {
+    if (!pair.in_data()) {
       one.test.undefined = "only one renderer in the data";
       continue;
     }
-    one.accuracy_point = description.accuracy[0][s].mean_of_participant_accuracies;
-    one.accuracy_ray = description.accuracy[1][s].mean_of_participant_accuracies;
+    const std::size_t reference = *pair.reference_at, renderer = *pair.renderer_at;
+    one.accuracy_reference = description.accuracy[reference][s].mean_of_participant_accuracies;
+    one.accuracy_renderer = description.accuracy[renderer][s].mean_of_participant_accuracies;
     std::vector<double> changes;
     for (std::size_t p = 0; p < table.participants.size(); ++p) {
-      const ParticipantCell& point = description.people[0][s][p];
-      const ParticipantCell& ray = description.people[1][s][p];
-      if (point.n_trials == 0 || ray.n_trials == 0) continue;
-      changes.push_back(static_cast<double>(ray.n_correct) / static_cast<double>(ray.n_trials) -
-                        static_cast<double>(point.n_correct) / static_cast<double>(point.n_trials));
+      const ParticipantCell& a = description.people[reference][s][p];
+      const ParticipantCell& b = description.people[renderer][s][p];
+      if (a.n_trials == 0 || b.n_trials == 0) continue;
+      changes.push_back(static_cast<double>(b.n_correct) / static_cast<double>(b.n_trials) -
+                        static_cast<double>(a.n_correct) / static_cast<double>(a.n_trials));
     }
     one.n_pairs = changes.size();
     one.test = t_test(changes);

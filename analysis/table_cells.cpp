@@ -7,6 +7,12 @@
 
 namespace palpate {
 
+namespace {
+
+constexpr std::ptrdiff_t kMostListed = 200;  // shapes of a reason
+
+}  // namespace
+
 std::string number(const std::optional<double>& value, int decimals) {
   return value && std::isfinite(*value) ? fixed(*value, decimals) : kMissing;
 }
@@ -39,6 +45,30 @@ std::string caption(const Analysis& analysis, const std::string& what) {
   return label.empty() ? what : what + " (" + label + ")";
 }
 
+bool several(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
+
+Table comparison_table(const Analysis& analysis, const std::string& what,
+                       const std::vector<std::string>& header) {
+  Table table;
+  table.caption = caption(analysis, what);
+  if (several(analysis)) table.header.emplace_back("renderer");
+  table.header.emplace_back("shape");
+  table.n_names = table.header.size();
+  table.header.insert(table.header.end(), header.begin(), header.end());
+  return table;
+}
+
+std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
+                                   const std::string& shape) {
+  if (several(analysis)) return {pair.renderer, shape};
+  return {shape};
+}
+
+std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
+                         const std::string& shape) {
+  return several(analysis) ? shape + " (" + pair.renderer + ")" : shape;
+}
+
 void Reasons::add(const std::string& reason, const std::string& shape) {
   if (reason.empty()) return;
   for (auto& [known, shapes] : reasons_) {
@@ -51,7 +81,12 @@ void Reasons::add(const std::string& reason, const std::string& shape) {
 
 void Reasons::put(std::vector<std::string>& notes) const {
   for (const auto& [reason, shapes] : reasons_) {
-    notes.push_back("Undefined for " + joined(shapes) + ": " + reason + ".");
+    std::vector<std::string> named(shapes.begin(),
+                                   shapes.begin() + std::min(std::ssize(shapes), kMostListed));
+    if (named.size() < shapes.size()) {
+      named.push_back(std::to_string(shapes.size() - named.size()) + " more");
+    }
+    notes.push_back("Undefined for " + joined(named) + ": " + reason + ".");
   }
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/analysis.h"
+#include "analysis/tables.h"
 
 namespace palpate {
 
@@ -25,6 +26,19 @@ std::string reduction_interval(const std::optional<Interval>& log_ratio);
 
 /// "Response times" or "Response times (SIMULATED PARTICIPANTS)".
 std::string caption(const Analysis& analysis, const std::string& what);
+
+/// Whether there is more than one comparison: then its renderer stands before the shape in a
+/// table's rows, and after it where shapes are listed.
+bool several(const Analysis& analysis);
+/// A table with a row for each comparison and shape. \param header without the names' columns
+Table comparison_table(const Analysis& analysis, const std::string& what,
+                       const std::vector<std::string>& header);
+/// The names of one of its rows.
+std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
+                                   const std::string& shape);
+/// A shape where shapes are listed: "cone" or "cone (tube)".
+std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
+                         const std::string& shape);
 
 /// A note for each reason, with the shapes that it holds for.
 class Reasons {

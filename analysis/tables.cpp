@@ -7,32 +7,49 @@
 
 #include "analysis/table_cells.h"
 #include "analysis/text.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 
 Table reduction_table(const Analysis& analysis) {
-  Table table;
-  table.caption = caption(analysis, "How much faster with the ray: reduction of response time");
-  table.header = {"shape",    "geometric", "95 % interval", "arithmetic",
-                  "p (Holm)", "pairs",     "paper"};
+  const bool paper_too = compares_as_paper(analysis);
+  std::vector<std::string> header{"geometric", "95 % interval", "arithmetic", "p (Holm)", "pairs"};
+  if (paper_too) header.emplace_back("paper");
+  Table table = comparison_table(
+      analysis,
+      "How much faster " + with_renderer(analysis, "than with") + ": reduction of response time",
+      header);
   Reasons reasons;
-  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
-    const PairedShape& shape = analysis.shapes[s];
-    const std::string& name = analysis.table.shapes[s];
-    const std::string paper = paper_reduction(name);
-    table.rows.push_back({name, percent(shape.percent_reduction_geometric),
-                          reduction_interval(shape.t_test.log_ratio_ci95),
-                          percent(shape.percent_reduction_arithmetic),
-                          p_or_missing(shape.t_test.p_holm), std::to_string(shape.n_pairs),
-                          paper.empty() ? kMissing : paper});
-    reasons.add(shape.t_test.undefined, name);
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      const std::string& name = analysis.table.shapes[s];
+      auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
+      row.insert(row.end(), {percent(shape.percent_reduction_geometric),
+                             reduction_interval(shape.t_test.log_ratio_ci95),
+                             percent(shape.percent_reduction_arithmetic),
+                             p_or_missing(shape.t_test.p_holm), std::to_string(shape.n_pairs)});
+      if (paper_too) {
+        const std::string paper = paper_reduction(comparison.pair, name);
+        row.push_back(paper.empty() ? kMissing : paper);
+      }
+      reasons.add(shape.t_test.undefined, listed_shape(analysis, comparison.pair, name));
+    }
   }
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string renderer = several(analysis) ? "renderer" : first.renderer;
   table.notes = {
-      "Geometric: 100 (1 − exp m), m the mean over participants of mean log ray − mean log point; "
-      "interval and p from the paired t-test on m, p adjusted over the shapes (Holm). Positive: "
-      "the "
-      "ray is faster. Arithmetic: from mean times, which the paper may have used.",
-      "Paper: Ho, Basdogan & Srinivasan 2000, fig. 15; n.s.: no significant difference."};
+      "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
+      " − mean log " + first.reference +
+      "; interval and p from the paired t-test on m, p adjusted over " +
+      (several(analysis) ? "all shapes and comparisons" : "the shapes") + " (Holm). Positive: " +
+      (several(analysis) ? "faster than with " + the(first.reference)
+                         : the(first.renderer) + " is faster") +
+      ". Arithmetic: from mean times" + (paper_too ? ", which the paper may have used." : ".")};
+  if (paper_too) {
+    table.notes.emplace_back(
+        "Paper: Ho, Basdogan & Srinivasan 2000, fig. 15; n.s.: no significant difference.");
+  }
   reasons.put(table.notes);
   return table;
 }
@@ -104,29 +121,39 @@ std::vector<Table> confusion_tables(const Analysis& analysis) {
 }
 
 Table tests_table(const Analysis& analysis) {
-  Table table;
-  table.caption = caption(analysis, "Tests of ray − point on log times, over participants");
-  table.header = {"shape",      "t", "df",           "p",       "p (Holm)", "dz",
-                  "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"};
+  const RendererPair& first = analysis.comparisons.front().pair;
+  Table table = comparison_table(
+      analysis,
+      "Tests of " +
+          (several(analysis) ? "each renderer − " + first.reference : difference_name(first)) +
+          " on log times, over participants",
+      {"t", "df", "p", "p (Holm)", "dz", "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"});
   Reasons reasons;
-  for (std::size_t s = 0; s < analysis.shapes.size(); ++s) {
-    const PairedShape& shape = analysis.shapes[s];
-    const std::string& name = analysis.table.shapes[s];
-    table.rows.push_back(
-        {name, number(shape.t_test.t, 2), number(shape.t_test.df, 0), p_or_missing(shape.t_test.p),
-         p_or_missing(shape.t_test.p_holm), number(shape.effect_size.dz, 2),
-         number(shape.effect_size.hedges_gz, 2), number(shape.wilcoxon.positive_rank_sum, 1),
-         p_or_missing(shape.wilcoxon.p), reduction_interval(shape.bootstrap.log_ratio_ci95)});
-    for (const std::string& reason : {shape.t_test.undefined, shape.effect_size.undefined,
-                                      shape.wilcoxon.undefined, shape.bootstrap.undefined}) {
-      reasons.add(reason, name);
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      const std::string& name = analysis.table.shapes[s];
+      auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
+      row.insert(
+          row.end(),
+          {number(shape.t_test.t, 2), number(shape.t_test.df, 0), p_or_missing(shape.t_test.p),
+           p_or_missing(shape.t_test.p_holm), number(shape.effect_size.dz, 2),
+           number(shape.effect_size.hedges_gz, 2), number(shape.wilcoxon.positive_rank_sum, 1),
+           p_or_missing(shape.wilcoxon.p), reduction_interval(shape.bootstrap.log_ratio_ci95)});
+      for (const std::string& reason : {shape.t_test.undefined, shape.effect_size.undefined,
+                                        shape.wilcoxon.undefined, shape.bootstrap.undefined}) {
+        reasons.add(reason, listed_shape(analysis, comparison.pair, name));
+      }
     }
   }
   table.notes = {
-      "t, dz and gz are negative when the ray is faster. Primary: the paired t-test, "
-      "Holm-adjusted. "
-      "Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the percent "
-      "reduction, " +
+      "t, dz and gz are negative when " +
+      (several(analysis) ? "it is faster than with " + the(first.reference)
+                         : the(first.renderer) + " is faster") +
+      ". Primary: the paired t-test, Holm-adjusted" +
+      (several(analysis) ? " over all shapes and comparisons" : "") +
+      ". Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the "
+      "percent reduction, " +
       std::to_string(kResamples) + " resamples, seed " + std::to_string(analysis.settings.seed) +
       "."};
   reasons.put(table.notes);
@@ -175,13 +202,13 @@ Table provenance_table(const Analysis& analysis) {
 std::vector<Table> all_tables(const Analysis& analysis) {
   std::vector<Table> tables{reduction_table(analysis), times_table(analysis),
                             accuracy_table(analysis)};
-  if (analysis.table.renderers.size() == 2) tables.push_back(speed_accuracy_table(analysis));
+  if (analysis.table.renderers.size() > 1) tables.push_back(speed_accuracy_table(analysis));
   std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
   tables.push_back(tests_table(analysis));
   tables.push_back(anova_table(analysis));
   tables.push_back(mixed_model_table(analysis));
   tables.push_back(learning_table(analysis));
-  if (analysis.table.renderers.size() == 2) tables.push_back(renderer_order_table(analysis));
+  if (analysis.table.renderers.size() > 1) tables.push_back(renderer_order_table(analysis));
   tables.push_back(exclusions_table(analysis));
   tables.push_back(provenance_table(analysis));
   return tables;

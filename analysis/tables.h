@@ -17,11 +17,11 @@ struct Table {
   std::vector<std::string> notes;              ///< below it: what a reader must know
 };
 
-/// Percent reduction per shape with its interval, beside the paper's.
+/// Percent reduction per comparison and shape with its interval, beside the paper's.
 Table reduction_table(const Analysis& analysis);
 Table times_table(const Analysis& analysis);
 Table accuracy_table(const Analysis& analysis);
-/// Change of accuracy beside the change of time: is speed bought with errors?
+/// Change of accuracy beside the change of time, per comparison: is speed bought with errors?
 Table speed_accuracy_table(const Analysis& analysis);
 /// One for each renderer.
 std::vector<Table> confusion_tables(const Analysis& analysis);
@@ -33,7 +33,7 @@ Table anova_table(const Analysis& analysis);
 Table mixed_model_table(const Analysis& analysis);
 /// Log times over the trials with each renderer.
 Table learning_table(const Analysis& analysis);
-/// Gains by which renderer came first.
+/// Gains by which renderer came first, per comparison.
 Table renderer_order_table(const Analysis& analysis);
 /// What and where from: two columns of text.
 Table provenance_table(const Analysis& analysis);

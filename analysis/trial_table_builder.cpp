@@ -21,6 +21,11 @@ std::size_t rank(const std::string& name, const std::vector<std::string>& listed
   return kShapes.size() + static_cast<std::size_t>(found - listed.begin());
 }
 
+/// Point and ray stand first; the others keep their order.
+std::size_t renderer_rank(const std::string& name) {
+  return name == "point" ? 0 : name == "ray" ? 1 : 2;
+}
+
 std::string plural(std::size_t n, const char* one, const char* many) {
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
@@ -126,15 +131,20 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
     table.answers.push_back(names[order[i]]);
     if (shown_[order[i]] > 0) table.shapes.push_back(names[order[i]]);
   }
-  table.renderers.assign(renderers_.names().begin(), renderers_.names().end());
-  std::sort(table.renderers.begin(), table.renderers.end());  // point before ray
-  const bool swapped = !table.renderers.empty() && table.renderers[0] != renderers_.names()[0];
+  std::vector<std::uint32_t> renderers(renderers_.names().size()), renderer_place(renderers.size());
+  std::iota(renderers.begin(), renderers.end(), 0U);
+  std::ranges::stable_sort(renderers, {},
+                           [&](std::uint32_t i) { return renderer_rank(renderers_.names()[i]); });
+  for (std::uint32_t i = 0; i < renderers.size(); ++i) {
+    renderer_place[renderers[i]] = i;
+    table.renderers.push_back(renderers_.names()[renderers[i]]);
+  }
   for (TrialRow& row : rows_) {
     row.shape = static_cast<std::uint16_t>(place[row.shape]);
     if (row.answer >= 0) {
       row.answer = static_cast<std::int32_t>(place[static_cast<std::size_t>(row.answer)]);
     }
-    if (swapped) row.renderer = static_cast<std::uint16_t>(1 - row.renderer);
+    row.renderer = static_cast<std::uint16_t>(renderer_place[row.renderer]);
   }
   table.rows = std::move(rows_);
 

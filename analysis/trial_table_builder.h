@@ -18,7 +18,9 @@ class Interner {
  public:
   std::uint32_t number(std::string_view name);
   /// Whether the name is known already.
-  bool holds(std::string_view name) const { return numbers_.contains(name); }
+  bool holds(std::string_view name) const {
+    return (!names_.empty() && names_[last_] == name) || numbers_.contains(name);
+  }
   const std::deque<std::string>& names() const { return names_; }
 
  private:

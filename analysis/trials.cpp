@@ -41,9 +41,11 @@ constexpr std::array<std::string_view, n_columns> kColumns{
 constexpr int kNeeded = response_time + 1;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
-constexpr std::size_t kMaxName = 200;      // bytes; the contract's codes have at most 32
-constexpr std::size_t kMaxStimuli = 200;   // the confusion matrix grows with its square
-constexpr std::size_t kMaxPeople = 10000;  // cells are people x renderers x stimuli
+constexpr std::size_t kMaxName = 200;     // bytes; the contract's codes have at most 32
+constexpr std::size_t kMaxStimuli = 200;  // the confusion matrix grows with its square
+constexpr std::size_t kMaxPeople = 10000;
+constexpr std::size_t kMaxRenderers = 20;
+constexpr std::size_t kMaxCells = 4'000'000;  // people x renderers x stimuli: some 500 MB
 constexpr std::string_view kNoResponse = "no_response";  // a key of the results
 constexpr double kMaxTime = 1e6;  // s; keeps every sum finite, and no trial lasts 11 days
 
@@ -119,11 +121,7 @@ class CsvTrials {
       }
     }
     std::string hint;
-    if (names.size() == 1 && names[0].find('\r') != std::string_view::npos) {
-      hint = " (lines end in CR alone; expected LF or CRLF)";
-    } else if (names.size() == 1) {
-      hint = " (one column only: are the fields separated by commas?)";
-    }
+    if (names.size() == 1) hint = " (one column only: are the fields separated by commas?)";
     for (std::size_t i = 0; i < kNeeded; ++i) {
       if (at_[i] == kAbsent) {
         faults_.add(line(reader), "expected a column '" + std::string(kColumns[i]) + "'" + hint);
@@ -148,7 +146,10 @@ class CsvTrials {
     if (text.empty() || text.size() > kMaxName || !is_plain_utf8(text)) {
       fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");
     }
-    if (text == kNoResponse) fault(column, "a stimulus; empty where there was no response");
+    if (text == kNoResponse) {
+      fault(column, column == renderer ? "a renderer; this name is taken"
+                                       : "a stimulus; empty where there was no response");
+    }
     return text;
   }
 
@@ -197,8 +198,7 @@ class CsvTrials {
     raw.session = number(session);
     raw.block = number(block);
     raw.trial = number(trial);
-    raw.renderer = field(renderer);
-    if (raw.renderer != "point" && raw.renderer != "ray") fault(renderer, "'point' or 'ray'");
+    raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
     if (!field(response).empty()) raw.response = name(response, stimuli_);
     raw.correct = truth(correct);
@@ -206,20 +206,33 @@ class CsvTrials {
     raw.practice = truth(practice);
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
     raw.simulated = truth(simulated);
-    if (!ok_) return;
+    if (!ok_ || too_many_) return;
     names_.number(raw.participant);
+    renderers_.number(raw.renderer);
     stimuli_.number(raw.shape);
     if (!raw.response.empty()) stimuli_.number(raw.response);
-    if (names_.names().size() > kMaxPeople || stimuli_.names().size() > kMaxStimuli) {
-      if (!too_many_)
-        fault(names_.names().size() > kMaxPeople ? participant_id : shape,
-              "at most 10000 different participants and 200 different stimuli");
-      too_many_ = true;
-      return;
-    }
+    if (!room_enough()) return;
     if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
     if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
+  }
+
+  /// Whether all names so far are within the limits; the first time that they are not is a fault.
+  bool room_enough() {
+    const std::size_t people = names_.names().size(), renderers = renderers_.names().size(),
+                      stimuli = stimuli_.names().size();
+    if (people > kMaxPeople || stimuli > kMaxStimuli) {
+      fault(people > kMaxPeople ? participant_id : shape,
+            "at most 10000 different participants and 200 different stimuli");
+    } else if (renderers > kMaxRenderers) {
+      fault(renderer, "at most 20 different renderers");
+    } else if (people * renderers * stimuli > kMaxCells) {
+      fault(participant_id, "at most 4000000 cells (participants x renderers x stimuli)");
+    } else {
+      return true;
+    }
+    too_many_ = true;
+    return false;
   }
 
   /// Provenance is shown, not checked: an odd value is made printable, and a few are enough.
@@ -252,7 +265,8 @@ class CsvTrials {
   std::array<std::size_t, n_columns> at_{};
   std::size_t n_fields_ = 0, n_rows_ = 0;
   bool ok_ = true, too_many_ = false;
-  Interner names_, stimuli_;  ///< those seen in good rows, practice too: each is checked once
+  Interner names_, renderers_,
+      stimuli_;  ///< those seen in good rows, practice too: each is checked once
   std::vector<std::string> protocols_, versions_;
   TrialTableBuilder builder_;
 };

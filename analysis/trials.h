@@ -36,7 +36,7 @@ struct Provenance {
 
 struct TrialTable {
   std::vector<std::string> participants;  ///< in order of first appearance
-  std::vector<std::string> renderers;     ///< those shown; point before ray
+  std::vector<std::string> renderers;     ///< those shown: point, ray, then as they appear
   /// Those shown: sphere, cone, cylinder, cube, then as the protocol lists them or as they appear.
   std::vector<std::string> shapes;
   std::vector<std::string> answers;  ///< shapes, then names that were answered but never shown
@@ -48,7 +48,8 @@ struct TrialTable {
 };
 
 /// Reads trials from CSV: the contract's first nine columns in any order, `practice`, `timed_out`,
-/// `simulated`, `protocol_sha256` and `program_version` where they exist; others are ignored.
+/// `simulated`, `protocol_sha256` and `program_version` where they exist; others are ignored. Any
+/// names of renderers.
 /// \throws InputError with every fault (a count of the rest past kMaxFaults); never half a table.
 TrialTable read_trials_csv(const std::string& path);
 

@@ -97,6 +97,8 @@ int analyze_command(const std::vector<std::string>& args) {
   line.summary =
       "Is a shape identified faster with the ray than with the point renderer, by how much, how "
       "sure?\n"
+      "Any renderers of other people's data: each is compared with the first (point where it is "
+      "there).\n"
       "The answer and its tables go to stdout. A JSON file or report that is there already is "
       "replaced, figures only with --force.";
   line.example =

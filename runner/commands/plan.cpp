@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -180,6 +181,7 @@ Pilot starting_point(const Options& options, const po::variables_map& values) {
                          "; more: add --help");
       }
     }
+    pilot.pair = {"point", "ray", std::nullopt, std::nullopt};
     pilot.model.shapes = {"sphere", "cone", "cylinder", "cube"};
     pilot.model.log_ratios.assign(4, 0.0);
     pilot.model.intercept_sd = options.intercept_sd;
@@ -215,8 +217,13 @@ StudyModel model_of(Pilot& pilot, const Options& options, const po::variables_ma
   }
   if (values.count("effect") != 0) {
     put_effects(options.effect, model);
-  } else {
+  } else if (pilot.pair.is_ray_minus_point()) {
     put_paper_effects(model);
+  } else {
+    throw UsageError(
+        "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
+        "point, this pilot is of " +
+        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60));
   }
   if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
     throw UsageError("expected the wanted effect of some shape: --effect SHAPE=PERCENT,...");
@@ -278,8 +285,8 @@ int plan_command(const std::vector<std::string>& args) {
   add("db", po::value(&options.database)->value_name("FILE"), "a pilot's database");
   add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
   add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
-      "wanted reductions of time with the ray, or one number for all shapes; default: the paper's, "
-      "cone=22,cube=11");
+      "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
+      "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11");
   add("power", po::value(&options.power)->default_value(0.8, "0.8"), "wanted power");
   add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05"), "of the tests, after Holm");
   add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),

@@ -13,6 +13,7 @@
 #include "analysis/plan.h"
 #include "analysis/power.h"
 #include "analysis/trial_table_builder.h"
+#include "analysis/wording.h"
 
 namespace palpate {
 namespace {
@@ -112,7 +113,7 @@ TEST(Dropped, AreNamedWithTheRendererThatIsMissing) {
   const Analysis analysis = analysis_with(4, 3, [](int p, int, RawTrial& trial) {
     return (p != 1 || trial.renderer == "ray") && (p != 2 || trial.renderer == "point");
   });
-  for (const PairedShape& shape : analysis.shapes) {
+  for (const PairedShape& shape : analysis.comparisons[0].shapes) {
     ASSERT_EQ(shape.dropped.size(), 2U);
     EXPECT_EQ(shape.dropped[0].renderers, std::vector<std::string>{"point"});
     EXPECT_EQ(shape.dropped[1].renderers, std::vector<std::string>{"ray"});
@@ -124,17 +125,48 @@ TEST(Dropped, AreNamedWithTheRendererThatIsMissing) {
 TEST(Answer, GoesByHolmsP) {
   Analysis analysis;
   analysis.table.shapes = {"sphere", "cone"};
-  analysis.shapes.resize(2);
-  for (PairedShape& shape : analysis.shapes) {
+  Comparison& comparison = analysis.comparisons.emplace_back();
+  comparison.pair = {"point", "ray", 0, 1};
+  comparison.shapes.resize(2);
+  for (PairedShape& shape : comparison.shapes) {
     shape.mean_log_ratio = -0.2;
     shape.percent_reduction_geometric = percent_reduction(-0.2);
     shape.t_test.p = 0.03;
     shape.t_test.p_holm = 0.06;
   }
   EXPECT_EQ(answer(analysis), "No clear difference between ray and point for sphere and cone.");
-  analysis.shapes[1].t_test.p_holm = 0.04;
+  comparison.shapes[1].t_test.p_holm = 0.04;
   EXPECT_EQ(answer(analysis),
             "The ray is faster than the point for cone (18 %); no clear difference for sphere.");
+}
+
+TEST(Answer, HasASentenceForEachComparison) {
+  Analysis analysis;
+  analysis.table.shapes = {"sphere", "cone"};
+  analysis.table.renderers = {"point", "ray", "tube"};
+  const auto add = [&](const RendererPair& pair, double log_ratio, double p_holm) {
+    Comparison& comparison = analysis.comparisons.emplace_back();
+    comparison.pair = pair;
+    comparison.shapes.resize(2);
+    for (PairedShape& shape : comparison.shapes) {
+      shape.mean_log_ratio = log_ratio;
+      shape.percent_reduction_geometric = percent_reduction(log_ratio);
+      shape.t_test.p_holm = p_holm;
+    }
+  };
+  add({"point", "ray", 0, 1}, -0.2, 0.01);
+  add({"point", "tube", 0, 2}, 0.1, 0.02);
+  EXPECT_EQ(answer(analysis),
+            "The ray is faster than the point for sphere (18 %) and cone (18 %). tube is slower "
+            "than the point for sphere (11 %) and cone (11 %).");
+  EXPECT_EQ(with_renderer(analysis, "than with"), "than with the point");
+  EXPECT_TRUE(compares_as_paper(analysis));
+  analysis.comparisons.erase(analysis.comparisons.begin());
+  analysis.comparisons[0].pair = {"tip1", "tip2", 0, 1};
+  EXPECT_EQ(answer(analysis), "tip2 is slower than tip1 for sphere (11 %) and cone (11 %).");
+  EXPECT_EQ(with_renderer(analysis, "than with"), "with tip2 than with tip1");
+  EXPECT_EQ(paper_reduction(analysis.comparisons[0].pair, "cone"), "");
+  EXPECT_FALSE(compares_as_paper(analysis));
 }
 
 TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
@@ -143,8 +175,8 @@ TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
     if (trial.renderer == "point" && i < 3) answer_wrongly(trial);
     return true;
   });
-  EXPECT_EQ(analysis.speed_accuracy[0].reading, "trade-off possible");
-  EXPECT_NEAR(*analysis.speed_accuracy[0].accuracy_change, 0.3, 1e-12);
+  EXPECT_EQ(analysis.comparisons[0].speed_accuracy[0].reading, "trade-off possible");
+  EXPECT_NEAR(*analysis.comparisons[0].speed_accuracy[0].accuracy_change, 0.3, 1e-12);
 }
 
 TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
@@ -155,8 +187,8 @@ TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
     trial.response_time = std::exp(2 + slope * number);
     return true;
   });
-  EXPECT_NEAR(*analysis.practice.mean_slope_difference, -3, 1e-9);
-  EXPECT_NEAR(*analysis.practice.slope_difference.sd, 1, 1e-9);
+  EXPECT_NEAR(*analysis.practice.pairs[0].mean_slope_difference, -3, 1e-9);
+  EXPECT_NEAR(*analysis.practice.pairs[0].slope_difference.sd, 1, 1e-9);
   // The first of 8 bins holds trials 0 to 3 of each person, 14 before the middle of either shape;
   // persons' slopes have an sd of 0.01.
   EXPECT_NEAR(*analysis.practice.learning[1].bins[0].se_mean_log, 0.14 / std::sqrt(3.0), 1e-9);
@@ -165,10 +197,10 @@ TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
 TEST(RendererOrder, OfAllShapesTakesWhoHasThemAll) {
   const Analysis analysis = analysis_with(
       4, 3, [](int p, int, RawTrial& trial) { return p != 3 || trial.shape == "cone"; });
-  const auto of = [&](const OrderEffect& effect) { return effect.point_first.n_participants; };
-  EXPECT_EQ(of(analysis.practice.shapes[0]), 3U);
-  EXPECT_EQ(of(analysis.practice.shapes[1]), 4U);
-  EXPECT_EQ(of(analysis.practice.all_shapes), 3U);
+  const auto of = [&](const OrderEffect& effect) { return effect.reference_first.n_participants; };
+  EXPECT_EQ(of(analysis.practice.pairs[0].shapes[0]), 3U);
+  EXPECT_EQ(of(analysis.practice.pairs[0].shapes[1]), 4U);
+  EXPECT_EQ(of(analysis.practice.pairs[0].all_shapes), 3U);
 }
 
 TEST(Sphericity, SaysThatMauchlyNeedsMoreParticipants) {

@@ -140,6 +140,24 @@ TEST(MixedModel, ConvergesWhereverTheVariancesLie) {
   }
 }
 
+TEST(MixedModel, RefusesWhatWouldTakeHours) {
+  const auto reason = [](std::size_t n_renderers, std::size_t n_shapes) {
+    People people(n_renderers, {n_shapes, std::vector<ParticipantCell>(3)});
+    std::vector<std::string> renderers, shapes;
+    for (std::size_t r = 0; r < n_renderers; ++r) {
+      renderers.push_back("r" + std::to_string(r));
+      for (auto& shape : people[r]) {
+        for (ParticipantCell& cell : shape) cell = cell_of({1.0, 2.0});
+      }
+    }
+    for (std::size_t s = 0; s < n_shapes; ++s) shapes.push_back("s" + std::to_string(s));
+    return mixed_model(people, renderers, shapes).undefined;
+  };
+  EXPECT_EQ(reason(9, 2), "too many renderers and shapes for this model");
+  EXPECT_EQ(reason(5, 200), "too many renderers and shapes for this model");
+  EXPECT_EQ(reason(8, 2), "");
+}
+
 TEST(MixedModel, DoesNotDependOnTheUnitOfTime) {
   People people = people_of(8, 4, 0.3, 0.2, 0.4, 3);
   const MixedModel before = mixed_model(people, kTwo, kShapes);

@@ -69,8 +69,8 @@ TEST(Learning, SlopesAreThoseOfTheTimesWithinShapes) {
     EXPECT_NEAR(*learning.bins[7].mean_log - *learning.bins[0].mean_log,
                 -0.2 * (last - first) / 100, 1e-12);
   }
-  EXPECT_NEAR(*practice.mean_slope_difference, 0, 1e-12);
-  EXPECT_NE(practice.slope_difference.undefined, "");  // all alike
+  EXPECT_NEAR(*practice.pairs[0].mean_slope_difference, 0, 1e-12);
+  EXPECT_NE(practice.pairs[0].slope_difference.undefined, "");  // all alike
 }
 
 TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
@@ -80,13 +80,13 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
                                          {"D", "ray", 0},
                                          {"E", "ray", -0.1},
                                          {"F", "ray", 5, 0, 0, true}});
-  const Practice& practice = analysis.practice;
+  const PairPractice& practice = analysis.practice.pairs[0];
   EXPECT_EQ(practice.n_interleaved, 1U);
   std::vector<OrderEffect> effects = practice.shapes;
   effects.push_back(practice.all_shapes);
   for (const OrderEffect& effect : effects) {
-    EXPECT_EQ(effect.point_first.n_participants, 2U);
-    EXPECT_EQ(effect.ray_first.n_participants, 3U);
+    EXPECT_EQ(effect.reference_first.n_participants, 2U);
+    EXPECT_EQ(effect.renderer_first.n_participants, 3U);
     EXPECT_NEAR(*effect.difference, -0.4, 1e-12);
     EXPECT_NEAR(*effect.balanced_log_ratio, -0.2, 1e-12);
     // R: t.test(c(-.5, -.3), c(.1, 0, -.1), var.equal = TRUE)
@@ -103,8 +103,7 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
 
 TEST(RendererOrder, SaysWhyItCannotBeTold) {
   const auto undefined = [](const std::vector<Person>& people) {
-    const OrderEffect& effect = analysis_of(people).practice.all_shapes;
-    return effect.test.undefined;
+    return analysis_of(people).practice.pairs[0].all_shapes.test.undefined;
   };
   EXPECT_EQ(undefined({{"A", "point", 0.1}, {"B", "point", 0.2}}),
             "all participants had the point first");
@@ -123,22 +122,22 @@ TEST(RendererOrder, SaysWhyItCannotBeTold) {
 TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
   const Analysis bought = analysis_of(
       {{"A", "point", -0.3, 0, 4}, {"B", "ray", -0.2, 0, 8}, {"C", "ray", -0.1, 0, 12}});
-  for (const SpeedAccuracy& shape : bought.speed_accuracy) {
+  for (const SpeedAccuracy& shape : bought.comparisons[0].speed_accuracy) {
     EXPECT_EQ(shape.reading, "trade-off possible");
     EXPECT_NEAR(*shape.percent_change_time, 100 * std::expm1(-0.2), 1e-9);
-    EXPECT_NEAR(*shape.accuracy_point, 1, 1e-15);
-    EXPECT_NEAR(*shape.accuracy_ray, 0.8, 1e-15);
+    EXPECT_NEAR(*shape.accuracy_reference, 1, 1e-15);
+    EXPECT_NEAR(*shape.accuracy_renderer, 0.8, 1e-15);
     EXPECT_NEAR(*shape.accuracy_change, -0.2, 1e-15);
     EXPECT_NEAR(*shape.test.t, -0.2 / (0.1 / std::sqrt(3.0)), 1e-9);
     EXPECT_EQ(shape.n_pairs, 3U);
   }
   const Analysis slower = analysis_of({{"A", "point", 0.3, 0, 4}, {"B", "ray", 0.2, 0, 8}});
-  EXPECT_EQ(slower.speed_accuracy[0].reading, "no trade-off");
+  EXPECT_EQ(slower.comparisons[0].speed_accuracy[0].reading, "no trade-off");
   const Analysis clean = analysis_of({{"A", "point", -0.3}, {"B", "ray", -0.2}});
-  EXPECT_EQ(clean.speed_accuracy[0].reading, "no trade-off");
-  EXPECT_NE(clean.speed_accuracy[0].test.undefined, "");
+  EXPECT_EQ(clean.comparisons[0].speed_accuracy[0].reading, "no trade-off");
+  EXPECT_NE(clean.comparisons[0].speed_accuracy[0].test.undefined, "");
   const Analysis none = analysis_of({{"A", "point", -0.3, 0, kTrials}});
-  EXPECT_EQ(none.speed_accuracy[0].reading, "");
+  EXPECT_EQ(none.comparisons[0].speed_accuracy[0].reading, "");
 }
 
 }  // namespace

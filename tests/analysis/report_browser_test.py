@@ -103,6 +103,28 @@ class Report(unittest.TestCase):
         self.assertEqual(self.browser.run("document.querySelector('#person').options[1].value"), who)
         self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b').length"), 0)
 
+    def test_many_renderers_are_told_apart_and_their_names_are_text(self):
+        csv = self.dir / "renderers.csv"
+        renderers = ["</script><b>x</b>", "tip 2", "tip 3", "tip 4", "tip 5", "tip 6", "tip 7"]
+        rows = [f"{p},1,1,{i},{r},{s},{s},1,{2 + 0.3 * (i % 5) + 0.2 * len(s) + 0.1 * (i * ord(p) % 7)}\n" for p in "ABC"
+                for i, (r, s) in enumerate([(r, s) for r in renderers for s in ("cone", "cube")] * 3, 1)]
+        csv.write_text("participant_id,session,block,trial,renderer,shape,response,correct,response_time\n" +
+                       "".join(rows))
+        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+        colours = {}
+        for dark in (False, True):
+            self.open(self.dir / "other.html", dark=dark)
+            self.assertEqual([figure[0] for figure in self.shown()],
+                             [name for name in FIGURES if name not in ("servo", "order")])
+            self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b, .cards + b').length"), 0)
+            self.assertIn(renderers[0], self.browser.run(DRAWN + "[0].textContent"))
+            colours[dark] = set(self.browser.run(
+                "[...document.querySelectorAll('#figure15 .fixed svg g > :not(title)')].map(e => e.getAttribute('fill'))"
+                ".filter(f => f && f !== 'none').map(f => { const p = document.createElement('p'); p.style.color = f; "
+                "document.body.append(p); const c = getComputedStyle(p).color; p.remove(); return c; })"))
+            self.assertEqual(len(colours[dark]), 6, "of the first six renderers")
+        self.assertFalse(colours[False] & colours[True])
+
     def test_nothing_foreign_runs_and_nothing_is_fetched(self):
         self.open()
         self.assertEqual(self.browser.run(

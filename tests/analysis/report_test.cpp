@@ -17,6 +17,7 @@
 #include "analysis/report_text.h"
 #include "analysis/text.h"
 #include "analysis/trial_table_builder.h"
+#include "analysis/wording.h"
 #include "stimuli/random.h"
 
 namespace palpate {
@@ -161,7 +162,7 @@ TEST(Json, IsTheSameAgainAndReadsBackExactly) {
   EXPECT_EQ(text, report_json(analysis_of_study({})));
   const auto json = nlohmann::json::parse(text);
   EXPECT_EQ(json["paired_by_shape"]["cone"]["t_test"]["p"].get<double>(),
-            analysis.shapes[1].t_test.p.value());
+            analysis.comparisons[0].shapes[1].t_test.p.value());
   EXPECT_EQ(json["program_version"], "1.2.3");
 }
 

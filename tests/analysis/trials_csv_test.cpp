@@ -89,6 +89,70 @@ TEST_F(TrialsCsv, LinesAreCountedThroughQuotedNewlines) {
                "line 5, column response_time", "'fast'");
 }
 
+TEST_F(TrialsCsv, AnyRenderersPointAndRayFirstThenAsTheyAppear) {
+  const TrialTable table = read(kHeader +
+                                "P1,1,1,1,tube,cone,cone,1,1\n"
+                                "P1,1,1,2,ray,cone,cone,1,2\n"
+                                "P1,1,1,3,a b,cone,cone,1,3\n"
+                                "P1,1,1,4,point,cone,cone,1,4\n"
+                                "P1,1,1,5,tube,cone,cone,1,5\n");
+  EXPECT_EQ(table.renderers, (std::vector<std::string>{"point", "ray", "tube", "a b"}));
+  std::vector<int> renderers;
+  for (const TrialRow& row : table.rows) renderers.push_back(row.renderer);
+  EXPECT_EQ(renderers, (std::vector<int>{2, 1, 3, 0, 2}));
+  EXPECT_EQ(table.rows[4].exposure, 2U) << "counted by renderer";
+}
+
+TEST_F(TrialsCsv, NamesOfRenderersAreChecked) {
+  const auto row = [](const std::string& renderer) {
+    return kHeader + "P1,1,1,1," + renderer + ",cone,cone,1,2\n";
+  };
+  for (const std::string& bad : {std::string(), std::string(201, 'r'), std::string("a\x1b[1m"),
+                                 std::string("\xFF"), std::string("no_response")}) {
+    expect_fault(row(bad), "line 2, column renderer", "expected a");
+  }
+  EXPECT_EQ(read(row(std::string(200, 'r'))).renderers[0].size(), 200U);
+}
+
+TEST_F(TrialsCsv, RenderersAndCellsHaveALimit) {
+  const auto with = [](int renderers, int people, int stimuli) {
+    std::string text = kHeader;
+    int trial = 0;
+    const auto add = [&](int renderer, int person, int stimulus) {
+      const std::string shape = "s" + std::to_string(stimulus);
+      text += "P" + std::to_string(person) + ",1,1," + std::to_string(++trial) + ",r" +
+              std::to_string(renderer) + "," + shape + "," + shape + ",1,2\n";
+    };
+    for (int r = 0; r < renderers; ++r) add(r, 0, 0);
+    for (int s = 0; s < stimuli; ++s) add(0, 0, s);
+    for (int p = 0; p < people; ++p) add(0, p, 0);
+    return text;
+  };
+  EXPECT_EQ(read(with(20, 1, 1)).renderers.size(), 20U);
+  expect_fault(with(21, 1, 1), "line 22, column renderer", "at most 20 different renderers");
+  EXPECT_EQ(read(with(2, 10000, 200)).participants.size(), 10000U);
+  expect_fault(with(3, 7000, 200), "line 6871, column participant_id", "at most 4000000 cells");
+}
+
+TEST_F(TrialsCsv, LinesThatEndInCrAloneAreNamedAsSuch) {
+  const auto with_cr = [](std::string text) {
+    for (char& c : text) c = c == '\n' ? '\r' : c;
+    return text;
+  };
+  const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
+  const std::string words = "a CR that no LF follows";
+  expect_fault(with_cr(kHeader + row + row), "line 1", words);
+  expect_fault(with_cr("note," + kHeader + "x," + row), "line 1", words);
+  expect_fault(with_cr(kHeader.substr(0, kHeader.size() - 1) + ",note\n" + row), "line 1", words);
+  expect_fault(with_cr(kHeader + "\"P1\",1,1,1,ray,cone,cone,1,2\n" + row), "line 1", words);
+  expect_fault(with_cr(kHeader + "P1,1,1,1,ray,cone,cone,1,\"2\"\n" + row), "line 1", words);
+  expect_fault(kHeader + with_cr(row + row + row), "line 2", words);
+  std::string large = kHeader;
+  while (large.size() < (2U << 20)) large += row;
+  expect_fault(with_cr(large), "line 1", words);
+  expect_fault(kHeader + row + "P1,1,1,2,ray,co\rne,cone,1,2\n", "line 3", words);
+}
+
 TEST_F(TrialsCsv, PracticeIsLeftOutAndOnlyAOneIsATimeOut) {
   const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",practice,timed_out\n";
   const TrialTable table = read(header +
@@ -124,7 +188,7 @@ TEST_F(TrialsCsv, KnowsWhoIsSimulatedAndWhereRowsComeFrom) {
 }
 
 TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
-  const auto found = faults(kHeader + "P1,0,1.5,x,rays,,cone,yes,-1\n" +
+  const auto found = faults(kHeader + "P1,0,1.5,x,,,cone,yes,-1\n" +
                             "P1,1,1,1,ray,cone,cone,1,2\n" + "\t,1,1,2,ray,cone,cone,1,nan\n");
   std::vector<std::string> places;
   for (const Fault& fault : found) places.push_back(fault.place);
