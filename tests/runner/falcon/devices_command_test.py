@@ -13,6 +13,8 @@ import tempfile
 import time
 import unittest
 
+from emulator_control import EmulatorControl
+
 EMULATED, PALPATE = sys.argv[1:3]
 GRAVITY = 9.80665
 PATIENCE = 60  # s
@@ -23,32 +25,15 @@ class Bench:
 
     def __init__(self, folder, options, arguments):
         self.folder = pathlib.Path(tempfile.mkdtemp(dir=folder))
-        fifo = self.folder / "control"
-        os.mkfifo(fifo)
-        # Held open for reading, too: nothing is lost before the other side has opened it.
-        self.control = os.open(fifo, os.O_RDWR)
+        self.control = EmulatorControl(self.folder, PATIENCE)
         self.process = subprocess.Popen(
-            [EMULATED, *options, "--control", fifo, PALPATE, *arguments], text=True,
+            [EMULATED, *options, "--control", self.control.fifo, PALPATE, *arguments], text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
         self.messages = ""
 
-    def tell(self, line):
-        os.write(self.control, (line + "\n").encode())
-
-    def state(self):
-        path = self.folder / "state.json"
-        path.unlink(missing_ok=True)
-        self.tell(f"state {path}")
-        self.wait_until(lambda: path.exists() or self.process.poll() is not None)
-        return json.loads(path.read_text()) if path.exists() else None
-
-    @staticmethod
-    def wait_until(done):
-        end = time.monotonic() + PATIENCE
-        while not done():
-            if time.monotonic() > end:
-                raise AssertionError("nothing came of it")
-            time.sleep(0.01)
+    def states(self):
+        """None where the command has ended."""
+        return self.control.states(given_up=lambda: self.process.poll() is not None)
 
     def expect(self, text):
         """Reads messages until `text` has come."""
@@ -68,7 +53,7 @@ class Bench:
 
     def finish(self):
         out, messages = self.process.communicate(timeout=PATIENCE)
-        os.close(self.control)
+        self.control.close()
         return self.process.returncode, out, self.messages + messages
 
 
@@ -115,25 +100,25 @@ class Devices(unittest.TestCase):
                                     str(self.calibration), "--sweep-seconds", "1", *arguments])
 
     def hold(self, bench):
-        bench.tell("hand 1 0 0 0.125 200 10")
+        bench.control.tell("hand 1 0 0 0.125 200 10")
 
     def test_weights_give_the_true_scale(self):
         bench = self.calibrate(["--unhomed"], "--weights", "0.25")
-        bench.tell("scale 1 -5000")
+        bench.control.tell("scale 1 -5000")
         bench.expect("pull the grip fully out")
-        bench.tell("shake 1 0.035")
+        bench.control.tell("shake 1 0.035")
         bench.expect("middle of its space")
-        self.assertFalse(bench.state()[0]["torque_before_homing"])
+        self.assertFalse(bench.states()[0]["torque_before_homing"])
         self.hold(bench)
         time.sleep(0.5)
         bench.enter()
         bench.expect("Let go")
         time.sleep(0.2)
-        bench.tell("hand 1 0 0 0.125 0 0.5")
+        bench.control.tell("hand 1 0 0 0.125 0 0.5")
         bench.enter()
         for mass in (0.25,):
             bench.expect(f"Hang {mass} kg")
-            bench.tell(f"load 1 0 {-mass * GRAVITY} 0 {mass}")
+            bench.control.tell(f"load 1 0 {-mass * GRAVITY} 0 {mass}")
             time.sleep(0.5)
             bench.enter()
         status, out, messages = bench.finish()
@@ -157,7 +142,7 @@ class Devices(unittest.TestCase):
                 time.sleep(0.2)
                 bench.enter()
                 bench.expect("Let go")
-                bench.wait_until(lambda: not bench.state()[0]["torque_is_zero"])
+                bench.control.wait_until(lambda: not bench.states()[0]["torque_is_zero"])
                 if end == "signal":
                     children = pathlib.Path(f"/proc/{bench.process.pid}/task/{bench.process.pid}/children")
                     os.kill(int(children.read_text().split()[0]), signal.SIGINT)
@@ -166,7 +151,7 @@ class Devices(unittest.TestCase):
                 else:
                     bench.process.stdin.close()
                     bench.process.stdin = None
-                bench.wait_until(lambda: (state := bench.state()) is None or state[0]["torque_is_zero"])
+                bench.control.wait_until(lambda: (state := bench.states()) is None or state[0]["torque_is_zero"])
                 status, _, messages = bench.finish()
                 self.assertEqual(status, 1, messages)
                 self.assertIn("nothing was stored", messages)
@@ -180,8 +165,8 @@ class Devices(unittest.TestCase):
         for number, (x, y, z) in enumerate(places, 1):
             bench.expect(f"Place {number} of 6")
             # In their own frames; the second is turned half round about the vertical, 3 mm off.
-            bench.tell(f"hand 1 {x} {y} {0.125 + z} 2000 60")
-            bench.tell(f"hand 2 {-x + 0.003} {y} {0.125 - z} 2000 60")
+            bench.control.tell(f"hand 1 {x} {y} {0.125 + z} 2000 60")
+            bench.control.tell(f"hand 2 {-x + 0.003} {y} {0.125 - z} 2000 60")
             time.sleep(0.5)
             bench.enter()
         status, out, messages = bench.finish()

@@ -6,7 +6,6 @@ Usage: preflight_command_test.py EMULATED_FALCONS PALPATE
 import contextlib
 import datetime
 import json
-import os
 import pathlib
 import re
 import sqlite3
@@ -15,6 +14,8 @@ import sys
 import tempfile
 import time
 import unittest
+
+from emulator_control import EmulatorControl
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "live"))
 from terminal import Terminal  # noqa: E402
@@ -40,10 +41,8 @@ class Preflight(unittest.TestCase):
         self.folder = pathlib.Path(scratch.name)
         self.database = self.folder / "study.db"
         (self.folder / "protocol.json").write_text(json.dumps(PROTOCOL))
-        fifo = self.folder / "control"
-        os.mkfifo(fifo)
-        self.control = os.open(fifo, os.O_RDWR)
-        self.addCleanup(os.close, self.control)
+        self.control = EmulatorControl(self.folder, PATIENCE)
+        self.addCleanup(self.control.close)
 
     def calibration(self, days_ago, serial="EMU1"):
         made = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(days=days_ago)
@@ -54,44 +53,29 @@ class Preflight(unittest.TestCase):
         return path
 
     def run_session(self, *options, emulator=()):
-        terminal = Terminal([EMULATED, *emulator, "--control", self.folder / "control", PALPATE, "run",
+        terminal = Terminal([EMULATED, *emulator, "--control", self.control.fifo, PALPATE, "run",
                              self.folder / "protocol.json", "--db", self.database, "--participant", "P01",
                              "--device", "falcon", "--no-window", *options], patience=PATIENCE)
         self.addCleanup(terminal.__exit__)
         return terminal
 
-    def tell(self, line):
-        os.write(self.control, (line + "\n").encode())
-
     def hand(self, x, y, z):
         """The hand takes the grip there: m from the centre, in the Falcon's own frame."""
-        self.tell(f"hand 1 {x} {y} {0.125 + z} 400 10")
+        self.control.tell(f"hand 1 {x} {y} {0.125 + z} 400 10")
 
     def state(self):
-        path = self.folder / "state.json"
-        path.unlink(missing_ok=True)
-        self.tell(f"state {path}")
-        self.wait_until(path.exists)
-        return json.loads(path.read_text())[0]
-
-    @staticmethod
-    def wait_until(done):
-        end = time.monotonic() + PATIENCE
-        while not done():
-            if time.monotonic() > end:
-                raise AssertionError("nothing came of it")
-            time.sleep(0.01)
+        return self.control.states()[0]
 
     def press(self, bit):
         """Down and up, each for many ticks."""
         for bits in (bit, 0):
-            self.tell(f"buttons 1 {bits}")
+            self.control.tell(f"buttons 1 {bits}")
             time.sleep(0.3)
 
     def pushed_and_felt(self, terminal):
         """Asks for the push until it came whole: a starved machine's guard takes it off."""
         self.hand(0, 0, 0)
-        self.wait_until(lambda: abs(self.state()["position_m"][0]) < 0.001)
+        self.control.wait_until(lambda: abs(self.state()["position_m"][0]) < 0.001)
         while True:
             self.assertTrue(self.state()["torque_is_zero"], "no force before somebody says so")
             terminal.type(":go\n")
@@ -117,7 +101,7 @@ class Preflight(unittest.TestCase):
         terminal = self.run_session("--calibration", self.calibration(1), "--buttons", emulator=["--unhomed"])
         terminal.wait_for("home the device: pull the grip fully out")
         self.assertFalse(self.state()["torque_before_homing"])
-        self.tell("shake 1 0.035")
+        self.control.tell("shake 1 0.035")
         terminal.wait_for("limits: forces of up to ")
         limits = re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)", terminal.text)
         terminal.wait_for("(go: push)")
@@ -131,7 +115,7 @@ class Preflight(unittest.TestCase):
         terminal.wait_for("move the stylus 26 mm from the centre")
         for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
             self.hand(*place)
-            self.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
+            self.control.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
                 self.state()["position_m"], (place[0], place[1], 0.125 + place[2]))))
             time.sleep(0.1)  # some ticks
         terminal.wait_for("press button 1 of the device")
@@ -188,7 +172,7 @@ class Preflight(unittest.TestCase):
                 terminal.type(":clear\n:go\n")
                 continue
             self.hand(0.01, 0, 0)  # within the shape
-            self.wait_until(lambda: not self.state()["torque_is_zero"] or terminal.text.count("[fault, ") > 0)
+            self.control.wait_until(lambda: not self.state()["torque_is_zero"] or terminal.text.count("[fault, ") > 0)
             if not self.state()["torque_is_zero"]:
                 break
         ballast = disk / "ballast"

@@ -1,0 +1,38 @@
+"""Says to emulated Falcons what happens to them, and asks how they are."""
+
+import json
+import os
+import time
+
+
+class EmulatorControl:
+    """For `emulated_falcons --control FIFO`, which it makes in `folder`."""
+
+    def __init__(self, folder, patience):
+        self.folder = folder
+        self.patience = patience  # s; only a hang reaches it
+        self.fifo = folder / "control"
+        os.mkfifo(self.fifo)
+        # Held open for reading, too: nothing is lost before the other side has opened it.
+        self.descriptor = os.open(self.fifo, os.O_RDWR)
+
+    def close(self):
+        os.close(self.descriptor)
+
+    def tell(self, line):
+        os.write(self.descriptor, (line + "\n").encode())
+
+    def states(self, given_up=lambda: False):
+        """One for each Falcon; None where it is given up before they come."""
+        path = self.folder / "state.json"
+        path.unlink(missing_ok=True)
+        self.tell(f"state {path}")
+        self.wait_until(lambda: path.exists() or given_up())
+        return json.loads(path.read_text()) if path.exists() else None
+
+    def wait_until(self, done):
+        end = time.monotonic() + self.patience
+        while not done():
+            if time.monotonic() > end:
+                raise AssertionError("nothing came of it")
+            time.sleep(0.01)
