@@ -41,6 +41,7 @@ Measured step_from_face(const ConvexMesh& mesh, std::uint32_t from, const Neighb
 /// (to the next silhouette edge). False when the probe is within both.
 bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d,
                     Measured& next) {
+  if (at.within) return false;
   const Edge& edge = mesh.edges()[at.index];
   if (at.place < 0 || at.place > 1) {
     const bool to_left = (at.place < 0) == at.left_ahead;
@@ -96,6 +97,7 @@ WalkResult to_result(const Measured& at, bool capped) {
   result.normal = at.normal;
   result.depth = at.depth;
   result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
+  result.along_edge = at.along_edge;
   result.capped = capped;
   const MinkowskiFacet facet(at.edge ? Kind::edge : Kind::face, at.left_ahead, at.index);
   (at.depth >= 0 ? result.facet : result.separates) = facet;

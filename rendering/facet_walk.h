@@ -36,7 +36,8 @@ struct WalkResult {
   MinkowskiFacet separates;  ///< where it has left: the facet of M whose plane is between
   Vec3 normal;               ///< unit, outward, of `facet`; when left: of the plane that separates
   double depth = 0;          ///< m, along normal; negative when left
-  double place = 0;  ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  double place = 0;       ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
+  double along_edge = 0;  ///< edge only: where on it, as a fraction from v0
   /// No step helped, yet the ideal probe is off the facet: the probe has left the object, or edges
   /// nearly parallel to it hide the way. Look at all facets.
   bool unsure = false;

@@ -85,6 +85,7 @@ struct Measured {
   bool edge = false;        ///< else a face
   bool left_ahead = false;  ///< edge only
   bool slender = false;     ///< edge only: nearly parallel to the probe
+  bool within = false;      ///< edge only: the probe crosses it between its ends and the probe's
   std::uint32_t index = 0;
   Vec3 normal;
   double depth = 0;
@@ -151,8 +152,11 @@ inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_
   }
   m.depth = -glm::dot(m.normal, w);
   // w + depth n + place d = along_edge e, crossed with e and with d
-  m.place = glm::dot(glm::cross(w, e), c) * inverse;
-  m.along_edge = glm::dot(glm::cross(w, d), c) * inverse;
+  const double place = glm::dot(glm::cross(w, e), c), along_edge = glm::dot(glm::cross(w, d), c);
+  // Compared before they are divided: whether to step need not wait for a division.
+  m.within = (place >= 0) & (place <= c2) & (along_edge >= 0) & (along_edge <= c2);
+  m.place = place * inverse;
+  m.along_edge = along_edge * inverse;
   return true;
 }
 

@@ -24,10 +24,11 @@ inline double small_asin(double x) {
 struct Portion {
   double enter = 0, leave = 1;
 
-  /// Keeps what has height + t slope >= 0. Written as selections: on a fine mesh the signs change
-  /// from tick to tick, and a branch that is guessed wrong costs more than the whole clip.
-  void clip(double height, double slope) {
-    const double t = -height / slope;  // of a slope of 0 infinite or undefined, and not selected
+  /// Keeps what has height + (t - at) slope >= 0. Written as selections: on a fine mesh the signs
+  /// change from tick to tick, and a branch that is guessed wrong costs more than the whole clip.
+  void clip(double height, double slope, double at = 0) {
+    const double t =
+        at - height / slope;  // of a slope of 0 infinite or undefined, and not selected
     const double from = slope > 0 ? t : 0.0;
     const double to = slope < 0 ? t : 1.0;
     enter = from > enter ? from : enter;
@@ -60,6 +61,29 @@ inline Portion touching_portion(const ConvexMesh& mesh, std::uint32_t index, con
   return portion;
 }
 
+/// The same for a probe that crosses an edge of the face, a triangle: there it enters or leaves.
+/// The other two sides are measured from the crossing, which is known sooner than the ideal tip.
+/// \param on_left  whether the face is the one on the edge's left; \param rise  dot(its normal, d)
+inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, bool on_left,
+                                 double rise, const Vec3& d) {
+  const Edge& edge = mesh.edges()[hit.facet.index];
+  const Facet& facet = mesh.facets()[on_left ? edge.left : edge.right];
+  const Vec3 crossing = edge.from + hit.along_edge * (edge.to - edge.from);
+  const Vec3 along = d - rise * facet.normal;
+  const bool enters = on_left == hit.facet.left_ahead;
+  Portion portion{enters ? hit.place : 0, enters ? 1 : hit.place};
+  const auto& sides = facet.triangle;
+  const std::size_t here = sides[1].edge == hit.facet.index   ? 1
+                           : sides[2].edge == hit.facet.index ? 2
+                                                              : 0;
+  for (const std::size_t other : {here == 2 ? 0 : here + 1, here == 0 ? 2 : here - 1}) {
+    const Facet& across = mesh.facets()[sides[other].across];
+    portion.clip(across.offset - glm::dot(across.normal, crossing), -glm::dot(across.normal, along),
+                 hit.place);
+  }
+  return portion;
+}
+
 /// The whole segment.
 struct SegmentProbe {
   static constexpr bool kSegment = true;
@@ -82,24 +106,30 @@ struct SegmentProbe {
     const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
     c.contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
     c.place = hit.place;
-    // Of an edge's two faces the one that the probe is nearer to parallel with.
     std::uint32_t face = hit.facet.index;
+    double rise = 0;
+    bool on_left = false;
     if (edge) {
+      // Of its two faces the one that the probe is nearer to parallel with.
       const Edge& e = mesh.edges()[hit.facet.index];
-      const double left = std::abs(glm::dot(mesh.facets()[e.left].normal, d));
-      const double right = std::abs(glm::dot(mesh.facets()[e.right].normal, d));
-      face = left <= right ? e.left : e.right;
+      const double left = glm::dot(mesh.facets()[e.left].normal, d);
+      const double right = glm::dot(mesh.facets()[e.right].normal, d);
+      on_left = std::abs(left) <= std::abs(right);
+      face = on_left ? e.left : e.right;
+      rise = on_left ? left : right;
+    } else {
+      rise = glm::dot(mesh.facets()[face].normal, d);
     }
-    const double rise = glm::dot(mesh.facets()[face].normal, d);
     if (std::abs(rise) > kSinEpsilon * length || length == 0) return;
     // Equation (2): the contact point glides from one end of the touching portion to the other
     // while the probe turns through the face, instead of jumping. Depth and normal stay those of
     // the facet.
-    const auto [enter, leave] = touching_portion(mesh, face, tip + hit.depth * hit.normal, d);
+    const auto [enter, leave] = edge && mesh.facets()[face].side_count == 3
+                                    ? portion_from_edge(mesh, hit, on_left, rise, d)
+                                    : touching_portion(mesh, face, tip + hit.depth * hit.normal, d);
     if (!(enter <= leave)) return;
-    const double theta = small_asin(rise / length);
-    const double middle = 0.5 * (enter + leave);
-    c.place = std::clamp(middle + theta / kEpsilon * 0.5 * (enter - leave), enter, leave);
+    const double turned = small_asin(rise / length) * (0.5 / kEpsilon);  // -0.5 to 0.5
+    c.place = std::clamp((0.5 + turned) * enter + (0.5 - turned) * leave, enter, leave);
     c.contact.type = ContactType::segment_face;
   }
 };
