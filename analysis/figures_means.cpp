@@ -30,6 +30,15 @@ double place(std::size_t renderer, std::size_t renderers, double spread) {
          spread * (2 * static_cast<double>(renderer) / static_cast<double>(renderers - 1) - 1);
 }
 
+/// Of a renderer's mean, and of its participants' marks: apart from each other. Two renderers have
+/// the participants between them.
+double mean_place(std::size_t renderer, std::size_t renderers) {
+  return renderers <= 2 ? place(renderer, renderers, 0.27) : place(renderer, renderers, 0.3) + 0.03;
+}
+double people_place(std::size_t renderer, std::size_t renderers) {
+  return renderers <= 2 ? place(renderer, renderers, 0.15) : place(renderer, renderers, 0.3) - 0.03;
+}
+
 void add_people(Panel& panel, const Analysis& analysis, std::size_t renderers, std::size_t shape) {
   const auto& table = analysis.table;
   const std::size_t n = std::min(table.participants.size(), kShownPeople);
@@ -44,7 +53,7 @@ void add_people(Panel& panel, const Analysis& analysis, std::size_t renderers, s
     for (std::size_t r = 0; r < renderers; ++r) {
       const ParticipantCell& cell = analysis.description.people[r][shape][p];
       if (cell.n_used == 0) continue;
-      line.x.push_back(static_cast<double>(shape) + place(r, renderers, 0.15));
+      line.x.push_back(static_cast<double>(shape) + people_place(r, renderers));
       line.y.push_back(cell.mean);
       line.text += " " + short_name(table.renderers[r]) + " " + seconds_text(cell.mean);
       const Look look = look_of(analysis, table.renderers[r]);
@@ -99,6 +108,7 @@ FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std
       high = std::max(high, ends.high);
     }
   }
+  if (comparisons > 1) high += 0.12 * (high - std::max(low, -150.0));  // room for each p
   // A slowing-down has no end: it is cut.
   return linear_axis(std::max(low, -150.0), high, gain_title(analysis, "less time", "than with"));
 }
@@ -150,7 +160,7 @@ bool add_reductions(Panel& panel, const Comparison& comparison,
       Mark mark = text_mark(Role::soft, static_cast<double>(s) + 0.5, panel.y.high,
                             (*p < 0.001 ? "p " : "p = ") + p_text(*p), 12);
       mark.bold = *p < 0.05;
-      mark.dy = -9;
+      mark.dy = panel.title.empty() ? -9 : 14;  // below a title
       panel.marks.push_back(std::move(mark));
       text += "; adjusted p " + p_text(*p);
     }
@@ -178,7 +188,7 @@ Figure figure15_of(const Analysis& analysis) {
       const TimesCell& cell = analysis.description.times[r][s];
       if (!cell.mean_of_participant_means) continue;
       const Look look = look_of(analysis, table.renderers[r]);
-      const double x = static_cast<double>(s) + place(r, renderers, 0.27);
+      const double x = static_cast<double>(s) + mean_place(r, renderers);
       std::string text = printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]) +
                          ": mean " + seconds_text(*cell.mean_of_participant_means);
       if (const auto ends = interval_of(cell)) {

@@ -126,7 +126,10 @@ Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::
                        double slot) {
   const bool alone = analysis.comparisons.size() == 1;
   Panel panel;
-  if (!alone) panel.title = short_name(pair.renderer) + " − " + short_name(pair.reference);
+  constexpr std::size_t kLongest = 24;  // bytes: two names above a narrow panel
+  if (!alone) {
+    panel.title = printable(pair.renderer, kLongest) + " − " + printable(pair.reference, kLongest);
+  }
   panel.width = std::max(alone ? kWide : kHalfWide, slot * static_cast<double>(shapes));
   return panel;
 }

@@ -11,7 +11,7 @@
 namespace palpate {
 
 /// Width of a panel that stands alone, and of one of several comparisons, px.
-constexpr double kWide = 850, kHalfWide = 390;
+constexpr double kWide = 850, kHalfWide = 370;
 
 /// Everything that figures have in common: label, subtitle.
 Figure new_figure(const Analysis& analysis, std::string id, std::string title);

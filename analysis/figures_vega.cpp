@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 
 #include "analysis/figures_svg.h"
 #include "analysis/text.h"
@@ -325,17 +326,19 @@ Json panel_group(const Panel& panel, std::size_t number) {
   return group;
 }
 
-/// One row where there is room for it, or as many entries in a row as there is room for.
-Json legend_columns(const Figure& figure) {
-  constexpr double kShort = 800, kSymbol = 44, kLongest = 240;  // px
+/// Short names stand in one row, or two columns on a phone; others in as many columns as there is
+/// room for, cut where there is little. \return the columns and the width of a label
+std::pair<Json, Json> legend_columns(const Figure& figure) {
+  constexpr double kShortRow = 800, kShortEntry = 160, kSymbol = 44, kLongest = 240;  // px
   double all = 0, widest = 0;
   for (const LegendEntry& entry : figure.legend) {
     const double wide = kSymbol + std::min(kLongest, 7.2 * static_cast<double>(width(entry.label)));
     all += wide;
     widest = std::max(widest, wide);
   }
-  if (all <= kShort) return signal("room < 480 ? 2 : 0");
-  return signal("max(1, floor(room / " + fixed(widest, 0) + "))");
+  if (all <= kShortRow && widest <= kShortEntry) return {signal("room < 480 ? 2 : 0"), 240};
+  return {signal("max(1, floor(room / " + fixed(widest, 0) + "))"),
+          signal("room < 480 ? 160 : 240")};
 }
 
 void add_legend(Json& spec, const Figure& figure) {
@@ -356,13 +359,14 @@ void add_legend(Json& spec, const Figure& figure) {
   scale("legend_fill", signal("[" + fills + "]"));
   scale("legend_stroke", signal("[" + strokes + "]"));
   scale("legend_shape", std::move(shapes));
+  auto [columns, label_limit] = legend_columns(figure);
   spec["legends"] = Json::array({{{"orient", "top"},
                                   {"direction", "horizontal"},
                                   {"fill", "legend_fill"},
                                   {"stroke", "legend_stroke"},
                                   {"shape", "legend_shape"},
                                   {"symbolStrokeWidth", 2},
-                                  {"columns", legend_columns(figure)},
+                                  {"columns", std::move(columns)},
                                   {"columnPadding", 18},
                                   {"rowPadding", 6},
                                   {"offset", 22},
@@ -370,7 +374,7 @@ void add_legend(Json& spec, const Figure& figure) {
                                   {"labelFont", kVegaFont},
                                   {"labelFontSize", 13},
                                   {"labelColor", colour(Role::ink)},
-                                  {"labelLimit", 240},
+                                  {"labelLimit", std::move(label_limit)},
                                   {"aria", false}}});
 }
 
