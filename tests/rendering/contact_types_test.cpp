@@ -195,5 +195,78 @@ TEST(SegmentFace, ContactMovesWithoutJumpsThroughTheBlend) {
   }
 }
 
+/// Where the line of the ideal probe enters and leaves a triangle that it is held at, looked at in
+/// the triangle's plane; from the triangle's corners. Fractions of the probe.
+std::pair<double, double> over_triangle(const ConvexMesh& mesh, const Facet& facet,
+                                        const LineProbe& ideal) {
+  const Vec3 d = ideal.tail - ideal.tip;
+  double enter = 0, leave = 1;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + 3; ++i) {
+    const Edge& edge = mesh.edges()[mesh.sides()[i].edge];
+    const bool with_it = &mesh.facets()[edge.left] == &facet;
+    const Vec3 from = with_it ? edge.from : edge.to, to = with_it ? edge.to : edge.from;
+    // Area of the triangle that a point spans with the side: positive inside.
+    const auto area = [&](const Vec3& point) {
+      return glm::dot(glm::cross(to - from, point - from), facet.normal);
+    };
+    const double at_tip = area(ideal.tip), at_tail = area(ideal.tail);
+    const double crossing = at_tip / (at_tip - at_tail);
+    if (at_tail > at_tip) enter = std::max(enter, crossing);
+    if (at_tail < at_tip) leave = std::min(leave, crossing);
+  }
+  return {enter, leave};
+}
+
+/// The side slides over a sphere of 30 mm, now and then parallel to it within the blend's angle.
+testing::ProbePath along_sphere(Random& random, int ticks) {
+  const testing::Wave3 place(random), turn(random);
+  testing::ProbePath path;
+  for (int tick = 0; tick < ticks; ++tick) {
+    const Vec3 out = testing::safe_direction(place(1e-3 * tick));
+    const Vec3 level = testing::safe_direction(glm::cross(out, turn(1e-3 * tick)));
+    const Vec3 direction = glm::normalize(level + 0.03 * std::sin(0.02 * tick) * out);
+    path.push_back(testing::probe_at((tick == 0 ? 0.1 : 0.0285) * out, direction, 0.12,
+                                     0.5 + 0.6 * std::sin(0.003 * tick)));
+  }
+  return path;
+}
+
+// Along edges and faces of fine meshes, in every direction.
+TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
+  Random random(5);
+  int from_edges = 0, from_faces = 0;
+  for (const int subdivisions : {2, 3, 4, 5}) {
+    const auto mesh = std::make_shared<const ConvexMesh>(icosphere(0.03, subdivisions));
+    for (int path = 0; path < 8; ++path) {
+      Bench bench(ray_renderer(), mesh);
+      for (const LineProbe& probe : along_sphere(random, 2000)) {
+        const Rendering r = bench.tick(probe);
+        if (r.deepest.type != ContactType::segment_face) continue;
+        const MinkowskiFacet held = bench.state().parts[0].facet;
+        const bool edge = held.kind == MinkowskiFacet::Kind::edge;
+        const Vec3 d = r.ideal.tail - r.ideal.tip;
+        std::uint32_t face = held.index;
+        if (edge) {
+          const Edge& e = mesh->edges()[held.index];
+          const auto rise = [&](std::uint32_t f) {
+            return std::abs(glm::dot(mesh->facets()[f].normal, d));
+          };
+          if (std::abs(rise(e.left) - rise(e.right)) < 1e-12 * glm::length(d)) continue;
+          face = rise(e.left) < rise(e.right) ? e.left : e.right;
+        }
+        const Facet& facet = mesh->facets()[face];
+        const auto [enter, leave] = over_triangle(*mesh, facet, r.ideal);
+        const double theta = std::asin(glm::dot(facet.normal, d) / glm::length(d));
+        const double place = (enter + leave) / 2 + theta / kBlendAngle * (enter - leave) / 2;
+        ASSERT_NEAR(r.deepest.along, place * glm::length(d), 1e-9 * glm::length(d))
+            << (edge ? "edge " : "face ") << held.index << " of " << subdivisions;
+        ++(edge ? from_edges : from_faces);
+      }
+    }
+  }
+  EXPECT_GT(from_edges, 5000);
+  EXPECT_GT(from_faces, 100);
+}
+
 }  // namespace
 }  // namespace palpate
