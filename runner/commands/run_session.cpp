@@ -1,0 +1,107 @@
+#include "runner/commands/run_session.h"
+
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+
+#include "data/utc.h"
+#include "runner/build_info.h"
+#include "runner/commands/command.h"
+#include "runner/commands/run_preflight.h"
+
+namespace palpate {
+namespace {
+
+ClockStamp stamp_now(Clock& clock) {
+  const std::int64_t before = clock.now_ns();
+  const std::int64_t utc =
+      std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  return {utc, before + (clock.now_ns() - before) / 2};
+}
+
+RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, int session,
+                 const ClockStamp& stamp) {
+  RunInfo info;
+  info.session = session;
+  info.clock = stamp;
+  info.program_version = PALPATE_VERSION;
+  info.build = build_description();
+  info.device = settings.device;
+  info.device_calibration = device.calibration;
+  if (!device.serial.empty()) info.device_calibration += " (serial " + device.serial + ")";
+  info.response_device = settings.buttons ? "device buttons" : "keyboard";
+  info.response_latency = settings.response_latency;
+  info.consent_version = settings.consent;
+  if (!settings.consent.empty()) info.consent_utc_ns = stamp.utc_ns;
+  info.hand = settings.hand;
+  return info;
+}
+
+SessionPlan plan_of(const RunParts& at, const SessionProgress& before) {
+  SessionPlan plan(at.protocol, at.participant.number, at.session);
+  for (const TrialRecord& record : before.completed) plan.answered(record.correct);
+  return plan;
+}
+
+}  // namespace
+
+int choose_session(Store& store, const Participant& participant, const Protocol& protocol,
+                   const RunSettings& settings, Clock& clock) {
+  const int count = protocol.sessions.count;
+  if (settings.session && *settings.session > count)
+    throw UsageError("--session: the protocol has " + std::to_string(count));
+  int session = 1;
+  SessionProgress before;
+  for (; session <= count; ++session) {
+    const SessionProgress progress = store.progress(participant, session);
+    if (progress.last_end != RunEnd::done) break;
+    before = progress;
+  }
+  if (settings.session) {
+    if (*settings.session > session)
+      std::fprintf(stderr, "session %d is not finished; session %d was asked for\n", session,
+                   *settings.session);
+    return *settings.session;
+  }
+  if (session > count)
+    throw UsageError("participant " + participant.code + " has done every session");
+  const std::string day = format_utc(before.clock.utc_ns).substr(0, 10);
+  if (session > 1 && day == format_utc(stamp_now(clock).utc_ns).substr(0, 10))
+    std::fprintf(stderr, "session %d was today as well\n", session - 1);
+  return session;
+}
+
+LiveSession::Outcome run_session(const RunParts& at) {
+  const PreflightRecord preflight = go_through_preflight(at);
+  const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
+  const ClockStamp stamp = stamp_now(at.clock);
+  const Run run =
+      at.store.begin_run(at.participant, describe(at.settings, at.device, at.session, stamp));
+  LiveSession session(
+      {at.protocol, at.library, at.servo, at.guard, at.clock, at.store, at.display.participant(),
+       at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
+       [&at] { return at.signals.end_requested(); }, at.noise},
+      at.participant, run, stamp, plan);
+  for (const std::string& message : preflight.messages) session.say(message);  // it shows on
+  if (at.kind.pushes) {
+    std::string text = "pre-flight: ";
+    for (const std::string& finding : preflight.findings) text += finding + "; ";
+    at.store.add_note(
+        run, stamp.monotonic_ns,
+        text + (at.settings.without_calibration ? "WITHOUT calibration" : "calibration stored"));
+  }
+  if (!at.limited.empty()) {
+    at.store.add_note(run, stamp.monotonic_ns,
+                      to_json_text(at.limited, at.device, at.protocol.servo_rate));
+  }
+  if (at.protocol.masking_noise && at.noise == nullptr) {
+    session.say("WITHOUT the protocol's masking noise");
+    at.store.add_note(run, stamp.monotonic_ns, R"({"masking_noise":"left out"})");
+  }
+  const std::string& missing = at.servo.rights().missing;
+  if (!missing.empty()) session.say(missing);
+  return session.run();
+}
+
+}  // namespace palpate

@@ -1,0 +1,224 @@
+#include "runner/commands/run_station.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "protocols/parse.h"
+#include "runner/commands/command.h"
+#include "runner/commands/run_session.h"
+#include "runner/display/text_display.h"
+
+namespace palpate {
+namespace {
+
+/// Stands for a device whether it is in this process or in a guard's.
+struct OpenDevice {
+  std::unique_ptr<Device> device;
+  GuardedDevice* guard = nullptr;  ///< the same, where there is one
+};
+
+const DeviceKind& kind_of(const std::string& name) {
+  try {
+    return device_kind(name);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+}
+
+OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
+                       const Protocol& protocol) {
+  const DeviceOrder order{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
+                          settings.serials,    settings.firmware,      settings.calibration};
+  if (!kind.pushes) return {kind.open(order), nullptr};
+  GuardSettings guard;
+  guard.rate = protocol.servo_rate;
+  auto guarded = std::make_unique<GuardedDevice>([&] { return kind.open(order); }, guard);
+  GuardedDevice* const itself = guarded.get();
+  return {std::move(guarded), itself};
+}
+
+/// \throws UsageError where the device cannot or should not show the protocol.
+void check_fitness(const DeviceKind& kind, const Device& device, const RunSettings& settings,
+                   const Protocol& protocol, const StimulusLibrary& library) {
+  const DeviceCapabilities& able = device.capabilities();
+  std::string reasons;
+  for (const std::string& misfit : misfits(protocol, library, able)) {
+    reasons += "\n";
+    reasons += misfit;
+  }
+  if (!reasons.empty()) throw UsageError("this protocol cannot be run with this device:" + reasons);
+  if (settings.buttons && protocol.response.keys.size() > 8)
+    throw UsageError("--buttons: a device has 8 buttons at most; the protocol has " +
+                     std::to_string(protocol.response.keys.size()) + " answers");
+  const bool stale = able.calibration.rfind("stale", 0) == 0;
+  if (!kind.pushes || settings.without_calibration || (!able.calibration.empty() && !stale)) return;
+  throw UsageError("the calibration of '" + settings.device + "' is " +
+                   (stale ? able.calibration : "missing") +
+                   "\n'palpate devices --calibrate' makes one, --calibration names its file, "
+                   "--without-calibration runs the session without");
+}
+
+std::vector<std::unique_ptr<MarkerSink>> open_markers(const std::vector<std::string>& names) {
+  std::vector<std::unique_ptr<MarkerSink>> sinks;
+  for (const std::string& name : names) {
+    try {
+      sinks.push_back(open_marker_sink(name));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--markers: ") + error.what());
+    }
+  }
+  return sinks;
+}
+
+/// None where the protocol wants none, or the experimenter. \throws SoundError
+std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings, const Protocol& protocol) {
+  if (!protocol.masking_noise || settings.without_noise) return nullptr;
+  return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
+                                       settings.sound_device);
+}
+
+std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Protocol& protocol,
+                                          Clock& clock, Device& device,
+                                          const std::function<void()>& emergency) {
+  if (!settings.no_window) {
+    WindowSettings window;
+    window.title = protocol.name + ", " + settings.participant;
+    window.full_screen = settings.full_screen;
+    window.participant_monitor = settings.participant_monitor;
+    window.console_monitor = settings.console_monitor;
+    const auto& texts = protocol.texts;
+    window.texts = {texts.instructions, texts.practice, texts.break_text, texts.end};
+    for (const auto& [key, name] : protocol.response.keys) window.texts.push_back(name);
+    window.emergency = emergency;
+    window.mouse = dynamic_cast<MouseStylus*>(&device);
+    window.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+    window.clock = &clock;
+    try {
+      auto windows = make_windows(window);
+      const std::string missing = missing_letters(window.texts);
+      if (!missing.empty()) std::fprintf(stderr, "%s\n", missing.c_str());
+      return windows;
+    } catch (const DisplayError& error) {
+      if (window.mouse != nullptr) throw;
+      std::fprintf(stderr, "%s; a text display instead\n", error.what());
+    }
+  }
+  return make_text_display({&clock, emergency});
+}
+
+/// While it lives, signals turn these forces off.
+template <class Forces>
+class Watch {
+ public:
+  Watch(FaultSignals& signals, Forces* forces) : signals_(signals) { signals_.watch(forces); }
+  Watch(const Watch&) = delete;
+  Watch& operator=(const Watch&) = delete;
+  ~Watch() { signals_.watch(static_cast<Forces*>(nullptr)); }
+
+ private:
+  FaultSignals& signals_;
+};
+
+void report_servo(const RunParts& at, std::int64_t started_ns) {
+  const ServoHealth& health = at.servo.health();
+  const double elapsed = static_cast<double>(at.clock.now_ns() - started_ns) * 1e-9;
+  std::fprintf(stderr,
+               "servo: %llu ticks in %.3f s, %llu missed, longest period %.2f ms, lateness p99.9 "
+               "%.0f us\n",
+               static_cast<unsigned long long>(health.ticks()), elapsed,
+               static_cast<unsigned long long>(health.missed_ticks()),
+               static_cast<double>(health.longest_period_ns()) * 1e-6,
+               static_cast<double>(health.lateness().quantile(0.999)) * 1e-3);
+}
+
+/// \return the exit status
+int report(const RunParts& at, const LiveSession::Outcome& outcome) {
+  std::printf("%s, participant %s (number %d), session %d: %zu of %zu trials on record; %s\n",
+              at.protocol.name.c_str(), at.participant.code.c_str(), at.participant.number,
+              at.session, outcome.recorded, outcome.trials, to_string(outcome.end));
+  if (!outcome.reason.empty()) std::fprintf(stderr, "%s\n", outcome.reason.c_str());
+  if (outcome.end == RunEnd::paused || outcome.end == RunEnd::aborted)
+    std::fprintf(stderr, "the same command goes on from here\n");
+  if (at.markers.dropped() > 0)
+    std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
+                 static_cast<unsigned long long>(at.markers.dropped()));
+  return outcome.failed ? 1 : 0;
+}
+
+}  // namespace
+
+int run_station(const RunSettings& settings) {
+  Protocol protocol = parse_protocol(settings.protocol);
+  const DeviceKind& kind = kind_of(settings.device);
+  Markers markers(open_markers(settings.markers));
+  FaultSignals signals;
+  const OpenDevice open = open_device(kind, settings, protocol);
+  const Watch guard_watch(signals, open.guard);
+  const DeviceCapabilities& able = open.device->capabilities();
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, able);
+  const StimulusLibrary library(protocol);
+  check_fitness(kind, *open.device, settings, protocol, library);
+  const auto noise = open_noise(settings, protocol);  // after the guard's fork: it has a thread
+
+  Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  RealClock clock;
+  // What a simulated device gave is labelled simulated, whoever answered.
+  const Participant participant =
+      store.enrol({protocol.name, protocol.source_text, protocol.sha256}, settings.participant,
+                  settings.number, able.simulated);
+  const int session = choose_session(store, participant, protocol, settings, clock);
+  std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
+              participant.number, session, protocol.sessions.count);
+  std::fflush(stdout);
+  if (able.simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
+  if (settings.consent.empty())
+    std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
+
+  ServoSettings servo_settings;
+  servo_settings.rate = protocol.servo_rate;
+  servo_settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+  servo_settings.passivity_controller = protocol.passivity_controller;
+  ForceLimits limits = servo_settings.limits;
+  limits.max_force = std::min(limits.max_force, able.max_force);
+  const FeeblePush push(limits, able.sensed_freedom >= 5);
+  const std::int64_t started_ns = clock.now_ns();
+  ServoThread servo(*open.device, clock, servo_settings);
+  const Watch servo_watch(signals, &servo);
+  const auto emergency = [&servo, guard = open.guard] {
+    if (guard != nullptr) guard->emergency_zero();
+    servo.emergency_zero();
+  };
+  const auto display = open_display(settings, protocol, clock, *open.device, emergency);
+  const RunParts parts{settings,    protocol, library,     kind,     open.guard, able,
+                       servo,       clock,    store,       *display, markers,    signals,
+                       participant, session,  noise.get(), limited,  push};
+  LiveSession::Outcome outcome;
+  std::exception_ptr failure;
+  std::jthread session_thread([&] {
+    try {
+      outcome = run_session(parts);
+    } catch (const EndOfSession& end) {  // before there was anything to record
+      outcome = {end.end, end.what(), 0, 0, end.failed};
+    } catch (...) {
+      emergency();
+      failure = std::current_exception();
+    }
+    display->end();
+  });
+  display->run();
+  session_thread.join();
+  report_servo(parts, started_ns);
+  if (failure) std::rethrow_exception(failure);
+  return report(parts, outcome);
+}
+
+}  // namespace palpate
