@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: what store.cpp (opening, writing) and store_read.cpp share.
+// Internal to data/: what the store_*.cpp share.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>

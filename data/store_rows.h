@@ -1,0 +1,42 @@
+#pragma once
+// Internal to data/: which columns stand for a person, a run and a trial, each list beside the
+// function that takes its values from a row, in the same order.
+
+#include <cstdint>
+
+#include "data/record.h"
+#include "data/store_impl.h"
+
+namespace palpate {
+
+// Aliases: pr protocols, pa participants, s sessions, r runs, a attempts.
+inline constexpr const char* kPersonColumns = "pa.id, pa.code, pa.number, pa.simulated, pa.seed";
+Row& operator>>(Row& row, Participant& person);
+
+inline constexpr const char* kRunColumns =
+    "s.number, r.started_utc_ns, r.started_ns, r.program_version, r.build, r.device, "
+    "r.device_calibration, r.response_device, r.response_latency, s.observer_sha256, "
+    "r.consent_version, r.consent_utc_ns, r.hand";
+Row& operator>>(Row& row, RunInfo& info);
+
+inline constexpr const char* kPlanColumns =
+    "a.id, s.number, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
+    "a.orientation_w, a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
+/// kPlanColumns; the onset is when the attempt was begun, until read_outcome knows better.
+/// \returns the attempt's key
+std::int64_t read_plan(Row& row, TrialRecord& record);
+
+inline constexpr const char* kOutcomeColumns =
+    "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, a.onset_ns, "
+    "a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, a.start_tail_x, a.start_tail_y, "
+    "a.start_tail_z, a.ticks, a.missed_ticks, a.longest_period_ns, a.faults, a.started_inside, "
+    "a.max_force";
+void read_outcome(Row& row, TrialRecord& record);
+
+// CROSS JOIN keeps SQLite to this nesting; with the indexes each level comes in order, so nothing
+// is sorted in memory or in a temporary file, however many trials there are.
+inline constexpr const char* kFromProtocolDown =
+    " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
+    "ON s.participant_id = pa.id ";
+
+}  // namespace palpate
