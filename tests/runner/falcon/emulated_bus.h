@@ -2,9 +2,9 @@
 // Emulated Falcons on a USB bus that libusb takes for real: umockdev answers the kernel's usbfs
 // calls with the emulator. Works across fork and exec: children inherit the mocked bus.
 //
-// The program must run with umockdev's library preloaded: call rerun_preloaded() first in main.
-// The mocked node always polls as ready, so libusb spins while it waits: rates on the wall clock
-// mean nothing here.
+// The program must run with umockdev's library preloaded: call rerun_preloaded() of preload.h first
+// in main. The mocked node always polls as ready, so libusb spins while it waits: rates on the wall
+// clock mean nothing here.
 
 #include <cstdint>
 #include <functional>
@@ -14,10 +14,6 @@
 #include "tests/runner/falcon/emulator.h"
 
 namespace palpate::falcon::testing {
-
-/// Starts the program again with umockdev's library (and a sanitizer's before it) preloaded, unless
-/// it is. Returns whether it is.
-bool rerun_preloaded(char** argv);
 
 class EmulatedBus {
  public:

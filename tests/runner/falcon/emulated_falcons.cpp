@@ -32,6 +32,7 @@
 
 #include "runner/devices/falcon_parameters.h"
 #include "tests/runner/falcon/emulated_bus.h"
+#include "tests/runner/falcon/preload.h"
 
 namespace {
 

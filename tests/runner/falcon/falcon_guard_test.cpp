@@ -17,6 +17,7 @@
 #include "runner/guard.h"
 #include "runner/realtime.h"
 #include "tests/runner/falcon/emulated_bus.h"
+#include "tests/runner/falcon/preload.h"
 
 namespace palpate::falcon {
 namespace {

@@ -15,6 +15,7 @@
 #include "runner/devices/falcon_boot.h"
 #include "runner/devices/falcon_kinematics.h"
 #include "tests/runner/falcon/emulated_bus.h"
+#include "tests/runner/falcon/preload.h"
 
 namespace palpate::falcon {
 namespace {
