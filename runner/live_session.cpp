@@ -93,10 +93,7 @@ void LiveSession::between_trials() {
   const Session::State now = session_.state();
   if (now == Session::State::response) return;  // a trial that was shown is recorded
   attend();
-  const bool block_begins = now == Session::State::practice || now == Session::State::block;
-  const bool began = session_.plan().done() > 0 || now != Session::State::instruction;
-  if (stop_ == Stop::after_trial || (stop_ == Stop::after_block && block_begins && began))
-    throw EndOfSession(RunEnd::paused, "stopped by the experimenter, to be continued");
+  stop_if_due();
   const auto& longest = parts_.protocol.sessions.max_minutes;
   const double elapsed = static_cast<double>(parts_.clock.now_ns() - started_ns_) / kSecond_ns;
   if (longest && elapsed > *longest * 60)
@@ -108,6 +105,14 @@ void LiveSession::between_trials() {
   } while (now == Session::State::trial && !start_noise());
 }
 
+void LiveSession::stop_if_due() {
+  const Session::State now = session_.state();
+  const bool block_begins = now == Session::State::practice || now == Session::State::block;
+  const bool began = session_.plan().done() > 0 || now != Session::State::instruction;
+  if (stop_ == Stop::after_trial || (stop_ == Stop::after_block && block_begins && began))
+    throw EndOfSession(RunEnd::paused, "stopped by the experimenter, to be continued");
+}
+
 void LiveSession::wait_while_held() {
   if (!paused_) return;
   stop_noise();
@@ -115,6 +120,7 @@ void LiveSession::wait_while_held() {
   while (paused_) {
     state_.state = faulted_ ? "fault" : "paused";
     attend();
+    stop_if_due();
     parts_.clock.wait_until(parts_.clock.now_ns() + kNap_ns);
   }
   state_.state = word(session_.state());

@@ -66,6 +66,7 @@ class LiveSession final : public Attendant, private SessionEvents {
  private:
   Outcome go_through();
   void between_trials();
+  void stop_if_due();  ///< where no trial is under way. \throws EndOfSession
   void wait_while_held();
   void obey(const ConsoleCommand& command);
   void zero_force();

@@ -43,7 +43,7 @@ class Screen final : public ParticipantScreen {
   Clock& clock_;
 };
 
-/// Clears every fault and goes on.
+/// Clears every fault and goes on, if not told otherwise.
 class Console final : public ExperimenterConsole {
  public:
   explicit Console(Clock& clock) : clock_(clock) {}
@@ -55,7 +55,11 @@ class Console final : public ExperimenterConsole {
       if (repair) repair();
       out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
     }
-    if (last.state == "fault") {
+    if (last.state == "fault" && in_fault) {
+      out.push_back(*std::exchange(in_fault, std::nullopt));
+    } else if (last.state == "fault" && !clears && ++ignored > 1000) {
+      out.push_back({ConsoleCommand::Kind::quit, "not obeyed", clock_.now_ns()});
+    } else if (last.state == "fault" && clears) {
       ++faults;
       if (repair) repair();
       out.push_back({ConsoleCommand::Kind::clear_fault, "", clock_.now_ns()});
@@ -66,9 +70,12 @@ class Console final : public ExperimenterConsole {
   ConsoleState last;
   std::vector<ConsoleCommand> next;
   std::function<void()> repair;
-  bool goes_on = false;  ///< after a pause
+  bool goes_on = false;                    ///< after a pause
+  bool clears = true;                      ///< faults
+  std::optional<ConsoleCommand> in_fault;  ///< said once
   int pauses = 0;
   int faults = 0;
+  int ignored = 0;  ///< looks at the console after `in_fault`
 
  private:
   Clock& clock_;
@@ -215,6 +222,17 @@ TEST_F(LiveSessions, AClosedScreenASignalAndAQuitEndItResumably) {
   outcome = run(device);
   EXPECT_EQ(outcome.end, RunEnd::done);
   EXPECT_EQ(outcome.recorded, 2u);
+}
+
+TEST_F(LiveSessions, AStopIsObeyedWhileItIsHeld) {
+  FakeDevice device([](int tick) { return at(0.1, tick > 30); });  // lost for good
+  screen_.answers = false;
+  console_.clears = false;
+  console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::paused);
+  EXPECT_FALSE(outcome.failed);
+  EXPECT_EQ(outcome.recorded, 0u);
 }
 
 TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
