@@ -35,11 +35,10 @@ void KeyboardRespondent::wait_until(std::int64_t when_ns) {
   }
 }
 
-void KeyboardRespondent::wait_for_space() {
-  const std::int64_t shown_ns = clock_.now_ns();
+void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
   while (true) {
     for (const KeyPress& press : screen_.keys()) {
-      if (press.time_ns >= shown_ns && (press.key == "space" || press.key == "enter")) return;
+      if (press.time_ns >= since_ns && (press.key == "space" || press.key == "enter")) return;
     }
     attendant_.attend();
     clock_.wait_until(clock_.now_ns() + kPause_ns);
@@ -48,8 +47,10 @@ void KeyboardRespondent::wait_for_space() {
 
 void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
+  // Before it shows: whoever is quick answers before this thread goes on.
+  const std::int64_t before_ns = clock_.now_ns();
   screen_.show({Page::Kind::text, text, {}});
-  wait_for_space();
+  wait_for_space(before_ns);
 }
 
 void KeyboardRespondent::rest(const std::string& text, std::int64_t until_ns) {

@@ -44,7 +44,7 @@ class KeyboardRespondent final : public Respondent {
 
  private:
   void wait_until(std::int64_t when_ns);
-  void wait_for_space();
+  void wait_for_space(std::int64_t since_ns);
   void listen(const Sample& sample);
   std::optional<int> meaning(const std::string& key) const;
 
