@@ -98,6 +98,7 @@ TEST_F(TrialsCsv, AnyRenderersPointAndRayFirstThenAsTheyAppear) {
                                 "P1,1,1,5,tube,cone,cone,1,5\n");
   EXPECT_EQ(table.renderers, (std::vector<std::string>{"point", "ray", "tube", "a b"}));
   std::vector<int> renderers;
+  renderers.reserve(table.rows.size());
   for (const TrialRow& row : table.rows) renderers.push_back(row.renderer);
   EXPECT_EQ(renderers, (std::vector<int>{2, 1, 3, 0, 2}));
   EXPECT_EQ(table.rows[4].exposure, 2U) << "counted by renderer";
@@ -191,6 +192,7 @@ TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
   const auto found = faults(kHeader + "P1,0,1.5,x,,,cone,yes,-1\n" +
                             "P1,1,1,1,ray,cone,cone,1,2\n" + "\t,1,1,2,ray,cone,cone,1,nan\n");
   std::vector<std::string> places;
+  places.reserve(found.size());
   for (const Fault& fault : found) places.push_back(fault.place);
   EXPECT_EQ(places, (std::vector<std::string>{
                         "line 2, column session", "line 2, column block", "line 2, column trial",
