@@ -128,6 +128,20 @@ TEST(Text, StaysWithinAHundredColumns) {
   }
 }
 
+TEST(Reports, HoldManyRenderersOfAnyName) {
+  Study study;
+  study.renderers = {"</script><b>", "ray", std::string(200, 'r'), "a\"'&", "]]>", "x", "y", "z"};
+  const Analysis analysis = analysis_of_study(study);
+  ASSERT_EQ(analysis.comparisons.size(), 7U);
+  for (const auto& write : {page, drawings}) {
+    const std::string text = write(analysis);
+    EXPECT_FALSE(holds(text, "</script><b>"));
+    EXPECT_TRUE(holds(text, "&lt;/script&gt;&lt;b&gt;"));
+  }
+  std::istringstream lines(report_text(analysis));
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(width(line), 100U) << line;
+}
+
 TEST(Text, WarnsOfExclusions) {
   Study study;
   EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "Warning"));
@@ -140,7 +154,12 @@ TEST(Text, WarnsOfExclusions) {
 
 TEST(Reports, NeverPrintNanOrInfinity) {
   for (std::size_t people = 1; people <= 3; ++people) {
-    for (const auto& renderers : {std::vector<std::string>{"point"}, {"ray"}, {"point", "ray"}}) {
+    for (const auto& renderers : {std::vector<std::string>{"point"},
+                                  {"ray"},
+                                  {"point", "ray"},
+                                  {"tip"},
+                                  {"ray", "tip"},
+                                  {"point", "ray", "a", "b", "c", "d", "e"}}) {
       Study study;
       study.people.resize(people);
       study.renderers = renderers;
