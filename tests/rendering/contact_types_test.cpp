@@ -199,7 +199,6 @@ TEST(SegmentFace, ContactMovesWithoutJumpsThroughTheBlend) {
 /// the triangle's plane; from the triangle's corners. Fractions of the probe.
 std::pair<double, double> over_triangle(const ConvexMesh& mesh, const Facet& facet,
                                         const LineProbe& ideal) {
-  const Vec3 d = ideal.tail - ideal.tip;
   double enter = 0, leave = 1;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + 3; ++i) {
     const Edge& edge = mesh.edges()[mesh.sides()[i].edge];
