@@ -23,7 +23,8 @@ struct Compound {
     const ScenePart& part = tick.scene.parts()[index];
     PartState& memory = tick.state.parts[index];
     const LineProbe local = to_local<Probe>(part, tick.probe, shift);
-    const bool touching = track<Probe>(part, memory, before, local, hit, tick.faults);
+    const bool touching =
+        track<Probe>(part, memory, before, local, local.tail - local.tip, hit, tick.faults);
     memory.yielded = shift;
     memory.share = touching ? hit.depth * part.world_vector(hit.normal) : Vec3(0);
     return touching;

@@ -20,6 +20,7 @@ struct LoadedContact {
   double share = 0;        ///< m, of the ideal probe's translation along the normal (set by load)
   double force = 0;        ///< N, along the normal, on the hand; never negative (set by load)
   Vec3 lag;                ///< m, of the ideal probe along the surface (set by rub)
+  Vec3 shift;              ///< m, from the virtual to the ideal probe at the contact, with lag
   int object = -1;         ///< parts of one compound share it
   std::uint32_t part = 0;  ///< index of the part in the scene
 };
@@ -81,7 +82,10 @@ template <bool kSegment, bool kFriction, std::size_t kCount>
     if constexpr (kFriction) force += c.stiffness * c.lag;
     loads.force += force;
     if constexpr (kSegment) {
-      loads.torque += glm::cross(c.contact.point - probe.tip, force);
+      // The lever is place d + shift. The place is known last of all: what it scales comes before.
+      // Of a lone contact without lag the shift is along the force.
+      loads.torque += c.place * glm::cross(probe.tail - probe.tip, force);
+      if constexpr (kFriction || kCount != 1) loads.torque += glm::cross(c.shift, force);
       loads.device2 += c.place * force;
     }
   }

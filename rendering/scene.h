@@ -44,8 +44,11 @@ struct ScenePart {
 
   // Inlined: a tick turns three to five vectors, at ten instructions each.
   [[gnu::always_inline]] Vec3 local_point(const Vec3& world) const {
-    const Vec3 from = world - position;
-    return {glm::dot(to_world[0], from), glm::dot(to_world[1], from), glm::dot(to_world[2], from)};
+    return local_vector(world - position);
+  }
+  [[gnu::always_inline]] Vec3 local_vector(const Vec3& world) const {
+    return {glm::dot(to_world[0], world), glm::dot(to_world[1], world),
+            glm::dot(to_world[2], world)};
   }
   [[gnu::always_inline]] Vec3 world_vector(const Vec3& local) const {
     return to_world[0] * local.x + to_world[1] * local.y + to_world[2] * local.z;

@@ -173,10 +173,11 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
 
 /// Contact of one part, found or followed. True when in contact. Frame of the part's mesh.
 /// \param before  the probe at the last tick; null at the first tick of all
+/// \param d       tail - tip of the probe, m
 template <class Probe>
 [[gnu::always_inline]] inline bool track(const ScenePart& part, PartState& state,
                                          const LineProbe* before, const LineProbe& probe,
-                                         WalkResult& hit, std::uint32_t& faults) {
+                                         const Vec3& d, WalkResult& hit, std::uint32_t& faults) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
   const Vec3 &tip = probe.tip, &tail = probe.tail;
@@ -184,11 +185,11 @@ template <class Probe>
     // In free space the plane of an earlier tick mostly still stands between them.
     return !state.plane.separates(tip, tail) && meet<Probe>(part, state, before, probe, hit);
   }
-  hit = walk<Probe>(mesh, state.facet, tip, tail - tip);
+  hit = walk<Probe>(mesh, state.facet, tip, d);
   if (hit.capped) faults |= render_fault::kWalkCapped;
   if (hit.unsure) [[unlikely]] {
     separate(part, state, probe);
-    if (state.plane.valid || !make_sure<Probe>(part, tip, tail - tip, hit)) {
+    if (state.plane.valid || !make_sure<Probe>(part, tip, d, hit)) {
       state.facet = {};
       return false;
     }
@@ -220,15 +221,16 @@ struct Tick {
   [[gnu::always_inline]] bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
-    const LineProbe local =
-        kShares ? to_local<Probe>(part, probe, shift) : to_local<Probe>(part, probe);
+    const Vec3 tip = part.local_point(kShares ? probe.tip + shift : probe.tip);
+    const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
+    const LineProbe local{tip, tip + d};
     WalkResult hit;
-    const bool touching = track<Probe>(part, memory, last(), local, hit, faults);
+    const bool touching = track<Probe>(part, memory, last(), local, d, hit, faults);
     if constexpr (kShares) memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
     if (!touching) return false;
     c.part = index;
-    Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c);
+    Probe::describe(*part.mesh, hit, tip, d, length, c);
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth;
     if constexpr (kShares) c.contact.depth += glm::dot(c.contact.normal, shift);
@@ -241,16 +243,13 @@ struct Tick {
   /// \param shift  m, of the ideal probe, without its lag by friction. \return with it
   template <bool kFriction>
   Vec3 place(LoadedContact& c, Vec3 shift) const {
-    c.contact.point = probe.tip;
+    if constexpr (kFriction) shift += c.lag;
+    c.contact.point = probe.tip + shift;
     if constexpr (Probe::kSegment) {
       c.contact.along = c.place * length;
       c.contact.point += c.place * (probe.tail - probe.tip);
     }
-    c.contact.point += shift;
-    if constexpr (kFriction) {
-      shift += c.lag;
-      c.contact.point += c.lag;
-    }
+    c.shift = shift;
     return shift;
   }
 
