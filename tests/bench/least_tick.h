@@ -81,11 +81,13 @@ template <class Probe, bool kTorque = Probe::kSegment>
     return nothing(state.last, render_fault::kNonFinite);
   const ScenePart& part = scene.parts()[0];
   PartState& memory = state.parts[0];
-  const LineProbe local = in_frame<Probe>(part, probe);
+  const Vec3 tip = part.local_point(probe.tip);
+  const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
+  const LineProbe local{tip, tip + d};
   WalkResult hit;
   std::uint32_t faults = 0;
   const bool touching = memory.facet.kind != MinkowskiFacet::Kind::none
-                            ? tick::track<Probe>(part, memory, nullptr, local, hit, faults)
+                            ? tick::track<Probe>(part, memory, nullptr, local, d, hit, faults)
                             : met<Probe>(part, memory, state, local, hit);
   state.last = probe;
   state.has_last = true;
@@ -93,7 +95,7 @@ template <class Probe, bool kTorque = Probe::kSegment>
     return nothing(probe, faults | (memory.blocked ? render_fault::kStartedInside : 0));
   LoadedContact c;
   const double length = Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0;
-  Probe::describe(*part.mesh, hit, local.tip, local.tail - local.tip, length, c);
+  Probe::describe(*part.mesh, hit, tip, d, length, c);
   const Vec3 normal = part.world_vector(hit.normal);
   const Vec3 force = part.material.stiffness * hit.depth * normal;
   const Vec3 shift = hit.depth * normal;
@@ -102,7 +104,7 @@ template <class Probe, bool kTorque = Probe::kSegment>
     point += c.place * (probe.tail - probe.tip);
   }
   if constexpr (kTorque) {
-    torque = glm::cross(point - probe.tip, force);
+    torque = c.place * glm::cross(probe.tail - probe.tip, force);
     device2 = c.place * force;
   }
   const Vec3 all = force + torque;
