@@ -19,12 +19,13 @@ struct Compound {
   /// Contact of one part where its siblings let the ideal probe be. Sets the part's share to what
   /// it adds to their shift.
   /// \param before  the probe that part.yielded belongs to; null at the first tick of all
-  bool follow(std::uint32_t index, const Vec3& shift, const LineProbe* before, WalkResult& hit) {
+  bool follow(std::uint32_t index, const Vec3& shift, const LineProbe* before) {
     const ScenePart& part = tick.scene.parts()[index];
     PartState& memory = tick.state.parts[index];
     const LineProbe local = to_local<Probe>(part, tick.probe, shift);
-    const bool touching =
-        track<Probe>(part, memory, before, local, local.tail - local.tip, hit, tick.faults);
+    const WalkResult hit =
+        track<Probe>(part, memory, before, local.tip, local.tail - local.tip, tick.faults);
+    const bool touching = hit.facet.kind != MinkowskiFacet::Kind::none;
     memory.yielded = shift;
     memory.share = touching ? hit.depth * part.world_vector(hit.normal) : Vec3(0);
     return touching;
@@ -67,8 +68,7 @@ struct Compound {
       if (!holds(index)) continue;
       PartState& memory = tick.state.parts[index];
       const PartState kept = memory;
-      WalkResult hit;
-      if (!follow(index, shift_of_siblings(index), tick.last(), hit)) {
+      if (!follow(index, shift_of_siblings(index), tick.last())) {
         memory = kept;
         memory.share = Vec3(0);
       }
@@ -122,8 +122,7 @@ struct Compound {
       PartState& memory = tick.state.parts[index];
       if (holds(index)) continue;
       const Vec3 shift = shift_of_siblings(index);
-      WalkResult hit;
-      if (!before || memory.blocked) follow(index, shift, before, hit);
+      if (!before || memory.blocked) follow(index, shift, before);
       memory.yielded = shift;
     }
     return met;

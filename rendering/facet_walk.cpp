@@ -18,23 +18,24 @@ using namespace minkowski;
 
 constexpr double kFlat = 1e-14;  // sine of the angle between probe and face
 constexpr double kOff = 1e-11;   // of the size; an ideal probe that is farther off is on no facet
+constexpr std::size_t kFewSteps = 8;      // so few need not be compared with the size of the mesh
 constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is rounding, not a step
 
 /// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
 /// face.
 template <bool kSegment>
-Measured step_from_face(const ConvexMesh& mesh, std::uint32_t from, const Neighbour& side,
+Measured step_from_face(const ConvexMesh& mesh, const Measured& from, const Neighbour& side,
                         const Vec3& tip, const Vec3& d) {
+  Measured next = measure_face<kSegment>(mesh, side.across, tip, d);
   if constexpr (kSegment) {
-    const bool here = glm::dot(mesh.facets()[from].normal, d) >= 0;
-    const bool there = glm::dot(mesh.facets()[side.across].normal, d) >= 0;
+    const bool here = from.rise >= 0, there = next.rise >= 0;
     if (here != there) {
-      const bool left_ahead = (mesh.edges()[side.edge].left == from) == here;
-      Measured next;
-      if (measure_edge(mesh, side.edge, left_ahead, tip, d, next)) return next;
+      const bool left_ahead = (mesh.edges()[side.edge].left == from.index) == here;
+      Measured between;
+      if (measure_edge(mesh, side.edge, left_ahead, tip, d, between)) return between;
     }
   }
-  return measure_face<kSegment>(mesh, side.across, tip, d);
+  return next;
 }
 
 /// From an edge past an end of the probe (to the face ahead or behind) or past an end of the edge
@@ -92,35 +93,37 @@ template <bool kEdges>
   }
 }
 
-WalkResult to_result(const Measured& at, bool capped) {
-  WalkResult result;
-  result.normal = at.normal;
-  result.depth = at.depth;
-  result.place = at.place < 0 ? 0 : at.place > 1 ? 1 : at.place;
-  result.along_edge = at.along_edge;
-  result.capped = capped;
+[[gnu::always_inline]] inline WalkResult to_result(const Measured& at, bool capped) {
   const MinkowskiFacet facet(at.edge ? Kind::edge : Kind::face, at.left_ahead, at.index);
-  (at.depth >= 0 ? result.facet : result.separates) = facet;
-  return result;
+  const bool held = at.depth >= 0;
+  return {.facet = held ? facet : MinkowskiFacet(),
+          .separates = held ? MinkowskiFacet() : facet,
+          .normal = at.normal,
+          .depth = at.depth,
+          .place = at.place < 0   ? 0
+                   : at.place > 1 ? 1
+                                  : at.place,
+          .along_edge = at.along_edge,
+          .capped = capped};
 }
 
+// Rare. Takes a copy: what has been passed by reference stays in memory for the whole walk.
 template <bool kSegment>
-bool is_off(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+[[gnu::cold, gnu::noinline]] bool is_off(const ConvexMesh& mesh, Measured at, const Vec3& tip,
+                                         const Vec3& d) {
   return off_facet<kSegment>(mesh, at, tip, d) > kOff * (mesh.size() + glm::length(d));
 }
 
 /// Then which of its ends is the deeper one is rounding, and either may be past the face.
-bool lies_flat(const Vec3& normal, const Vec3& d) {
-  const double rise = glm::dot(normal, d);
-  return rise * rise <= kFlat * kFlat * glm::dot(d, d);
-}
+bool lies_flat(double rise, const Vec3& d) { return rise * rise <= kFlat * kFlat * glm::dot(d, d); }
 
 template <bool kSegment>
-WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
+[[gnu::always_inline]] inline WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start,
+                                              const Vec3& tip, const Vec3& d) {
   const double gain = kDepthRounding * mesh.size();
   Measured at = resume<kSegment>(mesh, start, tip, d);
   bool capped = false, helpless = false;
-  int steps = 0;
+  std::size_t steps = 0;
   while (at.depth >= 0) {
     Measured next;
     if (kSegment && at.edge) {
@@ -129,8 +132,8 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
       const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
       const Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
       if (side.edge == kNone) break;
-      if (kSegment && lies_flat(at.normal, d) && !is_off<kSegment>(mesh, at, tip, d)) break;
-      next = step_from_face<kSegment>(mesh, at.index, side, tip, d);
+      if (kSegment && lies_flat(at.rise, d) && !is_off<kSegment>(mesh, at, tip, d)) break;
+      next = step_from_face<kSegment>(mesh, at, side, tip, d);
     }
     if (!(next.depth < at.depth - gain)) {
       helpless = true;
@@ -138,7 +141,7 @@ WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
     }
     at = next;
     // A path straight across the object visits some sqrt(facets) of them.
-    if (++steps > static_cast<int>(mesh.facets().size() + mesh.edges().size())) {
+    if (++steps > kFewSteps && steps > mesh.facets().size() + mesh.edges().size()) {
       capped = true;
       break;
     }

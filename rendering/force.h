@@ -68,6 +68,22 @@ struct Loads {
   Vec3 device2;  ///< N, at the tail
 };
 
+/// What one contact gives; device 1 is left at zero.
+/// \tparam kAlone  without a second contact: then the shift is along the force, unless it lags
+template <bool kSegment, bool kFriction, bool kAlone>
+[[gnu::always_inline]] inline Loads loads_of(const LoadedContact& c, const LineProbe& probe) {
+  Loads loads;
+  loads.force = c.force * c.contact.normal;
+  if constexpr (kFriction) loads.force += c.stiffness * c.lag;
+  if constexpr (kSegment) {
+    // The lever is place d + shift. The place is known last of all: what it scales comes before.
+    loads.torque = c.place * glm::cross(probe.tail - probe.tip, loads.force);
+    if constexpr (kFriction || !kAlone) loads.torque += glm::cross(c.shift, loads.force);
+    loads.device2 = c.place * loads.force;
+  }
+  return loads;
+}
+
 /// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
 /// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, L1/L the contact's place on the probe. A probe of zero
 /// length is touched at place 0: device 1 takes all.
@@ -76,17 +92,14 @@ struct Loads {
 template <bool kSegment, bool kFriction, std::size_t kCount>
 [[gnu::always_inline]] inline Loads sum_loads(std::span<const LoadedContact, kCount> contacts,
                                               const LineProbe& probe) {
-  Loads loads;
-  for (const auto& c : contacts) {
-    Vec3 force = c.force * c.contact.normal;
-    if constexpr (kFriction) force += c.stiffness * c.lag;
-    loads.force += force;
-    if constexpr (kSegment) {
-      // The lever is place d + shift. The place is known last of all: what it scales comes before.
-      // Of a lone contact without lag the shift is along the force.
-      loads.torque += c.place * glm::cross(probe.tail - probe.tip, force);
-      if constexpr (kFriction || kCount != 1) loads.torque += glm::cross(c.shift, force);
-      loads.device2 += c.place * force;
+  constexpr bool kAlone = kCount == 1;
+  Loads loads = loads_of<kSegment, kFriction, kAlone>(contacts[0], probe);
+  if constexpr (!kAlone) {
+    for (const auto& c : contacts.subspan(1)) {
+      const Loads more = loads_of<kSegment, kFriction, kAlone>(c, probe);
+      loads.force += more.force;
+      loads.torque += more.torque;
+      loads.device2 += more.device2;
     }
   }
   loads.device1 = loads.force - loads.device2;

@@ -3,6 +3,7 @@
 // probe, and what adjoins them. Internal to the walks: facet_walk.cpp and approach.cpp.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -58,16 +59,17 @@ inline Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const 
   Neighbour beyond{kNone, kNone};
   double worst = 0;
   if (facet.side_count == 3) {
-    // Past a side is above the plane of the facet there, which a step reads next anyway.
-    for (const Neighbour& next : facet.triangle) {
-      const Facet& across = mesh.facets()[next.across];
-      const double height = glm::dot(across.normal, p) - across.offset;
-      if (height > worst) {
-        worst = height;
-        beyond = next;
-      }
+    // Past a side is above the plane of the facet there, which a step reads next anyway. One
+    // branch: whether it is past any can be guessed on a coarse mesh, past which one on none.
+    std::array<double, 3> height;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Facet& across = mesh.facets()[facet.triangle[i].across];
+      height[i] = glm::dot(across.normal, p) - across.offset;
     }
-    return beyond;
+    if (!((height[0] > 0) | (height[1] > 0) | (height[2] > 0))) return beyond;
+    const unsigned second = height[1] > height[0];
+    const unsigned third = height[2] > std::max(height[0], height[1]);
+    return facet.triangle[2 * third + (second & ~third)];
   }
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
     const Side& side = mesh.sides()[i];
@@ -89,6 +91,7 @@ struct Measured {
   std::uint32_t index = 0;
   Vec3 normal;
   double depth = 0;
+  double rise = 0;        ///< face only: dot(normal, d), m
   double place = 0;       ///< along the probe, 0 tip to 1 tail
   double along_edge = 0;  ///< edge only: 0 at v0 to 1 at v1
 };
@@ -101,9 +104,9 @@ Measured measure_face(const ConvexMesh& mesh, std::uint32_t index, const Vec3& t
   m.normal = facet.normal;
   const double height = facet.offset - glm::dot(facet.normal, tip);
   if constexpr (kSegment) {
-    const double slope = glm::dot(facet.normal, d);
-    m.place = slope >= 0 ? 0.0 : 1.0;
-    m.depth = slope >= 0 ? height : height - slope;
+    m.rise = glm::dot(facet.normal, d);
+    m.place = m.rise >= 0 ? 0.0 : 1.0;
+    m.depth = m.rise >= 0 ? height : height - m.rise;
   } else {
     m.depth = height;
   }

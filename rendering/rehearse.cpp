@@ -120,8 +120,7 @@ class Stages {
     });
     add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const Moment& m) {
       PartState state = m.before;
-      WalkResult hit;
-      return tick::meet<Probe>(part, state, &m.last, m.local, hit) ? hit.depth : 0;
+      return tick::meet<Probe>(part, state, &m.last, m.local).depth;
     });
     add("neighbourhood watch", touching_, &Recording::contact,
         [](const ScenePart& part, const Moment& m) {

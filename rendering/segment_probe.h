@@ -2,6 +2,7 @@
 // The whole segment as what touches: tip and side. Included by what instantiates ticks.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -63,6 +64,7 @@ inline Portion touching_portion(const ConvexMesh& mesh, std::uint32_t index, con
 
 /// The same for a probe that crosses an edge of the face, a triangle: there it enters or leaves.
 /// The other two sides are measured from the crossing, which is known sooner than the ideal tip.
+/// No branches: from edge to edge they could not be guessed.
 /// \param on_left  whether the face is the one on the edge's left; \param rise  dot(its normal, d)
 inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, bool on_left,
                                  double rise, const Vec3& d) {
@@ -70,13 +72,13 @@ inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, 
   const Facet& facet = mesh.facets()[on_left ? edge.left : edge.right];
   const Vec3 crossing = edge.from + hit.along_edge * (edge.to - edge.from);
   const Vec3 along = d - rise * facet.normal;
-  const bool enters = on_left == hit.facet.left_ahead;
-  Portion portion{enters ? hit.place : 0, enters ? 1 : hit.place};
+  const double enters = on_left == hit.facet.left_ahead ? 1 : 0;
+  Portion portion{std::min(hit.place, enters), std::max(hit.place, enters)};
   const auto& sides = facet.triangle;
-  const std::size_t here = sides[1].edge == hit.facet.index   ? 1
-                           : sides[2].edge == hit.facet.index ? 2
-                                                              : 0;
-  for (const std::size_t other : {here == 2 ? 0 : here + 1, here == 0 ? 2 : here - 1}) {
+  const unsigned here =
+      unsigned{sides[1].edge == hit.facet.index} + 2 * unsigned{sides[2].edge == hit.facet.index};
+  constexpr std::array<std::uint8_t, 4> kSides{1, 2, 0, 1};
+  for (const unsigned other : {kSides[here], kSides[here + 1]}) {
     const Facet& across = mesh.facets()[sides[other].across];
     portion.clip(across.offset - glm::dot(across.normal, crossing), -glm::dot(across.normal, along),
                  hit.place);
@@ -115,7 +117,8 @@ struct SegmentProbe {
       const double left = glm::dot(mesh.facets()[e.left].normal, d);
       const double right = glm::dot(mesh.facets()[e.right].normal, d);
       on_left = std::abs(left) <= std::abs(right);
-      face = on_left ? e.left : e.right;
+      // A selection; as ?: it would become a branch, which cannot be guessed.
+      face = e.right ^ ((e.left ^ e.right) & (0u - unsigned{on_left}));
       rise = on_left ? left : right;
     } else {
       rise = glm::dot(mesh.facets()[face].normal, d);

@@ -111,11 +111,12 @@ inline void separate(const ScenePart& part, PartState& state, const LineProbe& p
   state.watch = {MinkowskiFacet::Kind::face, false, mesh.edges()[edge].left};
 }
 
-/// A part that was not in contact at the last tick: whether it is now. Frame of the part's mesh.
+/// A part that was not in contact at the last tick: its contact now, of kind none where there is
+/// none. Frame of the part's mesh.
 /// \param before  the probe at the last tick; null at the first tick of all
 template <class Probe>
-bool meet(const ScenePart& part, PartState& state, const LineProbe* before, const LineProbe& probe,
-          WalkResult& hit) {
+WalkResult meet(const ScenePart& part, PartState& state, const LineProbe* before,
+                const LineProbe& probe) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
   const Vec3 d = probe.tail - probe.tip;
@@ -132,7 +133,7 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
         if (way.end == Approach::End::separated) {
           state.plane = way.plane;
           state.watch = way.facet;
-          return false;
+          return {};
         }
         decided = way.end == Approach::End::entered;
         if (decided) first = {way.facet, way.time};
@@ -145,63 +146,67 @@ bool meet(const ScenePart& part, PartState& state, const LineProbe* before, cons
       state.blocked =
           !state.plane.valid &&
           (state.blocked || nearest_facet<Probe>(mesh, probe.tip, d).depth > part.tolerance);
-      return false;
+      return {};
     }
-    if (state.plane.separates(from.tip, from.tail)) return false;  // so was the whole way between
+    if (state.plane.separates(from.tip, from.tail)) return {};  // so was the whole way between
     first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
   }
+  WalkResult hit;
   if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, probe.tip, d);
   if (hit.unsure) [[unlikely]] {
     if (decided) separate(part, state, probe);
-    if (state.plane.valid || !make_sure<Probe>(part, probe.tip, d, hit)) return false;
+    if (state.plane.valid || !make_sure<Probe>(part, probe.tip, d, hit)) return {};
   }
   if (hit.facet.kind == Kind::none) {
     if (decided) {  // in and out again
       leave(state, hit, probe);
-      return false;
+      return {};
     }
-    if (state.plane.valid) return false;
+    if (state.plane.valid) return {};
     // Neither a plane nor a crossing: rounding hid the way in, so the nearest way out it is. Rare.
     hit = nearest_facet<Probe>(mesh, probe.tip, d);
-    if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return false;
+    if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return {};
   }
   state.facet = hit.facet;
   state.plane.valid = false;
   fetch_ahead(mesh, state.facet);
-  return true;
+  return hit;
 }
 
-/// Contact of one part, found or followed. True when in contact. Frame of the part's mesh.
+/// Contact of one part, found or followed; of kind none where there is none. Frame of the part's
+/// mesh.
 /// \param before  the probe at the last tick; null at the first tick of all
 /// \param d       tail - tip of the probe, m
 template <class Probe>
-[[gnu::always_inline]] inline bool track(const ScenePart& part, PartState& state,
-                                         const LineProbe* before, const LineProbe& probe,
-                                         const Vec3& d, WalkResult& hit, std::uint32_t& faults) {
+[[gnu::always_inline]] inline WalkResult track(const ScenePart& part, PartState& state,
+                                               const LineProbe* before, const Vec3& tip,
+                                               const Vec3& d, std::uint32_t& faults) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
-  const Vec3 &tip = probe.tip, &tail = probe.tail;
-  if (state.facet.kind == Kind::none) {
-    // In free space the plane of an earlier tick mostly still stands between them.
-    return !state.plane.separates(tip, tail) && meet<Probe>(part, state, before, probe, hit);
-  }
-  hit = walk<Probe>(mesh, state.facet, tip, d);
+  const bool held = state.facet.kind != Kind::none;
+  // In free space the plane of an earlier tick mostly still stands between them. Written so that
+  // the result is built in place: a copy of it costs as much as a dot product or five.
+  WalkResult hit = held ? walk<Probe>(mesh, state.facet, tip, d)
+                   : state.plane.separates(tip, tip + d)
+                       ? WalkResult()
+                       : meet<Probe>(part, state, before, {tip, tip + d});
+  if (!held) return hit;
   if (hit.capped) faults |= render_fault::kWalkCapped;
   if (hit.unsure) [[unlikely]] {
-    separate(part, state, probe);
+    separate(part, state, {tip, tip + d});
     if (state.plane.valid || !make_sure<Probe>(part, tip, d, hit)) {
-      state.facet = {};
-      return false;
+      state.facet = hit.facet = {};
+      return hit;
     }
   }
   const bool moved = !(hit.facet == state.facet);
   state.facet = hit.facet;
-  if (hit.facet.kind != Kind::none) {
-    if (moved) fetch_ahead(mesh, state.facet);
-    return true;
+  if (hit.facet.kind == Kind::none) {
+    leave(state, hit, {tip, tip + d});
+  } else if (moved) {
+    fetch_ahead(mesh, state.facet);
   }
-  leave(state, hit, probe);
-  return false;
+  return hit;
 }
 
 /// One tick under way: the contacts found so far.
@@ -223,12 +228,10 @@ struct Tick {
     PartState& memory = state.parts[index];
     const Vec3 tip = part.local_point(kShares ? probe.tip + shift : probe.tip);
     const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
-    const LineProbe local{tip, tip + d};
-    WalkResult hit;
-    const bool touching = track<Probe>(part, memory, last(), local, d, hit, faults);
+    const WalkResult hit = track<Probe>(part, memory, last(), tip, d, faults);
     if constexpr (kShares) memory.yielded = shift;
     if (memory.blocked) faults |= render_fault::kStartedInside;
-    if (!touching) return false;
+    if (hit.facet.kind == MinkowskiFacet::Kind::none) return false;
     c.part = index;
     Probe::describe(*part.mesh, hit, tip, d, length, c);
     c.contact.normal = part.world_vector(hit.normal);

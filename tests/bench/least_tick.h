@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
+#include <optional>
 
 #include "rendering/renderer.h"
 #include "rendering/tick.h"
@@ -17,36 +18,33 @@ template <class Probe>
   return {tip, Probe::kSegment ? part.local_point(probe.tail) : tip};
 }
 
-/// A part without trees and map that was not in contact at the last tick: whether it is now.
-/// \return false in `known` where the approach alone cannot tell
+/// A part without trees and map that was not in contact at the last tick: its contact now.
+/// \return nothing where the approach alone cannot tell
 template <class Probe>
-bool approached(const ScenePart& part, PartState& memory, const LineProbe& from,
-                const LineProbe& to, WalkResult& hit, bool& known) {
+std::optional<WalkResult> approached(const ScenePart& part, PartState& memory,
+                                     const LineProbe& from, const LineProbe& to) {
   using Kind = MinkowskiFacet::Kind;
   const ConvexMesh& mesh = *part.mesh;
-  known = false;
-  if (memory.blocked || memory.watch.kind == Kind::none) return false;
+  if (memory.blocked || memory.watch.kind == Kind::none) return {};
   const WalkResult was = tick::walk<Probe>(mesh, memory.watch, from.tip, from.tail - from.tip);
-  if (was.facet.kind != Kind::none) return false;
+  if (was.facet.kind != Kind::none) return {};
   const Approach way = Probe::approach(mesh, was.separates, from, to);
   if (way.end == Approach::End::separated) {
-    known = true;
     memory.plane = way.plane;
     memory.watch = way.facet;
-    return false;
+    return WalkResult();
   }
-  if (way.end != Approach::End::entered) return false;
-  hit = tick::walk<Probe>(mesh, way.facet, to.tip, to.tail - to.tip);
-  if (hit.unsure) return false;
-  known = true;
+  if (way.end != Approach::End::entered) return {};
+  const WalkResult hit = tick::walk<Probe>(mesh, way.facet, to.tip, to.tail - to.tip);
+  if (hit.unsure) return {};
   if (hit.facet.kind == Kind::none) {
     tick::leave(memory, hit, to);
-    return false;
+    return hit;
   }
   memory.facet = hit.facet;
   memory.plane.valid = false;
   fetch_ahead(mesh, memory.facet);
-  return true;
+  return hit;
 }
 
 inline Rendering nothing(const LineProbe& ideal, std::uint32_t faults) {
@@ -56,18 +54,16 @@ inline Rendering nothing(const LineProbe& ideal, std::uint32_t faults) {
   return out;
 }
 
-/// Whether the part was come upon in this tick.
+/// The contact of a part that is come upon in this tick; of kind none where there is none.
 template <class Probe>
-bool met(const ScenePart& part, PartState& memory, const RenderState& state, const LineProbe& local,
-         WalkResult& hit) {
-  if (memory.plane.separates(local.tip, local.tail)) return false;
+WalkResult met(const ScenePart& part, PartState& memory, const RenderState& state,
+               const LineProbe& local) {
+  if (memory.plane.separates(local.tip, local.tail)) return {};
   if (state.has_last) {
-    bool known = false;
-    const bool touching =
-        approached<Probe>(part, memory, in_frame<Probe>(part, state.last), local, hit, known);
-    if (known) return touching;
+    const auto hit = approached<Probe>(part, memory, in_frame<Probe>(part, state.last), local);
+    if (hit) return *hit;
   }
-  return tick::meet<Probe>(part, memory, state.has_last ? &state.last : nullptr, local, hit);
+  return tick::meet<Probe>(part, memory, state.has_last ? &state.last : nullptr, local);
 }
 
 /// One convex part of few facets that is a plain spring, and nothing else in the world: no trees,
@@ -83,15 +79,13 @@ template <class Probe, bool kTorque = Probe::kSegment>
   PartState& memory = state.parts[0];
   const Vec3 tip = part.local_point(probe.tip);
   const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
-  const LineProbe local{tip, tip + d};
-  WalkResult hit;
   std::uint32_t faults = 0;
-  const bool touching = memory.facet.kind != MinkowskiFacet::Kind::none
-                            ? tick::track<Probe>(part, memory, nullptr, local, d, hit, faults)
-                            : met<Probe>(part, memory, state, local, hit);
+  const WalkResult hit = memory.facet.kind != MinkowskiFacet::Kind::none
+                             ? tick::track<Probe>(part, memory, nullptr, tip, d, faults)
+                             : met<Probe>(part, memory, state, {tip, tip + d});
   state.last = probe;
   state.has_last = true;
-  if (!touching)
+  if (hit.facet.kind == MinkowskiFacet::Kind::none)
     return nothing(probe, faults | (memory.blocked ? render_fault::kStartedInside : 0));
   LoadedContact c;
   const double length = Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0;
