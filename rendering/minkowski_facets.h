@@ -51,26 +51,30 @@ inline Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const 
   return outside(sides[low], p) ? beyond(low) : Neighbour{kNone, kNone};
 }
 
+/// The same for a triangle. Past a side is above the plane of the facet there, which a step reads
+/// next anyway. One branch: whether p is past any side can be guessed on a coarse mesh, past which
+/// one on none.
+inline Neighbour beyond_triangle(const ConvexMesh& mesh, const Facet& facet, const Vec3& p) {
+  std::array<double, 3> height;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Facet& across = mesh.facets()[facet.triangle[i].across];
+    height[i] = glm::dot(across.normal, p) - across.offset;
+  }
+  const double highest = std::max(height[0], height[1]);
+  if (!(std::max(highest, height[2]) > 0)) return {kNone, kNone};
+  const unsigned second = height[1] > height[0];
+  const unsigned third = height[2] > highest;
+  return facet.triangle[2 * third + (second & ~third)];
+}
+
 /// What p, a point of the facet's plane, lies over when it is past a side; edge kNone when it is
 /// inside.
 inline Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
   const Facet& facet = mesh.facets()[index];
+  if (facet.side_count == 3) return beyond_triangle(mesh, facet, p);
   if (facet.side_count > kScanSides) return beyond_many(mesh, index, p);
   Neighbour beyond{kNone, kNone};
   double worst = 0;
-  if (facet.side_count == 3) {
-    // Past a side is above the plane of the facet there, which a step reads next anyway. One
-    // branch: whether it is past any can be guessed on a coarse mesh, past which one on none.
-    std::array<double, 3> height;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Facet& across = mesh.facets()[facet.triangle[i].across];
-      height[i] = glm::dot(across.normal, p) - across.offset;
-    }
-    if (!((height[0] > 0) | (height[1] > 0) | (height[2] > 0))) return beyond;
-    const unsigned second = height[1] > height[0];
-    const unsigned third = height[2] > std::max(height[0], height[1]);
-    return facet.triangle[2 * third + (second & ~third)];
-  }
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
     const Side& side = mesh.sides()[i];
     const double distance = side.offset - glm::dot(side.inward, p);
