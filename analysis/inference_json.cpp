@@ -19,8 +19,7 @@ Json model_estimate(const ModelEstimate& value) {
   out["df_satterthwaite"] = number(value.df_satterthwaite);
   out["t"] = number(value.t);
   out["p"] = number(value.p);
-  out["ci95_low"] = value.ci95 ? Json(value.ci95->low) : Json(nullptr);
-  out["ci95_high"] = value.ci95 ? Json(value.ci95->high) : Json(nullptr);
+  put_interval(out, "ci95", value.ci95);
   return out;
 }
 
@@ -32,13 +31,14 @@ void put_test(Json& out, const TTest& test) {
   out["t"] = number(test.t);
   out["df"] = number(test.df);
   out["p"] = number(test.p);
-  std::optional<double> low, high;
-  if (test.log_ratio_ci95) {
-    low = test.log_ratio_ci95->low;
-    high = test.log_ratio_ci95->high;
-  }
-  out["ci95_low"] = number(low);
-  out["ci95_high"] = number(high);
+  put_interval(out, "ci95", test.log_ratio_ci95);
+}
+
+/// A log ratio and its interval as percent reductions.
+void put_reduction(Json& out, const std::string& name, const std::optional<double>& log_ratio,
+                   const std::optional<Interval>& ci95) {
+  out[name] = log_ratio ? number(percent_reduction(*log_ratio)) : Json(nullptr);
+  put_reduction_ci95(out, name, ci95);
 }
 
 Json order_group(const OrderGroup& group) {
@@ -54,15 +54,7 @@ Json order_effect(const OrderEffect& effect, const RendererPair& pair) {
   out[paper ? "point_first" : "reference_first"] = order_group(effect.reference_first);
   out[paper ? "ray_first" : "renderer_first"] = order_group(effect.renderer_first);
   out["balanced_log_ratio"] = number(effect.balanced_log_ratio);
-  std::optional<double> percent, low, high;
-  if (effect.balanced_log_ratio) percent = percent_reduction(*effect.balanced_log_ratio);
-  if (effect.balanced_ci95) {
-    low = percent_reduction(*effect.balanced_ci95).low;
-    high = percent_reduction(*effect.balanced_ci95).high;
-  }
-  out["balanced_percent_reduction"] = number(percent);
-  out["balanced_percent_reduction_ci95_low"] = number(low);
-  out["balanced_percent_reduction_ci95_high"] = number(high);
+  put_reduction(out, "balanced_percent_reduction", effect.balanced_log_ratio, effect.balanced_ci95);
   return out;
 }
 
@@ -88,15 +80,7 @@ Json contrasts_json(const std::vector<ModelEstimate>& contrasts, const TrialTabl
     const ModelEstimate& contrast = contrasts[s];
     Json& one = out[table.shapes[s]] = model_estimate(contrast);
     one["p_holm"] = number(contrast.p_holm);
-    std::optional<double> percent, low, high;
-    if (contrast.estimate) percent = percent_reduction(*contrast.estimate);
-    if (contrast.ci95) {
-      low = percent_reduction(*contrast.ci95).low;
-      high = percent_reduction(*contrast.ci95).high;
-    }
-    one["percent_reduction"] = number(percent);
-    one["percent_reduction_ci95_low"] = number(low);
-    one["percent_reduction_ci95_high"] = number(high);
+    put_reduction(one, "percent_reduction", contrast.estimate, contrast.ci95);
   }
   return out;
 }
@@ -139,6 +123,18 @@ Json variance_components(const MixedModel& model, const std::vector<std::string>
 
 Json number(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
+
+void put_interval(Json& out, const std::string& name, const std::optional<Interval>& interval) {
+  out[name + "_low"] = interval ? number(interval->low) : Json(nullptr);
+  out[name + "_high"] = interval ? number(interval->high) : Json(nullptr);
+}
+
+void put_reduction_ci95(Json& out, const std::string& name,
+                        const std::optional<Interval>& log_ratio) {
+  std::optional<Interval> reduction;
+  if (log_ratio) reduction = percent_reduction(*log_ratio);
+  put_interval(out, name + "_ci95", reduction);
 }
 
 void put_status(Json& out, const std::string& undefined) {

@@ -18,6 +18,14 @@ Json number(const std::optional<double>& value);
 /// "status", and where something is missing "reason".
 void put_status(Json& out, const std::string& undefined);
 
+/// NAME_low and NAME_high; null where there is no interval.
+void put_interval(Json& out, const std::string& name, const std::optional<Interval>& interval);
+
+/// The ends of an interval of log ratios as percent reductions, under NAME_ci95_low and
+/// NAME_ci95_high.
+void put_reduction_ci95(Json& out, const std::string& name,
+                        const std::optional<Interval>& log_ratio);
+
 Json anova_json(const RmAnova& anova, const TrialTable& table);
 Json mixed_model_json(const Analysis& analysis);
 /// By shape.

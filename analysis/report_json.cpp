@@ -9,18 +9,9 @@ namespace palpate {
 
 namespace {
 
-void put_interval(Json& out, const std::optional<Interval>& interval) {
-  std::optional<double> low, high, percent_low, percent_high;
-  if (interval) {
-    low = interval->low;
-    high = interval->high;
-    percent_low = percent_reduction(*interval).low;
-    percent_high = percent_reduction(*interval).high;
-  }
-  out["log_ratio_ci95_low"] = number(low);
-  out["log_ratio_ci95_high"] = number(high);
-  out["percent_reduction_ci95_low"] = number(percent_low);
-  out["percent_reduction_ci95_high"] = number(percent_high);
+void put_log_ratio_ci95(Json& out, const std::optional<Interval>& interval) {
+  put_interval(out, "log_ratio_ci95", interval);
+  put_reduction_ci95(out, "percent_reduction", interval);
 }
 
 Json counts(const Counts& counts) {
@@ -74,7 +65,7 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   t["t"] = number(shape.t_test.t);
   t["df"] = number(shape.t_test.df);
   t["p"] = number(shape.t_test.p);
-  put_interval(t, shape.t_test.log_ratio_ci95);
+  put_log_ratio_ci95(t, shape.t_test.log_ratio_ci95);
   t["p_holm"] = number(shape.t_test.p_holm);
 
   Json& effect = out["effect_size"];
@@ -96,7 +87,7 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   bootstrap["seed"] = shape.bootstrap.seed;
   bootstrap["bias_correction"] = number(shape.bootstrap.bias_correction);
   bootstrap["acceleration"] = number(shape.bootstrap.acceleration);
-  put_interval(bootstrap, shape.bootstrap.log_ratio_ci95);
+  put_log_ratio_ci95(bootstrap, shape.bootstrap.log_ratio_ci95);
 
   Json& dropped = out["dropped_participants"] = Json::array();
   for (const Dropped& one : shape.dropped) {
