@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <span>
@@ -206,11 +205,7 @@ int accuracy_command(const std::vector<std::string>& args) {
   take("most-triangles", settings.most_triangles, 20, 1310720);
   if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
   if (searching && !figure.empty()) throw UsageError("--figure: a search draws nothing");
-  for (const std::string& path : {json, figure, page}) {
-    if (!path.empty() && !values->count("force") && std::filesystem::exists(path)) {
-      throw UsageError(path + ": is there already; --force replaces it");
-    }
-  }
+  check_outputs(*values, {"json", "figure", "report"});
 
   AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));

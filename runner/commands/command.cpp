@@ -41,6 +41,22 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
   return values;
 }
 
+void check_outputs(const po::variables_map& values, std::initializer_list<const char*> options) {
+  for (const char* option : options) {
+    if (!values.count(option)) continue;
+    const auto& path = values[option].as<std::string>();
+    const std::string named = std::string("--") + option;
+    if (path.empty()) throw UsageError(named + ": expected a path");
+    std::error_code error;
+    if (std::filesystem::is_directory(path, error)) {
+      throw UsageError(named + " " + path + ": expected a file; this is a folder");
+    }
+    if (std::filesystem::is_regular_file(path, error) && !values.count("force")) {
+      throw UsageError(path + ": is there already; --force replaces it");
+    }
+  }
+}
+
 void write_whole(const std::string& path, const std::string& text) {
   std::error_code error;
   const bool in_place =

@@ -7,6 +7,7 @@
 // while running (status 1); main.cpp prints them.
 
 #include <boost/program_options.hpp>
+#include <initializer_list>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -34,6 +35,11 @@ struct CommandLine {
 /// Writes a file whole or leaves it untouched: beside the target first, then renamed. What is no
 /// regular file (a pipe, a terminal) is written to as it is. \throws std::runtime_error.
 void write_whole(const std::string& path, const std::string& text);
+
+/// Before the work begins: the files that these options name, where they were given, can be written
+/// and replace nothing unless --force was given. \throws UsageError.
+void check_outputs(const boost::program_options::variables_map& values,
+                   std::initializer_list<const char*> options);
 
 int accuracy_command(const std::vector<std::string>& args);
 int analyze_command(const std::vector<std::string>& args);

@@ -1,8 +1,4 @@
-#include <unistd.h>
-
 #include <atomic>
-#include <csignal>
-#include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -14,51 +10,33 @@
 #include "data/store.h"
 #include "protocols/protocol.h"
 #include "runner/commands/command.h"
+#include "runner/commands/progress_line.h"
+#include "runner/commands/stop_signal.h"
 
 namespace palpate {
 namespace {
 
 namespace po = boost::program_options;
 
-std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
-
-void ask_to_stop(int) { stop_asked = true; }
-
-/// Ctrl-C leaves nothing behind; a second one ends the program as usual.
-void watch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = ask_to_stop;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
-
-/// Shows how far the export is, on a terminal, and ends it when that was asked for.
+/// Shows how far the export is, and ends it when that was asked for.
 class Progress {
  public:
-  explicit Progress(Store& store) : on_terminal_(isatty(STDERR_FILENO) == 1) {
-    if (!on_terminal_) return;  // counting a million takes a while
+  Progress(Store& store, const std::atomic<bool>& stop_asked)
+      : stop_asked_(stop_asked), line_("export") {
+    if (!line_.on_terminal()) return;  // counting a million takes a while
     const StoreCounts counts = store.counts();
-    all_ = counts.completed + counts.cut_off;
+    all_ = static_cast<double>(counts.completed + counts.cut_off);
   }
-  ~Progress() {
-    if (on_terminal_) std::fprintf(stderr, "\r\x1b[K");
-  }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   void show(std::int64_t done) {
-    if (stop_asked) throw std::runtime_error("stopped; nothing was exported");
-    const std::int64_t percent = all_ > 0 ? 100 * done / all_ : 100;
-    if (!on_terminal_ || percent == shown_) return;
-    shown_ = percent;
-    std::fprintf(stderr, "\r%lld of %lld trials (%lld %%)\x1b[K", static_cast<long long>(done),
-                 static_cast<long long>(all_), static_cast<long long>(percent));
+    if (stop_asked_) throw std::runtime_error("stopped; nothing was exported");
+    line_.show(all_ > 0 ? static_cast<double>(done) / all_ : 1);
   }
 
  private:
-  std::int64_t all_ = 0, shown_ = -1;
-  bool on_terminal_;
+  const std::atomic<bool>& stop_asked_;
+  ProgressLine line_;
+  double all_ = 0;
 };
 
 /// Reads what is needed and no more: the text is a record, and exports must work years after the
@@ -124,10 +102,9 @@ int export_command(const std::vector<std::string>& args) {
     settings.force = (*values)["force"].as<bool>();
     settings.program_version = PALPATE_VERSION;
     settings.facts = facts_of;
-    watch_signals();
     ExportDone done;
     {
-      Progress progress(store);
+      Progress progress(store, watch_stop_signals());
       settings.progress = [&](std::int64_t trials) { progress.show(trials); };
       done = export_as(format, store, out, settings);
     }

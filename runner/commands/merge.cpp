@@ -1,36 +1,17 @@
 #include "data/merge.h"
 
-#include <unistd.h>
-
 #include <atomic>
-#include <csignal>
-#include <cstdio>
 #include <iostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "runner/commands/command.h"
+#include "runner/commands/progress_line.h"
+#include "runner/commands/stop_signal.h"
 
 namespace palpate {
-namespace {
-
 namespace po = boost::program_options;
-
-std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
-
-void ask_to_stop(int) { stop_asked = true; }
-
-/// Ctrl-C leaves nothing behind; a second one ends the program as usual.
-void watch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = ask_to_stop;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
-
-}  // namespace
 
 int merge_command(const std::vector<std::string>& args) {
   CommandLine line;
@@ -56,15 +37,14 @@ int merge_command(const std::vector<std::string>& args) {
   if (inputs.empty()) {
     throw UsageError("missing the databases to merge\nUsage: " + line.usage + "\nMore: add --help");
   }
-  watch_signals();
-  const bool on_terminal = isatty(STDERR_FILENO) == 1;
+  const std::atomic<bool>& stop_asked = watch_stop_signals();
   try {
+    ProgressLine progress("sessions");
     const Merged done = merge(out, inputs, [&](std::int64_t session, std::int64_t all) {
       if (stop_asked) throw std::runtime_error("stopped; nothing was written");
-      if (!on_terminal) return;
-      std::fprintf(stderr, session < all ? "\r%lld of %lld sessions\x1b[K" : "\r\x1b[K",
-                   static_cast<long long>(session), static_cast<long long>(all));
+      progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
     });
+    progress.clear();
     std::cout << out << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";

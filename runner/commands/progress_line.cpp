@@ -15,21 +15,30 @@ double now_ns() {
       .count();
 }
 
-ProgressLine::ProgressLine(std::string what)
-    : what_(std::move(what)), on_terminal_(isatty(STDERR_FILENO) == 1), start_(now_ns()) {}
+ProgressLine::ProgressLine(std::string what) : on_terminal_(isatty(STDERR_FILENO) == 1) {
+  begin(std::move(what));
+}
 
-ProgressLine::~ProgressLine() {
-  if (shown_ > 0) std::cerr << "\r\033[K";
+void ProgressLine::begin(std::string what) {
+  what_ = std::move(what);
+  start_ = now_ns();
+  first_ = -1;
 }
 
 void ProgressLine::show(double done) {
+  if (first_ < 0) first_ = done;
   const double now = now_ns();
   if (!on_terminal_ || now - shown_ < 2e8) return;
   shown_ = now;
-  const double gone = (now - start_) / 1e9;
+  const double gone = (now - start_) / 1e9, since = done - first_;
   std::cerr << "\r\033[K" << what_ << ": " << std::lround(100 * done) << " %";
-  if (done > 0.02) std::cerr << ", about " << std::lround(gone / done - gone) << " s left";
+  if (since > 0.02) std::cerr << ", about " << std::lround(gone / since * (1 - done)) << " s left";
   std::cerr << std::flush;
+}
+
+void ProgressLine::clear() {
+  if (shown_ > 0) std::cerr << "\r\033[K" << std::flush;
+  shown_ = 0;
 }
 
 }  // namespace palpate

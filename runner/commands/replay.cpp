@@ -257,11 +257,7 @@ int replay_command(const std::vector<std::string>& args) {
   add("force", "replace files that are there");
   const auto values = line.parse(args);
   if (!values) return 0;
-  for (const std::string& path : {out, json}) {
-    if (!path.empty() && !values->count("force") && std::filesystem::exists(path)) {
-      throw UsageError(path + ": is there already; --force replaces it");
-    }
-  }
+  check_outputs(*values, {"out", "json"});
   const TrialName name = trial_name(trial);
   Store store = Store::open(db, Store::Mode::read_only);
   const StoredTrial stored = find_trial(store, name, protocol_name);

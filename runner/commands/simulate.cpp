@@ -1,15 +1,13 @@
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <thread>
 
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/commands/progress_line.h"
+#include "runner/commands/stop_signal.h"
 #include "runner/device_check.h"
 #include "runner/devices/simulated.h"
 #include "runner/simulated_study.h"
@@ -19,48 +17,9 @@ namespace {
 
 namespace po = boost::program_options;
 
-std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
-
-void ask_to_stop(int) { stop_asked = true; }
-
-/// Ctrl-C ends the study cleanly; a second one ends the program as usual.
-void watch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = ask_to_stop;
-  action.sa_flags = SA_RESETHAND;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
-
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
-
-/// One line on a terminal, rewritten in place.
-class ProgressLine {
- public:
-  ProgressLine() : on_terminal_(isatty(STDERR_FILENO) == 1) {}
-  void show(const StudyProgress& p) {
-    if (!on_terminal_) return;
-    const double elapsed = seconds_since(start_);
-    const auto left = static_cast<double>(p.expected - p.recorded);
-    std::fprintf(stderr, "\r%lld of %lld trials, %.0f simulated s per s, ",
-                 static_cast<long long>(p.recorded), static_cast<long long>(p.expected),
-                 p.simulated_seconds / elapsed);
-    if (p.this_run > 0) {
-      std::fprintf(stderr, "%.0f s left \x1b[K", left * elapsed / static_cast<double>(p.this_run));
-    } else {
-      std::fprintf(stderr, "starting \x1b[K");
-    }
-  }
-  void clear() const {
-    if (on_terminal_) std::fprintf(stderr, "\r\x1b[K");
-  }
-
- private:
-  bool on_terminal_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 
@@ -111,13 +70,14 @@ int simulate_command(const std::vector<std::string>& args) {
   if (!limited.empty())
     plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
   Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
-  watch_signals();
   const auto start = std::chrono::steady_clock::now();
-  ProgressLine progress_line;
+  ProgressLine progress_line("trials");
   StudyProgress progress;
   try {
-    progress = simulate_study(protocol, store, settings, plan, stop_asked,
-                              [&](const StudyProgress& p) { progress_line.show(p); });
+    progress = simulate_study(
+        protocol, store, settings, plan, watch_stop_signals(), [&](const StudyProgress& p) {
+          progress_line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
+        });
   } catch (const std::invalid_argument& error) {
     progress_line.clear();
     throw UsageError(std::string("this protocol cannot be simulated:\n") + error.what());

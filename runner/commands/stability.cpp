@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <string>
@@ -201,11 +200,7 @@ int stability_command(const std::vector<std::string>& args) {
   if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
     throw UsageError("--jobs: expected 1 to 256, not " + std::to_string(jobs));
   }
-  for (const std::string& path : {json, page, figure}) {
-    if (!path.empty() && !values->count("force") && std::filesystem::exists(path)) {
-      throw UsageError(path + ": is there already; --force replaces it");
-    }
-  }
+  check_outputs(*values, {"json", "report", "figure"});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const StabilityReport report = study(values->count("full") > 0, jobs);
   if (!json.empty()) write_whole(json, stability_json(report).dump(1) + "\n");
