@@ -230,6 +230,7 @@ int devices_command(const std::vector<std::string>& args) {
     if (values->count("timing") > 0) {
       status = timing(*values, order, report);
     } else {
+      if (only != nullptr) only->check(order);
       report["devices"] = Json::array();
       for (const DeviceKind& kind : device_kinds()) {
         if (only != nullptr && only != &kind) continue;

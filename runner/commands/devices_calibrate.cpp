@@ -159,6 +159,11 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
             << "sideways                 " << force.sideways << " N for each N\n"
             << "weight of the arms       " << force.arm_weight << " N\n"
             << "force in every direction " << sure_force(force.counts_per_torque) << " N\n";
+  if (!believable(force)) {
+    std::cerr << "This scale is more than " << kBelievableFactor
+              << " times off the nominal one and will not be used: were the weights right, and did "
+                 "they hang freely?\n";
+  }
   return 0;
 }
 

@@ -38,6 +38,11 @@ OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
                        const Protocol& protocol) {
   const DeviceOrder order{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
                           settings.serials,    settings.firmware,      settings.calibration};
+  try {
+    kind.check(order);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--serial: ") + error.what());
+  }
   if (!kind.pushes) return {kind.open(order), nullptr};
   GuardSettings guard;
   guard.rate = protocol.servo_rate;
@@ -59,10 +64,11 @@ void check_fitness(const DeviceKind& kind, const Device& device, const RunSettin
   if (settings.buttons && protocol.response.keys.size() > 8)
     throw UsageError("--buttons: a device has 8 buttons at most; the protocol has " +
                      std::to_string(protocol.response.keys.size()) + " answers");
-  const bool stale = able.calibration.rfind("stale", 0) == 0;
-  if (!kind.pushes || settings.without_calibration || (!able.calibration.empty() && !stale)) return;
+  const bool unfit =
+      able.calibration.rfind("stale", 0) == 0 || able.calibration.rfind("implausible", 0) == 0;
+  if (!kind.pushes || settings.without_calibration || (!able.calibration.empty() && !unfit)) return;
   throw UsageError("the calibration of '" + settings.device + "' is " +
-                   (stale ? able.calibration : "missing") +
+                   (unfit ? able.calibration : "missing") +
                    "\n'palpate devices --calibrate' makes one, --calibration names its file, "
                    "--without-calibration runs the session without");
 }

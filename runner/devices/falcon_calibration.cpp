@@ -1,15 +1,20 @@
 #include "runner/devices/falcon_calibration.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string_view>
 
 #include "protocols/object_reader.h"
+#include "runner/devices/falcon_parameters.h"
 
 namespace palpate::falcon {
 namespace {
@@ -54,7 +59,8 @@ void read_date(ObjectReader& reader, std::string& out) {
 ForceCalibration read_force(ObjectReader& reader) {
   ForceCalibration force;
   reader.text("serial", force.serial);
-  reader.number("counts_per_newton_metre", force.counts_per_torque, {-1e6, -1e2, "1/(N m)"},
+  reader.number("counts_per_newton_metre", force.counts_per_torque,
+                {kCountsPerTorque * kMostSlope, kCountsPerTorque * kLeastSlope, "1/(N m)"},
                 Need::required);
   reader.number("residual_n", force.residual, {0, 1e3, "N"});
   reader.number("sideways_n_per_n", force.sideways, {0, 1e3, "N/N"});
@@ -116,7 +122,36 @@ CalibrationVerdict judge(const std::string& what, const std::string& made_utc, b
                         : ", " + age.str() + " days ago; run palpate devices --calibrate again")};
 }
 
+CalibrationVerdict implausible(const std::string& what, const ForceCalibration& force) {
+  const double times = force.counts_per_torque / kCountsPerTorque;
+  std::ostringstream text;
+  text << std::setprecision(2) << what << ": its motors would be "
+       << (times > 1 ? times : 1 / times) << " times " << (times > 1 ? "weaker" : "stronger")
+       << " than a Falcon's (up to " << kBelievableFactor
+       << " is believed), and is not used; run palpate devices --calibrate again";
+  return {CalibrationState::implausible, text.str()};
+}
+
+/// The scale of force is trusted with a hand: nobody else may have put it there.
+void require_own(const std::string& path) {
+  struct stat found {};
+  if (::stat(path.c_str(), &found) != 0) return;  // reading it will tell
+  const bool ours = found.st_uid == ::geteuid() || found.st_uid == 0;
+  if (ours && (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) return;
+  throw InputError(
+      {{path, "",
+        ours ? "expected a file that only its owner can write, since it decides what force reaches "
+               "a hand: chmod go-w"
+             : "expected a file of this user or of root, since it decides what force reaches a "
+               "hand: copy it once it has been checked"}});
+}
+
 }  // namespace
+
+bool believable(const ForceCalibration& force) {
+  const double times = force.counts_per_torque / kCountsPerTorque;
+  return times >= 1 / kBelievableFactor && times <= kBelievableFactor;
+}
 
 const ForceCalibration* Calibration::force_of(const std::string& serial) const {
   const auto found = std::find_if(forces.begin(), forces.end(),
@@ -160,6 +195,7 @@ Calibration parse_calibration(const std::string& text, const std::string& path) 
 
 Calibration read_calibration(const std::string& path) {
   if (!std::filesystem::exists(path)) return {};
+  require_own(path);
   return parse_calibration(read_text_file(path), path);
 }
 
@@ -192,11 +228,7 @@ std::string to_json(const Calibration& calibration) {
 }
 
 CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b) {
-  // Missing is worse than stale.
-  const auto rank = [](CalibrationState state) {
-    return state == CalibrationState::good ? 0 : state == CalibrationState::stale ? 1 : 2;
-  };
-  return {rank(a.state) >= rank(b.state) ? a.state : b.state,
+  return {std::max(a.state, b.state),
           a.text + (a.text.empty() || b.text.empty() ? "" : "\n") + b.text};
 }
 
@@ -205,9 +237,11 @@ CalibrationVerdict judge_forces(const Calibration& calibration,
   CalibrationVerdict verdict;
   for (const std::string& serial : serials) {
     const ForceCalibration* force = calibration.force_of(serial);
-    verdict =
-        both(verdict, judge("force of the Falcon " + serial,
-                            force != nullptr ? force->made_utc : "", force != nullptr, unix_ns));
+    const std::string what = "force of the Falcon " + serial;
+    verdict = both(verdict, force != nullptr && !believable(*force)
+                                ? implausible(what, *force)
+                                : judge(what, force != nullptr ? force->made_utc : "",
+                                        force != nullptr, unix_ns));
   }
   return verdict;
 }

@@ -43,12 +43,15 @@ struct Calibration {
   void put(const PairRegistration& pair);
 };
 
-/// A file that is not there holds nothing. \throws InputError with every fault.
+/// A file that is not there holds nothing. \throws InputError with every fault, also where another
+/// user could have written the file: its scale decides what force reaches a hand.
 Calibration read_calibration(const std::string& path);
 Calibration parse_calibration(const std::string& text, const std::string& path);
 std::string to_json(const Calibration& calibration);
 
-enum class CalibrationState : std::uint8_t { good, missing, stale };
+/// By rising gravity. An implausible scale is that of other motors than a Falcon's, or of weights
+/// that were mistyped: it is not used.
+enum class CalibrationState : std::uint8_t { good, stale, implausible, missing };
 struct CalibrationVerdict {
   CalibrationState state = CalibrationState::good;
   std::string text;  ///< one sentence for each device, with what would help
@@ -56,7 +59,11 @@ struct CalibrationVerdict {
 
 inline constexpr double kCalibrationDays = 90;  ///< gears wear and motors age; then weigh again
 
-/// Is every device calibrated, and not too long ago? \param unix_ns  now
+/// Is the scale within kBelievableFactor of the nominal one? Beyond it the limits, which count by
+/// the scale, would let a multiple of their force through, or a push could not be felt.
+bool believable(const ForceCalibration& force);
+
+/// Is every device calibrated, believably, and not too long ago? \param unix_ns  now
 CalibrationVerdict judge_forces(const Calibration& calibration,
                                 const std::vector<std::string>& serials, std::int64_t unix_ns);
 CalibrationVerdict judge_pair(const Calibration& calibration, const std::string& tip,

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "protocols/parse.h"
@@ -25,6 +26,22 @@ Calibration calibration_in(const std::string& path) {
   return path.empty() ? Calibration{} : read_calibration(path);
 }
 
+std::optional<FirmwareImage> image_in(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  return read_image(path);
+}
+
+/// \throws InputError: the calibration has none of these two.
+const PairRegistration& registration_in(const Calibration& calibration, const DeviceOrder& order) {
+  const std::string &tip = order.serials[0], &tail = order.serials[1];
+  if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
+  throw InputError(
+      {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
+        "expected a registration of the Falcons " + tip + " (tip) and " + tail +
+            " (tail), without which nobody knows how they stand to each other: run "
+            "palpate devices --calibrate --device falcon2"}});
+}
+
 CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::string>& serials) {
   CalibrationVerdict verdict = judge_forces(calibration, serials, unix_ns());
   if (serials.size() == 2) {
@@ -35,8 +52,17 @@ CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::
 
 /// As DeviceCapabilities tells it: nothing when it is missing.
 std::string in_short(const CalibrationVerdict& verdict) {
-  if (verdict.state == CalibrationState::missing) return "";
-  return (verdict.state == CalibrationState::stale ? "stale: " : "") + verdict.text;
+  switch (verdict.state) {
+    case CalibrationState::good:
+      return verdict.text;
+    case CalibrationState::stale:
+      return "stale: " + verdict.text;
+    case CalibrationState::implausible:
+      return "implausible: " + verdict.text;
+    case CalibrationState::missing:
+      return "";
+  }
+  return "";
 }
 
 void tell(const std::string& serial, const BootProgress& progress) {
@@ -67,24 +93,39 @@ CalibrationVerdict judge_calibration(const std::string& path,
 
 std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
                                     const Calibration& calibration) {
-  std::optional<FirmwareImage> image;  // a bad file is found before the device is touched
-  if (!firmware.empty()) image = read_image(firmware);
+  const auto image = image_in(firmware);  // a bad file is found before the device is touched
   auto line = open_usb(serial);
   const std::string name = line->serial();
   boot(*line, image ? &*image : nullptr, {},
        [&name](const BootProgress& progress) { tell(name, progress); });
   ArmSettings settings;
-  if (const ForceCalibration* force = calibration.force_of(name)) {
+  const ForceCalibration* force = calibration.force_of(name);
+  if (force != nullptr && believable(*force)) {
     settings.counts_per_torque = force->counts_per_torque;
   }
   return std::make_unique<FalconArm>(std::move(line), settings);
 }
 
-std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
+void check_falcon(const DeviceOrder& order) {
   if (order.serials.size() > 1) {
-    throw TransportError("falcon is one device; " + std::to_string(order.serials.size()) +
-                         " serial numbers are given");
+    throw std::invalid_argument("falcon is one device; " + std::to_string(order.serials.size()) +
+                                " serial numbers are given");
   }
+  calibration_in(order.calibration);
+  image_in(order.firmware);
+}
+
+void check_falcon2(const DeviceOrder& order) {
+  if (order.serials.size() != 2 || order.serials[0] == order.serials[1]) {
+    throw std::invalid_argument(
+        "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
+        "the one at its tail (palpate devices lists them)");
+  }
+  registration_in(calibration_in(order.calibration), order);
+  image_in(order.firmware);
+}
+
+std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
   const Calibration calibration = calibration_in(order.calibration);
   auto arm = open_arm(order.serials.empty() ? "" : order.serials[0], order.firmware, calibration);
   const std::string known = in_short(judge(calibration, {arm->serial()}));
@@ -92,27 +133,13 @@ std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
 }
 
 std::unique_ptr<Device> open_falcon2(const DeviceOrder& order) {
-  if (order.serials.size() != 2 || order.serials[0] == order.serials[1]) {
-    throw TransportError(
-        "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
-        "the one at its tail (palpate devices lists them)");
-  }
-  const std::string &tip_serial = order.serials[0], &tail_serial = order.serials[1];
   const Calibration calibration = calibration_in(order.calibration);
-  const PairRegistration* pair = calibration.pair_of(tip_serial, tail_serial);
-  if (pair == nullptr) {
-    throw InputError(
-        {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
-          "expected a registration of the Falcons " + tip_serial + " (tip) and " + tail_serial +
-              " (tail), without which nobody knows how they stand to each other: run "
-              "palpate devices --calibrate --device falcon2"}});
-  }
-  auto tip = open_arm(tip_serial, order.firmware, calibration);
-  auto tail = open_arm(tail_serial, order.firmware, calibration);
+  const PairRegistration& pair = registration_in(calibration, order);
+  auto tip = open_arm(order.serials[0], order.firmware, calibration);
+  auto tail = open_arm(order.serials[1], order.firmware, calibration);
   const std::string known = in_short(judge(calibration, order.serials));
-  return std::make_unique<Falcon2Device>(std::move(tip), std::move(tail),
-                                         StylusFromEnds(pair->tail_in_tip, pair->stylus_length),
-                                         known);
+  return std::make_unique<Falcon2Device>(
+      std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
 }
 
 }  // namespace palpate::falcon

@@ -17,8 +17,13 @@ namespace palpate::falcon {
 /// Falcons that are plugged in. \throws TransportError where this computer cannot look.
 std::vector<ConnectedDevice> connected_falcons();
 
+/// See DeviceKind::check.
+void check_falcon(const DeviceOrder& order);
+void check_falcon2(const DeviceOrder& order);
+
 /// One Falcon. Its capabilities' `calibration` is empty when none is stored, and begins with
-/// "stale" when it is too old. \throws TransportError, InputError.
+/// "stale" when it is too old, with "implausible" when its scale is not used. \throws
+/// TransportError, InputError.
 std::unique_ptr<Device> open_falcon(const DeviceOrder& order);
 
 /// Two, which order.serials names: first the one at the stylus' tip. Their registration must be in

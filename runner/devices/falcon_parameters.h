@@ -32,6 +32,10 @@ inline constexpr double kZeroAngle = 35 * 3.14159265358979323846 / 180;  ///< ra
 // uncertain by a factor of 2 to 4 until the device has been calibrated with weights.
 inline constexpr double kCountsPerTorque = -1e4;  ///< 1/(N m) at the thigh
 inline constexpr int kMaxCount = 4095;            ///< larger ones would wrap or saturate singly
+/// Nominal newtons that are told for each newton of a known weight. Weighing refuses what lies
+/// outside; a scale beyond the believable is never used for forces on a hand.
+inline constexpr double kLeastSlope = 0.05, kMostSlope = 20;
+inline constexpr double kBelievableFactor = 4;  ///< off the nominal scale, either way
 
 // Workspace, m.
 inline constexpr Vec3 kCentre{0, 0, 0.125};       ///< Falcon frame

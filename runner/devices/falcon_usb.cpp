@@ -135,6 +135,11 @@ class UsbTransport final : public Transport {
       throw TransportError("several Falcons are plugged in; name one by its serial number:" +
                            others);
     }
+    const auto named = [this](const Candidate& c) { return c.listing.serial == serial_; };
+    if (!serial_.empty() && std::count_if(candidates.begin(), candidates.end(), named) > 1) {
+      throw TransportError("several devices call themselves " + serial_ +
+                           "; unplug all but one:" + others);
+    }
     for (Candidate& candidate : candidates) {
       if (!serial_.empty() && candidate.listing.serial != serial_) continue;
       if (candidate.handle == nullptr) throw TransportError(candidate.listing.trouble);
@@ -207,7 +212,8 @@ class UsbTransport final : public Transport {
       self.gone_ = true;
       return;
     }
-    for (std::size_t i = kStatus; i < static_cast<std::size_t>(transfer->actual_length); ++i) {
+    const auto length = static_cast<std::size_t>(std::max(transfer->actual_length, 0));
+    for (std::size_t i = kStatus; i < std::min(length, slot.bytes.size()); ++i) {
       self.ring_.put(slot.bytes[i]);
     }
     if (!self.closing_) self.submit(slot, kInEndpoint, kPacket, &UsbTransport::received);

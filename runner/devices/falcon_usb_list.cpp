@@ -1,7 +1,9 @@
 #include <array>
+#include <span>
 #include <sstream>
 
 #include "runner/devices/falcon_parameters.h"
+#include "runner/devices/falcon_serial.h"
 #include "runner/devices/falcon_usb_context.h"
 
 namespace palpate::falcon {
@@ -120,7 +122,11 @@ UsbHandle open_listed(libusb_device* device, UsbListing& listing) {
                          ? 0
                          : libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber,
                                                               text.data(), text.size());
-  if (length > 0) listing.serial.assign(text.begin(), text.begin() + length);
+  if (length > 0) {
+    const std::string serial =
+        clean_serial(std::span(text).first(static_cast<std::size_t>(length)));
+    if (!serial.empty()) listing.serial = serial;
+  }
   return {handle, &libusb_close};
 }
 

@@ -22,7 +22,6 @@ constexpr double kRamp = 0.5;         // s, from nothing to full force
 // By the nominal scale; the true one may be 4 times stronger, and the loop must bear that.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
-constexpr double kLeastSlope = 0.05, kMostSlope = 20;              // nominal N for each N
 constexpr double kMostResidual = 0.1;                              // of the heaviest weight
 
 /// Holds the grip at a target.

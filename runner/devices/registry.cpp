@@ -10,6 +10,7 @@ namespace palpate {
 namespace {
 
 std::vector<ConnectedDevice> always_there() { return {{}}; }
+void nothing_to_check(const DeviceOrder& /*order*/) {}
 
 std::unique_ptr<Device> open_simulated(const DeviceOrder& order) {
   return std::make_unique<StrokingStylus>(order.stylus_length, order.stylus_grip, order.rate);
@@ -20,15 +21,15 @@ std::unique_ptr<Device> open_mouse(const DeviceOrder& order) {
 }
 
 constexpr DeviceKind kKinds[] = {
-    {"falcon", "a Novint Falcon: feels with one point, no direction", true,
+    {"falcon", "a Novint Falcon: feels with one point, no direction", true, falcon::check_falcon,
      falcon::connected_falcons, falcon::open_falcon},
-    {"falcon2", "two Novint Falcons that hold the ends of a stylus", true,
+    {"falcon2", "two Novint Falcons that hold the ends of a stylus", true, falcon::check_falcon2,
      falcon::connected_falcons, falcon::open_falcon2},
     {"mouse", "the pointer moves a stylus in the window; contact is seen, nothing is felt", false,
-     always_there, open_mouse},
+     nothing_to_check, always_there, open_mouse},
     {"simulated",
      "a stylus held by two simulated devices and a simulated hand that strokes to and fro", false,
-     always_there, open_simulated},
+     nothing_to_check, always_there, open_simulated},
 };
 
 }  // namespace

@@ -30,6 +30,9 @@ struct DeviceKind {
   const char* name;
   const char* description;
   bool pushes;  ///< moves a real hand: a guard process must own it
+  /// What can be wrong with an order before any device is touched, in this process: the guard's
+  /// words come back without their kind. \throws std::invalid_argument (usage), InputError (files)
+  void (*check)(const DeviceOrder& order);
   /// \throws std::runtime_error where this computer cannot look
   std::vector<ConnectedDevice> (*connected)();
   /// Ready to be read and written. \throws std::runtime_error saying why not and what would help

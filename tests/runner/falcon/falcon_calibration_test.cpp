@@ -1,10 +1,15 @@
 #include "runner/devices/falcon_calibration.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <fstream>
 #include <string>
+#include <utility>
 
 #include "protocols/parse.h"
+#include "runner/devices/falcon_serial.h"
 
 namespace palpate::falcon {
 namespace {
@@ -70,6 +75,65 @@ TEST(FalconCalibration, EveryFaultIsNamed) {
   EXPECT_NE(refusal(R"({"version": 2})").find("/version"), std::string::npos);
   EXPECT_NE(refusal(R"([])"), "");
   EXPECT_NE(refusal(R"({"version": 1)"), "");
+}
+
+TEST(FalconCalibration, OnlyWhatWeighingYieldsIsTaken) {
+  const auto scaled = [](double counts) {
+    Calibration calibration;
+    calibration.put({"A1", counts, 0.01, 0.02, 0.3, {0.1, 0.2}, "2026-10-31T11:00:00Z"});
+    return to_json(calibration);
+  };
+  for (const double counts : {-1e6, -2.0001e5, -499.9, -100.0, 0.0, 1e4}) {
+    EXPECT_NE(refusal(scaled(counts)).find("/forces/0/counts_per_newton_metre"), std::string::npos)
+        << counts;
+  }
+  for (const double counts : {-2e5, -1e4, -500.0}) EXPECT_EQ(refusal(scaled(counts)), "") << counts;
+}
+
+TEST(FalconCalibration, AScaleFarFromAFalconsIsImplausible) {
+  for (const auto& [counts, state] :
+       {std::pair(-1e4, CalibrationState::good), std::pair(-2500.0, CalibrationState::good),
+        std::pair(-4e4, CalibrationState::good), std::pair(-2400.0, CalibrationState::implausible),
+        std::pair(-4.1e4, CalibrationState::implausible)}) {
+    Calibration calibration;
+    calibration.put({"A1", counts, 0.01, 0.02, 0.3, {0.1, 0.2}, "2026-10-31T11:00:00Z"});
+    EXPECT_EQ(believable(calibration.forces[0]), state == CalibrationState::good) << counts;
+    const CalibrationVerdict verdict = judge_forces(calibration, {"A1"}, kNow);
+    EXPECT_EQ(verdict.state, state) << counts;
+    if (state == CalibrationState::good) continue;
+    EXPECT_NE(verdict.text.find(counts > -1e4 ? "4.2 times stronger" : "4.1 times weaker"),
+              std::string::npos)
+        << verdict.text;
+  }
+}
+
+TEST(FalconCalibration, AFileThatOthersCanWriteIsRefused) {
+  const std::string path = ::testing::TempDir() + "calibration-of-others.json";
+  std::ofstream(path) << to_json(example());
+  for (const mode_t mode : {0600, 0644, 0400}) {
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    EXPECT_EQ(read_calibration(path).forces.size(), 2U);
+  }
+  for (const mode_t mode : {0660, 0602, 0666}) {
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    EXPECT_THROW(read_calibration(path), InputError) << std::oct << mode;
+  }
+  ASSERT_EQ(::chmod(path.c_str(), 0600), 0);
+  if (::chown(path.c_str(), 65534, 65534) == 0 && ::geteuid() != 65534) {  // root alone may
+    EXPECT_THROW(read_calibration(path), InputError);
+  }
+  ::unlink(path.c_str());
+}
+
+TEST(FalconSerial, IsCleanedAndCut) {
+  const auto clean = [](const std::string& text) {
+    return clean_serial({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  };
+  EXPECT_EQ(clean("FALCON-01.a_b"), "FALCON-01.a_b");
+  EXPECT_EQ(clean("\x1b[2J/../x\ny"), "__2J_.._x_y");
+  EXPECT_EQ(clean(std::string(200, 'A')), std::string(kMaxSerial, 'A'));
+  EXPECT_EQ(clean("    "), "");
+  EXPECT_EQ(clean(std::string("\0A", 2)), "");
 }
 
 TEST(FalconCalibration, MissingAndStaleAreSaidSo) {

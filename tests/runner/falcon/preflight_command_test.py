@@ -44,11 +44,11 @@ class Preflight(unittest.TestCase):
         self.control = EmulatorControl(self.folder, PATIENCE)
         self.addCleanup(self.control.close)
 
-    def calibration(self, days_ago, serial="EMU1"):
+    def calibration(self, days_ago, serial="EMU1", counts=-10000):
         made = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(days=days_ago)
         path = self.folder / "lab.json"
         path.write_text(json.dumps({"version": 1, "forces": [
-            {"serial": serial, "counts_per_newton_metre": -10000, "weights_kg": [0.1],
+            {"serial": serial, "counts_per_newton_metre": counts, "weights_kg": [0.1],
              "made_utc": made.strftime("%Y-%m-%dT%H:%M:%SZ")}]}))
         return path
 
@@ -197,6 +197,16 @@ class Preflight(unittest.TestCase):
             self.assertIn("the calibration of 'falcon' " + word, terminal.text)
             self.assertIn("--without-calibration", terminal.text)
             self.assertFalse(self.database.exists())
+        terminal = self.run_session("--calibration", self.calibration(1, counts=-100000))
+        self.assertEqual(terminal.finish(), 2, terminal.text)
+        self.assertIn("is implausible: force of the Falcon EMU1", terminal.text)
+        self.assertIn("10 times weaker", terminal.text)
+        open_to_all = self.calibration(1)
+        open_to_all.chmod(0o666)
+        terminal = self.run_session("--calibration", open_to_all)
+        self.assertEqual(terminal.finish(), 2, terminal.text)
+        self.assertIn("chmod go-w", terminal.text)
+        open_to_all.unlink()
         stale = self.calibration(91)
         terminal = self.run_session("--calibration", stale)
         self.assertEqual(terminal.finish(), 2, terminal.text)

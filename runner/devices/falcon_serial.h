@@ -1,0 +1,30 @@
+#pragma once
+// What a device calls itself. It is printed, stored and compared with files, and whoever makes a
+// device chooses it.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace palpate::falcon {
+
+inline constexpr std::size_t kMaxSerial = 32;  ///< characters
+
+/// Letters, digits, '.', '_' and '-' stay, anything else becomes '_'; the rest is cut off.
+/// \return "" for nothing but blanks and zeros
+inline std::string clean_serial(std::span<const std::uint8_t> text) {
+  std::string clean;
+  bool any = false;
+  for (const std::uint8_t byte : text.first(std::min(text.size(), kMaxSerial))) {
+    if (byte == 0) break;
+    const bool plain = (byte >= '0' && byte <= '9') || (byte >= 'A' && byte <= 'Z') ||
+                       (byte >= 'a' && byte <= 'z') || byte == '.' || byte == '_' || byte == '-';
+    any = any || byte != ' ';
+    clean += plain ? static_cast<char>(byte) : '_';
+  }
+  return any ? clean : "";
+}
+
+}  // namespace palpate::falcon
