@@ -21,8 +21,12 @@ const char* advice(DeviceTrouble trouble) noexcept {
     case DeviceTrouble::guarded:
       return "the guard process has sent zero force, since the servo was silent for too long or "
              "asked for it";
+    case DeviceTrouble::guard_late:
+      return "the guard process was late: the machine may be busy";
     case DeviceTrouble::guard_lost:
-      return "the guard process has ended: start the program again";
+      return "the guard process has ended or hangs: start the program again";
+    case DeviceTrouble::reopening:
+      return "the device is being opened again";
   }
   return "";
 }

@@ -36,7 +36,9 @@ enum class DeviceTrouble : std::uint8_t {
   implausible,  ///< positions that no hand could have moved to
   apart,        ///< the ends of the stylus are not its length apart
   guarded,     ///< the guard process sent zero force: the servo had been silent, or it was asked to
-  guard_lost,  ///< the guard process has ended
+  guard_late,  ///< the guard process has given no readings for a while; it may again
+  guard_lost,  ///< the guard process has ended, or has been silent for so long that it counts so
+  reopening,   ///< the guard process is opening the device again
 };
 /// In words, with what the experimenter can do; empty for none.
 const char* advice(DeviceTrouble trouble) noexcept;
@@ -55,6 +57,10 @@ class Device {
   virtual DeviceReading read() noexcept = 0;
   /// Forces on the hand, N: device 1 at the tip, device 2 at the tail (eq. 1).
   virtual void write(const Vec3& device1, const Vec3& device2) noexcept = 0;
+  /// Gets a device back that was unplugged or fell silent; nothing to do for one that is well.
+  /// Takes as long as it takes, and no force is shown meanwhile: not for the servo's thread.
+  /// Between reads and writes. \throws std::runtime_error saying what is in the way
+  virtual void reopen() {}
 };
 
 /// Where the time of a session comes from: the machine, or simulation.

@@ -20,6 +20,10 @@ constexpr std::int64_t kSpin_ns = 20'000;          // after a reading its comman
 
 std::int64_t to_ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
+void keep(GuardChannel& channel, const char* message) {
+  std::strncpy(channel.message.data(), message, channel.message.size() - 1);
+}
+
 class Guard {
  public:
   Guard(GuardChannel& channel, Device& device, const GuardSettings& settings, int runner)
@@ -36,6 +40,7 @@ class Guard {
     while (!channel_.quit.load()) {
       wait();
       if (channel_.zeros.load() != zeros_) zero_on_demand();
+      if (channel_.reopens.load() != channel_.reopened.load()) reopen();
       const std::uint32_t calls = channel_.calls.load(std::memory_order_acquire);
       const std::int64_t now = clock_.now_ns();
       if (calls != calls_) {
@@ -75,6 +80,21 @@ class Guard {
     zeros_ = channel_.zeros.load();
     cut_off();
     device_.write(Vec3(0), Vec3(0));
+  }
+
+  void reopen() noexcept {
+    const std::uint32_t asked = channel_.reopens.load();
+    cut_off();
+    device_.write(Vec3(0), Vec3(0));
+    channel_.message[0] = '\0';
+    try {
+      device_.reopen();
+    } catch (const std::exception& error) {
+      keep(channel_, error.what());
+    } catch (...) {
+      keep(channel_, "the device could not be opened again");
+    }
+    channel_.reopened.store(asked, std::memory_order_release);
   }
 
   void answer() noexcept {
@@ -132,7 +152,7 @@ void stand_alone() {
 }
 
 void fail(GuardChannel& channel, const char* message) {
-  std::strncpy(channel.message.data(), message, channel.message.size() - 1);
+  keep(channel, message);
   channel.state.store(GuardState::failed);
 }
 

@@ -17,6 +17,7 @@ struct GuardSettings {
   double silence = 0.005;
   double linger = 1;      ///< s; zero force is sent for so long after the runner has died
   double patience = 120;  ///< s; for the device to be opened: firmware may have to be uploaded
+  double given_up = 30;   ///< s; a guard that has been silent for so long counts as ended
   int priority = 85;      ///< of SCHED_FIFO, where allowed; above the servo's. 0: do not ask
 };
 
@@ -29,7 +30,9 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
                int runner) noexcept;
 
 /// The runner's side. A reading that does not come within half a period is the last one again
-/// (DeviceTrouble::late); a guard that has ended is a lost device.
+/// (DeviceTrouble::late). So many in a row are a lost device (guard_late) until readings come
+/// again; a guard that has ended, or has hung for longer than any busy machine keeps it, is one for
+/// good.
 class GuardedDevice final : public Device {
  public:
   /// Forks: call it before there are other threads. `factory` runs in the guard. Returns once the
@@ -47,6 +50,14 @@ class GuardedDevice final : public Device {
 
   /// Zero force by the guard itself, whatever the servo does. From any thread or signal handler.
   void emergency_zero() noexcept;
+
+  /// Has the guard open the device again (Device::reopen). Returns at once; readings are lost until
+  /// it is done. From one thread, which may be another than that of read and write.
+  void ask_to_reopen() noexcept;
+  bool reopening() const noexcept;
+  /// What was in the way the last time; empty: nothing. By the thread that asked, once it is done.
+  std::string reopen_trouble() const;
+
   int guard_process() const { return guard_; }
 
  private:
@@ -55,6 +66,7 @@ class GuardedDevice final : public Device {
   };
 
   bool ended() noexcept;
+  DeviceTrouble without_answer() noexcept;
   void end() noexcept;
 
   std::unique_ptr<GuardChannel, Unmap> channel_;
@@ -64,7 +76,8 @@ class GuardedDevice final : public Device {
   DeviceCapabilities capabilities_;
   DeviceReading last_;
   std::uint32_t trips_seen_ = 0;
-  int unanswered_ = 0;  ///< reads in a row
+  int unanswered_ = 0;            ///< reads in a row
+  std::int64_t answered_ns_ = 0;  ///< when one was answered last
 };
 
 }  // namespace palpate

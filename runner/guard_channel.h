@@ -47,16 +47,18 @@ enum class GuardState : std::uint32_t { opening, ready, failed, ended };
 /// Only lock-free atomics and plain memory: it has no address of its own in either process.
 struct GuardChannel {
   // Written by the runner.
-  std::atomic<std::uint32_t> calls{0};  ///< futex: moves with each of the three below
+  std::atomic<std::uint32_t> calls{0};  ///< futex: moves with each of the four below
   std::atomic<std::uint32_t> reads{0}, commands{0}, zeros{0};
+  std::atomic<std::uint32_t> reopens{0};  ///< times that the device was to be opened again
   std::atomic<bool> quit{false};
   SharedValue<GuardedCommand> command;
   // Written by the guard.
   std::atomic<GuardState> state{GuardState::opening};
   std::atomic<std::uint32_t> answered{0};  ///< futex: the last of `reads` that was answered
   SharedValue<GuardedReading> reading;
-  FixedCapabilities capabilities;    ///< before state becomes ready
-  std::array<char, 1024> message{};  ///< before state becomes failed
+  std::atomic<std::uint32_t> reopened{0};  ///< the last of `reopens` that is done with
+  FixedCapabilities capabilities;          ///< before state becomes ready
+  std::array<char, 1024> message{};        ///< before state becomes failed or `reopened` moves
 
   static_assert(std::atomic<std::uint32_t>::is_always_lock_free &&
                 std::atomic<std::uint64_t>::is_always_lock_free &&

@@ -18,7 +18,7 @@ namespace palpate {
 namespace {
 
 constexpr std::int64_t kSpin_ns = 20'000;  // before sleeping for the reading
-constexpr int kUnanswered = 25;            // reads in a row: the guard has gone
+constexpr int kUnanswered = 25;            // reads in a row: forces go off
 constexpr auto kNap = std::chrono::milliseconds(2);
 constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
 
@@ -109,6 +109,7 @@ DeviceReading GuardedDevice::read() noexcept {
   if (channel_->answered.load(std::memory_order_acquire) == asked &&
       channel_->reading.read(reading)) {
     unanswered_ = 0;
+    answered_ns_ = clock.now_ns();
     last_ = reading.reading();
     if (reading.trips != trips_seen_) {
       trips_seen_ = reading.trips;
@@ -119,12 +120,21 @@ DeviceReading GuardedDevice::read() noexcept {
   }
   ++unanswered_;
   DeviceReading old = last_;
-  old.trouble = DeviceTrouble::late;
-  if (unanswered_ >= kUnanswered || ended()) {
-    old.lost = true;
-    old.trouble = DeviceTrouble::guard_lost;
-  }
+  old.trouble = without_answer();
+  old.lost = old.trouble != DeviceTrouble::late;
   return old;
+}
+
+DeviceTrouble GuardedDevice::without_answer() noexcept {
+  if (ended()) return DeviceTrouble::guard_lost;
+  const std::int64_t now = RealClock().now_ns();
+  if (reopening()) {
+    answered_ns_ = now;  // it is at work
+    return DeviceTrouble::reopening;
+  }
+  if (unanswered_ < kUnanswered) return DeviceTrouble::late;
+  const bool given_up = static_cast<double>(now - answered_ns_) * 1e-9 >= settings_.given_up;
+  return given_up ? DeviceTrouble::guard_lost : DeviceTrouble::guard_late;
 }
 
 void GuardedDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
@@ -134,6 +144,18 @@ void GuardedDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
   channel_->calls.fetch_add(1, std::memory_order_release);
   futex_wake(channel_->calls);
 }
+
+void GuardedDevice::ask_to_reopen() noexcept {
+  channel_->reopens.fetch_add(1);
+  channel_->calls.fetch_add(1);
+  futex_wake(channel_->calls);
+}
+
+bool GuardedDevice::reopening() const noexcept {
+  return channel_->reopens.load() != channel_->reopened.load(std::memory_order_acquire);
+}
+
+std::string GuardedDevice::reopen_trouble() const { return channel_->message.data(); }
 
 void GuardedDevice::emergency_zero() noexcept {
   channel_->zeros.fetch_add(1);

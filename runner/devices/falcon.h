@@ -20,6 +20,8 @@ class FalconDevice final : public Device {
   /// Both forces pull at the one grip.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
+  void reopen() override { arm_->reopen(); }
+
   FalconArm& arm() { return *arm_; }
 
  private:

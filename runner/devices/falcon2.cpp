@@ -36,6 +36,14 @@ DeviceReading Falcon2Device::read() noexcept {
           trouble};
 }
 
+void Falcon2Device::reopen() {
+  // The other one holds its last command while nobody speaks to it.
+  tip_->halt();
+  tail_->halt();
+  tip_->reopen();
+  tail_->reopen();
+}
+
 void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
   // One device alone would turn the stylus: both push or neither.
   tip_->push(lost_ ? Vec3(0) : device1);

@@ -24,6 +24,9 @@ class Falcon2Device final : public Device {
   /// \param device1, device2  N, world frame: eq. (1)'s forces at tip and tail.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
+  /// Neither end pushes meanwhile.
+  void reopen() override;
+
   FalconArm& tip() { return *tip_; }
   FalconArm& tail() { return *tail_; }
   const StylusFromEnds& stylus() const { return stylus_; }

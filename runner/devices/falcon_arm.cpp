@@ -34,6 +34,14 @@ void FalconArm::restart() noexcept {
   update();
 }
 
+void FalconArm::reopen() {
+  if (reading_.trouble != DeviceTrouble::unplugged && reading_.trouble != DeviceTrouble::silent)
+    return;
+  transport_->reopen();
+  if (settings_.boot) settings_.boot(*transport_);
+  restart();
+}
+
 void FalconArm::take_replies(std::int64_t wait_ns) noexcept {
   bool fresh = false;
   std::array<std::uint8_t, 256> bytes{};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -21,6 +22,7 @@ struct ArmSettings {
   std::int64_t resend_ns = 4'000'000;
   /// Without a reply for so long the device is lost.
   std::int64_t silence_ns = 25'000'000;
+  std::function<void(Transport&)> boot;  ///< makes the firmware run, for reopen(); none: it does
 };
 
 struct ArmReading {
@@ -64,8 +66,11 @@ class FalconArm {
   const std::array<int, 3>& motors() const { return motors_; }
   double counts_per_torque() const { return settings_.counts_per_torque; }
   Transport& transport() { return *transport_; }
-  /// After reopen() and boot(): as if new. Waits for a first reply.
+  /// After the line was opened again and the firmware runs: as if new. Waits for a first reply.
   void restart() noexcept;
+  /// Where it is unplugged or silent: opens the line again, makes the firmware run, restarts.
+  /// \throws TransportError
+  void reopen();
 
  private:
   void take_replies(std::int64_t wait_ns) noexcept;

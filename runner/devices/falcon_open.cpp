@@ -96,9 +96,12 @@ std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string
   const auto image = image_in(firmware);  // a bad file is found before the device is touched
   auto line = open_usb(serial);
   const std::string name = line->serial();
-  boot(*line, image ? &*image : nullptr, {},
-       [&name](const BootProgress& progress) { tell(name, progress); });
   ArmSettings settings;
+  settings.boot = [image, name](Transport& transport) {
+    boot(transport, image ? &*image : nullptr, {},
+         [&name](const BootProgress& progress) { tell(name, progress); });
+  };
+  settings.boot(*line);
   const ForceCalibration* force = calibration.force_of(name);
   if (force != nullptr && believable(*force)) {
     settings.counts_per_torque = force->counts_per_torque;

@@ -347,5 +347,126 @@ TEST(Guard, AGuardThatHasEndedIsALostDevice) {
   EXPECT_EQ(reading.trouble, DeviceTrouble::guard_lost);
 }
 
+/// Reads and commands zero until the reading is as wished; the last one.
+template <class Wished>
+DeviceReading read_until(GuardedDevice& device, Wished wished) {
+  DeviceReading reading = device.read();
+  for (int i = 0; i < 20'000 && !wished(reading); ++i) {
+    device.write(Vec3(0), Vec3(0));
+    reading = device.read();
+  }
+  return reading;
+}
+
+bool is_lost(const DeviceReading& reading) { return reading.lost; }
+bool is_well(const DeviceReading& reading) {
+  return !reading.lost && reading.trouble == DeviceTrouble::none;
+}
+
+TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItIsBack) {
+  Stage stage;
+  GuardedDevice device(
+      [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); },
+      no_rights());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(is_well(read_until(device, is_well)));
+    kill(device.guard_process(), SIGSTOP);
+    EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::guard_late);
+    kill(device.guard_process(), SIGCONT);
+  }
+  EXPECT_TRUE(is_well(read_until(device, is_well)));
+}
+
+TEST(Guard, AGuardThatHangsForGoodCountsAsEnded) {
+  Stage stage;
+  GuardSettings settings = no_rights();
+  settings.given_up = 0.2;
+  GuardedDevice device(
+      [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); }, settings);
+  kill(device.guard_process(), SIGSTOP);
+  RealClock clock;
+  const std::int64_t began = clock.now_ns();
+  EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::guard_late);
+  const DeviceReading last = read_until(device, [](const DeviceReading& reading) {
+    return reading.trouble == DeviceTrouble::guard_lost;
+  });
+  EXPECT_EQ(last.trouble, DeviceTrouble::guard_lost);
+  EXPECT_GE(clock.now_ns() - began, 190'000'000);
+}
+
+/// Pulled out and put in again by whoever has the stage.
+class Plug final : public Device {
+ public:
+  explicit Plug(Stage& stage) : stage_(stage), recording_(stage.shared->record, visiting) {}
+  const DeviceCapabilities& capabilities() const override { return recording_.capabilities(); }
+  DeviceReading read() noexcept override {
+    open_ = open_ && !stage_.shared->go;
+    DeviceReading reading = recording_.read();
+    reading.lost = !open_;
+    reading.trouble = open_ ? DeviceTrouble::none : DeviceTrouble::unplugged;
+    return reading;
+  }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    recording_.write(device1, device2);
+  }
+  void reopen() override {
+    nap(60);
+    if (stage_.shared->go) throw std::runtime_error("nothing is plugged in");
+    open_ = true;
+  }
+
+ private:
+  Stage& stage_;
+  RecordingDevice recording_;
+  bool open_ = true;
+};
+
+TEST(Guard, WhatWasUnpluggedIsOpenedAgainWhenAsked) {
+  Stage stage;
+  GuardedDevice device([&] { return std::make_unique<Plug>(stage); }, no_rights());
+  const auto reopened = [&device](const DeviceReading&) { return !device.reopening(); };
+  for (int i = 0; i < 3; ++i) {
+    stage.shared->go = true;
+    EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::unplugged);
+    device.ask_to_reopen();
+    EXPECT_TRUE(device.reopening());
+    EXPECT_EQ(read_until(device,
+                         [](const DeviceReading& reading) {
+                           return reading.trouble == DeviceTrouble::reopening;
+                         })
+                  .trouble,
+              DeviceTrouble::reopening);
+    EXPECT_TRUE(read_until(device, reopened).lost);
+    EXPECT_EQ(device.reopen_trouble(), "nothing is plugged in");
+    stage.shared->go = false;
+    nap(10);
+    EXPECT_TRUE(read_until(device, is_lost).lost) << "not before it is asked";
+    device.ask_to_reopen();
+    read_until(device, reopened);
+    EXPECT_EQ(device.reopen_trouble(), "");
+    EXPECT_TRUE(is_well(read_until(device, is_well)));
+  }
+}
+
+TEST(Guard, OpeningAgainTakesTheForceOffFirst) {
+  Stage stage;
+  GuardSettings settings = no_rights();
+  settings.silence = 60;  // only what is asked for
+  GuardedDevice device([&] { return std::make_unique<Plug>(stage); }, settings);
+  const auto command = [&](double force) {
+    const std::uint32_t before = stage.shared->record.count;
+    device.write({0, 0, force}, Vec3(0));
+    while (stage.shared->record.count == before) nap(1);
+    return stage.shared->record.last_force();
+  };
+  command(0);
+  EXPECT_EQ(command(1), 1);
+  device.ask_to_reopen();
+  while (device.reopening()) nap(1);
+  EXPECT_EQ(stage.shared->record.last_force(), 0);
+  EXPECT_EQ(command(0), 0);
+  EXPECT_EQ(command(1), 0) << "the runner has not yet heard of it";
+}
+
 }  // namespace
 }  // namespace palpate

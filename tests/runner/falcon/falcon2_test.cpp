@@ -129,6 +129,13 @@ TEST(Falcon2, EitherDeviceLostTakesBothForcesAway) {
     EXPECT_TRUE(run(bench, device, 3, {1, 0, 0}, {0, 1, 0}).lost);
     const Emulator& other = at_tip ? bench.tail_emulator : bench.tip_emulator;
     EXPECT_TRUE(other.torque_is_zero()) << at_tip;
+    EXPECT_THROW(device.reopen(), TransportError);
+    (at_tip ? bench.tip_line : bench.tail_line)->unplugged = false;
+    device.reopen();
+    EXPECT_TRUE(bench.tip_emulator.torque_is_zero() && bench.tail_emulator.torque_is_zero());
+    EXPECT_FALSE(run(bench, device, 20).lost);
+    run(bench, device, 20, {1, 0, 0}, {0, 1, 0});
+    EXPECT_FALSE(bench.tip_emulator.torque_is_zero() || bench.tail_emulator.torque_is_zero());
   }
 }
 

@@ -221,9 +221,12 @@ TEST(FalconArm, UnpluggedAndBackAgain) {
   bench.line->unplugged = true;
   EXPECT_EQ(bench.tick(push).trouble, DeviceTrouble::unplugged);
   EXPECT_FALSE(bench.arm->halt());
+  EXPECT_THROW(bench.arm->reopen(), TransportError);
   bench.line->unplugged = false;
-  bench.line->reopen();
-  bench.arm->restart();
+  bench.arm->reopen();
+  EXPECT_EQ(bench.line->reopened, 1);
+  bench.arm->reopen();
+  EXPECT_EQ(bench.line->reopened, 1) << "one that is well is left alone";
   EXPECT_EQ(bench.arm->reading().trouble, DeviceTrouble::none);
   EXPECT_TRUE(bench.emulator.torque_is_zero());  // restart leaves none
 }

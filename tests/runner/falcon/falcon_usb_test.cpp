@@ -193,20 +193,18 @@ TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
   EXPECT_LT(run(arm, 200, push, [&] { return arm.reading().trouble == DeviceTrouble::unplugged; }),
             200);
   EXPECT_FALSE(arm.halt());
-  EXPECT_THROW(arm.transport().reopen(), TransportError);
+  EXPECT_THROW(arm.reopen(), TransportError);
   bench.bus.plug(0);
   bool open = false;
   for (int i = 0; i < 200 && !open; ++i) {  // the bus's news take a moment
     try {
-      arm.transport().reopen();
+      arm.reopen();
       open = true;
     } catch (const TransportError&) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }
   ASSERT_TRUE(open);
-  boot(arm.transport(), nullptr);
-  arm.restart();
   EXPECT_EQ(arm.reading().trouble, DeviceTrouble::none);
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
