@@ -1,6 +1,7 @@
 #include "data/samples_codec.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <bit>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <random>
 
 #include "data/store.h"
+#include "tests/shared/peak_memory.h"
 
 namespace palpate {
 namespace {
@@ -146,6 +148,65 @@ TEST(SamplesCodec, AnAbsurdCountIsRefusedBeforeMemoryIsAskedFor) {
   EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 99'999'999), StoreError);
   const std::vector<SampleRecord> still(200'000);  // as small as samples get
   expect_same_bits(still);
+}
+
+/// A blob of the third packing, whole and in order, of samples that are all zero.
+std::string a_bomb(std::size_t count) {
+  std::string packed(count, '\0');
+  const std::vector<unsigned char> zeros(count);
+  z_stream stream{};
+  deflateInit(&stream, 6);
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  uLong crc = crc32_z(0, nullptr, 0);
+  constexpr int kBytesASample = 187;  // as data/samples_codec.h has it
+  for (int i = 0; i < kBytesASample; ++i) {
+    stream.next_in = const_cast<Bytef*>(zeros.data());
+    stream.avail_in = static_cast<uInt>(count);
+    crc = crc32_z(crc, zeros.data(), count);
+    deflate(&stream, i + 1 == kBytesASample ? Z_FINISH : Z_NO_FLUSH);
+  }
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+  return packed;
+}
+
+TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
+  const auto peak = [](const std::string& packed, std::size_t count, bool good) {
+    return peak_memory([&] {
+      try {
+        const auto samples =
+            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count));
+        if (!good || samples.size() != count) _exit(2);
+      } catch (const StoreError&) {
+        if (good) _exit(2);
+      }
+    });
+  };
+  constexpr std::size_t kRecord = sizeof(SampleRecord);
+  const std::string stroke = pack_samples(a_stroke(100'000));
+  const auto whole = peak(stroke, 100'000, true);
+  ASSERT_TRUE(whole);
+  EXPECT_LT(*whole, 100'000 * (kRecord + 8) + (4U << 20U));  // no copy besides
+  // 180 kB that unpack to a million samples, 187 MB; in memory they would take more.
+  const std::string bomb = a_bomb(1'000'000);
+  EXPECT_LT(bomb.size(), 500'000U);
+  const auto refused = peak(bomb, 1'000'000, false);
+  ASSERT_TRUE(refused);
+  EXPECT_LT(*refused, 4U << 20U);
+  // As many as are let through whatever their bytes.
+  const auto most = peak(a_bomb(400'000), 400'000, true);
+  ASSERT_TRUE(most);
+  EXPECT_LT(*most, 100U << 20U);
+}
+
+TEST(SamplesCodec, ALongStandstillIsStoredSoThatItIsReadAgain) {
+  constexpr std::size_t kTicks = 450'000;
+  const std::string packed = pack_samples(std::vector<SampleRecord>(kTicks));
+  const auto back = unpack_samples(packed.data(), packed.size(), kTicks);
+  ASSERT_EQ(back.size(), kTicks);
+  EXPECT_EQ(bits_of(back.back()), bits_of(SampleRecord{}));
 }
 
 TEST(SamplesCodec, DamageIsRefused) {
