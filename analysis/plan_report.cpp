@@ -2,7 +2,10 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "analysis/axes.h"
 #include "analysis/paired.h"
@@ -50,36 +53,60 @@ std::size_t trials_each(const Plan& plan, std::size_t trials) {
 
 void put_line(std::string& out, const std::string& text, const std::string& indent = "") {
   const auto fits = [&](std::string_view line) { return indent.size() + width(line) <= 100; };
-  for (const std::string& line : wrapped(text, fits)) {
+  for (const std::string& line : wrapped(printable(text), fits)) {
     out += indent;
     out += shortened(line, 100 - indent.size());
     out += "\n";
   }
 }
 
-void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
-  constexpr std::size_t kName = 14, kFigure = 12;
+constexpr std::size_t kNameColumns = 14, kFigureColumns = 12, kWidestShape = 24;
+
+std::string column_name(const Plan& plan, std::size_t shape) {
+  return "  " +
+         pad_left(shortened(printable(plan.model.shapes[shape]), kWidestShape), kFigureColumns - 2);
+}
+
+/// The columns of these shapes.
+void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
+                 std::span<const std::size_t> shapes) {
+  out += "  " + pad_right("participants", kNameColumns) + pad_left("goal", kFigureColumns);
+  for (const std::size_t s : shapes) out += column_name(plan, s);
   out += "\n";
-  put_line(out, "Power with " + counted(curve.trials, "trial", "trials") +
-                    " of each shape with each renderer (" +
-                    counted(trials_each(plan, curve.trials), "trial", "trials") +
-                    " for each participant)");
-  const std::size_t shown = std::min<std::size_t>(plan.model.shapes.size(), 5);
-  std::string header = "  " + pad_right("participants", kName) + pad_left("goal", kFigure);
-  for (std::size_t s = 0; s < shown; ++s) {
-    header += pad_left(shortened(plan.model.shapes[s], kFigure - 2), kFigure);
-  }
-  out += header + "\n";
   for (const PlanPoint& point : curve.points) {
-    std::string line = "  " + pad_right(std::to_string(point.design.participants), kName) +
-                       pad_left(percent(goal_power(plan, point.power)), kFigure);
-    for (std::size_t s = 0; s < shown; ++s) {
-      line += pad_left(percent(point.power.share(point.power.found[s])), kFigure);
+    std::string line = "  " + pad_right(std::to_string(point.design.participants), kNameColumns) +
+                       pad_left(percent(goal_power(plan, point.power)), kFigureColumns);
+    for (const std::size_t s : shapes) {
+      line +=
+          pad_left(percent(point.power.share(point.power.found[s])), width(column_name(plan, s)));
     }
     if (curve.smallest && curve.smallest->design.participants == point.design.participants) {
       line += "  <- enough";
     }
     out += line + "\n";
+  }
+}
+
+/// All shapes, those with an effect first.
+void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
+  constexpr std::size_t kRoom = 87 - 2 - kNameColumns - kFigureColumns;  // then "<- enough"
+  out += "\n";
+  put_line(out, "Power with " + counted(curve.trials, "trial", "trials") +
+                    " of each shape with each renderer (" +
+                    counted(trials_each(plan, curve.trials), "trial", "trials") +
+                    " for each participant)");
+  std::vector<std::size_t> shapes(plan.model.shapes.size());
+  std::iota(shapes.begin(), shapes.end(), std::size_t{0});
+  std::ranges::stable_partition(shapes,
+                                [&](std::size_t s) { return plan.model.log_ratios[s] != 0; });
+  for (std::size_t first = 0, last = 0; first < shapes.size(); first = last) {
+    std::size_t used = 0;
+    for (; last < shapes.size(); ++last) {
+      used += width(column_name(plan, shapes[last]));
+      if (last > first && used > kRoom) break;
+    }
+    if (first > 0) out += "  (continued)\n";
+    put_columns(out, plan, curve, std::span(shapes).subspan(first, last - first));
   }
 }
 
@@ -133,7 +160,7 @@ std::string plan_text(const Plan& plan) {
                     fixed(model.shape_gain_sd, 3) + ", single trials " +
                     fixed(model.residual_sd, 3) + "; " + percent(model.share_used) +
                     " of the trials give a time. " + std::to_string(settings.simulation.studies) +
-                    " studies for each figure (error at most " +
+                    " studies for each figure (standard error of a power at most " +
                     percent(0.5 / std::sqrt(static_cast<double>(settings.simulation.studies))) +
                     "), seed " + std::to_string(settings.simulation.seed) +
                     ". A shape without an effect shows how often it is taken for one.");

@@ -34,7 +34,8 @@ int plan_command(const std::vector<std::string>& args) {
   add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
   add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
       "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
-      "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11");
+      "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
+      "where there is neither, 11");
   add("power", po::value(&options.power)->default_value(0.8, "0.8"), "wanted power");
   add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05"), "of the tests, after Holm");
   add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -62,6 +63,13 @@ void check_within(const std::string& option, double value, double low, double hi
                    fixed(high, 2));
 }
 
+std::string shapes_of(const StudyModel& model) {
+  std::string known;
+  for (const std::string& each : model.shapes)
+    known += (known.empty() ? "" : ", ") + printable(each, 60);
+  return known;
+}
+
 /// "cone=22,cube=11": percent reductions; shapes that are not named have no effect. "11": all.
 void put_effects(const std::string& text, StudyModel& model) {
   const auto log_ratio = [](const std::string& percent) {
@@ -77,28 +85,43 @@ void put_effects(const std::string& text, StudyModel& model) {
     return;
   }
   std::ranges::fill(model.log_ratios, 0.0);
+  std::set<std::string> named;
   for (const std::string& part : split(text, ',')) {
     const std::size_t at = part.rfind('=');
     const std::string name = part.substr(0, at);
     const auto shape = std::ranges::find(model.shapes, name);
     if (at == std::string::npos || shape == model.shapes.end()) {
-      std::string known;
-      for (const std::string& each : model.shapes)
-        known += (known.empty() ? "" : ", ") + printable(each, 60);
-      throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + known + ", found '" +
-                       printable(part, 60) + "'");
+      throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + shapes_of(model) +
+                       ", found '" + printable(part, 60) + "'");
+    }
+    if (!named.insert(name).second) {
+      throw UsageError("--effect: expected each shape once, found '" + printable(name, 60) +
+                       "' again");
     }
     model.log_ratios[static_cast<std::size_t>(shape - model.shapes.begin())] =
         log_ratio(part.substr(at + 1));
   }
 }
 
-/// The paper's figure 15, for the shapes that are there.
-void put_paper_effects(StudyModel& model) {
+/// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
+/// paper's effects. \return what was taken
+std::string put_default_effects(StudyModel& model) {
+  constexpr double kCone = 22, kCube = 11;
+  bool known = false;
   for (std::size_t s = 0; s < model.shapes.size(); ++s) {
-    const double percent = model.shapes[s] == "cone" ? 22 : model.shapes[s] == "cube" ? 11 : 0;
-    model.log_ratios[s] = std::log1p(-percent / 100);
+    const bool cone = model.shapes[s] == "cone", cube = model.shapes[s] == "cube";
+    model.log_ratios[s] = std::log1p(-(cone ? kCone : cube ? kCube : 0) / 100);
+    known = known || cone || cube;
   }
+  std::string taken = "the paper's";
+  if (!known) {
+    std::ranges::fill(model.log_ratios, std::log1p(-kCube / 100));
+    taken = fixed(kCube, 0) +
+            " % for every shape, the smaller of the paper's, whose shapes are "
+            "not among these";
+  }
+  return "No wanted effects were given (--effect SHAPE=PERCENT,...): taken were " + taken +
+         ". The shapes: " + shapes_of(model) + ".";
 }
 
 TrialTable read_trials(const std::string& database, const std::string& csv) {
@@ -158,15 +181,18 @@ StudyModel model_of(Pilot& pilot, const PlanOptions& options, const po::variable
   if (values.count("effect") != 0) {
     put_effects(options.effect, model);
   } else if (pilot.pair.is_ray_minus_point()) {
-    put_paper_effects(model);
+    pilot.notes.push_back(put_default_effects(model));
   } else {
     throw UsageError(
         "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
         "point, this pilot is of " +
-        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60));
+        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60) +
+        "; its shapes: " + shapes_of(model));
   }
   if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
-    throw UsageError("expected the wanted effect of some shape: --effect SHAPE=PERCENT,...");
+    throw UsageError(
+        "expected the wanted effect of some shape: --effect SHAPE=PERCENT,... with a shape of " +
+        shapes_of(model));
   }
   return model;
 }

@@ -81,6 +81,43 @@ class Plan(unittest.TestCase):
         for text in (done.stdout, figure.read_text("utf-8"), out.read_text("utf-8")):
             self.assertIn("SIMULATED PARTICIPANTS", text)
 
+    def six_shapes(self):
+        """A pilot with shapes of its own, all of them slower with the point."""
+        rows = ["participant_id,session,block,trial,renderer,shape,response,correct,response_time"]
+        trial = 0
+        for person in range(4):
+            for shape in ["kugel", "kugel-gross", "platte", "winkel", "kegel", "wuerfel-hart"]:
+                for renderer in ["point", "ray"]:
+                    for repeat in range(4):
+                        trial += 1
+                        time = 5 + person + (trial * 7 % 13) / 5 - (renderer == "ray") * 0.8
+                        rows.append(f"P{person},1,1,{trial},{renderer},{shape},{shape},1,{time}")
+        path = self.dir / "six.csv"
+        path.write_text("\n".join(rows) + "\n", "utf-8")
+        return path
+
+    def test_every_shape_has_a_column_those_with_an_effect_first(self):
+        done = self.run_palpate("--csv", self.six_shapes(), *QUICK, "--effect", "wuerfel-hart=20")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        heads = [line.split() for line in done.stdout.splitlines()
+                 if line.startswith("  participants")]
+        self.assertEqual(heads[0][:3], ["participants", "goal", "wuerfel-hart"])
+        self.assertEqual({name for head in heads for name in head[2:]},
+                         {"kugel", "kugel-gross", "platte", "winkel", "kegel", "wuerfel-hart"})
+        self.assertLessEqual(max(len(line) for line in done.stdout.splitlines()), 100)
+        self.assertIn("standard error of a power at most", done.stdout)
+
+    def test_without_effects_says_what_was_taken_and_lists_the_shapes(self):
+        done = self.run_palpate("--csv", self.six_shapes(), *QUICK)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        words = " ".join(done.stdout.split())
+        self.assertIn("No wanted effects were given", words)
+        self.assertIn("11 % for every shape", words)
+        self.assertIn("kugel, kugel-gross, platte, winkel, kegel, wuerfel-hart", words)
+        done = self.run_palpate("--csv", FIXTURES / "balanced.csv", *QUICK)
+        self.assertIn("taken were the paper's", " ".join(done.stdout.split()))
+        self.refused("a shape of kugel, kugel-gross", "--csv", self.six_shapes(), "--effect", "0")
+
     def test_refuses_with_the_reason(self):
         self.refused("--residual-sd", "--gain-sd", "0.1")
         self.refused("one participant", "--csv", FIXTURES / "one_person.csv")
@@ -96,7 +133,10 @@ class Plan(unittest.TestCase):
                               ("--power", "1"), ("--alpha", "0"), ("--goal", "most"),
                               ("--test", "anova"), ("--correlation", "1.5"),
                               ("--share-used", "0"), ("--shape-gain-sd", "-1"),
-                              ("--shape-gain-sd", "nan"), ("--json", self.dir)]:
+                              ("--shape-gain-sd", "nan"), ("--json", self.dir),
+                              ("--seed", "-1"), ("--seed", "-0"), ("--seed", "1.5"),
+                              ("--power", "nan"), ("--alpha", "inf"),
+                              ("--effect", "cone=10,cone=20")]:
             with self.subTest(option=option, value=value):
                 self.refused(option[2:], *GIVEN, option, value)
         self.refused("variation", "--gain-sd", "0", "--residual-sd", "0")
