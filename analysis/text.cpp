@@ -10,25 +10,6 @@ namespace palpate {
 
 namespace {
 
-/// Bytes of the plain character at the start of a text that is not empty; 0: none.
-std::size_t plain_character(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint32_t lead = byte(0);
-  if (lead < 0x80) return lead >= 0x20 && lead != 0x7F ? 1 : 0;
-  const std::size_t size = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : lead >= 0xC2 ? 2 : 0;
-  if (size == 0 || lead > 0xF4 || text.size() < size) return 0;
-  std::uint32_t code = lead & (0xFFU >> (size + 1));
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0U) != 0x80) return 0;
-    code = code << 6 | (byte(i) & 0x3FU);
-  }
-  const bool overlong = (size == 3 && code < 0x800) || (size == 4 && code < 0x10000);
-  const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-  if (overlong || surrogate || code > 0x10FFFF || code < 0xA0 || (code & 0xFFFE) == 0xFFFE)
-    return 0;
-  return size;
-}
-
 std::size_t bytes_of(std::string_view text, std::size_t characters) {
   std::size_t at = 0;
   while (at < text.size() && characters-- > 0) {
@@ -40,29 +21,9 @@ std::size_t bytes_of(std::string_view text, std::size_t characters) {
 
 }  // namespace
 
-bool is_plain_utf8(std::string_view text) {
-  while (!text.empty()) {
-    const std::size_t size = plain_character(text);
-    if (size == 0) return false;
-    text.remove_prefix(size);
-  }
-  return true;
-}
-
-std::string printable(std::string_view text, std::size_t max_bytes) {
-  std::string out;
-  while (!text.empty()) {
-    const std::size_t size = plain_character(text);
-    if (out.size() + (size == 0 ? 1 : size) > max_bytes) return out + "…";
-    out += size == 0 ? "?" : text.substr(0, size);
-    text.remove_prefix(size == 0 ? 1 : size);
-  }
-  return out;
-}
-
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : printable(text, text.size())) {
+  for (const char c : printable(text)) {
     switch (c) {
       case '&':
         out += "&amp;";

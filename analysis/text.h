@@ -7,15 +7,9 @@
 #include <string_view>
 #include <vector>
 
+#include "stimuli/printable.h"
+
 namespace palpate {
-
-/// Whether all is well-formed UTF-8 without control characters (C0, DEL, C1) and noncharacters
-/// that XML does not allow.
-bool is_plain_utf8(std::string_view text);
-
-/// At most `max_bytes` of the text, cut between characters with an ellipsis; whatever is not plain
-/// UTF-8 becomes '?'.
-std::string printable(std::string_view text, std::size_t max_bytes);
 
 /// For text and quoted attributes of XML and HTML.
 std::string escaped(std::string_view text);

@@ -2,21 +2,16 @@
 
 #include <utility>
 
+#include "stimuli/printable.h"
+
 namespace palpate {
 namespace {
 
-/// Keys and names from a file must not break the lines of the list or reach a terminal as commands.
-std::string printable(std::string text) {
-  for (char& c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-  }
-  return text;
-}
-
+// Keys and names from a file must not break the lines of the list.
 std::string list(const std::vector<Fault>& faults) {
   std::string text;
   for (const Fault& fault : faults) {
-    text += (text.empty() ? "" : "\n") + fault.file;
+    text += (text.empty() ? "" : "\n") + printable(fault.file);
     // A place that is a line says it itself.
     if (fault.line > 0 && fault.place.front() == '/') (text += ':') += std::to_string(fault.line);
     text += ": " + printable(fault.place) + ": " + printable(fault.expected);

@@ -12,6 +12,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/printable.h"
 
 namespace {
 
@@ -87,19 +88,19 @@ int main(int argc, char** argv) {
       throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
   } catch (const palpate::UsageError& error) {
-    std::cerr << "palpate: " << error.what() << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::InputError& error) {
-    std::cerr << error.what() << "\n";
+    std::cerr << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::MeshError& error) {
-    std::cerr << error.what() << "\n";
+    std::cerr << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::StoreRefused& error) {
-    std::cerr << "palpate: " << error.what() << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const std::exception& error) {
-    std::cerr << "palpate: " << error.what() << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 1;
   }
 }

@@ -14,6 +14,7 @@
 #include "runner/guard.h"
 #include "runner/self_test.h"
 #include "runner/servo_timing.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -42,8 +43,9 @@ void print_limits(const DeviceCapabilities& c) {
       "    reaches %g mm about its centre, resolves %g um\n",
       c.sensed_freedom, c.actuated_freedom, c.max_force, c.max_stiffness, c.max_rate,
       c.workspace_radius * 1e3, c.resolution * 1e6);
-  if (!c.serial.empty()) std::printf("    serial number %s\n", c.serial.c_str());
-  if (!c.calibration.empty()) std::printf("    calibration: %s\n", c.calibration.c_str());
+  if (!c.serial.empty()) std::printf("    serial number %s\n", printable(c.serial).c_str());
+  if (!c.calibration.empty())
+    std::printf("    calibration: %s\n", printable(c.calibration).c_str());
 }
 
 /// Opened, its limits, its self-test. \return whether the test was passed
@@ -62,7 +64,7 @@ bool open_and_test(const DeviceKind& kind, const DeviceOrder& order, Json& row) 
     row["self_test"].push_back(
         {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
     std::printf("    %-8s%s: %s\n", result.passed ? "passed" : "FAILED", result.what.c_str(),
-                result.found.c_str());
+                printable(result.found).c_str());
   }
   return passed;
 }
@@ -78,8 +80,10 @@ bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& ro
     for (const ConnectedDevice& found : connected) {
       row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
       usable = usable || found.trouble.empty();
-      if (!found.serial.empty()) std::printf("    connected: %s\n", found.serial.c_str());
-      if (!found.trouble.empty()) std::printf("    cannot be used: %s\n", found.trouble.c_str());
+      if (!found.serial.empty())
+        std::printf("    connected: %s\n", printable(found.serial).c_str());
+      if (!found.trouble.empty())
+        std::printf("    cannot be used: %s\n", printable(found.trouble).c_str());
     }
     if (connected.empty()) std::printf("    none connected\n");
     if (kind.pushes && !named) {
@@ -91,7 +95,7 @@ bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& ro
     }
   } catch (const std::runtime_error& error) {
     row["trouble"] = error.what();
-    std::printf("    %s\n", error.what());
+    std::printf("    %s\n", printable(error.what()).c_str());
     good = !named;
   }
   rows.push_back(std::move(row));

@@ -20,6 +20,7 @@
 #include "runner/fault_signals.h"
 #include "runner/guard.h"
 #include "runner/realtime.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -32,9 +33,9 @@ class TerminalGuide final : public Guide {
  public:
   explicit TerminalGuide(const FaultSignals& signals) : signals_(signals) {}
 
-  void say(const std::string& text) override { std::cerr << text << "\n"; }
+  void say(const std::string& text) override { std::cerr << printable_lines(text) << "\n"; }
   void ask(const std::string& text) override {
-    std::cerr << text << "  [ENTER; q and ENTER stops] " << std::flush;
+    std::cerr << printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
   }
   Answer answer() override {
     if (signals_.end_requested() != 0) return Answer::stop;
@@ -133,7 +134,7 @@ constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force 
 
 void store(const std::string& path, const Calibration& calibration) {
   write_whole(path, to_json(calibration));
-  std::cerr << "Stored in " << path << "\n";
+  std::cerr << "Stored in " << printable(path) << "\n";
 }
 
 int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
@@ -152,7 +153,7 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
   force.made_utc = now_utc();
   calibration.put(force);
   store(order.calibration, calibration);
-  std::cout << "serial                   " << force.serial << "\n"
+  std::cout << "serial                   " << printable(force.serial) << "\n"
             << "counts per newton metre  " << force.counts_per_torque << " (nominal "
             << kCountsPerTorque << ")\n"
             << "residual                 " << force.residual << " N\n"
@@ -185,7 +186,8 @@ int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
   calibration.put(pair);
   store(order.calibration, calibration);
   const Vec3& p = pair.tail_in_tip.position;
-  std::cout << "tip, tail      " << pair.tip_serial << ", " << pair.tail_serial << "\n"
+  std::cout << "tip, tail      " << printable(pair.tip_serial) << ", "
+            << printable(pair.tail_serial) << "\n"
             << "tail's centre  " << p.x << ", " << p.y << ", " << p.z << " m from the tip's\n"
             << "residual       " << pair.residual * 1e3 << " mm over " << pair.points
             << " places\n";

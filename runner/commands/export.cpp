@@ -12,6 +12,7 @@
 #include "runner/commands/command.h"
 #include "runner/commands/progress_line.h"
 #include "runner/commands/stop_signal.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -108,15 +109,16 @@ int export_command(const std::vector<std::string>& args) {
       settings.progress = [&](std::int64_t trials) { progress.show(trials); };
       done = export_as(format, store, out, settings);
     }
-    std::cerr << out << ": " << done.trials << " trials";
+    std::cerr << printable(out) << ": " << done.trials << " trials";
     if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
     std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
     if (!done.attempts_path.empty()) {
-      std::cerr << done.attempts_path << ": " << done.attempts << " attempts that were cut off\n";
+      std::cerr << printable(done.attempts_path) << ": " << done.attempts
+                << " attempts that were cut off\n";
     }
     if (!done.not_recorded.empty()) {
-      std::cerr << "warning: 'palpate forget' will not list this export: " << done.not_recorded
-                << "\n";
+      std::cerr << "warning: 'palpate forget' will not list this export: "
+                << printable(done.not_recorded) << "\n";
     }
   } catch (const StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2

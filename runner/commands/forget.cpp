@@ -7,6 +7,7 @@
 #include "data/store.h"
 #include "data/utc.h"
 #include "runner/commands/command.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -18,7 +19,7 @@ void list_exports(const Holdings& holdings, std::ostream& out) {
   out << "These exports hold the participant; delete them and their copies, or export again:\n";
   for (const ExportRecord& one : holdings.exports) {
     std::error_code error;
-    out << "  " << one.path << " (" << one.format << ", " << format_utc(one.made_utc_ns)
+    out << "  " << printable(one.path) << " (" << one.format << ", " << format_utc(one.made_utc_ns)
         << (std::filesystem::exists(one.path, error) ? ")" : "; not there any more)") << "\n";
   }
 }
@@ -64,15 +65,15 @@ int forget_command(const std::vector<std::string>& args) {
     throw UsageError(database + ": there is no participant " + code + " here");
   }
   if (holdings.protocols > 0) {
-    std::cout << code << ": " << holdings.sessions << " sessions, " << holdings.trials
+    std::cout << printable(code) << ": " << holdings.sessions << " sessions, " << holdings.trials
               << " trials and " << holdings.cut_off << " attempts that were cut off\n";
   } else {
-    std::cout << code << " has withdrawn before; what may be left is cleared\n";
+    std::cout << printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
   list_exports(holdings, std::cout);
   if (holdings.mentions > 0) {
-    std::cout << "Notes on other participants that say " << code << ": " << holdings.mentions
-              << "; they are left as they are\n";
+    std::cout << "Notes on other participants that say " << printable(code) << ": "
+              << holdings.mentions << "; they are left as they are\n";
   }
   std::cout << std::flush;
   if (ask && holdings.protocols > 0 && !confirmed(code)) {
@@ -80,11 +81,12 @@ int forget_command(const std::vector<std::string>& args) {
     return 1;
   }
   const Withdrawal done = store.forget(code);
-  std::cout << "Removed from " << database << "\n";
-  for (const std::string& backup : done.backups_removed) std::cout << "Deleted " << backup << "\n";
+  std::cout << "Removed from " << printable(database) << "\n";
+  for (const std::string& backup : done.backups_removed)
+    std::cout << "Deleted " << printable(backup) << "\n";
   for (const std::string& backup : done.backups_left) {
-    std::cerr << backup << ": could not be read or deleted; delete it, it may hold " << code
-              << "\n";
+    std::cerr << printable(backup) << ": could not be read or deleted; delete it, it may hold "
+              << printable(code) << "\n";
   }
   return done.backups_left.empty() ? 0 : 1;
 }

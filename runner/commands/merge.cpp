@@ -9,6 +9,7 @@
 #include "runner/commands/command.h"
 #include "runner/commands/progress_line.h"
 #include "runner/commands/stop_signal.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace po = boost::program_options;
@@ -45,13 +46,13 @@ int merge_command(const std::vector<std::string>& args) {
       progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
     });
     progress.clear();
-    std::cout << out << ": " << done.counts.participants << " participants, "
+    std::cout << printable(out) << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";
     for (const LeftOut& one : done.left_out) {
-      std::cerr << one.code << " has withdrawn and is left out, but is still in " << one.path
-                << "; remove with: palpate forget --db '" << one.path << "' --participant "
-                << one.code << "\n";
+      std::cerr << printable(one.code) << " has withdrawn and is left out, but is still in "
+                << printable(one.path) << "; remove with: palpate forget --db '"
+                << printable(one.path) << "' --participant " << printable(one.code) << "\n";
     }
   } catch (const StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2

@@ -14,6 +14,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
 #include "runner/device_check.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -301,12 +302,13 @@ int replay_command(const std::vector<std::string>& args) {
     }
     write_whole(json, result.dump(1) + "\n");
   }
-  std::cout << (stored.participant.simulated ? "SIMULATED " : "") << "trial " << trial << " of "
-            << stored.protocol_name << ": " << record.shape << ", " << record.renderer << ", ";
+  std::cout << (stored.participant.simulated ? "SIMULATED " : "") << "trial " << printable(trial)
+            << " of " << printable(stored.protocol_name) << ": " << printable(record.shape) << ", "
+            << printable(record.renderer) << ", ";
   if (record.timed_out) {
     std::cout << "no answer";
   } else {
-    std::cout << "answered " << record.response;
+    std::cout << "answered " << printable(record.response);
   }
   char time[40];
   std::snprintf(time, sizeof time, " after %.3f s", record.response_time);
@@ -320,7 +322,8 @@ int replay_command(const std::vector<std::string>& args) {
     std::cout << "Rendered again: " << outcome.ticks - outcome.equal << " of " << outcome.ticks
               << " ticks differ from the record, the first is tick "
               << outcome.first_difference.value_or(0) << ". Recorded with palpate "
-              << stored.run.program_version << ", replayed with " << PALPATE_VERSION << ".\n";
+              << printable(stored.run.program_version) << ", replayed with " << PALPATE_VERSION
+              << ".\n";
     if (!outcome.periods_known) {
       std::cout << "The record does not hold the ticks' periods, on which damping depends.\n";
     }

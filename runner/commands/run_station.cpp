@@ -16,6 +16,7 @@
 #include "runner/commands/command.h"
 #include "runner/commands/run_session.h"
 #include "runner/display/text_display.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -111,11 +112,11 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
     try {
       auto windows = make_windows(window);
       const std::string missing = missing_letters(window.texts);
-      if (!missing.empty()) std::fprintf(stderr, "%s\n", missing.c_str());
+      if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
       return windows;
     } catch (const DisplayError& error) {
       if (window.mouse != nullptr) throw;
-      std::fprintf(stderr, "%s; a text display instead\n", error.what());
+      std::fprintf(stderr, "%s; a text display instead\n", printable(error.what()).c_str());
     }
   }
   return make_text_display({&clock, emergency});
@@ -151,7 +152,8 @@ int report(const RunParts& at, const LiveSession::Outcome& outcome) {
   std::printf("%s, participant %s (number %d), session %d: %zu of %zu trials on record; %s\n",
               at.protocol.name.c_str(), at.participant.code.c_str(), at.participant.number,
               at.session, outcome.recorded, outcome.trials, to_string(outcome.end));
-  if (!outcome.reason.empty()) std::fprintf(stderr, "%s\n", outcome.reason.c_str());
+  if (!outcome.reason.empty())
+    std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
   if (outcome.end == RunEnd::paused || outcome.end == RunEnd::aborted)
     std::fprintf(stderr, "the same command goes on from here\n");
   if (at.markers.dropped() > 0)

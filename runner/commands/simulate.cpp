@@ -11,6 +11,7 @@
 #include "runner/device_check.h"
 #include "runner/devices/simulated.h"
 #include "runner/simulated_study.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -65,7 +66,8 @@ int simulate_command(const std::vector<std::string>& args) {
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
                                protocol.stylus.grip, 1 / protocol.servo_rate);
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
-  for (const LimitedMaterial& one : limited) std::fprintf(stderr, "%s\n", one.text.c_str());
+  for (const LimitedMaterial& one : limited)
+    std::fprintf(stderr, "%s\n", printable(one.text).c_str());
   StudyPlan plan{participants, seed, jobs, ""};
   if (!limited.empty())
     plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
@@ -86,7 +88,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const double elapsed = seconds_since(start);
   std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),
               static_cast<long long>(progress.recorded), static_cast<long long>(progress.expected),
-              store.path().c_str());
+              printable(store.path()).c_str());
   std::printf("settings version %d, sha256 %.12s...; seed %llu\n", settings.version,
               settings.sha256.c_str(), static_cast<unsigned long long>(seed));
   if (progress.this_run > 0) {

@@ -9,6 +9,7 @@
 #include "runner/commands/command.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -71,7 +72,7 @@ void print_summary(const Protocol& protocol, std::ostream& out) {
   const double rest = protocol.home.rest;
   const auto n = static_cast<double>(trials.size());
 
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + protocol.title) << "\n"
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
       << "  renderers   " << list(renderers) << " ("
       << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
       << "  stimuli     " << list(stimuli) << "\n"

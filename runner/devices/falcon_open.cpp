@@ -14,6 +14,7 @@
 #include "runner/devices/falcon2.h"
 #include "runner/devices/falcon_image.h"
 #include "runner/devices/falcon_usb.h"
+#include "stimuli/printable.h"
 
 namespace palpate::falcon {
 namespace {
@@ -69,10 +70,11 @@ void tell(const std::string& serial, const BootProgress& progress) {
   if (isatty(STDERR_FILENO) == 0) return;
   using Stage = BootProgress::Stage;
   if (progress.stage == Stage::monitor && progress.attempt > 1) {
-    std::cerr << "\n  " << progress.trouble << "; attempt " << progress.attempt << "\n";
+    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
   }
   if (progress.stage != Stage::uploading) return;
-  std::cerr << "\rFalcon " << serial << ": firmware " << 100 * progress.sent / progress.size << " %"
+  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
+            << 100 * progress.sent / progress.size << " %"
             << (progress.sent == progress.size ? "\n" : "") << std::flush;
 }
 

@@ -15,6 +15,7 @@
 
 #include "runner/display/mailbox.h"
 #include "runner/display/text_input.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
@@ -74,22 +75,12 @@ class Bell {
   int file_;
 };
 
-/// A protocol's text must not move the cursor or worse.
-std::string printable(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '\n' || (byte >= ' ' && byte != 0x7F)) out += c;
-  }
-  return out;
-}
-
 class TextScreen final : public ParticipantScreen {
  public:
   TextScreen(Inbox<Words>& out, Bell& bell) : out_(out), bell_(bell) {}
 
   void show(const Page& page) override {
-    std::string text = printable(page.text);
+    std::string text = printable_lines(page.text);
     if (page.kind == Page::Kind::text) text += "\n[space bar: go on]";
     for (const auto& [key, answer] : page.keys) {
       text += text.empty() ? "" : "   ";
@@ -124,7 +115,7 @@ class TextConsole final : public ExperimenterConsole {
     for (heard_ = std::max(heard_, state.older_messages);
          heard_ < state.older_messages + state.messages.size(); ++heard_) {
       text += "* ";
-      text += printable(state.messages[heard_ - state.older_messages]);
+      text += printable_lines(state.messages[heard_ - state.older_messages]);
       text += '\n';
     }
     if (state.state != state_ || state.trial != trial_) {
