@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "data/checksum.h"
 #include "data/store.h"
 
 namespace palpate {
@@ -67,6 +68,14 @@ bool is_participant_code(std::string_view code) {
     if (!((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'))) return false;
   }
   return true;
+}
+
+void check(Checks& checks, const ProtocolInfo& protocol) {
+  checks.present("protocol's name", protocol.name);
+  checks.present("protocol's text", protocol.text);
+  checks.expect(protocol.sha256 == checksum_hex(protocol.text),
+                "protocol's SHA-256 must be that of its text");
+  for (const ProtocolFile& file : protocol.files) checks.present("name of a file", file.name);
 }
 
 void check(Checks& checks, const RunInfo& info, bool simulated) {

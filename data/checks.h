@@ -29,6 +29,7 @@ class Checks {
 bool is_clean_utf8(std::string_view text);        ///< well-formed, and no NUL
 bool is_participant_code(std::string_view code);  ///< 1 to 32 ASCII letters and digits
 
+void check(Checks& checks, const ProtocolInfo& protocol);
 void check(Checks& checks, const RunInfo& info, bool simulated);
 /// What is known of a trial before it is shown.
 void check_plan(Checks& checks, const TrialRecord& record, int session);

@@ -12,7 +12,8 @@ namespace palpate {
 
 void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later) {
   for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
-                            "exports", "export_participants", "tombstones", "tombstone_exports"}) {
+                            "exports", "export_participants", "tombstones", "tombstone_exports",
+                            "files", "protocol_files", "renumberings", "tombstone_secrets"}) {
     if (!db.tableExists(table)) continue;  // of a later version
     const bool later = attempts_later && std::string_view(table) == "attempts";
     db.exec(later ? "PRAGMA ignore_check_constraints = ON"

@@ -13,6 +13,7 @@
 
 #include "data/draft_folder.h"
 #include "data/merge_plan.h"
+#include "data/protocol_rows.h"
 #include "data/schema.h"
 #include "data/session_content.h"
 
@@ -60,14 +61,12 @@ void take_from(const Station& station, Work&& work) {
 }
 
 /// Fills a new database in the order of the plan, so that it does not depend on that of the inputs.
-void fill(SQLite::Database& db, const MergePlan& plan,
+void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
           const std::function<void(std::int64_t, std::int64_t)>& progress) {
   std::int64_t sessions = 0;
+  for (const PlannedProtocol& protocol : plan.protocols) keep_protocol(db, out, protocol.info);
   for (const PlannedProtocol& protocol : plan.protocols) {
-    SQLite::Statement add(db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?)");
-    Binder(add) << protocol.sha256 << protocol.name << protocol.text;
-    add.exec();
-    const std::int64_t protocol_id = db.getLastInsertRowid();
+    const std::int64_t protocol_id = keep_protocol(db, out, protocol.info);
     for (const auto& [number, person] : protocol.participants) {
       SQLite::Statement enrol(db,
                               "INSERT INTO participants (protocol_id, code, number, simulated, "
@@ -75,6 +74,12 @@ void fill(SQLite::Database& db, const MergePlan& plan,
       Binder(enrol) << protocol_id << person.code << number << person.simulated << person.seed;
       take_from(*person.station, [&] { enrol.exec(); });
       const std::int64_t participant = db.getLastInsertRowid();
+      if (person.enrolled_number != number) {
+        SQLite::Statement renumber(
+            db, "INSERT INTO renumberings (participant_id, enrolled_number) VALUES (?, ?)");
+        Binder(renumber) << participant << person.enrolled_number;
+        renumber.exec();
+      }
       for (const auto& [session_number, session] : person.sessions) {
         take_from(*session.station, [&, &theirs = session] {
           copy_session(theirs.station->db(), theirs.id, db, participant);
@@ -125,7 +130,7 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
     // It is thrown away if anything fails: no journal is needed.
     db.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA foreign_keys = ON");
     SQLite::Transaction transaction(db);
-    fill(db, plan, progress);
+    fill(db, out, plan, progress);
     transaction.commit();
     db.exec("PRAGMA journal_mode = WAL");
   });

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "data/checks.h"
+#include "data/protocol_rows.h"
 #include "data/session_content.h"
 
 namespace palpate {
@@ -17,15 +18,17 @@ struct FoundParticipant {
 
 std::vector<FoundParticipant> participants_of(Station& station, std::int64_t protocol_id) {
   std::vector<FoundParticipant> all;
-  SQLite::Statement find(
-      station.db(),
-      "SELECT id, number, code, simulated, seed FROM participants WHERE protocol_id = ? ORDER BY "
-      "number");
+  SQLite::Statement find(station.db(),
+                         "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings "
+                         "WHERE participant_id = "
+                         "id), number), code, simulated, seed FROM participants WHERE protocol_id "
+                         "= ? ORDER BY number");
   Binder(find) << protocol_id;
   while (find.executeStep()) {
     FoundParticipant& one = all.emplace_back();
     one.person.station = &station;
-    Row(find) >> one.id >> one.number >> one.person.code >> one.person.simulated >> one.person.seed;
+    Row(find) >> one.id >> one.number >> one.person.enrolled_number >> one.person.code >>
+        one.person.simulated >> one.person.seed;
   }
   SQLite::Statement sessions(station.db(),
                              "SELECT number, id FROM sessions WHERE participant_id = ?");
@@ -67,6 +70,7 @@ class Planner {
 
  private:
   void add_protocols(Station& station);
+  void add_files(ProtocolInfo& known, Station& station, std::int64_t protocol_id);
   void add_participant(PlannedProtocol& protocol, FoundParticipant found);
   void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
   void require_one_meaning_per_name(const std::deque<Station>& stations);
@@ -99,7 +103,7 @@ MergePlan Planner::plan(std::deque<Station>& stations) {
     plan_.protocols.push_back(std::move(protocol));
   }
   std::sort(plan_.protocols.begin(), plan_.protocols.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.name, a.sha256) < std::pair(b.name, b.sha256);
+    return std::pair(a.info.name, a.info.sha256) < std::pair(b.info.name, b.info.sha256);
   });
   return std::move(plan_);
 }
@@ -108,15 +112,17 @@ void Planner::add_protocols(Station& station) {
   SQLite::Statement find(station.db(), "SELECT id, name, sha256, text FROM protocols ORDER BY id");
   while (find.executeStep()) {
     std::int64_t id = 0;
-    PlannedProtocol found;
+    ProtocolInfo found;
     Row(find) >> id >> found.name >> found.sha256 >> found.text;
     names_[found.name][&station].insert(found.sha256);
-    PlannedProtocol& protocol = protocols_.try_emplace(found.sha256, found).first->second;
-    if (protocol.text != found.text || protocol.name != found.name) {
+    PlannedProtocol& protocol = protocols_[found.sha256];
+    if (protocol.info.sha256.empty()) protocol.info = found;
+    if (protocol.info.text != found.text || protocol.info.name != found.name) {
       conflicts_.push_back(station.path() + ": protocol " + found.name +
                            " has the checksum of another protocol: the file is damaged");
       continue;
     }
+    add_files(protocol.info, station, id);
     for (FoundParticipant& one : participants_of(station, id)) {
       const std::string code = one.person.code;
       if (!is_participant_code(code)) {
@@ -134,11 +140,25 @@ void Planner::add_protocols(Station& station) {
   }
 }
 
+/// A station of an older palpate may not have kept them.
+void Planner::add_files(ProtocolInfo& known, Station& station, std::int64_t protocol_id) {
+  for (ProtocolFile& file : files_of(station.db(), protocol_id)) {
+    const auto at = std::lower_bound(known.files.begin(), known.files.end(), file.name,
+                                     [](const auto& a, const auto& name) { return a.name < name; });
+    if (at == known.files.end() || at->name != file.name) {
+      known.files.insert(at, std::move(file));
+    } else if (at->bytes != file.bytes) {
+      conflicts_.push_back(station.path() + ": " + file.name + " of protocol " + known.name +
+                           " is another file than at another station");
+    }
+  }
+}
+
 void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found) {
   const std::string& code = found.person.code;
   for (auto& [number, known] : protocol.participants) {
     const std::string where = " (" + known.station->path() + ", " + found.person.station->path() +
-                              ", protocol " + protocol.name + ")";
+                              ", protocol " + protocol.info.name + ")";
     if (number == found.number && known.code != code) {
       conflicts_.push_back("number " + std::to_string(number) + " is that of participant " +
                            known.code + " and of participant " + code + where);

@@ -22,13 +22,14 @@ struct PlannedSession {
 struct PlannedParticipant {
   Station* station = nullptr;  ///< where it was found first
   std::string code;
+  int enrolled_number = 0;  ///< as of Participant
   bool simulated = false;
   std::optional<std::string> seed;
   std::map<int, PlannedSession> sessions;  ///< by number
 };
 
 struct PlannedProtocol {
-  std::string name, sha256, text;
+  ProtocolInfo info;                               ///< with its files, by name
   std::map<int, PlannedParticipant> participants;  ///< by number
 };
 

@@ -50,18 +50,27 @@ struct TrialRecord {
   std::vector<SampleRecord> samples;  ///< empty unless asked for
 };
 
+/// A file that a protocol names, such as a mesh.
+struct ProtocolFile {
+  std::string name;   ///< as the protocol names it
+  std::string bytes;  ///< as they were read
+};
+
 /// The protocol a participant is enrolled in.
 struct ProtocolInfo {
   std::string name;
-  std::string text;    ///< the file as it was read, byte for byte
-  std::string sha256;  ///< of text, 64 lower-case hexadecimal digits
+  std::string text;                      ///< the file as it was read, byte for byte
+  std::string sha256;                    ///< of text, 64 lower-case hexadecimal digits
+  std::vector<ProtocolFile> files = {};  ///< that it names, each once
 };
 
 /// Somebody, or a simulated somebody, enrolled in one protocol. Pseudonyms only.
 struct Participant {
   std::int64_t id = 0;  ///< the store's own key
   std::string code;     ///< 1 to 32 letters and digits
-  int number = 0;       ///< 1, 2, ...: orders the counterbalancing, unique within the protocol
+  int number = 0;       ///< 1, 2, ...: unique within the protocol
+  /// Orders the counterbalancing: number, unless a merge had to give another one since.
+  int enrolled_number = 0;
   bool simulated = false;
   std::optional<std::uint64_t> seed;  ///< of a simulated participant
 };
@@ -97,6 +106,12 @@ struct RunInfo {
   std::string consent_version;
   std::optional<std::int64_t> consent_utc_ns;
   std::string hand;  ///< "left", "right"
+  /// Of the protocol that the run was shown with, where only its texts differ from that of the
+  /// participant; "": the participant's own.
+  std::string protocol_sha256;
+  /// Of the files of that protocol, as the store knows them; "": none, or recorded by a palpate
+  /// that did not keep them. The store fills it in.
+  std::string files_sha256;
 };
 
 }  // namespace palpate

@@ -49,7 +49,7 @@ void remove_database(const std::string& file) {
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 1> steps = {{{1, withdrawal_sql()}}};
+  static const std::array<Migration, 2> steps = {{{1, withdrawal_sql()}, {2, provenance_sql()}}};
   return steps;
 }
 
@@ -64,7 +64,7 @@ void create_database(const std::string& path) {
       db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
       SQLite::Transaction transaction(db);
       db.exec(schema_sql());
-      db.exec(withdrawal_sql());
+      for (const Migration& step : migrations()) db.exec(step.sql);
       db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
       set_version(db, kSchemaVersion);
       transaction.commit();

@@ -9,15 +9,16 @@
 
 namespace palpate {
 
-inline constexpr int kSchemaVersion = 2;
+inline constexpr int kSchemaVersion = 3;
 inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", in every file of ours
 
 inline constexpr int kPageSize = 4096;  ///< bytes; a file of ours is whole pages
 
-/// schema.sql (version 1) and withdrawal.sql (what version 2 adds) as they were when the program
-/// was built.
+/// schema.sql (version 1), withdrawal.sql and provenance.sql (what versions 2 and 3 add) as they
+/// were when the program was built.
 const char* schema_sql();
 const char* withdrawal_sql();
+const char* provenance_sql();
 
 /// Turns version `from` into `from + 1`.
 struct Migration {

@@ -100,8 +100,10 @@ std::array<SessionRows, 4> session_rows(SQLite::Database& db) {
   std::array<SessionRows, 4> all{
       {{"runs", "", ""}, {"notes", "", ""}, {"attempts", "", ""}, {"samples", "", ""}}};
   for (SessionRows& one : all) one.columns = columns_but_keys(db, one.table);
-  all[0].select = "SELECT row_number() OVER (ORDER BY t.id), 0, " + all[0].columns +
-                  " FROM runs t WHERE t.session_id = ?1 ORDER BY t.id";
+  all[0].select =
+      "SELECT row_number() OVER (ORDER BY t.id), (SELECT sha256 FROM protocols WHERE id = "
+      "t.protocol_id), " +
+      all[0].columns + " FROM runs t WHERE t.session_id = ?1 ORDER BY t.id";
   all[1].select = "SELECT " + which_run + all[1].columns +
                   " FROM notes t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = ?1) "
                   "ORDER BY t.run_id, t.id";
@@ -160,7 +162,16 @@ void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
     return runs[static_cast<std::size_t>(place - 1)];
   };
   Inserter add_run = inserter("runs", 1, "session_id", rows[0].columns);
-  each_row(rows[0].select, [&](auto& row) { runs.push_back(add_run({session}, row)); });
+  SQLite::Statement shown_with(
+      to, "UPDATE runs SET protocol_id = (SELECT id FROM protocols WHERE sha256 = ?) WHERE id = ?");
+  each_row(rows[0].select, [&](auto& row) {
+    runs.push_back(add_run({session}, row));
+    if (row.getColumn(1).isNull()) return;
+    shown_with.reset();
+    shown_with.bind(1, row.getColumn(1).getString());
+    shown_with.bind(2, runs.back());
+    shown_with.exec();
+  });
   Inserter add_note = inserter("notes", 1, "run_id", rows[1].columns);
   each_row(rows[1].select, [&](auto& row) { add_note({run_of(row)}, row); });
   std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> attempts;  // (trial, number) -> id

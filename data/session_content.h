@@ -14,12 +14,12 @@ namespace palpate {
 struct SessionRows {
   const char* table;
   std::string columns;  ///< all but keys, comma-separated
-  /// SELECT kPlaces integers that say what a row belongs to, then `columns`.
+  /// SELECT kPlaces values that say what a row belongs to, then `columns`.
   std::string select;
 };
 
-/// Runs, notes and attempts: which run of the session (1, 2, ...), then 0. Samples: the attempt's
-/// trial and number.
+/// Runs: which of the session (1, 2, ...), then the checksum of a protocol of its own, if any.
+/// Notes and attempts: which run, then 0. Samples: the attempt's trial and number.
 inline constexpr int kPlaces = 2;
 
 /// runs, notes, attempts, samples: in this order they can be inserted.

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "data/file_checks.h"
+#include "data/protocol_rows.h"
 #include "data/schema.h"
 
 namespace palpate {
@@ -57,6 +58,7 @@ Station::Station(const std::string& path, const std::string& scratch) : path_(pa
     db_->exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
     require_our_schema(*db_, path, checked_version(*db_, path));
     if (read == file_) quick_check(*db_, path);
+    require_sound_protocols(*db_, path, kSchemaVersion);
   });
 }
 

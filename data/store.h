@@ -132,9 +132,12 @@ class Store {
                     std::optional<int> wanted_number = std::nullopt, bool simulated = false,
                     std::optional<std::uint64_t> seed = std::nullopt);
 
-  /// Starts session `info.session` or goes on with it. \throws StoreRefused: the session is done or
-  /// withdrawn, already running in this store, or was simulated with other observer settings.
-  Run begin_run(const Participant& participant, const RunInfo& info);
+  /// Starts session `info.session` or goes on with it. \param shown_with a protocol that differs
+  /// from the participant's in its texts only; nullptr: the participant's own. \throws
+  /// StoreRefused: the session is done or withdrawn, already running in this store, or was
+  /// simulated with other observer settings.
+  Run begin_run(const Participant& participant, const RunInfo& info,
+                const ProtocolInfo* shown_with = nullptr);
 
   /// To be called BEFORE the stimulus is shown; on disk when it returns. Takes session, block,
   /// trial, renderer, shape, practice and orientation from `planned`.
@@ -176,7 +179,10 @@ class Store {
   /// What the session holds; empty where it was never begun.
   SessionProgress progress(const Participant& participant, int session);
 
-  std::vector<ProtocolInfo> protocols();  ///< in the order they came
+  /// In the order they came, without their files; also those that only runs were shown with.
+  std::vector<ProtocolInfo> protocols();
+  /// The files that a protocol names, by name.
+  std::vector<ProtocolFile> files(const std::string& protocol_sha256);
   std::vector<Participant> participants(const std::string& protocol_sha256);  ///< by number
   std::vector<StoredRun> runs();    ///< by protocol, participant number, session, start
   std::vector<StoredNote> notes();  ///< same order

@@ -115,8 +115,8 @@ void Store::Impl::for_each_attempt(const char* state, bool with_samples,
                  "CROSS JOIN attempts a ON a.session_id = s.id WHERE a.state = ?" +
                  (only ? " AND pa.code = ? AND s.number = ? AND a.trial = ?" : "") +
                  " ORDER BY pr.id, pa.number, s.number, a.trial, a.attempt");
-    SQLite::Statement find_run(*db, std::string("SELECT pr.name, pr.sha256, ") + kPersonColumns +
-                                        ", " + kRunColumns +
+    SQLite::Statement find_run(*db, std::string("SELECT pr.name, pr.sha256, ") +
+                                        person_columns(version) + ", " + run_columns(version) +
                                         " FROM runs r JOIN sessions s ON s.id = r.session_id JOIN "
                                         "participants pa ON pa.id = s.participant_id JOIN "
                                         "protocols pr ON pr.id = pa.protocol_id WHERE r.id = ?");

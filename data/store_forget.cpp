@@ -44,6 +44,7 @@ void delete_rows(SQLite::Database& db, const std::string& code) {
         "runs WHERE session_id IN " + sessions,
         std::string("sessions WHERE participant_id IN ") + kTheirs,
         std::string("export_participants WHERE participant_id IN ") + kTheirs,
+        std::string("renumberings WHERE participant_id IN ") + kTheirs,
         std::string("participants WHERE code = ?")}) {
     SQLite::Statement remove(db, "DELETE FROM " + what);
     Binder(remove) << code;

@@ -32,6 +32,7 @@ struct Store::Impl {
   std::string path;  ///< as given; for messages
   std::string file;  ///< links followed
   Mode mode = Mode::read_only;
+  int version = 0;                 ///< of the schema; an older one than ours where it is only read
   std::optional<WriterLock> lock;  // before db: given up after the database is closed
   std::optional<SQLite::Database> db;
   FileIdentity identity, wal_identity;

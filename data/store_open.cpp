@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data/file_checks.h"
+#include "data/protocol_rows.h"
 #include "data/schema.h"
 #include "data/sqlite_errors.h"
 #include "data/store_impl.h"
@@ -140,13 +141,16 @@ Store Store::open(const std::string& path, Mode mode) {
     SQLite::Database& db = *impl->db;
     db.exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
     if (!writes) db.exec("BEGIN");
-    const int version = checked_version(db, path);
-    require_our_schema(db, path, version);
+    impl->version = checked_version(db, path);
+    require_our_schema(db, path, impl->version);
     if (writes) {
       if (sqlite3_db_readonly(db.getHandle(), "main") == 1) {
         throw StoreError(path + ": may not be written; check its permissions");
       }
-      if (version < kSchemaVersion) migrate(db, impl->file, version, kSchemaVersion, migrations());
+      if (impl->version < kSchemaVersion) {
+        migrate(db, impl->file, impl->version, kSchemaVersion, migrations());
+        impl->version = kSchemaVersion;
+      }
       if (db.execAndGet("PRAGMA journal_mode = WAL").getString() != "wal") {
         throw StoreError(
             path +
@@ -155,6 +159,7 @@ Store Store::open(const std::string& path, Mode mode) {
       db.exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
     }
     quick_check(db, path, !writes);
+    require_sound_protocols(db, path, impl->version);
     if (writes) mark_dead_runs(db);
   });
   impl->identity = identity_of(impl->file);

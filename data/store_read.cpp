@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "data/protocol_rows.h"
 #include "data/store_impl.h"
 #include "data/store_rows.h"
 #include "data/utc.h"
@@ -61,10 +62,20 @@ std::vector<ProtocolInfo> Store::protocols() {
   });
 }
 
+std::vector<ProtocolFile> Store::files(const std::string& protocol_sha256) {
+  if (impl_->version < 3) return {};
+  return guarded(impl_->path, [&] {
+    SQLite::Statement find(*impl_->db, "SELECT id FROM protocols WHERE sha256 = ?");
+    Binder(find) << protocol_sha256;
+    if (!find.executeStep()) return std::vector<ProtocolFile>();
+    return files_of(*impl_->db, find.getColumn(0).getInt64());
+  });
+}
+
 std::vector<Participant> Store::participants(const std::string& protocol_sha256) {
   return guarded(impl_->path, [&] {
     std::vector<Participant> all;
-    SQLite::Statement find(*impl_->db, std::string("SELECT ") + kPersonColumns +
+    SQLite::Statement find(*impl_->db, std::string("SELECT ") + person_columns(impl_->version) +
                                            " FROM participants pa JOIN protocols pr ON pr.id = "
                                            "pa.protocol_id WHERE pr.sha256 = ? ORDER BY pa.number");
     Binder(find) << protocol_sha256;
@@ -80,7 +91,8 @@ std::vector<StoredRun> Store::runs() {
   return guarded(impl_->path, [&] {
     std::vector<StoredRun> all;
     SQLite::Statement find(*impl_->db, std::string("SELECT pr.sha256, r.end_reason, ") +
-                                           kPersonColumns + ", " + kRunColumns + kFromProtocolDown +
+                                           person_columns(impl_->version) + ", " +
+                                           run_columns(impl_->version) + kFromProtocolDown +
                                            "JOIN runs r ON r.session_id = s.id ORDER BY pr.id, "
                                            "pa.number, s.number, r.id");
     while (find.executeStep()) {
@@ -98,7 +110,7 @@ std::vector<StoredNote> Store::notes() {
   return guarded(impl_->path, [&] {
     std::vector<StoredNote> all;
     SQLite::Statement find(*impl_->db,
-                           std::string("SELECT ") + kPersonColumns +
+                           std::string("SELECT ") + person_columns(impl_->version) +
                                ", s.number, n.text, n.at_ns, r.started_utc_ns, r.started_ns" +
                                kFromProtocolDown +
                                "JOIN runs r ON r.session_id = s.id JOIN notes n ON n.run_id = "

@@ -29,9 +29,28 @@ std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
   return columns;
 }
 
+std::string person_columns(int version) {
+  return std::string("pa.id, pa.code, pa.number, ") +
+         (version < 3 ? "pa.number"
+                      : "coalesce((SELECT enrolled_number FROM renumberings WHERE participant_id = "
+                        "pa.id), pa.number)") +
+         ", pa.simulated, pa.seed";
+}
+
+std::string run_columns(int version) {
+  return std::string(
+             "s.number, r.started_utc_ns, r.started_ns, r.program_version, r.build, r.device, "
+             "r.device_calibration, r.response_device, r.response_latency, s.observer_sha256, "
+             "r.consent_version, r.consent_utc_ns, r.hand, ") +
+         (version < 3 ? "'', ''"
+                      : "coalesce((SELECT sha256 FROM protocols WHERE id = r.protocol_id), ''), "
+                        "r.files_sha256");
+}
+
 Row& operator>>(Row& row, Participant& person) {
   std::optional<std::string> seed;
-  row >> person.id >> person.code >> person.number >> person.simulated >> seed;
+  row >> person.id >> person.code >> person.number >> person.enrolled_number >> person.simulated >>
+      seed;
   person.seed.reset();
   if (!seed) return row;
   const char* const end = seed->data() + seed->size();
@@ -47,7 +66,8 @@ Row& operator>>(Row& row, RunInfo& info) {
   return row >> info.session >> info.clock.utc_ns >> info.clock.monotonic_ns >>
          info.program_version >> info.build >> info.device >> info.device_calibration >>
          info.response_device >> info.response_latency >> info.observer_sha256 >>
-         info.consent_version >> info.consent_utc_ns >> info.hand;
+         info.consent_version >> info.consent_utc_ns >> info.hand >> info.protocol_sha256 >>
+         info.files_sha256;
 }
 
 std::int64_t read_plan(Row& row, TrialRecord& record) {

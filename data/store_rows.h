@@ -3,6 +3,7 @@
 // function that takes its values from a row, in the same order.
 
 #include <cstdint>
+#include <string>
 
 #include "data/record.h"
 #include "data/store_impl.h"
@@ -10,13 +11,10 @@
 namespace palpate {
 
 // Aliases: pr protocols, pa participants, s sessions, r runs, a attempts.
-inline constexpr const char* kPersonColumns = "pa.id, pa.code, pa.number, pa.simulated, pa.seed";
+std::string person_columns(int version);  ///< of the schema
 Row& operator>>(Row& row, Participant& person);
 
-inline constexpr const char* kRunColumns =
-    "s.number, r.started_utc_ns, r.started_ns, r.program_version, r.build, r.device, "
-    "r.device_calibration, r.response_device, r.response_latency, s.observer_sha256, "
-    "r.consent_version, r.consent_utc_ns, r.hand";
+std::string run_columns(int version);
 Row& operator>>(Row& row, RunInfo& info);
 
 inline constexpr const char* kPlanColumns =

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "data/checks.h"
+#include "data/protocol_rows.h"
 #include "data/store_impl.h"
 #include "data/tombstones.h"
 
@@ -43,35 +44,24 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
       "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
   if (wanted_number) checks.positive("the participant's number", *wanted_number);
   checks.expect(simulated || !seed, "only a simulated participant has a seed");
-  checks.present("protocol's name", protocol.name);
-  checks.present("protocol's text", protocol.text);
-  checks.expect(protocol.sha256.size() == 64 &&
-                    protocol.sha256.find_first_not_of("0123456789abcdef") == std::string::npos,
-                "protocol's SHA-256 must be 64 lower-case hexadecimal digits");
+  check(checks, protocol);
   checks.raise(impl_->path + ": participant");
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
-    SQLite::Statement add_protocol(
-        db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?) ON CONFLICT DO NOTHING");
-    Binder(add_protocol) << protocol.sha256 << protocol.name << protocol.text;
-    add_protocol.exec();
-    SQLite::Statement find_protocol(db, "SELECT id, text FROM protocols WHERE sha256 = ?");
-    Binder(find_protocol) << protocol.sha256;
-    find_protocol.executeStep();
-    const std::int64_t protocol_id = find_protocol.getColumn(0).getInt64();
-    if (find_protocol.getColumn(1).getString() != protocol.text) {
-      impl_->refuse("holds another protocol text under the same SHA-256 " + protocol.sha256);
-    }
+    const std::int64_t protocol_id = keep_protocol(db, impl_->path, protocol);
 
     Participant person{.code = code, .simulated = simulated, .seed = seed};
     SQLite::Statement find(
         db,
-        "SELECT id, number, simulated, seed FROM participants WHERE protocol_id = ? AND code = ?");
+        "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
+        "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
+        "AND code = ?");
     Binder(find) << protocol_id << code;
     if (find.executeStep()) {
       bool was_simulated = false;
       std::optional<std::string> was_seed;
-      Row(find) >> person.id >> person.number >> was_simulated >> was_seed;
+      Row(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
+          was_seed;
       if (wanted_number && *wanted_number != person.number) {
         impl_->refuse("participant " + code + " has number " + std::to_string(person.number) +
                       ", not " + std::to_string(*wanted_number) +
@@ -107,7 +97,7 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
       }
       if (number == next) ++next;
     }
-    person.number = wanted_number.value_or(next);
+    person.number = person.enrolled_number = wanted_number.value_or(next);
     SQLite::Statement add(db,
                           "INSERT INTO participants (protocol_id, code, number, simulated, seed) "
                           "VALUES (?, ?, ?, ?, ?)");
@@ -119,9 +109,11 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
   });
 }
 
-Run Store::begin_run(const Participant& participant, const RunInfo& info) {
+Run Store::begin_run(const Participant& participant, const RunInfo& info,
+                     const ProtocolInfo* shown_with) {
   Checks checks;
   check(checks, info, participant.simulated);
+  if (shown_with != nullptr) check(checks, *shown_with);
   checks.raise(impl_->path + ": session of participant " + participant.code);
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
@@ -154,16 +146,26 @@ Run Store::begin_run(const Participant& participant, const RunInfo& info) {
       add.exec();
       run.session_id = db.getLastInsertRowid();
     }
+    SQLite::Statement own(db, "SELECT protocol_id FROM participants WHERE id = ?");
+    Binder(own) << participant.id;
+    own.executeStep();
+    const std::int64_t own_protocol = own.getColumn(0).getInt64();
+    std::optional<std::int64_t> other_protocol;
+    if (shown_with != nullptr) {
+      const std::int64_t shown = keep_protocol(db, impl_->path, *shown_with);
+      if (shown != own_protocol) other_protocol = shown;
+    }
     SQLite::Statement add(
         db,
         "INSERT INTO runs (session_id, started_utc_ns, started_ns, program_version, build, device, "
         "device_calibration, response_device, response_latency, consent_version, consent_utc_ns, "
-        "hand, "
-        "end_reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'running')");
+        "hand, protocol_id, files_sha256, end_reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+        "?, ?, 'running')");
     Binder(add) << run.session_id << info.clock.utc_ns << info.clock.monotonic_ns
                 << info.program_version << info.build << info.device << info.device_calibration
                 << info.response_device << info.response_latency << info.consent_version
-                << info.consent_utc_ns << info.hand;
+                << info.consent_utc_ns << info.hand << other_protocol
+                << files_checksum(db, other_protocol.value_or(own_protocol));
     add.exec();
     run.id = db.getLastInsertRowid();
     return run;

@@ -3,7 +3,7 @@
 set -euo pipefail
 
 build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libjs-vega libsqlite3-dev
-  libsqlitecpp-dev libusb-1.0-0-dev nlohmann-json3-dev pkg-config zlib1g-dev
+  libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config zlib1g-dev
   fonts-noto-core libasound2-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev libstb-dev libx11-dev)
 tests=(imagemagick libbenchmark-dev libbullet-dev libfcl-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
   libumockdev-dev libxml2-utils python3 python3-jsonschema umockdev xdotool xvfb)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/trials.h"
+#include "data/checksum.h"
 #include "data/store.h"
 #include "protocols/parse.h"
 
@@ -39,10 +40,10 @@ class TrialsStore : public ::testing::Test {
   }
   void study(const std::vector<TrialRecord>& records) {
     Store store = Store::open(path_, Store::Mode::write_or_create);
-    const std::string sha(64, 'a');
     // Own stimuli stand in the protocol's order, not in that of their appearance.
-    const ProtocolInfo protocol{
-        "test", R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})", sha};
+    const std::string text =
+        R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})";
+    const ProtocolInfo protocol{"test", text, checksum_hex(text)};
     const Participant person = store.enrol(protocol, "S1", 1, true, 7);
     RunInfo info;
     info.program_version = "9.9.9";
@@ -78,7 +79,9 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
   EXPECT_EQ(table.rows[1].answer, -1);
   EXPECT_EQ(table.rows[2].answer, 1);
   EXPECT_EQ(table.provenance.protocol_name, "test");
-  EXPECT_EQ(table.provenance.protocol_sha256, (std::vector<std::string>{std::string(64, 'a')}));
+  EXPECT_EQ(table.provenance.protocol_sha256,
+            (std::vector<std::string>{checksum_hex(
+                R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})")}));
   EXPECT_EQ(table.provenance.observer_sha256, std::string(64, 'b'));
   EXPECT_EQ(table.provenance.program_versions, (std::vector<std::string>{"9.9.9"}));
 }

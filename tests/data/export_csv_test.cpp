@@ -137,7 +137,7 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
                                                     {"simulated", "0"},
                                                     {"missed_ticks", "5"},
                                                     {"attempt", "1"},
-                                                    {"protocol_sha256", std::string(64, 'a')},
+                                                    {"protocol_sha256", a_protocol().sha256},
                                                     {"program_version", "0.1.0"},
                                                     {"participant_number", "4"},
                                                     {"started_inside", "1"},
@@ -230,7 +230,7 @@ TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {
                                                     {"reason", "device fault, reconnected"},
                                                     {"device", "falcon"},
                                                     {"simulated", "0"},
-                                                    {"protocol_sha256", std::string(64, 'a')},
+                                                    {"protocol_sha256", a_protocol().sha256},
                                                     {"program_version", "0.1.0"},
                                                     {"participant_number", "4"}};
   EXPECT_EQ(row, expected);

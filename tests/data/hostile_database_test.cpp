@@ -145,7 +145,6 @@ struct Crafted {
 };
 
 TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
-  const std::string other(64, 'b');
   const Crafted all[] = {
       {"a code that leads out of the folder",
        "UPDATE participants SET code = '../../x' WHERE id = 1", "damaged"},
@@ -221,7 +220,7 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
       {"a name as long as a book",
        "UPDATE protocols SET name = replace(hex(zeroblob(5000)), '00', 'xy')", ""},
       {"two names that end alike",
-       "INSERT INTO protocols VALUES (2, '../" + other.substr(0, 61) +
+       "INSERT INTO protocols VALUES (2, '" + checksum_hex("x") +
            "', '..', 'x'); UPDATE protocols SET name = '.' WHERE id = 1; UPDATE participants SET "
            "protocol_id = 2 WHERE id = 2",
        ""},
@@ -235,9 +234,10 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
        "UPDATE runs SET device = '''); DROP TABLE attempts; --', program_version = '-1+1'",
        ""},
       {"a tombstone that takes days",
-       "INSERT INTO tombstones VALUES (1, '$6$rounds=999999999$aaaaaaaaaaaaaaaa$x', 1)",
+       "INSERT INTO tombstones VALUES (1, '$6$rounds=999999999$aaaaaaaaaaaaaaaa$x', 1, NULL)",
        "tombstone"},
-      {"a tombstone that is a path", "INSERT INTO tombstones VALUES (1, '../x', 1)", "tombstone"},
+      {"a tombstone that is a path", "INSERT INTO tombstones VALUES (1, '../x', 1, NULL)",
+       "tombstone"},
       {"a trigger", "CREATE TRIGGER t AFTER INSERT ON participants BEGIN DELETE FROM attempts; END",
        "trigger"},
       {"a view in place of a table",

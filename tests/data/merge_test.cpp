@@ -249,7 +249,9 @@ TEST_F(Merging, DifferentProtocolsUnderOneNameAreRefused) {
   }
   const std::string message = refusal({a_, b_});
   EXPECT_TRUE(contains(message, "protocol ho2000 is not the same")) << message;
-  EXPECT_TRUE(contains(message, "aaaaaaaaaaaa") && contains(message, "bbbbbbbbbbbb")) << message;
+  for (const char variant : {'a', 'b'}) {
+    EXPECT_TRUE(contains(message, a_protocol(variant).sha256.substr(0, 12))) << message;
+  }
   {
     Store a = write(a_);
     show_session(a, "P9", 9, 1, 'b');

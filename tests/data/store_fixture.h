@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "data/checksum.h"
 #include "data/store.h"
 
 namespace palpate::testing {
@@ -29,8 +30,11 @@ class TemporaryFolder {
   std::string path_;
 };
 
-inline ProtocolInfo a_protocol(char digit = 'a') {
-  return {.name = "ho2000", .text = "{\"version\": 1}\n", .sha256 = std::string(64, digit)};
+/// \param variant  another letter, another text
+inline ProtocolInfo a_protocol(char variant = 'a') {
+  const std::string text =
+      "{\"version\": 1}" + std::string(static_cast<std::size_t>(variant - 'a'), ' ') + "\n";
+  return {.name = "ho2000", .text = text, .sha256 = checksum_hex(text)};
 }
 
 inline RunInfo a_run(int session = 1) {

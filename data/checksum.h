@@ -1,0 +1,17 @@
+#pragma once
+// Internal to data/: SHA-256.
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace palpate {
+
+using Checksum = std::array<unsigned char, 32>;
+
+Checksum checksum(const void* bytes, std::size_t size);
+std::string to_hex(const Checksum& checksum);      ///< 64 lower-case digits
+std::string checksum_hex(std::string_view bytes);  ///< of bytes
+
+}  // namespace palpate
