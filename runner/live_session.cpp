@@ -1,5 +1,6 @@
 #include "runner/live_session.h"
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -25,7 +26,7 @@ const char* word(Session::State state) {
       return "rest";
     case Session::State::trial:
     case Session::State::response:
-      return "trial";
+      return nullptr;  // what was shown last
     case Session::State::end:
       return "end";
   }
@@ -42,6 +43,7 @@ LiveSession::LiveSession(const Parts& parts, const Participant& participant, con
       log_(parts.store, run),
       session_({parts.protocol, parts.library, parts.servo, parts.clock, respondent_, log_, this},
                plan, stamp),
+      forces_(parts.servo, parts.guard, parts.clock),
       started_ns_(parts.clock.now_ns()) {
   state_.study = parts.protocol.name;
   state_.participant = participant.code;
@@ -55,9 +57,10 @@ LiveSession::Outcome LiveSession::run() {
   try {
     outcome = go_through();
   } catch (const StoreError&) {
-    zero_force();
+    forces_.off();
     throw;
   }
+  take_last_words(outcome);
   outcome.recorded = session_.plan().done();
   outcome.trials = session_.plan().size();
   stop_noise();
@@ -65,7 +68,8 @@ LiveSession::Outcome LiveSession::run() {
   if (!outcome.reason.empty()) parts_.store.add_note(run_, now, "ended: " + outcome.reason);
   parts_.store.add_note(run_, now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
   parts_.store.end_run(run_, outcome.end, now);
-  if (outcome.end != RunEnd::done) respondent_.show_message(parts_.protocol.texts.end);
+  show_console();
+  if (outcome.end != RunEnd::done) respondent_.show_message("");  // it was not the last object
   return outcome;
 }
 
@@ -78,15 +82,28 @@ LiveSession::Outcome LiveSession::go_through() {
       if (const int signal = parts_.end_requested()) {
         return {RunEnd::aborted, std::string("signal: ") + strsignal(signal), 0, 0, true};
       }
-      faulted_ = paused_ = true;
       stop_noise();
-      say(fault.what());
+      if (fault.trouble == DeviceTrouble::guard_lost)
+        return {RunEnd::aborted, fault.reason, 0, 0, true};
+      hold(fault.reason, fault.passed(), fault.trouble);
+      say(std::string(fault.what()) + "; " + ways_on());
     } catch (const EndOfSession& end) {
-      if (session_.plan().finished()) break;
+      if (session_.plan().finished() && end.end != RunEnd::withdrawn) break;
       return {end.end, end.what(), 0, 0, end.failed};
     }
   }
   return {};
+}
+
+/// What was said at the same time as the end, or right after it, counts as well.
+void LiveSession::take_last_words(Outcome& outcome) {
+  for (ConsoleCommand& command : parts_.console.commands()) commands_.push_back(std::move(command));
+  for (const ConsoleCommand& command : std::exchange(commands_, {})) {
+    if (command.kind == ConsoleCommand::Kind::note) note(command.time_ns, command.text);
+    if (command.kind != ConsoleCommand::Kind::quit) continue;
+    const EndOfSession end = end_by_experimenter(command.text);
+    if (end.end == RunEnd::withdrawn) outcome = {end.end, end.what(), 0, 0, false};
+  }
 }
 
 void LiveSession::between_trials() {
@@ -98,7 +115,6 @@ void LiveSession::between_trials() {
   const double elapsed = static_cast<double>(parts_.clock.now_ns() - started_ns_) / kSecond_ns;
   if (longest && elapsed > *longest * 60)
     throw EndOfSession(RunEnd::paused, "the session has lasted as long as the protocol allows");
-  state_.state = word(now);
   if (now != Session::State::trial) stop_noise();  // a page to read, and perhaps to talk about
   do {
     wait_while_held();
@@ -114,16 +130,18 @@ void LiveSession::stop_if_due() {
 }
 
 void LiveSession::wait_while_held() {
-  if (!paused_) return;
+  if (hold_ == Hold::none) return;
   stop_noise();
   respondent_.show_message(parts_.protocol.texts.break_text);
-  while (paused_) {
-    state_.state = faulted_ ? "fault" : "paused";
+  while (hold_ != Hold::none) {
+    state_.state = hold_ == Hold::pause ? "paused" : held_state_;
+    state_.held_by = held_reason_ + (held_reason_.empty() ? "" : "; ") + ways_on();
     attend();
     stop_if_due();
     parts_.clock.wait_until(parts_.clock.now_ns() + kNap_ns);
   }
-  state_.state = word(session_.state());
+  state_.held_by.clear();
+  held_reason_.clear();
 }
 
 void LiveSession::attend() {
@@ -139,21 +157,23 @@ void LiveSession::attend() {
   if (!parts_.screen.open())
     throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
   if (parts_.clock.now_ns() - shown_ns_ >= kFrame_ns) show_console();
+  end_with_the_guard();
+}
+
+void LiveSession::end_with_the_guard() const {
+  if (state_.sample.trouble == DeviceTrouble::guard_lost)
+    throw EndOfSession(RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
 }
 
 void LiveSession::obey(const ConsoleCommand& command) {
   using Kind = ConsoleCommand::Kind;
   switch (command.kind) {
     case Kind::pause:
-      paused_ = true;
+      pause();
       say(in_trial_ ? "pause after this trial" : "paused");
       break;
     case Kind::go_on:
-      if (faulted_) {
-        say("forces are off: clear the fault first");
-      } else if (std::exchange(paused_, false)) {
-        say("going on");
-      }
+      go_on();
       break;
     case Kind::repeat_trial:
       if (in_trial_) throw TrialCutOff("repeated by the experimenter");
@@ -161,37 +181,90 @@ void LiveSession::obey(const ConsoleCommand& command) {
       break;
     case Kind::stop_after_trial:
     case Kind::stop_after_block:
-      stop_ = command.kind == Kind::stop_after_trial ? Stop::after_trial : Stop::after_block;
-      state_.stop_plan = stop_ == Stop::after_trial ? "after this trial" : "after this block";
-      say("the session will stop " + state_.stop_plan);
+      plan_stop(command.kind);
       break;
     case Kind::emergency_zero:
-      zero_force();
+      forces_.off();
       note(command.time_ns, "emergency zero");
       say("EMERGENCY: forces are off until the fault is cleared");
-      if (!in_trial_) faulted_ = paused_ = true;
+      if (!in_trial_)
+        hold(trip_reason(servo_fault::kEmergency, DeviceTrouble::none), false, DeviceTrouble::none);
       break;
     case Kind::clear_fault:
-      parts_.servo.clear_fault();
-      if (std::exchange(faulted_, false)) {
-        note(command.time_ns, "fault cleared");
-        say("fault cleared; go on when ready");
-      }
+      clear_fault(command.time_ns);
       break;
     case Kind::note:
       note(command.time_ns, command.text);
       break;
     case Kind::quit:
-      throw command.text == "withdrawn"
-          ? EndOfSession(RunEnd::withdrawn, "the participant withdrew")
-          : EndOfSession(RunEnd::aborted, "ended by the experimenter" +
-                                              (command.text.empty() ? "" : ": " + command.text));
+      throw end_by_experimenter(command.text);
   }
 }
 
-void LiveSession::zero_force() {
-  if (parts_.guard != nullptr) parts_.guard->emergency_zero();
-  parts_.servo.emergency_zero();
+void LiveSession::pause() { hold_ = std::max(hold_, Hold::pause); }
+
+void LiveSession::hold(const std::string& reason, bool passed, DeviceTrouble trouble) {
+  hold_ = passed ? Hold::passed : Hold::fault;
+  held_state_ = trouble == DeviceTrouble::guard_late ? "paused" : "fault";
+  held_reason_ = reason;
+}
+
+std::string LiveSession::ways_on() const {
+  const std::string go = parts_.console.name_of(ConsoleCommand::Kind::go_on);
+  if (hold_ != Hold::fault) return go + " goes on";
+  return parts_.console.name_of(ConsoleCommand::Kind::clear_fault) + ", then " + go + ", goes on";
+}
+
+bool LiveSession::allow_forces() {
+  const DeviceTrouble before = forces_.newest().trouble;
+  if (parts_.guard != nullptr &&
+      (before == DeviceTrouble::unplugged || before == DeviceTrouble::silent))
+    say("opening the device again");
+  const std::string trouble = forces_.allow([this] { return parts_.end_requested() != 0; });
+  state_.sample = forces_.newest();
+  end_with_the_guard();
+  if (trouble.empty()) return true;
+  hold(trouble, false, state_.sample.trouble);
+  say("not cleared, forces stay off: " + trouble + "; after that " + ways_on());
+  return false;
+}
+
+void LiveSession::clear_fault(std::int64_t at_ns) {
+  if (in_trial_ || hold_ < Hold::passed) {
+    say("there is no fault to clear");
+  } else if (allow_forces()) {
+    hold_ = Hold::pause;
+    held_reason_.clear();
+    note(at_ns, "fault cleared");
+    say("fault cleared; " + ways_on() + " when all are ready");
+  }
+}
+
+void LiveSession::go_on() {
+  if (hold_ == Hold::none) {
+    say("nothing is paused");
+  } else if (hold_ == Hold::fault) {
+    say("forces are off: clear the fault first (" +
+        parts_.console.name_of(ConsoleCommand::Kind::clear_fault) + ")");
+  } else if (hold_ == Hold::pause || allow_forces()) {
+    hold_ = Hold::none;
+    say("going on");
+  }
+}
+
+void LiveSession::plan_stop(ConsoleCommand::Kind kind) {
+  const Stop asked =
+      kind == ConsoleCommand::Kind::stop_after_trial ? Stop::after_trial : Stop::after_block;
+  if (stop_ == asked) {
+    stop_ = Stop::no;
+    state_.stop_plan.clear();
+    say("the stop is taken back: the session goes on");
+    return;
+  }
+  stop_ = asked;
+  state_.stop_plan = stop_ == Stop::after_trial ? "after this trial" : "after this block";
+  say("the session will stop " + state_.stop_plan + " (" + parts_.console.name_of(kind) +
+      " again takes it back)");
 }
 
 bool LiveSession::start_noise() {
@@ -200,7 +273,7 @@ bool LiveSession::start_noise() {
     parts_.noise->turn_on();
   } catch (const SoundError& error) {
     say(error.what());
-    paused_ = true;
+    pause();
     return false;
   }
   noise_noted_ = true;
@@ -222,7 +295,7 @@ void LiveSession::watch_noise() {
   if (!noise_noted_ || !parts_.noise->failed()) return;
   say(parts_.noise->report().trouble);
   stop_noise();
-  paused_ = true;
+  pause();
   if (in_trial_) throw TrialCutOff("the masking noise stopped");
 }
 
@@ -251,8 +324,12 @@ void LiveSession::show_console() {
   state_.trials = static_cast<int>(plan.size());
   state_.blocks = plan.blocks();
   state_.remaining = seconds_per_trial_ * static_cast<double>(plan.size() - plan.done());
-  parts_.servo.latest(state_.sample);
-  if (in_trial_) state_.state = feeling_ ? "trial" : "homing";
+  state_.sample = forces_.newest();
+  if (in_trial_) {
+    state_.state = feeling_ ? "trial" : "homing";
+  } else if (state_.held_by.empty() && word(session_.state()) != nullptr) {
+    state_.state = word(session_.state());
+  }
   state_.ticks = parts_.servo.health().ticks();
   state_.missed_ticks = parts_.servo.health().missed_ticks();
   state_.longest_period_ns = parts_.servo.health().longest_period_ns();

@@ -5,26 +5,18 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <stdexcept>
 #include <string>
 
 #include "runner/guard.h"
+#include "runner/live_forces.h"
 #include "runner/markers.h"
 #include "runner/participants/keyboard.h"
 #include "runner/servo_thread.h"
 #include "runner/session.h"
+#include "runner/session_end.h"
 #include "runner/sound/masking_noise.h"
 
 namespace palpate {
-
-/// The end of a session before its last trial; what() says why, for the record.
-class EndOfSession : public std::runtime_error {
- public:
-  EndOfSession(RunEnd how, const std::string& why, bool unwanted = false)
-      : std::runtime_error(why), end(how), failed(unwanted) {}
-  RunEnd end;
-  bool failed;  ///< nobody wished it
-};
 
 class LiveSession final : public Attendant, private SessionEvents {
  public:
@@ -69,8 +61,17 @@ class LiveSession final : public Attendant, private SessionEvents {
   void stop_if_due();  ///< where no trial is under way. \throws EndOfSession
   void wait_while_held();
   void obey(const ConsoleCommand& command);
-  void zero_force();
-  bool start_noise();  ///< false: it cannot be had, and the session is paused
+  void plan_stop(ConsoleCommand::Kind kind);
+  void take_last_words(Outcome& outcome);
+  /// Forces are off and nothing goes on until the experimenter says so.
+  void hold(const std::string& reason, bool passed, DeviceTrouble trouble);
+  bool allow_forces();  ///< false: something stands against it, and is said
+  void clear_fault(std::int64_t at_ns);
+  void pause();
+  void go_on();
+  void end_with_the_guard() const;  ///< \throws EndOfSession where it has ended
+  std::string ways_on() const;      ///< what to press or type
+  bool start_noise();               ///< false: it cannot be had, and the session is paused
   void stop_noise();
   void watch_noise();
   void note(std::int64_t at_ns, const std::string& text);
@@ -88,6 +89,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   KeyboardRespondent respondent_;
   DurableLog log_;
   Session session_;
+  LiveForces forces_;
   ConsoleState state_;
   std::deque<ConsoleCommand> commands_;  ///< not obeyed yet
   Marker marker_;                        ///< of the trial under way, to be filled in
@@ -95,7 +97,15 @@ class LiveSession final : public Attendant, private SessionEvents {
   double seconds_per_trial_ = 0;  ///< mean, of this run
   int timed_trials_ = 0;
   bool noise_noted_ = false;  ///< its start is on record, its end is not
-  bool in_trial_ = false, feeling_ = false, paused_ = false, faulted_ = false;
+  bool in_trial_ = false, feeling_ = false;
+  /// What keeps the next trial from beginning; each says more than the one before.
+  enum class Hold {
+    none,
+    pause,
+    passed,  ///< forces are off, but what took them off is over: to go on is enough
+    fault,   ///< forces are off: the fault must be cleared first
+  } hold_ = Hold::none;
+  std::string held_state_, held_reason_;  ///< of Hold::passed and fault
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

@@ -56,7 +56,7 @@ void Servo::begin(Stage& stage) noexcept {
 
 void Servo::clear_fault() noexcept {
   emergency_.store(false);  // first: a request that comes from now on is kept
-  clear_.store(true);
+  clear_trip();
 }
 
 bool Servo::at_home(const LineProbe& probe) noexcept {

@@ -60,6 +60,8 @@ class Servo final : public TickSource {
   void emergency_zero() noexcept { emergency_.store(true); }
   /// The experimenter allows forces again. From any thread.
   void clear_fault() noexcept;
+  /// The same, but zero force that was asked for stays asked for.
+  void clear_trip() noexcept { clear_.store(true); }
 
   /// Takes out the energy that sampling feeds to the hand; off unless asked for. Before start().
   void control_passivity() {

@@ -48,6 +48,7 @@ class ServoThread final : public TickSource {
   /// Zero force within the tick and until clear_fault(). From any thread or signal handler.
   void emergency_zero() noexcept { servo_.emergency_zero(); }
   void clear_fault() noexcept { servo_.clear_fault(); }
+  void clear_trip() noexcept { servo_.clear_trip(); }
   /// True once zero force was commanded to the device after emergency_zero(). Signal safe.
   bool forces_are_off() const noexcept { return off_.load(); }
 

@@ -12,19 +12,27 @@ constexpr double kPerSecond_ns = 1e9;
 
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
+}  // namespace
+
+bool SessionFault::passed() const {
+  if (faults & (servo_fault::kEmergency | render_fault::kNonFinite)) return false;
+  if (faults & servo_fault::kDeviceLost)
+    return trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded;
+  return (faults & (servo_fault::kMissedTicks | servo_fault::kStalled)) != 0;
+}
+
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   if (faults & servo_fault::kEmergency) return "zero force was asked for";
   if (faults & servo_fault::kStalled) return "the servo gives no more samples";
   if (faults & servo_fault::kDeviceLost) {
     const std::string why = advice(trouble);
+    if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) return why;
     return "the device was lost" + (why.empty() ? why : ": " + why);
   }
   if (faults & servo_fault::kMissedTicks) return "too many ticks were missed in a row";
   if (faults & render_fault::kNonFinite) return "a force or pose was not finite";
   return "they had not been cleared since the last fault";
 }
-
-}  // namespace
 
 Session::Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp)
     : parts_(parts), plan_(std::move(plan)), stamp_(stamp) {}
@@ -59,9 +67,9 @@ void Session::step() {
     case State::response:
       parts_.log.finish(record_);
       if (parts_.events != nullptr) parts_.events->recorded(record_);
+      plan_.answered(record_.correct);  // first: whoever leaves during the feedback has answered
       if (record_.practice || parts_.protocol.response.feedback)
         parts_.participant.feedback(record_.correct);
-      plan_.answered(record_.correct);
       state_ = before_trial();
       if (state_ == State::end) parts_.participant.read(texts.end);
       break;
@@ -144,7 +152,8 @@ bool Session::run_trial() {
     const std::string reason = trip_reason(faults, trouble);
     cut_off(reason);
     throw SessionFault("forces are off: " + reason + "; trial " + std::to_string(record_.trial) +
-                       " will be shown again");
+                           " will be shown again",
+                       reason, faults, trouble);
   }
   record_.response_time = protocol.response.time_out;
   if (answer) {

@@ -3,6 +3,8 @@
 
 #include <functional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "data/record.h"
 #include "runner/participants/respondent.h"
@@ -16,8 +18,18 @@ namespace palpate {
 /// What was in front of the participant was no trial any more: lost device, forces tripped. The
 /// attempt is on record as cut off, the forces are zero.
 class SessionFault : public std::runtime_error {
-  using std::runtime_error::runtime_error;
+ public:
+  SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
+      : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
+  /// It is over by itself: the machine was late, nothing is wrong with device or stylus.
+  bool passed() const;
+  std::string reason;    ///< that forces are off
+  std::uint32_t faults;  ///< of the tick
+  DeviceTrouble trouble;
 };
+
+/// Why forces went off, in words. \param faults, trouble  of a sample with kTripped
+std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
 
 /// What happens in a trial, as it happens: for markers and the experimenter's console.
 class SessionEvents {

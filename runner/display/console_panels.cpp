@@ -121,6 +121,11 @@ void draw_status(const ConsoleState& state) {
     ImGui::SameLine();
     text(kBad, state.stop_plan);
   }
+  if (!state.held_by.empty()) {
+    ImGui::PushTextWrapPos(0);
+    text(kBad, state.held_by);
+    ImGui::PopTextWrapPos();
+  }
   const float done = state.trials > 0 ? static_cast<float>(std::max(state.trial - 1, 0)) /
                                             static_cast<float>(state.trials)
                                       : 0.0F;
@@ -148,9 +153,9 @@ void draw_buttons(const ConsoleState& state, TypedText& reason,
   button("Pause", Kind::pause, state.state == "paused");
   ImGui::SameLine();
   button("Go on", Kind::go_on);
-  button("Stop after trial", Kind::stop_after_trial);
+  button("Stop after trial", Kind::stop_after_trial, state.stop_plan == "after this trial");
   ImGui::SameLine();
-  button("Stop after block", Kind::stop_after_block);
+  button("Stop after block", Kind::stop_after_block, state.stop_plan == "after this block");
   button("Repeat trial", Kind::repeat_trial);
   ImGui::SameLine();
   if (wide_button("End now...", half)) ImGui::OpenPopup("End the session now?");

@@ -19,6 +19,8 @@ void draw_health(const ConsoleState& state);
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);
 void draw_times(const std::vector<double>& times, float width, float height);
 
+/// On the button that asks for it.
+const char* button_words(ConsoleCommand::Kind kind);
 /// Words for bits of Sample::faults; empty for none.
 std::string fault_words(std::uint32_t faults);
 /// "1 h 05 min", "3 min 20 s"

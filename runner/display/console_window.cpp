@@ -87,6 +87,10 @@ void ConsoleWindow::destroy() {
   window_ = nullptr;
 }
 
+std::string ConsoleWindow::name_of(ConsoleCommand::Kind kind) const {
+  return "'" + std::string(button_words(kind)) + "'";
+}
+
 void ConsoleWindow::ask(ConsoleCommand::Kind kind, std::string text) {
   const std::int64_t now = settings_.clock->now_ns();
   if (kind == ConsoleCommand::Kind::emergency_zero && settings_.emergency) settings_.emergency();

@@ -24,6 +24,8 @@ class ConsoleWindow final : public ExperimenterConsole {
   void show(const ConsoleState& state) override { states_.put(state); }
   std::vector<ConsoleCommand> commands() override { return commands_.take(); }
 
+  std::string name_of(ConsoleCommand::Kind kind) const override;
+
   GLFWwindow* handle() const { return window_; }
   void draw();
   /// From a key of either window or a button.

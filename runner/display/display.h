@@ -63,6 +63,7 @@ struct ConsoleCommand {
 struct ConsoleState {
   std::string study, participant, state;   ///< state: a word or two, "trial", "rest", "paused"
   std::string shape, renderer, stop_plan;  ///< of the trial under way; what a stop was asked for
+  std::string held_by;  ///< while nothing goes on: why, and what to press or type; else empty
   int session = 0, block = 0, blocks = 0, trial = 0, trials = 0;
   double elapsed = 0;                 ///< s, of this session
   double remaining = 0;               ///< s, estimated, without breaks; 0 while unknown
@@ -81,6 +82,8 @@ class ExperimenterConsole {
   virtual ~ExperimenterConsole() = default;
   virtual void show(const ConsoleState& state) = 0;
   virtual std::vector<ConsoleCommand> commands() = 0;
+  /// What to press or type for it, in quotes: "':go'", "'Go on'".
+  virtual std::string name_of(ConsoleCommand::Kind kind) const = 0;
 };
 
 }  // namespace palpate

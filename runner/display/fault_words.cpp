@@ -38,6 +38,31 @@ std::string fault_words(std::uint32_t faults) {
   return out;
 }
 
+const char* button_words(ConsoleCommand::Kind kind) {
+  using Kind = ConsoleCommand::Kind;
+  switch (kind) {
+    case Kind::pause:
+      return "Pause";
+    case Kind::go_on:
+      return "Go on";
+    case Kind::repeat_trial:
+      return "Repeat trial";
+    case Kind::stop_after_trial:
+      return "Stop after trial";
+    case Kind::stop_after_block:
+      return "Stop after block";
+    case Kind::emergency_zero:
+      return "EMERGENCY: ZERO FORCE";
+    case Kind::clear_fault:
+      return "Clear the fault";
+    case Kind::note:
+      return "Enter";
+    case Kind::quit:
+      return "End now...";
+  }
+  return "";
+}
+
 std::string in_words(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "-";
   const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };

@@ -118,8 +118,9 @@ class TextConsole final : public ExperimenterConsole {
       text += printable_lines(state.messages[heard_ - state.older_messages]);
       text += '\n';
     }
-    if (state.state != state_ || state.trial != trial_) {
+    if (state.state != state_ || state.trial != trial_ || state.held_by != held_by_) {
       state_ = state.state;
+      held_by_ = state.held_by;
       trial_ = state.trial;
       text += status(state);
     }
@@ -128,6 +129,9 @@ class TextConsole final : public ExperimenterConsole {
     bell_.ring();
   }
   std::vector<ConsoleCommand> commands() override { return commands_.take(); }
+  std::string name_of(ConsoleCommand::Kind kind) const override {
+    return "':" + std::string(text_command(kind)) + "'";
+  }
 
   void ask(const ConsoleCommand& command) { commands_.add(command); }
 
@@ -141,6 +145,7 @@ class TextConsole final : public ExperimenterConsole {
     if (state.remaining > 60)
       text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
     if (state.missed_ticks > 0) text += ", " + std::to_string(state.missed_ticks) + " ticks missed";
+    if (!state.held_by.empty()) text += ": " + printable(state.held_by);
     return text + "]\n";
   }
 
@@ -149,7 +154,7 @@ class TextConsole final : public ExperimenterConsole {
   Inbox<ConsoleCommand> commands_;
   // Of what was shown last; the session's thread's own:
   std::size_t heard_ = 0;
-  std::string state_;
+  std::string state_, held_by_;
   int trial_ = 0;
 };
 

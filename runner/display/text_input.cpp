@@ -35,6 +35,13 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+/// Commands are the same in capital letters.
+std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+  return out;
+}
+
 bool continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U; }
 
 /// Bytes of the UTF-8 sequence that begins with this one; 0: none does.
@@ -53,18 +60,27 @@ const char* text_commands_help() {
          "  :pause       before the next trial       :go          go on\n"
          "  :repeat      show this trial again       :note TEXT   a note with its time\n"
          "  :stop        end after this trial        :stop block  end after this block\n"
+         "               (said again: it is taken back)\n"
          "  :zero, Esc   emergency: forces off       :clear       forces may go on again\n"
          "  :quit        end at once                 :quit withdrawn  the participant withdraws\n";
 }
 
+std::string_view text_command(Kind kind) {
+  for (const Word& word : kWords) {
+    if (kind == word.kind) return word.line;
+  }
+  return "note";
+}
+
 ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
   line = trimmed(line);
+  const std::string said = lower(line);
   for (const Word& word : kWords) {
-    if (line == word.line) return {word.kind, "", time_ns};
+    if (said == word.line) return {word.kind, "", time_ns};
   }
   for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
                                    std::pair(std::string_view("quit "), Kind::quit)}) {
-    if (line.substr(0, word.size()) == word)
+    if (said.rfind(word, 0) == 0)
       return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
   }
   return {Kind::note, "", time_ns};

@@ -15,6 +15,9 @@ namespace palpate {
 /// The commands of the text console, a line each.
 const char* text_commands_help();
 
+/// How it is typed, without the colon.
+std::string_view text_command(ConsoleCommand::Kind kind);
+
 /// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
 ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns);
 

@@ -5,9 +5,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "protocols/parse.h"
 #include "runner/realtime.h"
@@ -29,18 +31,29 @@ constexpr const char* kProtocol = R"({"version": 1, "name": "live", "renderers":
 class Screen final : public ParticipantScreen {
  public:
   explicit Screen(Clock& clock) : clock_(clock) {}
-  void show(const Page& page) override { kind = page.kind; }
+  void show(const Page& page) override {
+    kind = page.kind;
+    shown_ns_ = clock_.now_ns();
+    texts.push_back(page.text);
+    if (kind == Page::Kind::feedback && on_feedback) on_feedback();
+  }
   std::vector<KeyPress> keys() override {
+    if (clock_.now_ns() < shown_ns_ + takes_ns) return {};
+    if (kind == Page::Kind::text) return {{"space", clock_.now_ns()}};
     if (kind == Page::Kind::neutral && answers) return {{"1", clock_.now_ns()}};
     return {};
   }
   bool open() const override { return is_open; }
   Page::Kind kind = Page::Kind::message;
+  std::vector<std::string> texts;
   std::atomic<bool> answers{true};
+  std::int64_t takes_ns = 0;  ///< to read or to answer
+  std::function<void()> on_feedback;
   bool is_open = true;
 
  private:
   Clock& clock_;
+  std::int64_t shown_ns_ = 0;
 };
 
 /// Clears every fault and goes on, if not told otherwise.
@@ -50,12 +63,15 @@ class Console final : public ExperimenterConsole {
   void show(const ConsoleState& state) override { last = state; }
   std::vector<ConsoleCommand> commands() override {
     std::vector<ConsoleCommand> out = std::exchange(next, {});
+    if (in_state && in_state->first == last.state)
+      out.push_back(std::exchange(in_state, std::nullopt)->second);
     if (last.state == "paused" && goes_on) {
       ++pauses;
       if (repair) repair();
       out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
     }
     if (last.state == "fault" && in_fault) {
+      if (in_fault_sees != nullptr) *in_fault_sees = last.held_by;
       out.push_back(*std::exchange(in_fault, std::nullopt));
     } else if (last.state == "fault" && !clears && ++ignored > 1000) {
       out.push_back({ConsoleCommand::Kind::quit, "not obeyed", clock_.now_ns()});
@@ -67,12 +83,18 @@ class Console final : public ExperimenterConsole {
     }
     return out;
   }
+  std::string name_of(ConsoleCommand::Kind kind) const override {
+    return kind == ConsoleCommand::Kind::go_on ? "'on'" : "'other'";
+  }
   ConsoleState last;
   std::vector<ConsoleCommand> next;
   std::function<void()> repair;
   bool goes_on = false;                    ///< after a pause
   bool clears = true;                      ///< faults
   std::optional<ConsoleCommand> in_fault;  ///< said once
+  std::string* in_fault_sees = nullptr;    ///< what it was told then
+  /// Said once, in this state.
+  std::optional<std::pair<std::string, ConsoleCommand>> in_state;
   int pauses = 0;
   int faults = 0;
   int ignored = 0;  ///< looks at the console after `in_fault`
@@ -126,6 +148,11 @@ class LiveSessions : public ::testing::Test {
     return session.run();
   }
 
+  bool has_note(const std::string& text) {
+    const std::vector<StoredNote> notes = store_->notes();
+    return std::any_of(notes.begin(), notes.end(),
+                       [&text](const StoredNote& note) { return note.text == text; });
+  }
   std::vector<TrialRecord> records() { return store_->progress(participant_, 1).completed; }
   std::vector<std::string> cut_off_reasons() {
     std::vector<std::string> out;
@@ -222,6 +249,154 @@ TEST_F(LiveSessions, AClosedScreenASignalAndAQuitEndItResumably) {
   outcome = run(device);
   EXPECT_EQ(outcome.end, RunEnd::done);
   EXPECT_EQ(outcome.recorded, 2u);
+}
+
+TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
+  protocol_.texts.instructions = "read this";
+  protocol_.texts.practice = "try";
+  protocol_.practice.repetitions = 1;
+  protocol_.texts.break_text = "have a rest";
+  protocol_.breaks.every_trials = 1;
+  protocol_.breaks.min_seconds = 0.05;
+  protocol_.response.feedback = true;
+  protocol_.texts.end = "that was all";
+  const std::vector<std::string> texts = {"withdrawn", "Withdrawn", "WITHDRAWN.",
+                                          "she withdrew, feels sick"};
+  screen_.takes_ns = 80'000'000;
+  int number = 0;
+  for (const char* state : {"instructions", "practice begins", "block begins", "rest", "homing",
+                            "trial", "fault", "paused", "end"}) {
+    participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256},
+                                 "W" + std::to_string(++number));
+    console_.next.clear();
+    console_.last = {};
+    console_.clears = console_.goes_on = std::string(state) != "fault";
+    if (state == std::string("paused")) {
+      console_.goes_on = false;
+      console_.next = {{ConsoleCommand::Kind::pause, "", 0}};
+    }
+    const std::string& text = texts[static_cast<std::size_t>(number) % texts.size()];
+    console_.in_state = {state, {ConsoleCommand::Kind::quit, text, 0}};
+    FakeDevice device(
+        [state](int tick) { return at(0.1, tick > 60 && std::string(state) == "fault"); });
+    const LiveSession::Outcome outcome = run(device);
+    EXPECT_EQ(outcome.end, RunEnd::withdrawn) << text << " in " << state;
+    EXPECT_FALSE(outcome.failed);
+    EXPECT_EQ(store_->progress(participant_, 1).last_end, RunEnd::withdrawn);
+    EXPECT_EQ(store_->progress(participant_, 1).completed.size(), outcome.recorded) << state;
+  }
+}
+
+TEST_F(LiveSessions, WhoLeavesDuringTheFeedbackHasAnswered) {
+  protocol_.response.feedback = true;
+  FakeDevice device([](int) { return at(0.1); });
+  screen_.on_feedback = [&] { console_.next = {{ConsoleCommand::Kind::quit, "", 0}}; };
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.recorded, 1u);
+  EXPECT_EQ(records().size(), 1u);
+}
+
+TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
+  protocol_.texts.end = "that was all";
+  FakeDevice device([](int) { return at(0.1); });
+  screen_.takes_ns = 80'000'000;
+  console_.in_state = {"end", {ConsoleCommand::Kind::quit, "withdrawn", 0}};
+  LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.recorded, 2u);
+  EXPECT_EQ(outcome.end, RunEnd::withdrawn);
+  participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
+  console_.next = {{ConsoleCommand::Kind::quit, "a mistake", 0},
+                   {ConsoleCommand::Kind::note, "she said why", 0},
+                   {ConsoleCommand::Kind::quit, "Withdrawn", 0}};
+  outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::withdrawn);
+  EXPECT_EQ(store_->progress(participant_, 1).last_end, RunEnd::withdrawn);
+  EXPECT_TRUE(has_note("she said why"));
+}
+
+TEST_F(LiveSessions, AClearedFaultIsCleared) {
+  std::atomic<bool> plugged{true};
+  FakeDevice device([&](int tick) {
+    if (tick == 30) plugged = false;
+    return at(0.1, !plugged);
+  });
+  screen_.answers = false;
+  int tries = 0;
+  console_.repair = [&] {
+    if (++tries == 3) plugged = screen_.answers = true;
+  };
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  int cleared = 0, refused = 0;
+  for (const std::string& message : console_.last.messages) {
+    cleared += message.find("fault cleared") == 0 ? 1 : 0;
+    refused += message.find("not cleared, forces stay off: the device is unplugged") == 0 ? 1 : 0;
+  }
+  EXPECT_EQ(cleared, tries - 2) << "also where a busy machine has made it more";
+  EXPECT_EQ(refused, 2);
+  EXPECT_TRUE(has_note("fault cleared"));
+}
+
+TEST_F(LiveSessions, AFaultSaysWhatItIsAndWhatGoesOn) {
+  FakeDevice device([&](int tick) { return at(0.1, tick > 30); });
+  screen_.answers = console_.clears = false;
+  console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
+  std::string held;
+  console_.in_fault_sees = &held;
+  run(device);
+  EXPECT_EQ(held,
+            "the device was lost: the device is unplugged: plug it in again; 'other', then 'on', "
+            "goes on");
+}
+
+TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
+  std::atomic<DeviceTrouble> trouble{DeviceTrouble::none};
+  FakeDevice device([&](int tick) {
+    if (tick == 30) trouble = DeviceTrouble::guard_late;
+    DeviceReading reading = at(0.1, trouble != DeviceTrouble::none);
+    reading.trouble = trouble;
+    return reading;
+  });
+  screen_.answers = false;
+  console_.goes_on = true;
+  console_.clears = false;
+  console_.repair = [&] {
+    EXPECT_EQ(console_.last.held_by,
+              "the guard process was late: the machine may be busy; 'on' goes on");
+    EXPECT_EQ(device.force, Vec3(0));
+    trouble = DeviceTrouble::none;
+    screen_.answers = true;
+  };
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(console_.pauses, 1);
+
+  participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
+  screen_.answers = false;
+  FakeDevice dying([&](int tick) {
+    DeviceReading reading = at(0.1, tick >= 30);
+    if (tick >= 30) reading.trouble = DeviceTrouble::guard_lost;
+    return reading;
+  });
+  const LiveSession::Outcome outcome = run(dying);
+  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_TRUE(outcome.failed);
+  EXPECT_NE(outcome.reason.find("start the program again"), std::string::npos);
+  EXPECT_EQ(dying.force, Vec3(0));
+}
+
+TEST_F(LiveSessions, AStopIsTakenBackAndTheEndSaysSo) {
+  protocol_.texts.end = "that was all";
+  FakeDevice device([](int) { return at(0.1); });
+  const ConsoleCommand stop{ConsoleCommand::Kind::stop_after_trial, "", 0};
+  console_.next = {stop, stop};
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(screen_.texts.back(), "that was all");
+  EXPECT_EQ(console_.last.state, "end");
+  EXPECT_EQ(console_.last.stop_plan, "");
+
+  participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
+  console_.next = {{ConsoleCommand::Kind::quit, "", 0}};
+  run(device);
+  EXPECT_EQ(screen_.texts.back(), "") << "it was not the last object";
 }
 
 TEST_F(LiveSessions, AStopIsObeyedWhileItIsHeld) {
