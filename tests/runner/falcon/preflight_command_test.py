@@ -123,13 +123,14 @@ class Preflight(unittest.TestCase):
         self.press(1)
         self.press(2)
         while True:
-            came = terminal.wait_for("[space bar: go on]", "[trial, ", "[fault, ", "on record; ", "press button")
+            came = terminal.wait_for("[space bar: go on]", "[trial, ", "[fault, ", "[paused, ", "on record; ",
+                                      "press button")
             if came == "on record; ":
                 break
             if came in ("[trial, ", "press button"):
                 self.press(2)
             else:
-                terminal.type(":clear\n:go\n" if came == "[fault, " else " ")
+                terminal.type(":clear\n:go\n" if came in ("[fault, ", "[paused, ") else " ")
         self.assertEqual(terminal.finish(), 0, terminal.text)
         found = next(note for note in self.notes() if note.startswith("pre-flight: "))
         for part in ("device homed", "a push of 1.0 N to the right was felt; limits: forces of up to",
@@ -167,8 +168,8 @@ class Preflight(unittest.TestCase):
         terminal.type(":go\n")  # left unchecked
         while True:  # a starved machine's guard takes the force off and cuts the trial off
             self.hand(*AWAY)
-            came = terminal.wait_for("[trial, ", "[fault, ")
-            if came == "[fault, ":
+            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ")
+            if came != "[trial, ":
                 terminal.type(":clear\n:go\n")
                 continue
             self.hand(0.01, 0, 0)  # within the shape
