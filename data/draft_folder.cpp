@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "data/draft_file.h"
 #include "data/store.h"
 
 namespace palpate {
@@ -25,24 +26,6 @@ fs::path named(const std::string& target) {
   fs::path path = fs::absolute(target).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   return path;
-}
-
-std::string stem_of(const fs::path& target) {
-  return (target.parent_path() / ("." + target.filename().string() + ".palpate-")).string();
-}
-
-/// Drafts that nobody holds a lock on: their program is dead.
-void remove_dead_drafts(const fs::path& target) {
-  const std::string stem = stem_of(target);
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(target.parent_path(), error)) {
-    const std::string path = entry.path().string();
-    if (!path.starts_with(stem) || path.size() != stem.size() + 6) continue;
-    const int draft = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (draft < 0) continue;
-    if (::flock(draft, LOCK_EX | LOCK_NB) == 0) fs::remove_all(entry.path(), error);
-    ::close(draft);
-  }
 }
 
 bool made_by_palpate(const fs::path& description) {
@@ -60,7 +43,7 @@ bool made_by_palpate(const fs::path& description) {
 
 DraftFolder::DraftFolder(const std::string& target) : target_(named(target).string()) {
   remove_dead_drafts(target_);
-  draft_ = stem_of(target_) + "XXXXXX";
+  draft_ = draft_stem(target_) + "XXXXXX";
   if (::mkdtemp(draft_.data()) == nullptr) {
     const int error = errno;
     draft_.clear();
@@ -115,7 +98,7 @@ void DraftFolder::give_name(bool replace) {
 
 void DraftFolder::fail(const char* what, int error) const {
   throw StoreError(target_ + ": " + what + ": " + std::generic_category().message(error) +
-                   "; nothing was exported. Check the folder, its permissions and the free space");
+                   "; nothing was written. Check the folder, its permissions and the free space");
 }
 
 void require_replaceable(const std::string& target, bool force,

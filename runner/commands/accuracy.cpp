@@ -12,6 +12,7 @@
 #include "rendering/first_contact.h"
 #include "runner/commands/accuracy_report.h"
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/commands/progress_line.h"
 #include "stimuli/primitives.h"
 
@@ -205,7 +206,7 @@ int accuracy_command(const std::vector<std::string>& args) {
   take("most-triangles", settings.most_triangles, 20, 1310720);
   if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
   if (searching && !figure.empty()) throw UsageError("--figure: a search draws nothing");
-  check_outputs(*values, {"json", "figure", "report"});
+  Outputs outputs(*values, {"json", "figure", "report"}, {});
 
   AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -216,9 +217,10 @@ int accuracy_command(const std::vector<std::string>& args) {
     report.settings = settings;
     study(report, values->count("quick") > 0, jobs, seed);
   }
-  if (!json.empty()) write_whole(json, accuracy_json(report).dump(1) + "\n");
-  if (!figure.empty()) write_whole(figure, accuracy_figure(report));
-  if (!page.empty()) write_whole(page, accuracy_page(report));
+  if (outputs.wanted("json")) outputs.put("json", accuracy_json(report).dump(1) + "\n");
+  if (outputs.wanted("figure")) outputs.put("figure", accuracy_figure(report));
+  if (outputs.wanted("report")) outputs.put("report", accuracy_page(report));
+  outputs.write();
   std::cout << accuracy_text(report);
   const bool extremes_hold = std::all_of(report.extremes.begin(), report.extremes.end(),
                                          [](const ExtremeRow& row) { return row.result.passed; });

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/tick_cost.h"
 
 namespace palpate {
@@ -102,7 +103,7 @@ nlohmann::ordered_json to_json(const std::vector<TickCost>& rows) {
 
 int bench_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate bench [--json FILE] [--ticks N]";
+  line.usage = "palpate bench [--json FILE [--force]] [--ticks N]";
   line.summary =
       "Prints what a tick of the renderers costs on this machine: every tick timed alone, in "
       "nanoseconds. Quit other programs first.";
@@ -112,9 +113,11 @@ int bench_command(const std::vector<std::string>& args) {
   line.options.add_options()                                                               //
       ("json", po::value<std::string>()->value_name("FILE"), "write the figures as JSON")  //
       ("ticks", po::value<long>()->default_value(200'000)->value_name("N"),
-       "ticks a row, 1000 to 100 million");
+       "ticks a row, 1000 to 100 million")  //
+      ("force", "replace a file that is there");
   const auto values = line.parse(args);
   if (!values) return 0;
+  Outputs outputs(*values, {"json"}, {});
   const long ticks = (*values)["ticks"].as<long>();
   if (ticks < 1000 || ticks > 100'000'000)
     throw UsageError("--ticks: 1000 to 100000000 was expected, not " + std::to_string(ticks));
@@ -133,8 +136,8 @@ int bench_command(const std::vector<std::string>& args) {
                "first_contact: a new trial each.\n\n"
             << table(rows) << "\n"
             << conclusions(rows);
-  if (values->count("json") > 0)
-    write_whole((*values)["json"].as<std::string>(), to_json(rows).dump(2) + "\n");
+  outputs.put("json", to_json(rows).dump(2) + "\n");
+  outputs.write();
   return 0;
 }
 

@@ -10,6 +10,7 @@
 
 #include "runner/commands/command.h"
 #include "runner/commands/devices_calibrate.h"
+#include "runner/commands/outputs.h"
 #include "runner/devices/registry.h"
 #include "runner/guard.h"
 #include "runner/self_test.h"
@@ -214,13 +215,15 @@ int devices_command(const std::vector<std::string>& args) {
       ("no-fifo", "--timing: without real-time priority")                                        //
       ("no-realtime", "--timing: with no right that an ordinary program has not")                //
       ("core", po::value<int>()->default_value(-1)->value_name("N"),
-       "--timing: on this processor alone")            //
-      ("calibrate", "guided calibration of a device")  //
-      ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON");
+       "--timing: on this processor alone")                                                 //
+      ("calibrate", "guided calibration of a device")                                       //
+      ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
+      ("force", "replace a file that is there");
   add_calibrate_options(line.options);
   const auto values = line.parse(args);
   if (!values) return 0;
   const DeviceOrder order = order_of(*values);
+  Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
   Json report = {{"program_version", PALPATE_VERSION}};
@@ -244,8 +247,8 @@ int devices_command(const std::vector<std::string>& args) {
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--device: ") + error.what());
   }
-  if (values->count("json") > 0)
-    write_whole((*values)["json"].as<std::string>(), report.dump(2) + "\n");
+  outputs.put("json", report.dump(2) + "\n");
+  outputs.write();
   return status;
 }
 

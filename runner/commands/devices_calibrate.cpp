@@ -13,6 +13,7 @@
 
 #include "data/utc.h"
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/devices/falcon_homing.h"
 #include "runner/devices/falcon_open.h"
 #include "runner/devices/falcon_registration.h"
@@ -214,6 +215,10 @@ void add_calibrate_options(po::options_description& options) {
 int calibrate_devices(const std::string& device, const DeviceOrder& order,
                       const po::variables_map& values) {
   check(!order.calibration.empty(), "--calibrate needs --calibration FILE to store into");
+  TakenFiles firmware;
+  firmware.add(order.firmware, "--firmware reads it, it would be overwritten");
+  const std::string why = why_not_to_write(order.calibration, true, firmware);
+  check(why.empty(), "--calibration " + order.calibration + ": " + why);
   if (device == "falcon") return calibrate_force(order, values);
   if (device == "falcon2") return calibrate_pair(order, values);
   throw UsageError("--calibrate is for the devices falcon and falcon2, not for '" + device + "'");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/commands/plan_options.h"
 #include "runner/commands/progress_line.h"
 
@@ -71,7 +72,7 @@ int plan_command(const std::vector<std::string>& args) {
     throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + line.usage +
                      "\nMore: add --help");
   }
-  check_outputs(*values, {"json", "figure"});
+  Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
   PlanSettings settings = settings_of(options, *values);
   Pilot pilot = starting_point(options, *values);
   StudyModel model = model_of(pilot, options, *values);
@@ -89,8 +90,9 @@ int plan_command(const std::vector<std::string>& args) {
                         });
   progress.clear();
   plan.label = std::move(pilot.label);
-  if (!options.json.empty()) write_whole(options.json, plan_json(plan));
-  if (!options.figure.empty()) write_whole(options.figure, plan_svg(plan));
+  if (outputs.wanted("json")) outputs.put("json", plan_json(plan));
+  if (outputs.wanted("figure")) outputs.put("figure", plan_svg(plan));
+  outputs.write();
   std::cout << plan_text(plan);
   return 0;
 }

@@ -10,6 +10,7 @@
 
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/commands/render_explain.h"
 #include "runner/scene_builder.h"
 
@@ -127,15 +128,15 @@ std::string given(const po::variables_map& values, const char* option, const cha
   return values[option].as<std::string>();
 }
 
-void explain_scene(const po::variables_map& values, const Scene& scene, const Renderer& renderer) {
+void explain_scene(Outputs& outputs, const Scene& scene, const Renderer& renderer) {
   const Explanation explanation = explain_with_costs(scene, renderer);
   std::cout << to_text(explanation);
-  if (values.count("json") > 0)
-    write_whole(values["json"].as<std::string>(), to_json(explanation).dump(2) + "\n");
+  outputs.put("json", to_json(explanation).dump(2) + "\n");
+  outputs.write();
 }
 
-void render_trajectory(const Scene& scene, const Renderer& renderer,
-                       const std::vector<TrajectoryRow>& rows, const std::string& path) {
+std::string forces_along(const Scene& scene, const Renderer& renderer,
+                         const std::vector<TrajectoryRow>& rows) {
   RenderState state = scene.initial_state();
   std::string out = std::string(kForceHeader) + '\n';
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -143,7 +144,14 @@ void render_trajectory(const Scene& scene, const Renderer& renderer,
     const Rendering rendering = renderer.tick(scene, state, rows[i].probe, dt);
     append_row(out, rows[i].t, rendering);
   }
-  write_whole(path, out);
+  return out;
+}
+
+void keep_meshes(Outputs& outputs, const std::vector<ObjectSpec>& objects) {
+  for (const ObjectSpec& object : objects) {
+    if (!object.file.empty()) outputs.keep(object.file);
+    keep_meshes(outputs, object.parts);
+  }
 }
 
 }  // namespace
@@ -152,6 +160,7 @@ int render_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv\n"
+      "               [--force]\n"
       "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
   line.summary =
       "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
@@ -165,10 +174,11 @@ int render_command(const std::vector<std::string>& args) {
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
        (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader + " (s, m)")
-           .c_str())                                                                     //
-      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV; overwritten")  //
-      ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")   //
-      ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON");
+           .c_str())                                                                              //
+      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
+      ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
+      ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON")  //
+      ("force", "replace a file that is there");
   const auto values = line.parse(args);
   if (!values) return 0;
   const std::string name = (*values)["renderer"].as<std::string>();
@@ -181,15 +191,20 @@ int render_command(const std::vector<std::string>& args) {
   if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
   const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
   const std::string scene_path = (*values)["scene"].as<std::string>();
+  Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
-    explain_scene(*values, build_scene(scene_path, parse_scene(scene_path), renderer), renderer);
+    const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+    keep_meshes(outputs, objects);
+    explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
-  const std::string out = given(*values, "out", "unless --explain is given");
+  given(*values, "out", "unless --explain is given");
   const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+  keep_meshes(outputs, objects);
   const std::vector<TrajectoryRow> rows = read_trajectory(trajectory);
-  render_trajectory(build_scene(scene_path, objects, renderer), renderer, rows, out);
+  outputs.put("out", forces_along(build_scene(scene_path, objects, renderer), renderer, rows));
+  outputs.write();
   return 0;
 }
 

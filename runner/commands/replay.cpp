@@ -13,6 +13,7 @@
 #include "data/store.h"
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/device_check.h"
 #include "stimuli/printable.h"
 
@@ -258,7 +259,7 @@ int replay_command(const std::vector<std::string>& args) {
   add("force", "replace files that are there");
   const auto values = line.parse(args);
   if (!values) return 0;
-  check_outputs(*values, {"out", "json"});
+  Outputs outputs(*values, {"out", "json"}, {"db"});
   const TrialName name = trial_name(trial);
   Store store = Store::open(db, Store::Mode::read_only);
   const StoredTrial stored = find_trial(store, name, protocol_name);
@@ -280,7 +281,7 @@ int replay_command(const std::vector<std::string>& args) {
   const bool compare = values->count("compare") > 0;
   const Outcome outcome = replay_stored(protocol, record, compare, !out.empty());
 
-  if (!out.empty()) write_whole(out, csv_header(compare) + outcome.rows);
+  outputs.put("out", csv_header(compare) + outcome.rows);
   const bool equal = outcome.equal == outcome.ticks;
   if (!json.empty()) {
     Json result = {{"version", 1},
@@ -300,8 +301,9 @@ int replay_command(const std::vector<std::string>& args) {
           std::sqrt(outcome.difference_square_sum / static_cast<double>(outcome.ticks));
       result["max_difference_n"] = outcome.most_difference;
     }
-    write_whole(json, result.dump(1) + "\n");
+    outputs.put("json", result.dump(1) + "\n");
   }
+  outputs.write();
   std::cout << (stored.participant.simulated ? "SIMULATED " : "") << "trial " << printable(trial)
             << " of " << printable(stored.protocol_name) << ": " << printable(record.shape) << ", "
             << printable(record.renderer) << ", ";

@@ -8,6 +8,7 @@
 
 #include "runner/commands/accuracy_report.h"
 #include "runner/commands/command.h"
+#include "runner/commands/outputs.h"
 #include "runner/commands/progress_line.h"
 #include "runner/commands/stability_report.h"
 
@@ -200,12 +201,13 @@ int stability_command(const std::vector<std::string>& args) {
   if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
     throw UsageError("--jobs: expected 1 to 256, not " + std::to_string(jobs));
   }
-  check_outputs(*values, {"json", "report", "figure"});
+  Outputs outputs(*values, {"json", "report", "figure"}, {});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const StabilityReport report = study(values->count("full") > 0, jobs);
-  if (!json.empty()) write_whole(json, stability_json(report).dump(1) + "\n");
-  if (!figure.empty()) write_whole(figure, stability_figure(report));
-  if (!page.empty()) write_whole(page, stability_page(report));
+  if (outputs.wanted("json")) outputs.put("json", stability_json(report).dump(1) + "\n");
+  if (outputs.wanted("figure")) outputs.put("figure", stability_figure(report));
+  if (outputs.wanted("report")) outputs.put("report", stability_page(report));
+  outputs.write();
   std::cout << stability_text(report);
   return report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
 }

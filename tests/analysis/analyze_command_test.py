@@ -168,7 +168,7 @@ class Analyze(unittest.TestCase):
         csv = FIXTURES / "full.csv"
         used = []
         for limit in ("0.1", "0.2", "0.21"):
-            self.run_palpate("--csv", csv, "--too-fast-s", limit, "--json", self.dir / "a.json")
+            self.run_palpate("--csv", csv, "--too-fast-s", limit, "--json", self.dir / "a.json", "--force")
             used.append(json.loads((self.dir / "a.json").read_text())["counts"]["n_used_for_times"])
         self.assertTrue(used[0] > used[1] > used[2], used)
 

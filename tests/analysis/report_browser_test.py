@@ -82,7 +82,7 @@ class Report(unittest.TestCase):
     def test_every_fixture_is_drawn(self):
         for csv in sorted(FIXTURES.glob("*.csv")):
             with self.subTest(csv=csv.name):
-                self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+                self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html", "--force")
                 self.open(self.dir / "other.html")
                 self.assertTrue(all(figure[1] > 200 and figure[3] > 10 for figure in self.shown()), self.shown())
 
@@ -96,7 +96,7 @@ class Report(unittest.TestCase):
                 for i, (r, s) in enumerate([(r, s) for r in ("point", "ray") for s in (shape, "cube")] * 3, 1)]
         csv.write_text("participant_id,session,block,trial,renderer,shape,response,correct,response_time\n" +
                        "".join(rows))
-        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html", "--force")
         self.open(self.dir / "other.html")
         self.assertIn(shape, self.browser.run("[...document.querySelectorAll('.cards b')].map(b => b.textContent)"))
         self.assertIn(shape, self.browser.run(DRAWN + "[0].textContent"))
@@ -110,7 +110,7 @@ class Report(unittest.TestCase):
                 for i, (r, s) in enumerate([(r, s) for r in renderers for s in ("cone", "cube")] * 3, 1)]
         csv.write_text("participant_id,session,block,trial,renderer,shape,response,correct,response_time\n" +
                        "".join(rows))
-        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html")
+        self.run_palpate("analyze", "--csv", csv, "--report", self.dir / "other.html", "--force")
         colours = {}
         for dark in (False, True):
             self.open(self.dir / "other.html", dark=dark)

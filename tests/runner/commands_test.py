@@ -116,7 +116,7 @@ class Render(FromOutside):
         path = self.HEADER + "".join(",".join(map(repr, row)) + "\n" for row in rows)
         out = self.dir / "out.csv"
         self.palpate("render", "--scene", self.write("scene.json", scene), "--renderer", renderer, "--trajectory",
-                     self.write("path.csv", path), "--out", out)
+                     self.write("path.csv", path), "--out", out, "--force")
         with open(out, newline="") as file:
             return [{k: v if k == "contact_type" else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 

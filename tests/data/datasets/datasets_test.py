@@ -79,7 +79,7 @@ class Datasets(unittest.TestCase):
             results = []
             for source in (("--db", self.dir / f"{name}.db"), ("--csv", self.dir / f"{name}-csv" / "trials.csv")):
                 out = self.dir / "analysis.json"
-                run_palpate("analyze", *source, "--json", out)
+                run_palpate("analyze", *source, "--json", out, "--force")
                 text = out.read_text()
                 result = json.loads(text, parse_float=str)  # digit by digit
                 for origin in ("source", "protocol", "observer_sha256"):

@@ -1,0 +1,224 @@
+"""What commands write: whole, private, all or none, and over nothing that it must not replace.
+
+Usage: outputs_test.py PALPATE PROTOCOLS
+"""
+
+import os
+import pathlib
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
+TRIALS = "participant_id,session,block,trial,renderer,shape,response,correct,response_time\n" + "".join(
+    f"{who},1,1,{i},{r},{s},{s},1,{2 + 0.3 * i + 0.2 * len(r + who)}\n" for who in ("A", "BB", "CCC")
+    for i, (r, s) in enumerate([(r, s) for r in ("point", "ray") for s in ("cone", "cube")] * 3, 1))
+CUBE = '{"objects": [{"shape": "cube", "edge_m": 0.05}]}'
+MESH = '{"objects": [{"shape": "mesh", "file": "solid.obj"}]}'
+SOLID = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+PATH = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,0,0,1,0,0,2\n"
+
+
+class Outputs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.scratch.cleanup)
+        cls.study = pathlib.Path(cls.scratch.name) / "study.db"
+        subprocess.run([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", cls.study, "--participants", "2"],
+                       check=True, capture_output=True)
+
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        self.db, self.csv = self.dir / "s.db", self.write("x.csv", TRIALS)
+        shutil.copy(self.study, self.db)
+        self.scene, self.path = self.write("scene.json", CUBE), self.write("t.csv", PATH)
+
+    def write(self, name, text):
+        path = self.dir / name
+        path.write_text(text)
+        return path
+
+    def palpate(self, *args, status=0, **more):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=120, **more)
+        self.assertEqual(done.returncode, status, f"{args}\n{done.stdout}{done.stderr}")
+        return done
+
+    def writers(self):
+        """Commands with an option that names a file to write, and what they read, without that file."""
+        render = ["render", "--scene", self.scene, "--renderer", "ray"]
+        return [
+            (["analyze", "--csv", self.csv], ["json", "report"], [self.csv]),
+            (["analyze", "--db", self.db], ["json", "report"], [self.db]),
+            (["plan", "--db", self.db, "--participants", "2-3", "--trials", "10", "--studies", "100"],
+             ["json", "figure"], [self.db]),
+            (["replay", "--db", self.db, "--trial", "S001/1/1"], ["json", "out"], [self.db]),
+            (render + ["--trajectory", self.path], ["out"], [self.scene, self.path]),
+            (render + ["--explain"], ["json"], [self.scene]),
+            (["export", "--db", self.db, "--format", "csv"], ["out"], [self.db]),
+            (["accuracy", "--search", "100"], ["json", "report"], []),
+            (["stability"], ["json", "report", "figure"], []),
+            (["bench", "--ticks", "1000"], ["json"], []),
+            (["devices", "--device", "simulated", "--calibration", self.csv, "--firmware", self.path], ["json"],
+             [self.csv, self.path]),
+        ]
+
+    def everything(self):
+        return {str(p): (p.lstat().st_mode, p.read_bytes() if p.is_file() else b"") for p in self.dir.rglob("*")}
+
+    def refused(self, command, option, out, *more, status=2):
+        before = self.everything()
+        done = self.palpate(*command, f"--{option}", out, *more, status=status)
+        self.assertEqual(done.stdout, "", (command, option))
+        self.assertIn(str(out), done.stderr)
+        self.assertEqual(self.everything(), before, (command, option, out))
+        return done.stderr
+
+    def test_no_output_is_an_input_under_any_name(self):
+        for command, options, inputs in self.writers():
+            for option in options:
+                for source in inputs:
+                    linked, hard = self.dir / "linked", self.dir / "hard"
+                    linked.symlink_to(source)
+                    os.link(source, hard)
+                    for out in (source, self.dir / "." / source.name, linked, hard):
+                        with self.subTest(command=command[0], option=option, out=out.name):
+                            self.refused(command, option, out, "--force")
+                    linked.unlink()
+                    hard.unlink()
+
+    def test_a_mesh_that_a_scene_names_is_an_input(self):
+        scene, solid = self.write("scene.json", MESH), self.write("solid.obj", SOLID)
+        for more in (["--trajectory", self.path, "--out"], ["--explain", "--json"]):
+            self.refused(["render", "--scene", scene, "--renderer", "point", *more[:-1]], more[-1][2:], solid, "--force")
+
+    def test_no_output_is_a_database_or_beside_one(self):
+        other = self.dir / "other.db"
+        subprocess.run([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", other, "--participants", "1"],
+                       check=True, capture_output=True)
+        (self.dir / "bookmarks").write_bytes(b"SQLite format 3\0" + bytes(100))
+        (self.dir / "log").write_bytes(b"\x37\x7f\x06\x82" + bytes(100))
+        names = ["other.db", "bookmarks", "log", "other.db-wal", "other.db-shm", "other.db-journal",
+                 "other.db.palpate-lock"]
+        for command, options, _ in self.writers():
+            for option in options:
+                for name in names:
+                    with self.subTest(command=command[0], option=option, out=name):
+                        self.refused(command, option, self.dir / name, "--force")
+        (self.dir / "s.db-shm").write_bytes(bytes(100))
+        os.link(self.dir / "s.db-shm", self.dir / "index")
+        self.refused(["analyze", "--db", self.db], "json", self.dir / "index", "--force")
+
+    def test_no_output_is_a_folder_or_a_device(self):
+        os.mkfifo(self.dir / "pipe")
+        (self.dir / "nowhere").symlink_to(self.dir / "none" / "file")
+        for command, options, _ in self.writers():
+            for option in options:
+                for out in (self.dir, "/dev/full", "/dev/zero", self.dir / "nowhere"):
+                    with self.subTest(command=command[0], option=option, out=out):
+                        self.refused(command, option, out, "--force")
+                self.palpate(*command, f"--{option}", "", status=2)
+                self.refused(command, option, self.dir / "no" / "folder.x", status=1)
+
+    def test_what_is_there_is_replaced_with_force_alone_and_is_private(self):
+        before = os.umask(0)
+        self.addCleanup(os.umask, before)
+        for command, options, _ in self.writers():
+            if command[0] in ("stability", "replay", "devices"):
+                continue  # slow; without samples; without a real calibration
+            for option in options:
+                with self.subTest(command=command[0], option=option):
+                    out = self.write("mine", "mine")
+                    self.assertIn("--force", self.refused(command, option, out))
+                    self.palpate(*command, f"--{option}", out, "--force")
+                    self.assertGreater(out.stat().st_size, 10)
+                    self.assertEqual(stat.S_IMODE(out.stat().st_mode), 0o600)
+                    out.unlink()
+                    self.palpate(*command, f"--{option}", out)
+                    self.assertEqual(stat.S_IMODE(out.stat().st_mode), 0o600)
+        self.assertEqual([p.name for p in self.dir.iterdir() if "palpate" in p.name], [])
+
+    def test_all_or_none(self):
+        kept, page = self.write("a.json", "kept"), self.dir / "r.html"
+        analyze = ["analyze", "--csv", self.csv, "--force", "--json", kept]
+        self.refused(analyze, "report", "/dev/full")
+        self.refused(analyze, "report", kept)
+        self.refused(analyze, "figures", self.csv)
+        self.refused([*analyze, "--figures", self.dir / "figures"], "report", self.dir / "figures" / "times.svg",
+                     status=1)  # the folder is not there yet
+        ends = os.pipe()
+        os.close(ends[0])  # nobody reads: the text fails after all was checked
+        before = self.everything()
+        done = self.palpate(*analyze, "--report", f"/dev/fd/{ends[1]}", pass_fds=[ends[1]], status=1)
+        os.close(ends[1])
+        self.assertIn("cannot be written", done.stderr)
+        self.assertEqual(self.everything(), before)
+        self.palpate(*analyze, "--report", page, "--figures", self.dir / "figures")
+        self.assertTrue(page.stat().st_size > 1000 and kept.stat().st_size > 1000)
+        for figure in (self.dir / "figures").iterdir():
+            self.assertEqual(stat.S_IMODE(figure.stat().st_mode), 0o600)
+        self.refused(["analyze", "--csv", self.csv], "figures", self.dir / "figures")
+
+    def test_a_killed_writer_leaves_what_was_there_and_the_next_one_clears_up(self):
+        kept = self.write("a.json", "kept")
+        command = [PALPATE, "analyze", "--csv", self.csv, "--json", kept, "--force"]
+        done = subprocess.run(["prlimit", "--fsize=1000", *command], capture_output=True)
+        self.assertLess(done.returncode, 0, "killed by SIGXFSZ")
+        self.assertEqual(kept.read_text(), "kept")
+        drafts = [p.name for p in self.dir.iterdir() if ".palpate-" in p.name]
+        self.assertEqual(len(drafts), 1)
+        self.write(".b.json.palpate-abcdef", "of another file")
+        subprocess.run(command, check=True, capture_output=True)
+        self.assertGreater(kept.stat().st_size, 1000)
+        self.assertEqual([p.name for p in self.dir.iterdir() if ".palpate-" in p.name], [".b.json.palpate-abcdef"])
+
+    def test_pipes_take_a_text_as_it_comes(self):
+        shown = self.palpate("analyze", "--csv", self.csv, "--json", "/dev/stdout").stdout
+        self.assertIn('"mixed_model"', shown)
+        with open(self.dir / "shown", "w") as file:
+            subprocess.run([PALPATE, "analyze", "--csv", self.csv, "--json", "/dev/stdout"], stdout=file, check=True)
+        self.assertEqual((self.dir / "shown").read_text(), shown)
+        os.mkfifo(self.dir / "pipe")
+        texts = []
+        reader = threading.Thread(target=lambda: texts.append((self.dir / "pipe").read_text()))
+        reader.start()
+        self.palpate("render", "--scene", self.scene, "--renderer", "ray", "--trajectory", self.path, "--out",
+                     self.dir / "pipe")
+        reader.join()
+        self.assertTrue(texts[0].startswith("t,force_x"))
+        self.palpate("analyze", "--csv", self.csv, "--json", "/dev/null")
+        self.assertTrue(stat.S_ISCHR(os.stat("/dev/null").st_mode))
+
+    def test_links_of_ones_own_are_followed(self):
+        target = self.write("real.json", "old")
+        (self.dir / "link.json").symlink_to("real.json")
+        self.palpate("analyze", "--csv", self.csv, "--json", self.dir / "link.json", "--force")
+        self.assertTrue((self.dir / "link.json").is_symlink())
+        self.assertGreater(target.stat().st_size, 1000)
+
+    def test_files_that_only_sound_like_ours_are_left_alone(self):
+        protocol = PROTOCOLS / "quick.json"
+        others = {name: self.write(name, "mine") for name in
+                  ("poetry.lock", "Cargo.lock", "all.palpate-new", "all.palpate-new-wal", "all.lock", "r.json.part")}
+        for name in ("poetry", "all"):
+            self.palpate("simulate", protocol, "--db", self.dir / name, "--participants", 1)
+        self.palpate("merge", "--out", self.dir / "Cargo", self.dir / "all")
+        self.palpate("analyze", "--db", self.dir / "all", "--json", self.dir / "r.json")
+        for path in others.values():
+            self.assertEqual(path.read_text(), "mine")
+        lock = self.write("all.palpate-lock", "a lock of another program")
+        self.assertIn("all.palpate-lock", self.palpate("simulate", protocol, "--db", self.dir / "all", status=2).stderr)
+        self.assertEqual(lock.read_text(), "a lock of another program")
+        for name in ("all-wal", "all-journal", "all.palpate-lock2"):
+            self.palpate("simulate", protocol, "--db", self.dir / name, "--participants", 1,
+                         status=0 if name.endswith("2") else 2)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
