@@ -7,6 +7,7 @@
 #include <chrono>
 #include <filesystem>
 
+#include "data/private_files.h"
 #include "data/schema.h"
 #include "data/store_impl.h"
 
@@ -22,12 +23,14 @@ void log_export(const std::string& database, const ExportRecord& made,
   const std::string file = std::filesystem::weakly_canonical(database).string();
   guarded(database, [&] {
     std::optional<SQLite::Database> db;
+    require_private_companions(file);
     db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     if (checked_version(*db, database) < kSchemaVersion) {
       db.reset();
       Store::open(database, Store::Mode::write_or_create);
       db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     }
+    require_private_companions(file);
     db->exec("PRAGMA trusted_schema = OFF; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON");
     SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
     for (const char* sql :

@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <system_error>
 
+#include "data/draft_file.h"
 #include "data/draft_folder.h"
 #include "data/merge_plan.h"
+#include "data/output_check.h"
 #include "data/protocol_rows.h"
 #include "data/schema.h"
 #include "data/session_content.h"
@@ -30,6 +31,9 @@ void require_free(const std::string& out) {
     throw StoreRefused(out + end +
                        ": is there already; a merge makes a new database and replaces none, give "
                        "another name or move it away");
+  }
+  if (is_named_as_companion(out)) {
+    throw StoreRefused(out + ": is a name of what lies beside a database; give another name");
   }
 }
 
@@ -106,15 +110,6 @@ void sync_file(const std::string& file) {
     throw StoreError(file + ": cannot be written: " + std::generic_category().message(error));
 }
 
-void give_name(const std::string& draft, const std::string& out) {
-  int status = ::renameat2(AT_FDCWD, draft.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE);
-  if (status != 0 && errno == EINVAL) status = std::rename(draft.c_str(), out.c_str());
-  if (status == 0) return;
-  const int error = errno;
-  throw StoreError(out + ": cannot be given its name: " + std::generic_category().message(error) +
-                   "; nothing was written");
-}
-
 }  // namespace
 
 Merged merge(const std::string& out, const std::vector<std::string>& inputs,
@@ -137,7 +132,9 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
   for (const Station& station : stations) station.require_unchanged();
   Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out};
   sync_file(draft);
-  give_name(draft, out);
+  if (!name_new_file(draft, out)) {
+    throw StoreRefused(out + ": has come there meanwhile; nothing was written, give another name");
+  }
   return done;
 }
 

@@ -8,10 +8,10 @@
 
 #include <array>
 #include <cerrno>
-#include <cstdio>
-#include <filesystem>
 #include <system_error>
 
+#include "data/draft_file.h"
+#include "data/draft_folder.h"
 #include "data/sqlite_errors.h"
 #include "data/store.h"
 
@@ -22,28 +22,14 @@ void set_version(SQLite::Database& db, int version) {
   db.exec("PRAGMA user_version = " + std::to_string(version));
 }
 
-/// False when there is such a file already.
-bool make_private_file(const std::string& file) {
+/// In a folder of our own, where nobody else can put anything beside it.
+void make_private_file(const std::string& file) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) {
-    if (errno == EEXIST) return false;
     throw StoreError(file + ": cannot be created: " + std::generic_category().message(errno) +
                      "; check that the folder exists and that you may write there");
   }
   ::close(descriptor);
-  return true;
-}
-
-void sync_folder_of(const std::string& file) {
-  const auto folder = std::filesystem::path(file).parent_path();
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return;  // not every folder that may be written may be read
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
-void remove_database(const std::string& file) {
-  for (const char* end : {"", "-journal", "-wal", "-shm"}) ::unlink((file + end).c_str());
 }
 
 }  // namespace
@@ -54,29 +40,23 @@ std::span<const Migration> migrations() {
 }
 
 void create_database(const std::string& path) {
-  const std::string draft = path + ".palpate-new";
-  remove_database(draft);  // of a process that died right here
+  const DraftFolder folder(path);
+  const std::string draft = folder / "new.db";
   make_private_file(draft);
-  try {
-    guarded(path, [&] {
-      SQLite::Database db(draft, SQLite::OPEN_READWRITE);
-      db.exec("PRAGMA page_size = " + std::to_string(kPageSize));
-      db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
-      SQLite::Transaction transaction(db);
-      db.exec(schema_sql());
-      for (const Migration& step : migrations()) db.exec(step.sql);
-      db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
-      set_version(db, kSchemaVersion);
-      transaction.commit();
-    });
-    if (std::rename(draft.c_str(), path.c_str()) != 0) {
-      throw StoreError(path + ": cannot be created: " + std::generic_category().message(errno));
-    }
-  } catch (...) {
-    remove_database(draft);
-    throw;
+  guarded(path, [&] {
+    SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+    db.exec("PRAGMA page_size = " + std::to_string(kPageSize));
+    db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+    SQLite::Transaction transaction(db);
+    db.exec(schema_sql());
+    for (const Migration& step : migrations()) db.exec(step.sql);
+    db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
+    set_version(db, kSchemaVersion);
+    transaction.commit();
+  });
+  if (!name_new_file(draft, path)) {
+    throw StoreRefused(path + ": has come there while it was to be created; start again");
   }
-  sync_folder_of(path);
 }
 
 void require_application_id(SQLite::Database& db, const std::string& path) {
@@ -100,21 +80,20 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest) {
 std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
                     std::span<const Migration> steps) {
   const std::string stem = path + ".v" + std::to_string(from);
+  const DraftFolder folder(stem);
+  const std::string draft = folder / "backup.db";
+  make_private_file(draft);
   std::string copy = stem + ".backup";
-  for (int i = 2; !make_private_file(copy); ++i) copy = stem + "-" + std::to_string(i) + ".backup";
-  try {
-    guarded(copy, [&] {
-      SQLite::Database target(copy, SQLite::OPEN_READWRITE);
-      if (SQLite::Backup(target, db).executeStep() != 101 /* SQLITE_DONE */) {
-        throw StoreError(path + ": cannot be copied to " + copy +
-                         " before it is migrated: another program keeps it locked");
-      }
-    });
-  } catch (...) {
-    remove_database(copy);
-    throw;
+  guarded(copy, [&] {
+    SQLite::Database target(draft, SQLite::OPEN_READWRITE);
+    if (SQLite::Backup(target, db).executeStep() != 101 /* SQLITE_DONE */) {
+      throw StoreError(path + ": cannot be copied to " + copy +
+                       " before it is migrated: another program keeps it locked");
+    }
+  });
+  for (int i = 2; !name_new_file(draft, copy); ++i) {
+    copy = stem + "-" + std::to_string(i) + ".backup";
   }
-  sync_folder_of(copy);
   guarded(path, [&] {
     // A step may rebuild tables that others refer to: references are checked once, at the end.
     db.exec("PRAGMA foreign_keys = OFF");

@@ -29,7 +29,8 @@ struct Migration {
 /// The migrations to kSchemaVersion, in order.
 std::span<const Migration> migrations();
 
-/// Makes the database whole or not at all: built as `path`.new, synced, renamed. 0600.
+/// Makes the database whole or not at all: built in a private draft folder beside `path`, synced,
+/// renamed where there is nothing. 0600.
 /// The caller holds the writer's lock and has seen that there is no file. \throws StoreError.
 void create_database(const std::string& path);
 

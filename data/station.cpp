@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "data/file_checks.h"
+#include "data/private_files.h"
 #include "data/protocol_rows.h"
 #include "data/schema.h"
 
@@ -50,6 +51,7 @@ Station::Station(const std::string& path, const std::string& scratch) : path_(pa
   }
   looks_ = looks_of(file_);
   guarded(path, [&] {
+    require_private_companions(file_);
     require_ours(file_, path);
     require_whole_pages(file_);
     if (!is_current()) take_copy(scratch);

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "data/checks.h"
+#include "data/private_files.h"
 #include "data/store_impl.h"
 #include "data/tombstones.h"
 
@@ -112,9 +113,12 @@ enum class Backup { without, holds, unreadable };
 
 Backup look_into(const std::string& backup, const std::string& code) {
   try {
+    require_private_companions(backup);
     SQLite::Database db(backup, SQLite::OPEN_READONLY);
     return count(db, "participants WHERE code = ?", code) > 0 ? Backup::holds : Backup::without;
   } catch (const SQLite::Exception&) {
+    return Backup::unreadable;
+  } catch (const StoreRefused&) {
     return Backup::unreadable;
   }
 }

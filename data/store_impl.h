@@ -35,13 +35,20 @@ struct Store::Impl {
   int version = 0;                 ///< of the schema; an older one than ours where it is only read
   std::optional<WriterLock> lock;  // before db: given up after the database is closed
   std::optional<SQLite::Database> db;
-  FileIdentity identity, wal_identity;
+  FileIdentity identity, wal_identity, index_identity;
+  std::int64_t index_size = 0;  ///< bytes of the -shm
+
+  Impl() = default;
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   /// Runs `work` in a transaction that is on disk when this returns. A file that has been moved
   /// away or deleted meanwhile takes writes without a complaint: that is seen here.
   template <class Work>
   auto commit(Work&& work) {
     require_writer();
+    mend_index();
     return guarded(path, [&] {
       SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
       auto result = work();
@@ -62,6 +69,10 @@ struct Store::Impl {
   void require_writer() const;
   void require_running(const Run& run);
   void require_still_there();
+  /// The index of the log (-shm) is mapped into memory: where something has cut it short, a look
+  /// into it would end the program by SIGBUS. It gets its size back, empty; SQLite then makes it
+  /// again from the log, as after a crash.
+  void mend_index();
   [[noreturn]] void refuse(const std::string& why) const;
 };
 

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "data/file_checks.h"
+#include "data/output_check.h"
+#include "data/private_files.h"
 #include "data/protocol_rows.h"
 #include "data/schema.h"
 #include "data/sqlite_errors.h"
@@ -80,6 +82,7 @@ void Store::Impl::require_running(const Run& run) {
 }
 
 void Store::Impl::require_still_there() {
+  mend_index();
   const FileIdentity wal = identity_of(file + "-wal");
   if (wal_identity == FileIdentity{}) wal_identity = wal;  // made by the first write
   if (identity_of(file) != identity || wal != wal_identity || wal == FileIdentity{}) {
@@ -87,6 +90,33 @@ void Store::Impl::require_still_there() {
                      ": the file or its -wal was moved, replaced or deleted while in use; this "
                      "step is not safely stored. Put both back where they were before going on, or "
                      "restore a backup");
+  }
+}
+
+void Store::Impl::mend_index() {
+  if (mode == Mode::read_only) return;
+  const std::string index = file + "-shm";
+  struct stat found {};
+  if (::lstat(index.c_str(), &found) != 0 || !S_ISREG(found.st_mode)) return;
+  const FileIdentity now{found.st_dev, found.st_ino};
+  if (now != index_identity || found.st_size >= index_size) {
+    index_identity = now;
+    index_size = found.st_size;
+    return;
+  }
+  // By its name: closing a descriptor of it would drop SQLite's locks. From nothing, so that it is
+  // made again from the log as a whole.
+  if (::truncate(index.c_str(), 0) != 0 || ::truncate(index.c_str(), index_size) != 0) {
+    throw StoreError(path + ": its index " + index +
+                     " was cut short while in use and cannot be mended; this step was not saved");
+  }
+}
+
+Store::Impl::~Impl() {
+  try {
+    mend_index();                // closing looks into it
+  } catch (const StoreError&) {  // what was acknowledged is in the log
+    return;
   }
 }
 
@@ -116,10 +146,14 @@ Store Store::open(const std::string& path, Mode mode) {
   if (writes) {
     impl->lock.emplace(impl->file);
     if (!fs::exists(impl->file)) {
+      if (is_named_as_companion(impl->file)) {
+        impl->refuse("is a name of what lies beside a database; name another file");
+      }
       // SQLite would play the left-over log into the new file.
-      if (fs::exists(impl->file + "-wal")) {
-        impl->refuse("is gone but its log " + impl->file +
-                     "-wal is there and may hold trials; put the database back beside it, or move "
+      for (const char* end : {"-wal", "-journal"}) {
+        if (!fs::exists(impl->file + end)) continue;
+        impl->refuse("is gone but its log " + impl->file + end +
+                     " is there and may hold trials; put the database back beside it, or move "
                      "the log away to begin a new one");
       }
       create_database(impl->file);
@@ -130,6 +164,7 @@ Store Store::open(const std::string& path, Mode mode) {
         "is empty, which a palpate database never is; restore a backup, or remove it to begin a "
         "new one");
   }
+  require_private_companions(impl->file);
   guarded(path, [&] {
     require_ours(impl->file, path);
     require_whole_pages(impl->file);
@@ -160,9 +195,11 @@ Store Store::open(const std::string& path, Mode mode) {
     }
     quick_check(db, path, !writes);
     require_sound_protocols(db, path, impl->version);
+    require_private_companions(impl->file);  // SQLite has made them, or found others' by now
     if (writes) mark_dead_runs(db);
   });
   impl->identity = identity_of(impl->file);
+  impl->mend_index();
   return Store(std::move(impl));
 }
 

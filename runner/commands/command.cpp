@@ -1,12 +1,11 @@
 #include "runner/commands/command.h"
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <optional>
 #include <typeinfo>
 
+#include "data/private_files.h"
 #include "stimuli/printable.h"
 
 namespace palpate {
@@ -74,39 +73,9 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
   return values;
 }
 
-void check_outputs(const po::variables_map& values, std::initializer_list<const char*> options) {
-  for (const char* option : options) {
-    if (!values.count(option)) continue;
-    const auto& path = values[option].as<std::string>();
-    const std::string named = std::string("--") + option;
-    if (path.empty()) throw UsageError(named + ": expected a path");
-    std::error_code error;
-    if (std::filesystem::is_directory(path, error)) {
-      throw UsageError(named + " " + path + ": expected a file; this is a folder");
-    }
-    if (std::filesystem::is_regular_file(path, error) && !values.count("force")) {
-      throw UsageError(path + ": is there already; --force replaces it");
-    }
-  }
-}
-
-void write_whole(const std::string& path, const std::string& text) {
-  std::error_code error;
-  const bool in_place =
-      std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
-  const std::string target =
-      in_place ? path : std::filesystem::weakly_canonical(path, error).string();
-  const std::string draft = in_place ? path : target + ".part";
-  std::ofstream out(draft, std::ios::binary);
-  out.write(text.data(), static_cast<std::streamsize>(text.size()));
-  out.close();
-  error.clear();
-  if (out && !in_place) std::filesystem::rename(draft, target, error);
-  if (!out || error) {
-    if (!in_place) std::filesystem::remove(draft, error);
-    throw std::runtime_error(path +
-                             ": cannot be written; check the folder, its permissions and the disk");
-  }
+void warn_of_exposure(const std::string& database) {
+  const std::string exposure = exposure_of(database);
+  if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";
 }
 
 }  // namespace palpate

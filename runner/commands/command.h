@@ -7,7 +7,6 @@
 // while running (status 1); main.cpp prints them.
 
 #include <boost/program_options.hpp>
-#include <initializer_list>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -32,14 +31,8 @@ struct CommandLine {
   std::optional<boost::program_options::variables_map> parse(const std::vector<std::string>& args);
 };
 
-/// Writes a file whole or leaves it untouched: beside the target first, then renamed. What is no
-/// regular file (a pipe, a terminal) is written to as it is. \throws std::runtime_error.
-void write_whole(const std::string& path, const std::string& text);
-
-/// Before the work begins: the files that these options name, where they were given, can be written
-/// and replace nothing unless --force was given. \throws UsageError.
-void check_outputs(const boost::program_options::variables_map& values,
-                   std::initializer_list<const char*> options);
+/// Says on stderr, once, where others could get at the database or put files beside it.
+void warn_of_exposure(const std::string& database);
 
 int accuracy_command(const std::vector<std::string>& args);
 int analyze_command(const std::vector<std::string>& args);

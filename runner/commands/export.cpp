@@ -99,6 +99,7 @@ int export_command(const std::vector<std::string>& args) {
   }
   try {
     Store store = Store::open(database, Store::Mode::read_only);
+    warn_of_exposure(database);
     ExportSettings settings;
     settings.force = (*values)["force"].as<bool>();
     settings.program_version = PALPATE_VERSION;

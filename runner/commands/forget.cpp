@@ -60,6 +60,7 @@ int forget_command(const std::vector<std::string>& args) {
   if (!std::filesystem::exists(database)) throw UsageError(database + ": there is no such file");
 
   Store store = Store::open(database, Store::Mode::write_or_create);
+  warn_of_exposure(database);
   const Holdings holdings = store.holdings(code);
   if (holdings.protocols == 0 && !holdings.withdrawn_before) {
     throw UsageError(database + ": there is no participant " + code + " here");

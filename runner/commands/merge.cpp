@@ -46,6 +46,7 @@ int merge_command(const std::vector<std::string>& args) {
       progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
     });
     progress.clear();
+    warn_of_exposure(out);
     std::cout << printable(out) << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";

@@ -178,6 +178,7 @@ int run_station(const RunSettings& settings) {
   const auto noise = open_noise(settings, protocol);  // after the guard's fork: it has a thread
 
   Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  warn_of_exposure(store.path());
   RealClock clock;
   // What a simulated device gave is labelled simulated, whoever answered.
   const Participant participant =

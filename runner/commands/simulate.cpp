@@ -72,6 +72,7 @@ int simulate_command(const std::vector<std::string>& args) {
   if (!limited.empty())
     plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
   Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
+  warn_of_exposure(store.path());
   const auto start = std::chrono::steady_clock::now();
   ProgressLine progress_line("trials");
   StudyProgress progress;

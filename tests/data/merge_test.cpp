@@ -109,7 +109,6 @@ class Merging : public ::testing::Test {
   void expect_no_drafts() {
     for (const auto& entry : fs::directory_iterator(folder_.path())) {
       EXPECT_FALSE(contains(entry.path().filename().string(), ".palpate-")) << entry.path();
-      EXPECT_FALSE(contains(entry.path().string(), ".lock")) << entry.path();
     }
   }
   const TemporaryFolder folder_, export_folder_;

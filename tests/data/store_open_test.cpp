@@ -5,6 +5,8 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "data/schema.h"
@@ -63,7 +65,7 @@ TEST_F(StoreOpen, LeavesOneFileThatOnlyItsOwnerMayRead) {
   {
     Store store = write(path_);
     store.enrol(a_protocol(), "A");
-    for (const char* end : {"", "-wal", "-shm", ".lock"})
+    for (const char* end : {"", "-wal", "-shm", ".palpate-lock"})
       EXPECT_EQ(mode_of(path_ + end), 0600u) << end;
     read(path_);
   }
@@ -226,10 +228,81 @@ TEST_F(StoreOpen, ALogWithoutItsDatabaseIsNotPlayedIntoANewOne) {
 }
 
 TEST_F(StoreOpen, ACreationThatDiedHalfWayIsBegunAgain) {
-  write_file(path_ + ".palpate-new", "half a database");
-  write_file(path_ + ".palpate-new-wal", "half a log");
-  write_file(path_ + ".lock", "12345\n");
-  EXPECT_EQ(write(path_).counts().protocols, 0);
+  const std::string draft = folder_ / ".study.db.palpate-abcdef";
+  fs::create_directory(draft);
+  write_file(draft + "/new.db", "half a database");
+  write_file(draft + "/new.db-wal", "half a log");
+  for (const char* text : {"", "palpate 12345\n"}) {
+    write_file(path_ + ".palpate-lock", text);
+    fs::permissions(path_ + ".palpate-lock", fs::perms::owner_read | fs::perms::owner_write);
+    EXPECT_EQ(write(path_).counts().protocols, 0);
+    EXPECT_EQ(files(), 1);
+  }
+}
+
+TEST_F(StoreOpen, WhatOnlySoundsLikeItsDraftOrLockIsLeftAlone) {
+  const std::vector<std::string> others = {path_ + ".lock", path_ + ".palpate-new",
+                                           path_ + ".palpate-new-wal"};
+  for (const std::string& other : others) write_file(other, "mine");
+  write(path_);
+  for (const std::string& other : others) EXPECT_EQ(contents_of(other), "mine") << other;
+  const std::string lock = path_ + ".palpate-lock";
+  write_file(lock, "mine");
+  fs::permissions(lock, fs::perms::owner_read | fs::perms::owner_write);
+  EXPECT_TRUE(contains(error_of([&] { write(path_); }), lock));
+  EXPECT_EQ(contents_of(lock), "mine");
+  fs::remove(lock);
+  fs::create_symlink(path_ + ".lock", lock);
+  EXPECT_TRUE(contains(error_of([&] { write(path_); }), lock));
+  EXPECT_EQ(contents_of(path_ + ".lock"), "mine");
+}
+
+TEST_F(StoreOpen, OfManyThatStartAtOnceOneHoldsIt) {
+  for (int round = 0; round < 5; ++round) {
+    // Once with nothing, then with the lock of one that was killed.
+    std::vector<std::unique_ptr<ChildProcess>> all;
+    for (int i = 0; i < 6; ++i) {
+      all.push_back(std::make_unique<ChildProcess>(std::vector<std::string>{"hold", path_}));
+    }
+    int holders = 0;
+    for (const auto& one : all) holders += one->read_line() == "held" ? 1 : 0;
+    EXPECT_EQ(holders, 1);
+    for (const auto& one : all) one->kill();
+    EXPECT_TRUE(fs::exists(path_ + ".palpate-lock"));
+  }
+  write(path_);
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(StoreOpen, AnIndexThatIsCutShortWhileInUseCostsNothing) {
+  constexpr int kTrials = 12;
+  {
+    Store store = write(path_);
+    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+    std::optional<Store> reader;
+    for (int trial = 1; trial <= kTrials; ++trial) {
+      const std::string index = path_ + "-shm";
+      if (trial % 2 == 0) fs::resize_file(index, (trial / 2 - 1) * 5000 % 20000);
+      TrialRecord record = a_record(trial);
+      record.attempt = store.begin_attempt(run, record, 1);
+      if (trial % 3 == 0) fs::resize_file(index, 0);
+      store.finish_attempt(run, record);
+      EXPECT_EQ(read(path_).counts().completed, trial) << "a reader beside it";
+      if (trial == 5) reader.emplace(read(path_));
+    }
+    EXPECT_EQ(reader->counts().completed, 5) << "an old snapshot";
+    reader.reset();
+    fs::resize_file(path_ + "-shm", 0);
+  }
+  EXPECT_EQ(write(path_).counts().completed, kTrials);
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(StoreOpen, NoDatabaseGetsTheNameOfWhatLiesBesideAnother) {
+  make_study(1);
+  for (const char* end : {"-wal", "-shm", "-journal", ".palpate-lock"}) {
+    EXPECT_TRUE(contains(error_of([&] { write(path_ + end); }), path_ + end));
+  }
   EXPECT_EQ(files(), 1);
 }
 
