@@ -42,6 +42,8 @@ bool made_by_palpate(const fs::path& description) {
 }  // namespace
 
 DraftFolder::DraftFolder(const std::string& target) : target_(named(target).string()) {
+  const std::string fault = follow_own_links(fs::path(target_).parent_path().string()).fault;
+  if (!fault.empty()) throw StoreRefused(target_ + ": " + fault);
   remove_dead_drafts(target_);
   draft_ = draft_stem(target_) + "XXXXXX";
   if (::mkdtemp(draft_.data()) == nullptr) {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "data/draft_file.h"
 #include "data/file_checks.h"
 #include "data/output_check.h"
 #include "data/private_files.h"
@@ -136,6 +137,9 @@ Store Store::open(const std::string& path, Mode mode) {
   impl->file = fs::weakly_canonical(fs::absolute(path, error), error).string();
   if (path.empty() || error) throw StoreRefused("'" + path + "' is no path of a database");
   const bool writes = mode == Mode::write_or_create;
+  // A colleague's links may be read through; what is written goes nowhere that others choose.
+  const std::string fault = writes ? follow_own_links(path).fault : "";
+  if (!fault.empty()) impl->refuse(fault);
   const fs::file_status status = fs::status(impl->file, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     impl->refuse("is not a file; name a file");

@@ -134,7 +134,9 @@ void Outputs::check() const {
 
 void Outputs::put(const std::string& option, std::string text) {
   for (Output& output : outputs_) {
-    if (output.option == option) output.text = std::move(text);
+    if (output.option != option) continue;
+    output.text = std::move(text);
+    return;
   }
 }
 

@@ -137,8 +137,16 @@ class TwoUsers(unittest.TestCase):
         for name in ("r.html", "sub/new.html", "pipe"):
             done = self.lab("analyze", "--db", self.own / "s.db", "--report", self.shared / name, "--force", status=2)
             self.assertIn("another user", done.stderr)
+        self.other("ln -s ../own/s.db s.db")
+        for command in (["simulate", self.protocol, "--db", self.shared / "s.db"],
+                        ["simulate", self.protocol, "--db", self.shared / "sub" / "new.db"],
+                        ["merge", "--out", self.shared / "sub" / "all.db", self.own / "s.db"],
+                        ["export", "--db", self.own / "s.db", "--format", "bids", "--out", self.shared / "sub" / "bids"],
+                        ["export", "--db", self.own / "s.db", "--format", "csv", "--out", self.shared / "sub" / "t.csv"]):
+            self.assertIn("another user", self.lab(*command, status=2).stderr)
+        self.assertEqual(sorted(path.name for path in self.own.iterdir()), ["s.db", "victim"])
+        self.lab("analyze", "--db", self.shared / "s.db")  # reading through it is the reader's will
         self.assertEqual(victim.read_text(), "mine")
-        self.assertFalse((self.own / "new.html").exists())
         self.lab("analyze", "--db", self.own / "s.db", "--report", self.shared / "mine.html")
         page = (self.shared / "mine.html").stat()
         self.assertEqual((page.st_uid, stat.S_IMODE(page.st_mode)), (LAB, 0o600))

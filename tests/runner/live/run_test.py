@@ -284,6 +284,18 @@ class Broken(Live):
         attempts = (self.dir / "attempts.csv").read_text()
         self.assertEqual(attempts.count("\n"), 2, attempts)
 
+    def test_an_index_that_is_cut_short_meanwhile_costs_nothing(self):
+        terminal = self.begin()
+        for trial in (1, 2, 3):
+            os.truncate(f"{self.db}-shm", 0 if trial < 3 else 100)
+            terminal.type("1")
+            while terminal.wait_for(FEELING, "[space bar: go on]") != FEELING:
+                terminal.type(" ")
+        os.truncate(f"{self.db}-shm", 0)
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertEqual(self.attempts(), [(trial, 1, "completed") for trial in (1, 2, 3, 4)])
+
     def test_signals_end_it_with_everything_on_record(self):
         for which, word in ((signal.SIGINT, "Interrupt"), (signal.SIGTERM, "Terminated")):
             terminal = self.begin(code=f"P{int(which)}")
