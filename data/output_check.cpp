@@ -146,6 +146,9 @@ std::string why_not_to_write(const std::string& path, bool force, const TakenFil
     return "is a database or what belongs to one, and is never written over; name another file";
   }
   if (descriptor) return "";
+  if (place.starts_with("/dev/") && !place.starts_with("/dev/shm/")) {
+    return "is in the folder of devices; name a file elsewhere";
+  }
   why = follow_own_links(path).fault;
   if (!why.empty()) return why;
   struct stat link {};

@@ -2,6 +2,9 @@
 // From here to a force: session.cpp > servo.cpp > rendering/ray_renderer.cpp >
 // rendering/facet_walk.cpp
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -58,6 +61,14 @@ void print_help(std::ostream& out) {
          "version.\nExit status: 0 done, 1 failed while running, 2 wrong usage or bad input.\n";
 }
 
+/// Where standard input, output or error came closed, the next file that is opened would take its
+/// place, and messages would go into it.
+void hold_standard_places() {
+  int place = 0;
+  while (place >= 0 && place <= STDERR_FILENO) place = ::open("/dev/null", O_RDONLY);
+  if (place > STDERR_FILENO) ::close(place);
+}
+
 int run(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.empty()) {
@@ -81,6 +92,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  hold_standard_places();
   try {
     const int status = run(argc, argv);
     std::cout.flush();

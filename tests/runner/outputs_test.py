@@ -120,7 +120,7 @@ class Outputs(unittest.TestCase):
         (self.dir / "nowhere").symlink_to(self.dir / "none" / "file")
         for command, options, _ in self.writers():
             for option in options:
-                for out in (self.dir, "/dev/full", "/dev/zero", self.dir / "nowhere"):
+                for out in (self.dir, "/dev/full", "/dev/zero", "/dev/no-such-disk", self.dir / "nowhere"):
                     with self.subTest(command=command[0], option=option, out=out):
                         self.refused(command, option, out, "--force")
                 self.palpate(*command, f"--{option}", "", status=2)
@@ -194,6 +194,16 @@ class Outputs(unittest.TestCase):
         self.assertTrue(texts[0].startswith("t,force_x"))
         self.palpate("analyze", "--csv", self.csv, "--json", "/dev/null")
         self.assertTrue(stat.S_ISCHR(os.stat("/dev/null").st_mode))
+
+    def test_closed_standard_places_are_not_taken_by_files(self):
+        command = ["analyze", "--db", self.db, "--json"]
+        self.palpate(*command, self.dir / "open.json")
+        shell = f"exec {PALPATE} {' '.join(map(str, command))} {self.dir}/closed.json <&- >&- 2>&-"
+        self.assertEqual(subprocess.run(["bash", "-c", shell]).returncode, 1)
+        self.assertEqual((self.dir / "closed.json").read_bytes(), (self.dir / "open.json").read_bytes())
+        shell = f"exec {PALPATE} simulate {PROTOCOLS}/quick.json --db {self.dir}/n.db --participants 1 <&- >&- 2>&-"
+        self.assertEqual(subprocess.run(["bash", "-c", shell]).returncode, 1)
+        self.palpate("analyze", "--db", self.dir / "n.db")
 
     def test_links_of_ones_own_are_followed(self):
         target = self.write("real.json", "old")
