@@ -12,6 +12,7 @@
 
 #include "data/draft_file.h"
 #include "data/draft_folder.h"
+#include "data/seal_writer.h"
 #include "data/sqlite_errors.h"
 #include "data/store.h"
 
@@ -35,7 +36,9 @@ void make_private_file(const std::string& file) {
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 2> steps = {{{1, withdrawal_sql()}, {2, provenance_sql()}}};
+  static const std::array<Migration, 2> steps = {
+      {{1, withdrawal_sql()},
+       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).all_as_found(); }}}};
   return steps;
 }
 
@@ -102,6 +105,7 @@ std::string migrate(SQLite::Database& db, const std::string& path, int from, int
     for (const auto& step : steps) {
       if (step.from != version || version >= to) continue;
       db.exec(step.sql);
+      if (step.fill != nullptr) step.fill(db);
       ++version;
     }
     if (version != to) {

@@ -24,6 +24,7 @@ const char* provenance_sql();
 struct Migration {
   int from;
   const char* sql;
+  void (*fill)(SQLite::Database&) = nullptr;  ///< what SQL cannot do, after it
 };
 
 /// The migrations to kSchemaVersion, in order.

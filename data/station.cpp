@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "data/attempt_reader.h"
 #include "data/file_checks.h"
 #include "data/private_files.h"
 #include "data/protocol_rows.h"
@@ -61,6 +62,11 @@ Station::Station(const std::string& path, const std::string& scratch) : path_(pa
     require_our_schema(*db_, path, checked_version(*db_, path));
     if (read == file_) quick_check(*db_, path);
     require_sound_protocols(*db_, path, kSchemaVersion);
+    // A copy may have been sealed just now, as it was found.
+    AttemptFilter all;
+    all.samples =
+        read == file_ ? SamplesWanted::held_against_their_checksum : SamplesWanted::unpacked;
+    read_attempts(*db_, path_, kSchemaVersion, all, [](const StoredTrial&) {});
   });
 }
 

@@ -186,6 +186,7 @@ Withdrawal Store::forget(const std::string& code) {
     Binder(exports) << hash << code;
     exports.exec();
     delete_rows(db, code);
+    impl_->seals->start_anew();
     cross_out_in_paths(db, code);
     return true;
   });

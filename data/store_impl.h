@@ -8,12 +8,15 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "data/checksum.h"
+#include "data/seal_writer.h"
 #include "data/sqlite_errors.h"
 #include "data/store.h"
 #include "data/store_lock.h"
@@ -35,6 +38,8 @@ struct Store::Impl {
   int version = 0;                 ///< of the schema; an older one than ours where it is only read
   std::optional<WriterLock> lock;  // before db: given up after the database is closed
   std::optional<SQLite::Database> db;
+  std::optional<SealWriter> seals;  ///< of a writer
+  bool checked = false;             ///< a reader has held every session against its seals
   FileIdentity identity, wal_identity, index_identity;
   std::int64_t index_size = 0;  ///< bytes of the -shm
 
@@ -50,18 +55,18 @@ struct Store::Impl {
     require_writer();
     mend_index();
     return guarded(path, [&] {
-      SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
-      auto result = work();
-      transaction.commit();
-      require_still_there();
-      return result;
+      try {
+        SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
+        auto result = work();
+        transaction.commit();
+        require_still_there();
+        return result;
+      } catch (...) {
+        seals->start_anew();
+        throw;
+      }
     });
   }
-
-  /// Of attempts in this state, in the order of the header.
-  void for_each_attempt(const char* state, bool with_samples,
-                        const std::function<void(const StoredTrial&)>& visit,
-                        const TrialName* only = nullptr);
 
   /// Empties the log and rebuilds the file, so that nothing of removed rows is in either.
   void clear_traces();
@@ -87,6 +92,10 @@ class Binder {
   Binder& operator<<(std::uint32_t value) { return bind(static_cast<std::int64_t>(value)); }
   Binder& operator<<(std::int64_t value) { return bind(value); }
   Binder& operator<<(std::uint64_t value) { return bind(static_cast<std::int64_t>(value)); }
+  Binder& operator<<(const Checksum& value) {
+    statement_.bind(++index_, value.data(), static_cast<int>(value.size()));
+    return *this;
+  }
   Binder& operator<<(bool value) { return bind(value ? 1 : 0); }
   template <class T>
   Binder& operator<<(const std::optional<T>& value) {
@@ -120,6 +129,15 @@ class Row {
       const void* const text = column.getBlob();  // before its length
       value.assign(static_cast<const char*>(text), static_cast<std::size_t>(column.getBytes()));
       return !value.empty() || !column.isNull();
+    });
+  }
+  Row& operator>>(Checksum& value) {
+    return next([&](const SQLite::Column& column) {
+      const void* const bytes = column.getBlob();  // before their length
+      if (column.isNull()) return false;
+      if (column.getBytes() != static_cast<int>(value.size())) out_of_range(column.getBytes());
+      std::memcpy(value.data(), bytes, value.size());
+      return true;
     });
   }
   Row& operator>>(double& value) {
@@ -185,6 +203,7 @@ class Row {
 RunEnd run_end_of(const std::string& text);
 
 /// Within a transaction; no effect where none is open.
-void cut_off_open_attempt(SQLite::Database& db, const Run& run, const std::string& reason);
+void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
+                          const std::string& reason);
 
 }  // namespace palpate

@@ -28,16 +28,21 @@ constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
 constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 /// The one writer is us: whatever else is still running in the file is dead.
-void mark_dead_runs(SQLite::Database& db) {
+void mark_dead_runs(SQLite::Database& db, SealWriter& seals) {
   SQLite::Statement find(db, "SELECT 1 FROM runs WHERE end_reason = 'running' LIMIT 1");
   if (!find.executeStep()) return;
   find.reset();
   SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
-  SQLite::Statement update(
-      db, "UPDATE attempts SET state = 'cut_off', cut_off_reason = ? WHERE state = 'running'");
-  Binder(update) << kInterrupted;
-  update.exec();
-  db.exec("UPDATE runs SET end_reason = 'interrupted' WHERE end_reason = 'running'");
+  std::vector<std::int64_t> dead;
+  SQLite::Statement all(db, "SELECT id FROM runs WHERE end_reason = 'running' ORDER BY id");
+  while (all.executeStep()) dead.push_back(all.getColumn(0).getInt64());
+  for (const std::int64_t id : dead) {
+    cut_off_open_attempt(db, seals, {.id = id}, kInterrupted);
+    SQLite::Statement end(db, "UPDATE runs SET end_reason = 'interrupted' WHERE id = ?");
+    Binder(end) << id;
+    end.exec();
+    seals.end(id);
+  }
   transaction.commit();
 }
 
@@ -200,7 +205,7 @@ Store Store::open(const std::string& path, Mode mode) {
     quick_check(db, path, !writes);
     require_sound_protocols(db, path, impl->version);
     require_private_companions(impl->file);  // SQLite has made them, or found others' by now
-    if (writes) mark_dead_runs(db);
+    if (writes) mark_dead_runs(db, impl->seals.emplace(db));
   });
   impl->identity = identity_of(impl->file);
   impl->mend_index();

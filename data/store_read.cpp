@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "data/attempt_reader.h"
 #include "data/protocol_rows.h"
 #include "data/store_impl.h"
 #include "data/store_rows.h"
@@ -26,26 +27,15 @@ SessionProgress Store::progress(const Participant& participant, int session) {
       if (!progress.last_end) progress.clock = clock;
       progress.last_end = run_end_of(end);
     }
-    SQLite::Statement trials(
-        db, std::string("SELECT a.state, r.started_utc_ns, r.started_ns, ") + kPlanColumns + ", " +
-                kOutcomeColumns +
-                " FROM sessions s JOIN attempts a ON a.session_id = s.id JOIN runs r ON r.id = "
-                "a.run_id "
-                "WHERE s.participant_id = ? AND s.number = ? ORDER BY a.trial, a.attempt");
-    Binder(trials) << participant.id << session;
-    while (trials.executeStep()) {
-      Row row(trials);
-      std::string state;
-      ClockStamp clock;
-      row >> state >> clock.utc_ns >> clock.monotonic_ns;
-      if (state == "cut_off") ++progress.cut_off;
-      if (state != "completed") continue;
-      TrialRecord& record = progress.completed.emplace_back();
-      read_plan(row, record);
-      read_outcome(row, record);
-      record.onset_utc = format_utc(to_unix_ns(clock, record.onset_ns));
-      progress.latest_ns = std::max(progress.latest_ns, record.response_ns);
-    }
+    const AttemptFilter theirs{.session = std::pair(participant.id, session)};
+    read_attempts(db, impl_->path, impl_->version, theirs, [&](const StoredTrial& trial) {
+      if (!trial.cut_off_reason.empty()) {
+        ++progress.cut_off;
+      } else {
+        progress.completed.push_back(trial.record);
+        progress.latest_ns = std::max(progress.latest_ns, trial.record.response_ns);
+      }
+    });
     return progress;
   });
 }
@@ -145,6 +135,35 @@ StoreCounts Store::counts() {
     Row(count) >> counts.protocols >> counts.participants >> counts.sessions >> counts.runs >>
         counts.completed >> counts.cut_off >> counts.interrupted_runs >> counts.sampled;
     return counts;
+  });
+}
+
+void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
+                           bool with_samples) {
+  guarded(impl_->path, [&] {
+    AttemptFilter filter{.state = AttemptState::completed};
+    if (with_samples) filter.samples = SamplesWanted::unpacked;
+    read_attempts(*impl_->db, impl_->path, impl_->version, filter, visit);
+  });
+  impl_->checked = impl_->mode == Mode::read_only;  // nothing changes in its snapshot
+}
+
+void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visit) {
+  guarded(impl_->path, [&] {
+    const AttemptFilter filter{.state = AttemptState::cut_off, .checked_before = impl_->checked};
+    read_attempts(*impl_->db, impl_->path, impl_->version, filter, visit);
+  });
+}
+
+std::vector<StoredTrial> Store::attempts(const TrialName& name) {
+  return guarded(impl_->path, [&] {
+    std::vector<StoredTrial> all;
+    AttemptFilter filter{.trial = &name, .samples = SamplesWanted::unpacked};
+    read_attempts(*impl_->db, impl_->path, impl_->version, filter,
+                  [&all](const StoredTrial& trial) { all.push_back(trial); });
+    std::stable_partition(all.begin(), all.end(),
+                          [](const auto& one) { return !one.cut_off_reason.empty(); });
+    return all;
   });
 }
 

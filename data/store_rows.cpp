@@ -70,10 +70,24 @@ Row& operator>>(Row& row, RunInfo& info) {
          info.files_sha256;
 }
 
+SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version) {
+  SQLite::Statement find(db, "SELECT s.id, pr.id, pr.name, pr.sha256, " + person_columns(version) +
+                                 ", s.number, s.observer_sha256" + kFromProtocolDown +
+                                 "WHERE s.id = ?");
+  Binder(find) << id;
+  if (!find.executeStep()) throw SQLite::Exception("a session of nobody", SQLITE_CORRUPT);
+  SessionHead head;
+  Row row(find);
+  row >> head.id >> head.protocol_id >> head.protocol_name >> head.protocol_sha256;
+  row >> head.participant;
+  row >> head.number >> head.observer_sha256;
+  return head;
+}
+
 std::int64_t read_plan(Row& row, TrialRecord& record) {
   std::int64_t id = 0;
-  row >> id >> record.session >> record.block >> record.trial >> record.attempt >>
-      record.renderer >> record.shape >> record.practice;
+  row >> id >> record.block >> record.trial >> record.attempt >> record.renderer >> record.shape >>
+      record.practice;
   for (double& q : record.orientation_wxyz) row >> q;
   row >> record.onset_ns;
   return id;

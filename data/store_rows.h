@@ -17,11 +17,22 @@ Row& operator>>(Row& row, Participant& person);
 std::string run_columns(int version);
 Row& operator>>(Row& row, RunInfo& info);
 
+/// Whose a session is.
+struct SessionHead {
+  std::int64_t id = 0, protocol_id = 0;
+  std::string protocol_name, protocol_sha256;
+  Participant participant;
+  int number = 1;
+  std::string observer_sha256;
+};
+/// \throws SQLite::Exception: there is none.
+SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version);
+
 inline constexpr const char* kPlanColumns =
-    "a.id, s.number, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
+    "a.id, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
     "a.orientation_w, a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
-/// kPlanColumns; the onset is when the attempt was begun, until read_outcome knows better.
-/// \returns the attempt's key
+/// kPlanColumns, all of a plan but the session; the onset is when the attempt was begun, until
+/// read_outcome knows better. \returns the attempt's key
 std::int64_t read_plan(Row& row, TrialRecord& record);
 
 inline constexpr const char* kOutcomeColumns =

@@ -26,13 +26,18 @@ RunEnd run_end_of(const std::string& text) {
   throw SQLite::Exception("a run ends with '" + text + "'", SQLITE_CORRUPT);
 }
 
-void cut_off_open_attempt(SQLite::Database& db, const Run& run, const std::string& reason) {
+void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
+                          const std::string& reason) {
+  SQLite::Statement find(db, "SELECT id FROM attempts WHERE run_id = ? AND state = 'running'");
+  Binder(find) << run.id;
+  if (!find.executeStep()) return;
+  const std::int64_t id = find.getColumn(0).getInt64();
+  find.reset();
   SQLite::Statement update(
-      db,
-      "UPDATE attempts SET state = 'cut_off', cut_off_reason = ? WHERE run_id = ? "
-      "AND state = 'running'");
-  Binder(update) << reason << run.id;
+      db, "UPDATE attempts SET state = 'cut_off', cut_off_reason = ? WHERE id = ?");
+  Binder(update) << reason << id;
   update.exec();
+  seals.attempt(id);
 }
 
 Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
@@ -168,6 +173,7 @@ Run Store::begin_run(const Participant& participant, const RunInfo& info,
                 << files_checksum(db, other_protocol.value_or(own_protocol));
     add.exec();
     run.id = db.getLastInsertRowid();
+    impl_->seals->run(run.id);
     return run;
   });
 }
@@ -180,6 +186,7 @@ void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text
     SQLite::Statement add(*impl_->db, "INSERT INTO notes (run_id, at_ns, text) VALUES (?, ?, ?)");
     Binder(add) << run.id << at_ns << text;
     add.exec();
+    impl_->seals->note(impl_->db->getLastInsertRowid());
     return true;
   });
 }
@@ -190,12 +197,13 @@ void Store::end_run(const Run& run, RunEnd reason, std::int64_t ended_ns) {
   }
   impl_->commit([&] {
     impl_->require_running(run);
-    cut_off_open_attempt(*impl_->db, run,
+    cut_off_open_attempt(*impl_->db, *impl_->seals, run,
                          std::string("the session was ended: ") + to_string(reason));
     SQLite::Statement update(*impl_->db,
                              "UPDATE runs SET end_reason = ?, ended_ns = ? WHERE id = ?");
     Binder(update) << to_string(reason) << ended_ns << run.id;
     update.exec();
+    impl_->seals->end(run.id);
     return true;
   });
 }

@@ -62,7 +62,7 @@ constexpr const char* kComplete =
     "response_time = ?, first_contact_time = ?, onset_ns = ?, response_ns = ?, start_tip_x = ?, "
     "start_tip_y = ?, start_tip_z = ?, start_tail_x = ?, start_tail_y = ?, start_tail_z = ?, "
     "ticks = ?, missed_ticks = ?, longest_period_ns = ?, faults = ?, started_inside = ?, "
-    "max_force = ? WHERE id = ?";
+    "max_force = ?, samples_sha256 = ? WHERE id = ?";
 
 void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
               const TrialRecord& record) {
@@ -73,13 +73,18 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   for (const double x : record.start_tip) bind << x;
   for (const double x : record.start_tail) bind << x;
   bind << record.ticks << record.missed_ticks << record.longest_period_ns << record.faults
-       << record.started_inside << record.max_force << id;
+       << record.started_inside << record.max_force;
+  const auto count = static_cast<std::int64_t>(record.samples.size());
+  const std::string packed = count > 0 ? pack_samples(record.samples) : "";
+  bind << (count > 0 ? std::optional(checksum_of_samples(kSamplesPacking, count, packed.data(),
+                                                         packed.size()))
+                     : std::nullopt)
+       << id;
   update.exec();
-  if (record.samples.empty()) return;
-  const std::string packed = pack_samples(record.samples);
+  if (count == 0) return;
   SQLite::Statement insert(
       db, "INSERT INTO samples (attempt_id, packing, count, data) VALUES (?, ?, ?, ?)");
-  Binder(insert) << id << kSamplesPacking << static_cast<std::int64_t>(record.samples.size());
+  Binder(insert) << id << kSamplesPacking << count;
   insert.bindNoCopy(4, packed.data(), static_cast<int>(packed.size()));
   insert.exec();
 }
@@ -131,6 +136,7 @@ void Store::finish_attempt(const Run& run, const TrialRecord& record) {
     }
     SQLite::Statement update(db, kComplete);
     complete(db, update, open->id, record);
+    impl_->seals->attempt(open->id);
     return true;
   });
 }
@@ -141,7 +147,7 @@ void Store::cut_off_attempt(const Run& run, const std::string& reason) {
   checks.raise(impl_->path + ": attempt");
   impl_->commit([&] {
     if (!open_attempt(*impl_->db, run)) impl_->refuse("no attempt is open that could be cut off");
-    cut_off_open_attempt(*impl_->db, run, reason);
+    cut_off_open_attempt(*impl_->db, *impl_->seals, run, reason);
     return true;
   });
 }
@@ -169,7 +175,9 @@ void Store::record_simulated(const Run& run, const std::vector<TrialRecord>& rec
       if (has_record(db, run, record.trial))
         impl_->refuse(trial_name(record) + " has its record already");
       insert_attempt(db, insert, run, record, record.onset_ns);
-      complete(db, update, db.getLastInsertRowid(), record);
+      const std::int64_t id = db.getLastInsertRowid();
+      complete(db, update, id, record);
+      impl_->seals->attempt(id);
     }
     return true;
   });

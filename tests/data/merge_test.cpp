@@ -12,6 +12,7 @@
 #include "data/schema.h"
 #include "tests/data/child_process.h"
 #include "tests/data/old_database.h"
+#include "tests/data/seal_again.h"
 #include "tests/data/store_fixture.h"
 
 namespace palpate {
@@ -53,6 +54,13 @@ void show_session(Store& store, const std::string& code, std::optional<int> numb
 void make(const std::string& path, const std::string& code, int number) {
   Store store = write(path);
   show_session(store, code, number);
+}
+
+/// As if this had been recorded.
+void record_otherwise(const std::string& path, const std::string& sql) {
+  SQLite::Database db(path, SQLite::OPEN_READWRITE);
+  db.exec(sql);
+  seal_again(db);
 }
 
 /// Every line of a CSV export but the header, and of attempts.csv.
@@ -193,12 +201,11 @@ TEST_F(Merging, ListsEveryConflictAndWritesNothing) {
     show_session(b, "P4", 4, 1);  // alike so far
     b.enrol(a_protocol(), "S5", 5, true, 2);
   }
-  {
-    SQLite::Database b(b_, SQLite::OPEN_READWRITE);
-    b.exec(
-        "UPDATE attempts SET response_time = 9 WHERE trial = 3 AND session_id = (SELECT s.id FROM "
-        "sessions s JOIN participants p ON p.id = s.participant_id WHERE p.code = 'P4')");
-  }
+  record_otherwise(
+      b_,
+      "UPDATE attempts SET response_time = 9 WHERE trial = 3 AND session_id = (SELECT s.id FROM "
+      "sessions s JOIN participants p ON p.id = s.participant_id WHERE p.code = 'P4')");
+  record_otherwise(a_, "SELECT 1");
   const std::string message = refusal({a_, b_});
   EXPECT_TRUE(contains(message, "number 2 is that of participant P2 and of participant P7"));
   EXPECT_TRUE(contains(message, "participant P3 has number 3 and number 8"));
@@ -223,7 +230,7 @@ TEST_F(Merging, OneDifferenceAnywhereIsAConflict) {
     fs::copy_file(a_, b_, fs::copy_options::overwrite_existing);
     EXPECT_NO_THROW(merge(out_, {a_, b_}));
     fs::remove(out_);
-    SQLite::Database(b_, SQLite::OPEN_READWRITE).exec(change);
+    record_otherwise(b_, change);
     EXPECT_TRUE(contains(refusal({a_, b_}), "session 1 is not the same")) << change;
   }
 }
@@ -235,8 +242,7 @@ TEST_F(Merging, NobodyIsAtTwoStationsAtOnce) {
     show_session(b, "P1", 1, 2);
   }
   merge(folder_ / "fine.db", {a_, b_});
-  SQLite::Database(b_, SQLite::OPEN_READWRITE)
-      .exec("UPDATE runs SET started_utc_ns = started_utc_ns - 86400000000000");
+  record_otherwise(b_, "UPDATE runs SET started_utc_ns = started_utc_ns - 86400000000000");
   EXPECT_TRUE(contains(refusal({a_, b_}), "sessions 1 and 2 were at the same time"));
 }
 
