@@ -111,8 +111,9 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
   check();
 }
 
-void Outputs::keep(const std::string& path) {
-  inputs_.add(path, "it is read, and would be overwritten");
+void Outputs::keep(const ObjectSpec& object) {
+  inputs_.add(object.file, "it is a mesh that is read, and would be overwritten");
+  for (const ObjectSpec& part : object.parts) keep(part);
   check();
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "data/output_check.h"
+#include "stimuli/object_spec.h"
 
 namespace palpate {
 
@@ -24,8 +25,8 @@ class Outputs {
           std::initializer_list<const char*> options, std::initializer_list<const char*> inputs,
           const char* folder = nullptr);
 
-  /// A file that is read as well and no option names (a mesh of a scene). \throws UsageError.
-  void keep(const std::string& path);
+  /// The mesh files of an object are read as well, though no option names them. \throws UsageError.
+  void keep(const ObjectSpec& object);
 
   bool wanted(const char* option) const { return values_.count(option) > 0; }
   /// The text for an option's file; no effect where the option was not given.

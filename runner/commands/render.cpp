@@ -147,13 +147,6 @@ std::string forces_along(const Scene& scene, const Renderer& renderer,
   return out;
 }
 
-void keep_meshes(Outputs& outputs, const std::vector<ObjectSpec>& objects) {
-  for (const ObjectSpec& object : objects) {
-    if (!object.file.empty()) outputs.keep(object.file);
-    keep_meshes(outputs, object.parts);
-  }
-}
-
 }  // namespace
 
 int render_command(const std::vector<std::string>& args) {
@@ -194,14 +187,14 @@ int render_command(const std::vector<std::string>& args) {
   Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
     const std::vector<ObjectSpec> objects = parse_scene(scene_path);
-    keep_meshes(outputs, objects);
+    for (const ObjectSpec& object : objects) outputs.keep(object);
     explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
   given(*values, "out", "unless --explain is given");
   const std::vector<ObjectSpec> objects = parse_scene(scene_path);
-  keep_meshes(outputs, objects);
+  for (const ObjectSpec& object : objects) outputs.keep(object);
   const std::vector<TrajectoryRow> rows = read_trajectory(trajectory);
   outputs.put("out", forces_along(build_scene(scene_path, objects, renderer), renderer, rows));
   outputs.write();

@@ -271,6 +271,7 @@ int replay_command(const std::vector<std::string>& args) {
   Protocol protocol = parse_protocol_text(
       text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string());
   const auto& stimuli = protocol.stimuli;
+  for (const StimulusSpec& stimulus : stimuli) outputs.keep(stimulus.object);
   if (std::none_of(stimuli.begin(), stimuli.end(),
                    [&](const auto& stimulus) { return stimulus.name == record.shape; })) {
     throw StoreRefused(db + ": trial " + trial + " shows '" + record.shape +

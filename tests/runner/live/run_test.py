@@ -296,6 +296,21 @@ class Broken(Live):
         self.finish(terminal)
         self.assertEqual(self.attempts(), [(trial, 1, "completed") for trial in (1, 2, 3, 4)])
 
+    def test_a_replay_writes_over_no_mesh_that_it_reads(self):
+        (self.dir / "solid.obj").write_text(
+            "v 0 0 0\nv 0.04 0 0\nv 0 0.04 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        before = (self.dir / "solid.obj").read_bytes()
+        stimuli = [{"name": name, "shape": "mesh", "file": "solid.obj"} for name in ("ball", "box")]
+        with self.run_session(samples=True, stimuli=stimuli) as terminal:
+            self.finish(terminal)
+        replay = [PALPATE, "replay", "--db", self.db, "--trial", "P01/1/2", "--meshes", self.dir, "--out"]
+        done = subprocess.run([*replay, self.dir / "solid.obj", "--force"], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+        self.assertIn("mesh", done.stderr)
+        self.assertEqual((self.dir / "solid.obj").read_bytes(), before)
+        done = subprocess.run([*replay, self.dir / "ticks.csv"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
     def test_signals_end_it_with_everything_on_record(self):
         for which, word in ((signal.SIGINT, "Interrupt"), (signal.SIGTERM, "Terminated")):
             terminal = self.begin(code=f"P{int(which)}")
