@@ -131,7 +131,8 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.settings = settings;
   out.program_version = program_version;
   out.description = describe(table, settings.too_fast);
-  out.comparisons = compare_renderers(table, out.description, settings.seed);
+  out.time_outs = time_outs(table, out.description);
+  out.comparisons = compare_renderers(table, out.description, out.time_outs, settings.seed);
   out.rm_anova = rm_anova(out.description.people);
   out.mixed_model = mixed_model(out.description.people, table.renderers, table.shapes);
   out.practice = practice_effects(table, out.description, settings.too_fast);

@@ -11,6 +11,7 @@
 #include "analysis/describe.h"
 #include "analysis/mixed_model.h"
 #include "analysis/practice.h"
+#include "analysis/time_outs.h"
 #include "analysis/trials.h"
 
 namespace palpate {
@@ -31,6 +32,7 @@ struct Analysis {
   std::string program_version;  ///< of the program that analyses
   TrialTable table;
   Description description;
+  TimeOuts time_outs;
   std::vector<Comparison> comparisons;  ///< one at least
   RmAnova rm_anova;
   MixedModel mixed_model;

@@ -5,11 +5,12 @@
 namespace palpate {
 
 std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
-                                          std::uint64_t seed) {
+                                          const TimeOuts& time_outs, std::uint64_t seed) {
   std::vector<Comparison> all;
   for (const RendererPair& pair : renderer_pairs(table.renderers)) {
-    Comparison one{pair, compare_by_shape(table, description, pair), {}};
+    Comparison one{pair, compare_by_shape(table, description, pair), {}, {}};
     one.speed_accuracy = speed_accuracy(table, description, pair, one.shapes);
+    one.censored = censored_by_shape(description, time_outs, pair);
     all.push_back(std::move(one));
   }
   std::vector<PairedShape*> tests;
