@@ -1,6 +1,7 @@
 #include "analysis/analysis.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -12,6 +13,10 @@ namespace {
 
 constexpr double kMuchExcluded = 0.10;       // of a renderer's trials
 constexpr double kUnequallyExcluded = 0.05;  // difference of the renderers' shares
+constexpr double kManyTimeOuts = 0.05;       // of a cell's trials
+constexpr double kUnequalTimeOuts = 0.025;   // difference of two renderers' shares for a shape
+constexpr double kConcentrated = 1.5;        // a participant's share of a cell's
+constexpr std::size_t kMostNamed = 6;        // shapes or comparisons in a warning
 constexpr double kAlpha = 0.05;
 constexpr double kLongTime = 600;  // s; a mean above it looks like milliseconds
 
@@ -48,6 +53,77 @@ void warn_of_exclusions(Analysis& analysis) {
   analysis.warnings.push_back("Exclusions differ between renderers (" +
                               share(*std::min(least, most)) + ", " + share(*std::max(least, most)) +
                               "): the times compare different selections of trials.");
+}
+
+/// "12.2 % with the point (38.2 % of P3's trials)"
+std::string time_outs_with(const Analysis& analysis, std::size_t renderer, std::size_t shape) {
+  const TimeOutCell& cell = analysis.time_outs.cells[renderer][shape];
+  std::string text =
+      fixed(100 * cell.share(), 1) + " % with " + the(analysis.table.renderers[renderer]);
+  if (cell.most_in && cell.largest_share > kConcentrated * cell.share()) {
+    text += " (" + fixed(100 * cell.largest_share, 1) + " % in " +
+            analysis.table.participants[*cell.most_in] + ")";
+  }
+  return text;
+}
+
+/// What time-outs do to one shape of a comparison; empty where they do little.
+std::string time_outs_of(const Analysis& analysis, const Comparison& comparison,
+                         std::size_t shape) {
+  const std::size_t reference = *comparison.pair.reference_at,
+                    renderer = *comparison.pair.renderer_at;
+  const double a = analysis.time_outs.cells[reference][shape].share(),
+               b = analysis.time_outs.cells[renderer][shape].share();
+  if (a + b == 0) return {};
+  const CensoredEstimate& censored = comparison.censored[shape];
+  const PairedShape& paired = comparison.shapes[shape];
+  const auto& primary = paired.t_test.log_ratio_ci95;
+  const bool moved = primary && censored.log_ratio &&
+                     (*censored.log_ratio < primary->low || *censored.log_ratio > primary->high);
+  if (std::max(a, b) <= kManyTimeOuts && std::fabs(a - b) <= kUnequalTimeOuts && !moved) return {};
+  std::string text = analysis.table.shapes[shape] + " " +
+                     time_outs_with(analysis, reference, shape) + " and " +
+                     time_outs_with(analysis, renderer, shape);
+  if (censored.log_ratio && paired.percent_reduction_geometric) {
+    text += ", reduction " + fixed(percent_reduction(*censored.log_ratio), 1) +
+            " % where they count as censored, " + fixed(*paired.percent_reduction_geometric, 1) +
+            " % without them" + (moved ? ", outside its interval" : "");
+  }
+  return text;
+}
+
+void warn_of_time_outs(Analysis& analysis) {
+  const auto warn = [&](const std::vector<std::string>& shapes) {
+    if (shapes.empty()) return;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(shapes.size(), kMostNamed); ++i) {
+      text += (i == 0 ? "" : "; ") + shapes[i];
+    }
+    if (shapes.size() > kMostNamed) {
+      text += "; and " + std::to_string(shapes.size() - kMostNamed) + " shapes more";
+    }
+    analysis.warnings.push_back(
+        "Time-outs are left out of the times, so that what is slow looks "
+        "faster than it is: " +
+        text + ".");
+  };
+  std::size_t said = 0;
+  for (const Comparison& comparison : analysis.comparisons) {
+    std::vector<std::string> shapes;
+    for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+      if (!comparison.pair.in_data()) {
+        const std::size_t renderer = comparison.pair.reference_at.value_or(0);
+        if (analysis.time_outs.cells[renderer][s].share() > kManyTimeOuts) {
+          shapes.push_back(analysis.table.shapes[s] + " " + time_outs_with(analysis, renderer, s));
+        }
+      } else if (!comparison.censored.empty()) {
+        std::string text = time_outs_of(analysis, comparison, s);
+        if (!text.empty()) shapes.push_back(std::move(text));
+      }
+    }
+    if (!shapes.empty() && ++said > kMostNamed) return;
+    warn(shapes);
+  }
 }
 
 /// "P3 (point: cone; ray: every shape)" for each participant without a pair somewhere.
@@ -107,12 +183,12 @@ void warn_of_practice(Analysis& analysis) {
           "All participants had " + the(reference ? pair.reference : pair.renderer) +
           (many ? " before " + the(reference ? pair.renderer : pair.reference) : " first") +
           ": what practice does and what the renderer does cannot be told apart.");
-    } else if (order.test.p.value_or(1) < kAlpha) {
+    } else if (order.test.p_holm.value_or(1) < kAlpha) {
       analysis.warnings.push_back(
           (many ? "The gain of " + the(pair.renderer) + " over " + the(pair.reference) +
-                      " depends on which of them came first (p "
-                : "The gain depends on which renderer came first (p ") +
-          p_text(*order.test.p) +
+                      " depends on which of them came first (adjusted p "
+                : "The gain depends on which renderer came first (adjusted p ") +
+          p_text(*order.test.p_holm) +
           "): see practice; the gain with the two orders balanced stands there.");
     }
   }
@@ -152,6 +228,7 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   }
   warn_of_times(out);
   warn_of_exclusions(out);
+  if (out.time_outs.any) warn_of_time_outs(out);
   warn_of_dropped(out);
   warn_of_practice(out);
   return out;

@@ -205,6 +205,13 @@ RmAnova rm_anova(const People& people) {
       test(scores[i], all_error, static_cast<double>(cells.cols()), out.effects[i]);
     }
   }
+  if (out.undefined.empty() && std::ranges::all_of(out.effects, [](const AnovaEffect& effect) {
+        return !effect.undefined.empty();
+      })) {
+    out.undefined = kFlat;
+    // A share of what varies, where nothing varies but people, would say 1 of any difference.
+    for (AnovaEffect& effect : out.effects) effect.generalized_eta_squared.reset();
+  }
   return out;
 }
 

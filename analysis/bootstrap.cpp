@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
@@ -64,6 +65,15 @@ Bootstrap bca_interval(const std::vector<double>& differences, std::vector<doubl
   const double z = normal_quantile(0.975);
   out.log_ratio_ci95 = Interval{end(-z), end(z)};
   return out;
+}
+
+std::optional<double> bca_coverage(std::size_t pairs) {
+  // From 2 pairs on; with 2 the interval reaches from one to the other, which holds the mean in
+  // half of all cases. The others: tests/analysis/fixtures/bca_coverage.R, 5,000 studies each.
+  constexpr std::array kCoverage{0.50, 0.73, 0.79, 0.84, 0.87, 0.88, 0.89, 0.90, 0.90,
+                                 0.91, 0.91, 0.91, 0.92, 0.92, 0.92, 0.92, 0.92, 0.92};
+  if (pairs < 2 || pairs - 2 >= kCoverage.size()) return std::nullopt;
+  return kCoverage[pairs - 2];
 }
 
 Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,

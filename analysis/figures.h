@@ -98,7 +98,8 @@ struct Figure {
 std::size_t roles_in(const Figure& figure);
 
 /// Those that the data allow, in the order of display: figure15, speedup, times, confusion,
-/// speed-accuracy, learning, order, servo, exclusions.
+/// speed-accuracy, learning, order, servo (unless all trials' longest periods are alike),
+/// exclusions.
 std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& record);
 
 /// Mean time per shape and renderer with 95 % t intervals over participants, and each
@@ -106,6 +107,9 @@ std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& rec
 Figure figure15_of(const Analysis& analysis);
 /// Percent reduction per shape with its interval, beside the paper's; a panel for each comparison.
 Figure speedup_of(const Analysis& analysis);
+
+/// Why there is no figure of the servo.
+std::string servo_sentence(const Analysis& analysis, const ReportRecord& record);
 
 /// Shapes that a figure has room for; the tables have all.
 constexpr std::size_t kShownShapes = 24;

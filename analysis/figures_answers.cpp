@@ -7,11 +7,15 @@
 #include <utility>
 
 #include "analysis/figures_parts.h"
+#include "analysis/svg.h"
 #include "analysis/text.h"
 
 namespace palpate {
 
 namespace {
+
+constexpr double kMuchLost = 10;       // percent of the trials
+constexpr double kWidestChange = 150;  // percent of the time; what is longer leaves the axis
 
 std::string percent_text(std::size_t part, std::size_t of) {
   const double percent = of ? 100 * static_cast<double>(part) / static_cast<double>(of) : 0;
@@ -72,25 +76,31 @@ struct Box {
 /// Names beside their points: right or left, above or below, wherever they hide no other. In a
 /// panel that has others at its sides they stay inside.
 void put_labels(Panel& panel, const std::vector<Label>& labels) {
-  constexpr double kSize = 13, kLetter = 7.5, kPoint = 7;  // px
+  constexpr double kSize = 13, kPoint = 7;  // px
   const auto px = [&](double x) {
     return (x - panel.x.low) / (panel.x.high - panel.x.low) * panel.width;
   };
   const auto py = [&](double y) {
     return (panel.y.high - y) / (panel.y.high - panel.y.low) * panel.height;
   };
-  std::vector<Box> taken;
-  taken.reserve(2 * labels.size());
+  std::vector<Box> taken;  // points, bars, the lines at 0, then labels
+  taken.reserve(2 * labels.size() + panel.marks.size());
+  for (const Mark& mark : panel.marks) {
+    if (mark.kind != Mark::Kind::line && mark.kind != Mark::Kind::interval) continue;
+    const auto [left, right] = std::ranges::minmax(mark.x);
+    const auto [low, high] = std::ranges::minmax(mark.y);
+    taken.push_back({px(left) - 2, px(right) + 2, py(high) - 2, py(low) + 2});
+  }
   for (const Label& label : labels) {
     const double x = px(label.x), y = py(label.y);
     taken.push_back({x - kPoint, x + kPoint, y - kPoint, y + kPoint});
   }
   for (const Label& label : labels) {
-    const double wide = kLetter * static_cast<double>(width(label.text));
+    const double wide = text_width(label.text, kSize, true);
     Mark best;
     Box place{};
     std::ptrdiff_t fewest = std::ssize(taken) + 1;
-    for (const double dy : {4.0, -14.0, 22.0, -32.0, 40.0}) {
+    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
       for (const int anchor : {-1, 1}) {
         Mark mark = text_mark(Role::ink, label.x, label.y, label.text, kSize);
         mark.anchor = anchor;
@@ -115,6 +125,13 @@ void put_labels(Panel& panel, const std::vector<Label>& labels) {
   }
 }
 
+/// Of the time in percent, negative where it is less.
+std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio) {
+  if (!log_ratio) return std::nullopt;
+  const Interval reduction = percent_reduction(*log_ratio);
+  return Interval{-reduction.high, -reduction.low};
+}
+
 /// One comparison's shapes. \return false where none can be shown
 bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
                  std::size_t shapes, std::string& description) {
@@ -130,9 +147,17 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
     if (!both.percent_change_time || !both.accuracy_change) continue;
     const std::string name = printable(names[s], 40);
     const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
-    const std::string text = (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " +
-                             fixed(x, 1) + " %, accuracy " + fixed(y, 1) + " points" +
-                             (both.reading.empty() ? "" : ", " + both.reading);
+    std::string text =
+        (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " + fixed(x, 1) + " %";
+    const auto time = percent_change(comparison.shapes[s].t_test.log_ratio_ci95);
+    if (time)
+      text += " (95 % interval " + fixed(time->low, 1) + " to " + fixed(time->high, 1) + ")";
+    text += ", accuracy " + fixed(y, 1) + " points";
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      text += " (" + fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1) + ")";
+    }
+    if (!both.reading.empty()) text += ", " + both.reading;
+    if (time) add_interval_across(panel, Role::ink, y, time->low, time->high, text);
     if (const auto& ends = both.test.log_ratio_ci95) {
       add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
     }
@@ -177,6 +202,12 @@ Figure speed_accuracy_of(const Analysis& analysis) {
       if (!both.percent_change_time || !both.accuracy_change) continue;
       widest = std::max(widest, std::fabs(*both.percent_change_time));
       highest = std::max(highest, 100 * std::fabs(*both.accuracy_change));
+      if (const auto time =
+              percent_change(analysis.comparisons[c].shapes[s].t_test.log_ratio_ci95)) {
+        for (const double end : {time->low, time->high}) {
+          widest = std::max(widest, std::min(kWidestChange, std::fabs(end)));
+        }
+      }
       if (const auto& ends = both.test.log_ratio_ci95) {
         highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->low)));
         highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->high)));
@@ -199,8 +230,9 @@ Figure speed_accuracy_of(const Analysis& analysis) {
       analysis.comparisons.size() == 1 && analysis.comparisons.front().pair.is_ray_minus_point();
   figure.notes.insert(figure.notes.begin(),
                       std::string(paper ? "Ray minus point" : "Renderer minus reference") +
-                          ", means over participants; bars: 95 % interval of the change of "
-                          "accuracy. Shaded: speed may have been bought with errors, or accuracy "
+                          ", means over participants; bars: 95 % intervals of the change of time "
+                          "and of accuracy, not adjusted. Shaded: speed may have been bought with "
+                          "errors, or accuracy "
                           "with time.");
   return figure;
 }
@@ -229,7 +261,7 @@ Figure exclusions_of(const Analysis& analysis) {
   panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
   panel.width = kWide;
   panel.height = 260;
-  panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {10, 10}, 1.4));
+  panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {kMuchLost, kMuchLost}, 1.4));
   const double group = n < 4 ? 0.6 : 0.88, width = group / static_cast<double>(n);
   for (std::size_t r = 0; r < n; ++r) {
     const Exclusions& lost = analysis.exclusions[r];
@@ -246,7 +278,10 @@ Figure exclusions_of(const Analysis& analysis) {
                                counted(count, "trial", "trials") + " of " +
                                std::to_string(lost.n_trials) + " (" + fixed(percent, 1) + " %)";
       panel.marks.push_back(rect_mark(role, x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
-      Mark mark = text_mark(Role::soft, x + width / 2, percent, fixed(percent, 1), 12);
+      const double px = (panel.y.high - panel.y.low) / panel.height;
+      const bool crossed = percent < kMuchLost && percent + 18 * px > kMuchLost;
+      Mark mark = text_mark(Role::soft, x + width / 2, crossed ? kMuchLost : percent,
+                            fixed(percent, 1), 12);
       mark.dy = -5;
       panel.marks.push_back(std::move(mark));
       figure.description += text + ". ";

@@ -1,4 +1,5 @@
-// Figure 15 and the speed-up beside the paper's.
+// Mean times, as in the paper's figure 15, and the speed-up, with time-outs as censored times and
+// the paper's figures beside it.
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
@@ -93,19 +94,33 @@ std::optional<double> paper_number(const RendererPair& pair, const std::string& 
   return std::stod(text);
 }
 
+/// The estimate with time-outs as censored times; none where the shape has no time-out, or no
+/// estimate.
+const CensoredEstimate* shown_censored(const Comparison& comparison, std::size_t shape) {
+  if (comparison.censored.empty()) return nullptr;
+  const CensoredEstimate& censored = comparison.censored[shape];
+  return censored.n_censored > 0 && censored.log_ratio ? &censored : nullptr;
+}
+
 /// One for all comparisons.
 FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std::size_t shapes) {
-  double low = 0, high = 25;  // the paper's largest stays inside
+  double low = 0, high = compares_as_paper(analysis) ? 25 : 10;  // the paper's largest stays inside
+  const auto include = [&](const Interval& log_ratio) {
+    const Interval ends = percent_reduction(log_ratio);
+    low = std::min(low, ends.low);
+    high = std::max(high, ends.high);
+  };
   for (std::size_t c = 0; c < comparisons; ++c) {
     for (std::size_t s = 0; s < shapes; ++s) {
+      if (const CensoredEstimate* censored = shown_censored(analysis.comparisons[c], s)) {
+        include({*censored->log_ratio, *censored->log_ratio});
+        if (censored->log_ratio_ci95) include(*censored->log_ratio_ci95);
+      }
       const PairedShape& shape = analysis.comparisons[c].shapes[s];
       if (!shape.percent_reduction_geometric) continue;
       low = std::min(low, *shape.percent_reduction_geometric);
       high = std::max(high, *shape.percent_reduction_geometric);
-      if (!shape.t_test.log_ratio_ci95) continue;
-      const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
-      low = std::min(low, ends.low);
-      high = std::max(high, ends.high);
+      if (shape.t_test.log_ratio_ci95) include(*shape.t_test.log_ratio_ci95);
     }
   }
   if (comparisons > 1) high += 0.12 * (high - std::max(low, -150.0));  // room for each p
@@ -129,6 +144,19 @@ void add_paper(Panel& panel, const RendererPair& pair, const std::string& shape,
   }
 }
 
+void add_censored(Panel& panel, const CensoredEstimate& censored, double x, std::string& text) {
+  const double value = percent_reduction(*censored.log_ratio);
+  std::string own = "time-outs as censored: " + fixed(value, 1) + " %";
+  if (censored.log_ratio_ci95) {
+    const Interval ends = percent_reduction(*censored.log_ratio_ci95);
+    own += ", 95 % interval " + interval_text(ends);
+    add_interval(panel, Role::amber, x, ends.low, ends.high, own);
+  }
+  panel.marks.push_back(symbol(Role::amber, Shape::square, x,
+                               std::clamp(value, panel.y.low, panel.y.high), 5.8, own));
+  text += "; " + own;
+}
+
 /// One comparison's shapes. \return false where none can be shown
 bool add_reductions(Panel& panel, const Comparison& comparison,
                     const std::vector<std::string>& names, std::size_t shapes,
@@ -137,7 +165,9 @@ bool add_reductions(Panel& panel, const Comparison& comparison,
   panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
   for (std::size_t s = 0; s < shapes; ++s) {
     const PairedShape& shape = comparison.shapes[s];
-    const double left = static_cast<double>(s) + 0.42, right = static_cast<double>(s) + 0.62;
+    const CensoredEstimate* censored = shown_censored(comparison, s);
+    const double left = static_cast<double>(s) + (censored ? 0.36 : 0.42),
+                 right = static_cast<double>(s) + (censored ? 0.72 : 0.62);
     std::string text =
         (panel.title.empty() ? "" : panel.title + ", ") + printable(names[s], 40) + ": ";
     text += shape.percent_reduction_geometric ? fixed(*shape.percent_reduction_geometric, 1) + " %"
@@ -153,6 +183,7 @@ bool add_reductions(Panel& panel, const Comparison& comparison,
           std::clamp(*shape.percent_reduction_geometric, panel.y.low, panel.y.high), 6.5, text));
       any = true;
     }
+    if (censored) add_censored(panel, *censored, static_cast<double>(s) + 0.54, text);
     add_paper(panel, comparison.pair, names[s], right);
     const std::string paper = paper_reduction(comparison.pair, names[s]);
     if (!paper.empty()) text += "; paper " + paper;
@@ -235,15 +266,22 @@ Figure speedup_of(const Analysis& analysis) {
     }
   }
   if (figure.panels.empty()) return figure;
-  const bool with_paper =
-      std::ranges::any_of(analysis.comparisons, [&](const Comparison& comparison) {
-        return std::any_of(analysis.table.shapes.begin(),
-                           analysis.table.shapes.begin() + static_cast<std::ptrdiff_t>(shapes),
-                           [&](const std::string& shape) {
-                             return !paper_reduction(comparison.pair, shape).empty();
-                           });
-      });
+  const auto shown = [&](const auto& holds) {
+    for (const Comparison& comparison : analysis.comparisons) {
+      for (std::size_t s = 0; s < shapes; ++s) {
+        if (holds(comparison, s)) return true;
+      }
+    }
+    return false;
+  };
+  const bool with_paper = shown([&](const Comparison& comparison, std::size_t s) {
+    return !paper_reduction(comparison.pair, analysis.table.shapes[s]).empty();
+  });
+  const bool with_censored = shown([](const Comparison& comparison, std::size_t s) {
+    return shown_censored(comparison, s) != nullptr;
+  });
   figure.legend = {{"this data", Role::ink, Shape::circle}};
+  if (with_censored) figure.legend.push_back({"time-outs as censored", Role::amber, Shape::square});
   if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, Shape::diamond});
   const RendererPair& first = analysis.comparisons.front().pair;
   const bool many = analysis.comparisons.size() > 1;
@@ -253,9 +291,13 @@ Figure speedup_of(const Analysis& analysis) {
           (many ? "it is faster than with " + the(short_name(first.reference))
                 : the(short_name(first.renderer)) + " is faster") +
           ". Geometric reduction over participants with both renderers; bars: 95 % interval of the "
-          "paired t-test on log times; p adjusted over " +
+          "paired t-test on log times, not adjusted; p adjusted over " +
           (many ? "all shapes and comparisons" : "the shapes") + " after Holm, bold below 0.05." +
-          (compares_as_paper(analysis) ? " n.s.: the paper found no significant difference." : ""));
+          (with_censored
+               ? " Time-outs as censored: log-normal times that are longer than the limit "
+                 "where nobody answered in time."
+               : "") +
+          (with_paper ? " n.s.: the paper found no significant difference." : ""));
   return figure;
 }
 

@@ -257,6 +257,28 @@ void add_interval(Panel& panel, Role role, double x, double low, double high, st
   }
 }
 
+void add_interval_across(Panel& panel, Role role, double y, double low, double high,
+                         const std::string& text) {
+  const double left = std::clamp(low, panel.x.low, panel.x.high);
+  const double right = std::clamp(high, panel.x.low, panel.x.high);
+  Mark bar = line_mark(role, {left, right}, {y, y}, 2);
+  bar.text = text;
+  panel.marks.push_back(std::move(bar));
+  const double half = 5 * (panel.y.high - panel.y.low) / panel.height;
+  const auto end = [&](double x, bool inside, Shape arrow, double dx) {
+    if (inside) {
+      Mark cap = line_mark(role, {x, x}, {y - half, y + half}, 2);
+      cap.text = text;
+      panel.marks.push_back(std::move(cap));
+    } else {
+      panel.marks.push_back(symbol(role, arrow, x, y, 5, text));
+      panel.marks.back().dx = dx;
+    }
+  };
+  end(left, low >= panel.x.low, Shape::left, 4);
+  end(right, high <= panel.x.high, Shape::right, -4);
+}
+
 std::string seconds_text(double seconds) { return fixed(seconds, seconds < 10 ? 2 : 1) + " s"; }
 
 std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& record) {

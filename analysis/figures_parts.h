@@ -55,6 +55,10 @@ Mark rect_mark(Role role, double x0, double y0, double x1, double y1, double opa
 /// An interval, cut to the axis, with arrowheads where it leaves it.
 void add_interval(Panel& panel, Role role, double x, double low, double high, std::string text);
 
+/// The same from left to right.
+void add_interval_across(Panel& panel, Role role, double y, double low, double high,
+                         const std::string& text);
+
 /// "1.25 s"
 std::string seconds_text(double seconds);
 

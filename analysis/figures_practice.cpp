@@ -1,7 +1,9 @@
 // Learning over trials, and which renderer came first.
 
 #include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "analysis/figures_parts.h"
@@ -11,7 +13,14 @@ namespace palpate {
 
 namespace {
 
-constexpr double kNormal975 = 1.959963984540054;  // of the standard normal distribution
+constexpr double kLongestBar = 0.7;  // natural log: two people's bars leave the axis
+
+/// Half of a part's 95 % interval over participants (t), natural log of s; none below two.
+std::optional<double> half_interval(const LearningBin& bin) {
+  if (!bin.se_mean_log) return std::nullopt;
+  const boost::math::students_t distribution(static_cast<double>(bin.n_participants) - 1);
+  return quantile(distribution, 0.975) * *bin.se_mean_log;
+}
 
 /// One comparison's shapes. \return false where none can be shown
 bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, std::size_t shapes,
@@ -63,9 +72,9 @@ Figure learning_of(const Analysis& analysis) {
   for (std::size_t r = 0; r < renderers; ++r) {
     for (const LearningBin& bin : learning[r].bins) {
       if (!bin.mean_log) continue;
-      const double se = std::min(bin.se_mean_log.value_or(0), 1.0);
-      low = std::min(low, *bin.mean_log - kNormal975 * se);
-      high = std::max(high, *bin.mean_log + kNormal975 * se);
+      const double half = std::min(half_interval(bin).value_or(0), kLongestBar);
+      low = std::min(low, *bin.mean_log - half);
+      high = std::max(high, *bin.mean_log + half);
     }
   }
   if (low > high) return figure;
@@ -104,8 +113,8 @@ Figure learning_of(const Analysis& analysis) {
       const std::string text = renderer + ", part " + parts[b] + ": " +
                                seconds_text(std::exp(*bin.mean_log)) + ", " +
                                counted(bin.n_trials, "trial", "trials");
-      if (bin.se_mean_log) {
-        const double half = kNormal975 * *bin.se_mean_log / per_decade;
+      if (const auto natural = half_interval(bin)) {
+        const double half = *natural / per_decade;
         add_interval(panel, role, x, y - half, y + half, text);
       }
       panel.marks.push_back(symbol(role, shape, x, y, 5, text));
@@ -124,7 +133,7 @@ Figure learning_of(const Analysis& analysis) {
   figure.panels.push_back(std::move(panel));
   figure.notes.push_back(
       "Each participant’s times relative to their own mean of the shape, then the mean over "
-      "participants, the renderer’s mean added back; bars: 1.96 standard errors." +
+      "participants, the renderer’s mean added back; bars: 95 % interval of that mean (t)." +
       (slopes.empty() ? "" : " Change of the time: " + slopes));
   return figure;
 }

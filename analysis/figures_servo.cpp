@@ -9,6 +9,15 @@
 
 namespace palpate {
 
+namespace {
+
+constexpr const char* kVirtualClock =
+    " Simulated sessions run on a virtual clock: it keeps time by definition, and this says "
+    "nothing "
+    "about a machine.";
+
+}  // namespace
+
 Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
   Figure figure = new_figure(analysis, "servo", "Longest servo period of each trial");
   int first = ServoQuality::kBins, last = -1;
@@ -23,7 +32,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
           std::max(highest, 100 * static_cast<double>(n) / static_cast<double>(servo.n_trials));
     }
   }
-  if (last < 0) return figure;
+  if (last <= first) return figure;  // one bar is a sentence: servo_sentence()
   // At least from 0.5 to 5 ms, so that a perfect record shows as what it is.
   constexpr int kHalf = ServoQuality::kBinsPerDecade;
   first = std::min(first, static_cast<int>(0.7 * kHalf));
@@ -58,11 +67,21 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
   }
   figure.notes.push_back("One tick is due every 1 ms, unless the protocol says otherwise.");
   if (analysis.table.simulated != Simulated::no) {
-    figure.notes.push_back(
-        "Simulated sessions run on a virtual clock: it keeps time by definition, and this says "
-        "nothing about a machine.");
+    figure.notes.emplace_back(kVirtualClock + 1);  // without the space
   }
   return figure;
+}
+
+std::string servo_sentence(const Analysis& analysis, const ReportRecord& record) {
+  if (record.servo.empty()) {
+    return "This is on record in a study’s database only, not in a table of trials.";
+  }
+  double longest = 0;
+  for (const ServoQuality& servo : record.servo) longest = std::max(longest, servo.longest_period);
+  std::string text = "The longest servo period was alike in all trials, up to " +
+                     fixed(1000 * longest, 3) + " ms: there is nothing to draw.";
+  if (analysis.table.simulated != Simulated::no) text += kVirtualClock;
+  return text;
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -18,7 +19,8 @@ constexpr std::size_t kLongestEntry = 40;  // of one in the legend
 
 class Drawing {
  public:
-  Drawing(const Figure& figure, const Palette& palette) : figure_(figure), palette_(palette) {}
+  Drawing(const Figure& figure, const Palette& palette, Stands stands)
+      : figure_(figure), palette_(palette), in_page_(stands == Stands::in_page) {}
 
   std::string document() {
     measure();
@@ -30,13 +32,16 @@ class Drawing {
       y = draw_row(row_start, row_end, y);
       row_start = row_end;
     }
+    const double drawn = y + 8;
     y = draw_notes(y + 16);
+    std::optional<Svg::Part> shown;
+    if (in_page_) shown = Svg::Part{below_title_, drawn};
     Svg page;
     page.rect(0, 0, total_, y + kMargin - 10, colour(Role::page));
     page.append(svg_);
     return page.document(total_, y + kMargin - 10,
                          (figure_.label.empty() ? "" : figure_.label + ": ") + figure_.title,
-                         figure_.description, figure_.id);
+                         figure_.description, figure_.id, shown);
   }
 
  private:
@@ -82,10 +87,13 @@ class Drawing {
 
   double heading() {
     double y = kMargin + 18;
+    if (in_page_) svg_.begin_alone();
     for (const std::string& line : lines_of(figure_.title, total_ - 2 * kMargin, 19, true)) {
       svg_.text(kMargin, y, line, {19, colour(Role::ink), Svg::Anchor::start, true});
       y += 25;
     }
+    if (in_page_) svg_.end_group();
+    below_title_ = y - 20;  // the label's frame begins there
     double x = kMargin;
     if (!figure_.label.empty()) {
       const double pill = text_width(figure_.label, 12, true) + 44;
@@ -260,19 +268,22 @@ class Drawing {
   }
 
   double draw_notes(double y) {
+    if (in_page_) svg_.begin_alone();
     for (const std::string& note : figure_.notes) {
       for (const std::string& line : lines_of(note, total_ - 2 * kMargin, 12)) {
         svg_.text(kMargin, y, line, {12, colour(Role::soft)});
         y += 17;
       }
     }
+    if (in_page_) svg_.end_group();
     return y;
   }
 
   const Figure& figure_;
   const Palette& palette_;
+  bool in_page_;
   Svg svg_;
-  double total_ = 0;
+  double total_ = 0, below_title_ = 0;
 };
 
 }  // namespace
@@ -295,8 +306,8 @@ Palette page_palette() {
   return palette;
 }
 
-std::string figure_svg(const Figure& figure, const Palette& palette) {
-  return Drawing(figure, palette).document();
+std::string figure_svg(const Figure& figure, const Palette& palette, Stands stands) {
+  return Drawing(figure, palette, stands).document();
 }
 
 }  // namespace palpate

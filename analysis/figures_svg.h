@@ -18,7 +18,12 @@ Palette dark_palette();
 /// "var(--point)" and so on: a page's style says which.
 Palette page_palette();
 
-/// A stand-alone document with title, label, legend and notes.
-std::string figure_svg(const Figure& figure, const Palette& palette);
+/// Where a figure stands: in a file of its own, or in a page that has its title above and its notes
+/// below.
+enum class Stands { alone, in_page };
+
+/// A document with title, label, legend and notes; in a page, title and notes are there for whoever
+/// saves the drawing, but not shown.
+std::string figure_svg(const Figure& figure, const Palette& palette, Stands stands = Stands::alone);
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "analysis/figures_parts.h"
+#include "analysis/svg.h"
 #include "analysis/text.h"
 
 namespace palpate {
@@ -72,8 +73,9 @@ struct Stand {
   double scale = 1;
 };
 
-/// A violin, or its half that bulges to one side.
-void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand,
+/// A violin, or its half that bulges to one side. \param limit log10 of s, where it ends at the
+/// latest
+void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand, double limit,
                 const std::string& text) {
   const double step = (panel.y.high - panel.y.low) / kBins;
   Mark area = line_mark(role, {}, {}, 1.2);
@@ -82,12 +84,14 @@ void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand,
   area.text = text;
   const auto corner = [&](double offset, double bin) {
     area.x.push_back(stand.x + offset);
-    area.y.push_back(panel.y.low + (bin + 0.5) * step);
+    area.y.push_back(std::min(panel.y.low + (bin + 0.5) * step, limit));
   };
   std::size_t first = 0, last = kBins - 1;
   const double least = 0.004 / stand.scale;
   while (first < last && share[first] < least) ++first;
   while (last > first && share[last] < least) --last;
+  // Smoothing spreads times beyond the limit, where there can be none.
+  while (last > first && panel.y.low + (static_cast<double>(last) - 0.5) * step > limit) --last;
   if (stand.side != 0) {
     const auto beside = [&](double width) { return stand.side * (0.02 + width); };
     corner(beside(0), static_cast<double>(first));
@@ -107,7 +111,7 @@ void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand,
 }
 
 void add_cell(Panel& panel, const Look& look, const std::vector<float>& times, const Bins& share,
-              const Stand& stand, const std::string& text) {
+              const Stand& stand, double limit, const std::string& text) {
   if (times.size() < kFewTimes) {
     for (const float time : times) {
       panel.marks.push_back(symbol(look.role, look.shape, stand.x + stand.side * 0.12,
@@ -115,7 +119,7 @@ void add_cell(Panel& panel, const Look& look, const std::vector<float>& times, c
     }
     return;
   }
-  add_violin(panel, look.role, share, stand, text);
+  add_violin(panel, look.role, share, stand, limit, text);
   const double at = stand.x + stand.side * 0.055;
   panel.marks.push_back(
       line_mark(look.role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
@@ -136,6 +140,61 @@ Stand stand_of(const Analysis& analysis, std::size_t renderer, std::size_t rende
   return {slot - 0.45 + 0.9 * (static_cast<double>(renderer) + 0.5) / n, 0, scale / n};
 }
 
+/// A cell's time-outs above the middle of its violin, or of its half. \param room px for a text
+void add_time_outs(Panel& panel, const TimeOutCell& cell, const Look& look, const Stand& stand,
+                   double room, const std::string& name) {
+  if (cell.n_timeouts == 0) return;
+  const std::string share = fixed(100 * cell.share(), cell.share() < 0.0995 ? 1 : 0) + " %";
+  const double x = stand.x + 0.22 * stand.side;
+  constexpr double kSize = 11.5;
+  for (const std::string& text : {std::to_string(cell.n_timeouts) + " (" + share + ")", share}) {
+    if (text_width(text, kSize, true) > room) continue;
+    Mark mark = text_mark(look.role, x, panel.y.high, text, kSize);
+    mark.bold = true;
+    mark.dy = 16;
+    panel.marks.push_back(std::move(mark));
+    break;
+  }
+  panel.marks.push_back(symbol(look.role, Shape::up, x, std::log10(*cell.highest_limit), 4,
+                               name + ": " + counted(cell.n_timeouts, "time-out", "time-outs") +
+                                   " of " + counted(cell.n_trials, "trial", "trials") + " (" +
+                                   share + "), longer than the limit"));
+  panel.marks.back().dy = -6;
+}
+
+/// The limits of all time-outs that are drawn, log10 of s, and a few lines at most.
+std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
+  std::vector<double> limits;
+  for (std::size_t r = 0; r < renderers; ++r) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      for (const TimeOutGroup& group : analysis.time_outs.cells[r][s].groups) {
+        if (group.has_limit()) limits.push_back(std::log10(group.limit));
+      }
+    }
+  }
+  std::ranges::sort(limits);
+  limits.erase(
+      std::unique(limits.begin(), limits.end(), [](double a, double b) { return b - a < 0.005; }),
+      limits.end());
+  constexpr std::size_t kMostLines = 3;
+  if (limits.size() > kMostLines) limits = {limits.front(), limits.back()};
+  return limits;
+}
+
+void add_limits(Panel& panel, const std::vector<double>& limits) {
+  for (const double limit : limits) {
+    const std::string seconds = fixed(std::pow(10, limit), limit < 1 ? 2 : 0) + " s";
+    Mark line = line_mark(Role::amber, {panel.x.low, panel.x.high}, {limit, limit}, 1.4);
+    line.text = "limit of " + seconds;
+    panel.marks.push_back(std::move(line));
+    Mark name = text_mark(Role::amber, panel.x.low, limit, "limit " + seconds, 11.5);
+    name.anchor = -1;
+    name.dx = 4;
+    name.dy = -5;
+    panel.marks.push_back(std::move(name));
+  }
+}
+
 }  // namespace
 
 Figure times_of(const Analysis& analysis) {
@@ -154,9 +213,12 @@ Figure times_of(const Analysis& analysis) {
     }
   }
   if (low > high) return figure;
+  const std::vector<double> limits = limits_of(analysis, renderers, shapes);
+  // Above the highest limit there is room for what ended there.
+  const double top = limits.empty() ? high + 0.08 : std::max(high, limits.back()) + 0.17;
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
-  panel.y = seconds_axis(low - 0.08, high + 0.08, "time (s, logarithmic)");
+  panel.y = seconds_axis(low - 0.08, top, "time (s, logarithmic)");
   panel.width = std::max(
       kWide, std::max(70.0, 35.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
   panel.height = 360;
@@ -169,26 +231,45 @@ Figure times_of(const Analysis& analysis) {
       widest = std::max(widest, *std::ranges::max_element(shares[r][s]));
     }
   }
+  const double room = 0.95 * panel.width / static_cast<double>(shapes * renderers);
   for (std::size_t s = 0; s < shapes; ++s) {
     for (std::size_t r = 0; r < times.size(); ++r) {
+      const TimeOutCell& outs = analysis.time_outs.cells[r][s];
+      const std::string name =
+          printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
+      const Look look = look_of(analysis, table.renderers[r]);
+      const Stand stand = stand_of(analysis, r, renderers, s, widest);
+      if (outs.highest_limit) add_time_outs(panel, outs, look, stand, room, name);
+      if (outs.n_timeouts > 0) {
+        figure.description += name + ": " + counted(outs.n_timeouts, "time-out", "time-outs") +
+                              " of " + counted(outs.n_trials, "trial", "trials") + ". ";
+      }
       if (times[r][s].empty()) continue;
-      std::string text = printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]) +
-                         ": median " + seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
+      std::string text = name + ": median " +
+                         seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
                          ", middle half " + fixed(std::pow(10, quantile_of(times[r][s], 0.25)), 2) +
                          " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
                          counted(times[r][s].size(), "time", "times");
-      add_cell(panel, look_of(analysis, table.renderers[r]), times[r][s], shares[r][s],
-               stand_of(analysis, r, renderers, s, widest), text);
+      add_cell(panel, look, times[r][s], shares[r][s], stand,
+               outs.highest_limit ? std::max(std::log10(*outs.highest_limit),
+                                             static_cast<double>(times[r][s].back()))
+                                  : panel.y.high,
+               text);
       figure.description += text + ". ";
     }
   }
+  add_limits(panel, limits);
   figure.panels.push_back(std::move(panel));
   add_renderers(figure, analysis, renderers);
   figure.notes.insert(
       figure.notes.begin(),
-      "All correct answers of all participants. Width: share of the trials "
-      "(smoothed); mark: median; bar: the middle half of the trials. Cells of fewer "
-      "than " +
+      "All correct answers of all participants" +
+          std::string(limits.empty() ? ""
+                                     : "; above the limit: trials that ended there, which have no "
+                                       "time (share of the cell’s trials)") +
+          ". Width: share of the trials "
+          "(smoothed); mark: median; bar: the middle half of the trials. Cells of fewer "
+          "than " +
           std::to_string(kFewTimes) + " times show each one.");
   return figure;
 }

@@ -31,6 +31,7 @@ void put_test(Json& out, const TTest& test) {
   out["t"] = number(test.t);
   out["df"] = number(test.df);
   out["p"] = number(test.p);
+  if (test.p_holm) out["p_holm"] = number(test.p_holm);
   put_interval(out, "ci95", test.log_ratio_ci95);
 }
 
@@ -140,6 +141,56 @@ void put_reduction_ci95(Json& out, const std::string& name,
 void put_status(Json& out, const std::string& undefined) {
   out["status"] = undefined.empty() ? "ok" : "undefined";
   if (!undefined.empty()) out["reason"] = undefined;
+}
+
+Json censored_json(const CensoredEstimate& censored) {
+  Json out;
+  put_status(out, censored.undefined);
+  out["method"] =
+      "log-normal, time-outs right-censored at their limit, participants as fixed effects, maximum "
+      "likelihood; interval by t from scores summed by participant";
+  out["n_participants"] = censored.n_participants;
+  out["n_observed"] = censored.n_observed;
+  out["n_censored"] = censored.n_censored;
+  out["log_ratio"] = number(censored.log_ratio);
+  out["residual_sd"] = number(censored.residual_sd);
+  out["log_likelihood"] = number(censored.log_likelihood);
+  out["se_model"] = number(censored.se_model);
+  out["se_log_ratio"] = number(censored.se_log_ratio);
+  out["df"] = number(censored.df);
+  put_interval(out, "log_ratio_ci95", censored.log_ratio_ci95);
+  put_reduction(out, "percent_reduction", censored.log_ratio, censored.log_ratio_ci95);
+  return out;
+}
+
+Json time_outs_json(const Analysis& analysis) {
+  const TrialTable& table = analysis.table;
+  Json out;
+  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
+    for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+      const TimeOutCell& cell = analysis.time_outs.cells[r][s];
+      Json& one = out[table.renderers[r]][table.shapes[s]];
+      put_status(one, cell.n_trials == 0 ? "no trials" : "");
+      one["n_trials"] = cell.n_trials;
+      one["n_timeouts"] = cell.n_timeouts;
+      one["share"] = cell.n_trials > 0 ? Json(cell.share()) : Json(nullptr);
+      one["limit_s_low"] = number(cell.lowest_limit);
+      one["limit_s_high"] = number(cell.highest_limit);
+      Json& people = one["participants"] = Json::array();
+      for (std::size_t g = 0; g < cell.groups.size(); ++g) {
+        const TimeOutGroup& group = cell.groups[g];
+        if (g > 0 && cell.groups[g - 1].participant == group.participant) {
+          people.back()["n_timeouts"] = people.back()["n_timeouts"].get<std::size_t>() + group.n;
+          continue;
+        }
+        people.push_back(
+            {{"participant_id", table.participants[group.participant]},
+             {"n_trials", analysis.description.people[r][s][group.participant].n_trials},
+             {"n_timeouts", group.n}});
+      }
+    }
+  }
+  return out;
 }
 
 Json anova_json(const RmAnova& anova, const TrialTable& table) {

@@ -26,6 +26,9 @@ void put_interval(Json& out, const std::string& name, const std::optional<Interv
 void put_reduction_ci95(Json& out, const std::string& name,
                         const std::optional<Interval>& log_ratio);
 
+Json censored_json(const CensoredEstimate& censored);
+/// By renderer and shape; participants with time-outs alone are listed.
+Json time_outs_json(const Analysis& analysis);
 Json anova_json(const RmAnova& anova, const TrialTable& table);
 Json mixed_model_json(const Analysis& analysis);
 /// By shape.

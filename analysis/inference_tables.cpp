@@ -9,8 +9,6 @@ namespace palpate {
 
 namespace {
 
-constexpr double kNotableLearning = 0.05;  // p below which a slope is called one
-
 std::string sentence(const std::string& what, const std::string& reason) {
   return what + ": " + reason + ".";
 }
@@ -27,9 +25,7 @@ std::string learning_note(const std::string& who, const TTest& test,
   std::string text = who + ": " + percent_change(mean) + " of time per 100 trials";
   if (test.log_ratio_ci95) {
     text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
-            percent_change(test.log_ratio_ci95->high) + ", p " + p_text(*test.p) + ")";
-    if (*test.p < kNotableLearning)
-      text += *mean < 0 ? ": faster with practice" : ": slower with time";
+            percent_change(test.log_ratio_ci95->high) + ")";
   } else {
     text += "; " + test.undefined;
   }
@@ -204,7 +200,7 @@ Table renderer_order_table(const Analysis& analysis) {
   const std::string renderer = several(analysis) ? "renderer" : first.renderer;
   Table table = comparison_table(analysis, "Does the order of renderers explain the gain?",
                                  {first.reference + " first", "people", renderer + " first",
-                                  "people", "difference", "p", "balanced", "95 % interval"});
+                                  "people", "difference", "p (Holm)", "balanced", "95 % interval"});
   Reasons reasons;
   std::vector<std::string> interleaved;
   const auto add = [&](const RendererPair& pair, const std::string& name,
@@ -218,7 +214,7 @@ Table renderer_order_table(const Analysis& analysis) {
                 std::to_string(effect.reference_first.n_participants),
                 reduction(effect.renderer_first.mean_log_ratio),
                 std::to_string(effect.renderer_first.n_participants),
-                percent_change(effect.difference), p_or_missing(effect.test.p),
+                percent_change(effect.difference), p_or_missing(effect.test.p_holm),
                 reduction(effect.balanced_log_ratio), reduction_interval(effect.balanced_ci95)});
     reasons.add(effect.test.undefined, listed_shape(analysis, pair, name));
   };
@@ -242,7 +238,12 @@ Table renderer_order_table(const Analysis& analysis) {
       first.reference + " first and too small with " +
       (several(analysis) ? "the other" : first.renderer) + " first. Difference: ratio of " +
       renderer + " to " + first.reference + " times, " + first.reference + " first against " +
-      renderer + " first; below 0 where practice helps. Balanced: both orders with equal weight."};
+      renderer +
+      " first; below 0 where practice helps; p adjusted over all tests of practice (slopes over "
+      "the trials "
+      "and orders, " +
+      std::to_string(analysis.practice.n_tests) +
+      " in all). Balanced: both orders with equal weight."};
   table.notes.insert(table.notes.end(), interleaved.begin(), interleaved.end());
   reasons.put(table.notes);
   return table;

@@ -11,6 +11,8 @@ namespace palpate {
 namespace {
 
 constexpr double kPer = 100;  // trials that a slope is given for
+const std::string kTooFew =
+    "fewer than " + std::to_string(kSlopeTrials) + " times or no shape twice";
 
 /// Sums of one participant's trials with one renderer and shape: of exposures and of logs, relative
 /// to the cell's mean log.
@@ -26,14 +28,16 @@ struct PersonSums {
   std::uint32_t first = std::numeric_limits<std::uint32_t>::max(), last = 0;  // positions
   std::uint32_t exposures = 0;                                                // the last number
 
-  /// Within shapes, per kPer trials; none where no shape was met twice.
+  /// Within shapes, per kPer trials; none where there are few trials or no shape was met twice.
   std::optional<double> slope() const {
-    double xx = 0, xy = 0;
+    double n = 0, xx = 0, xy = 0;
     for (const ShapeSums& shape : shapes) {
       if (shape.n == 0) continue;
+      n += shape.n;
       xx += shape.xx - shape.x * shape.x / shape.n;
       xy += shape.xy;  // the logs' own sum is 0
     }
+    if (n < static_cast<double>(kSlopeTrials)) return std::nullopt;
     if (xx <= 0.25) return std::nullopt;  // exposures are whole numbers: two of them give 0.5
     return kPer * xy / xx;
   }
@@ -109,7 +113,7 @@ Learning learning(const std::vector<PersonSums>& people, const std::optional<dou
   out.n_participants = slopes.size();
   out.slope = t_test(slopes);
   if (slopes.empty()) {
-    out.slope.undefined = "no participant has several times for one shape";
+    out.slope.undefined = "every participant has " + kTooFew + " with it: too few for a slope";
   } else {
     out.mean_slope = mean(slopes);
   }
@@ -234,12 +238,31 @@ PairPractice pair_practice(const Description& description, const AllSums& sums,
   out.slope_difference = t_test(differences);
   if (differences.empty()) {
     out.slope_difference.undefined =
-        "no participant has several times for one shape in both renderers";
+        "every participant has " + kTooFew + " with one of them: too few for slopes";
   } else {
     out.mean_slope_difference = mean(differences);
   }
   compare_orders(description, sums, pair, out);
   return out;
+}
+
+/// Holm's adjustment over every test of practice.
+void adjust(Practice& practice) {
+  std::vector<TTest*> tests;
+  for (Learning& learning : practice.learning) tests.push_back(&learning.slope);
+  for (PairPractice& pair : practice.pairs) {
+    tests.push_back(&pair.slope_difference);
+    tests.push_back(&pair.all_shapes.test);
+    for (OrderEffect& shape : pair.shapes) tests.push_back(&shape.test);
+  }
+  std::vector<std::optional<double>> p;
+  p.reserve(tests.size());
+  for (const TTest* test : tests) {
+    p.push_back(test->p);
+    practice.n_tests += test->p ? 1 : 0;
+  }
+  const auto adjusted = holm(p);
+  for (std::size_t i = 0; i < tests.size(); ++i) tests[i]->p_holm = adjusted[i];
 }
 
 }  // namespace
@@ -254,6 +277,7 @@ Practice practice_effects(const TrialTable& table, const Description& descriptio
   for (const RendererPair& pair : renderer_pairs(table.renderers)) {
     out.pairs.push_back(pair_practice(description, sums, pair));
   }
+  adjust(out);
   return out;
 }
 

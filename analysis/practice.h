@@ -25,6 +25,10 @@ struct LearningBin {
   std::optional<double> se_mean_log;  ///< over participants, of the relative part
 };
 
+/// Trials with a renderer that the times use, from which a participant has a slope: a change per
+/// 100 trials from fewer is an extrapolation that says nothing.
+constexpr std::size_t kSlopeTrials = 32;
+
 /// Of one renderer. The slope is each participant's least-squares slope of log time on the number
 /// of the trial with this renderer, within shapes; then a t interval over participants.
 struct Learning {
@@ -66,6 +70,7 @@ struct PairPractice {
 struct Practice {
   std::vector<Learning> learning;   ///< one for each of table.renderers
   std::vector<PairPractice> pairs;  ///< one for each of renderer_pairs()
+  std::size_t n_tests = 0;          ///< slopes and orders with a p: one family for their p_holm
 };
 
 /// \param too_fast s, as in describe()

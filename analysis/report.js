@@ -78,6 +78,11 @@
   function fileText(id) {
     const source = document.querySelector(`#${id} .fixed svg`).cloneNode(true);
     source.removeAttribute('style');
+    const whole = source.dataset.whole;
+    source.setAttribute('viewBox', whole);
+    source.setAttribute('width', whole.split(' ')[2]);
+    source.setAttribute('height', whole.split(' ')[3]);
+    source.removeAttribute('data-whole');
     const text = new XMLSerializer().serializeToString(source);
     return text.replace(/var\(--([a-z]+)\)/g, (all, role) => content.palette[role] || all);
   }

@@ -149,7 +149,7 @@ class Page {
     const Figure* drawn = figure(id);
     if (!drawn) return false;
     body_ += "<figure>\n<div class=\"drawing\">\n<div class=\"fixed\">" +
-             figure_svg(*drawn, page_palette()) + "</div>\n</div>\n<figcaption>";
+             figure_svg(*drawn, page_palette(), Stands::in_page) + "</div>\n</div>\n<figcaption>";
     for (const std::string& note : drawn->notes) body_ += escaped_sentence(note) + " ";
     body_ += "</figcaption>\n</figure>\n<div class=\"tools\">\n";
     for (const char* kind : {"svg", "png"}) {
@@ -191,16 +191,19 @@ class Page {
 
   void sections() {
     const bool both = analysis_.table.renderers.size() > 1;
-    figure_section({"figure15", "How long people took (figure 15)", "Figure 15"},
+    const bool paper = compares_as_paper(analysis_);
+    figure_section({"figure15", paper ? "How long people took (figure 15)" : "How long people took",
+                    paper ? "Figure 15" : "Mean times"},
                    {times_table(analysis_)}, "No times to show.");
     begin({"speedup",
            "How much faster " + with_renderer(analysis_, "than with") +
-               (compares_as_paper(analysis_) ? ", beside the paper" : ""),
+               (paper ? ", beside the paper" : ""),
            "Speed-up"});
     if (!put_figure("speedup")) {
       put_missing("No participant has times with both renderers, so there is nothing to compare.");
     }
     put_table(body_, reduction_table(analysis_));
+    if (analysis_.time_outs.any) put_table(body_, censored_table(analysis_));
     end();
     if (figure("times")) {
       figure_section({"times", "Distributions of the times", "Times"}, {}, "");
@@ -221,9 +224,10 @@ class Page {
                      "The two orders of the renderers cannot be compared in these data.");
     }
     figure_section({"servo", "How well the servo kept time", "Servo"}, servo_tables(),
-                   "This is on record in a study’s database only, not in a table of trials.");
-    figure_section({"exclusions", "What was left out", "Exclusions"}, {exclusions_table(analysis_)},
-                   "");
+                   servo_sentence(analysis_, record_));
+    std::vector<Table> lost{exclusions_table(analysis_)};
+    if (analysis_.time_outs.any) lost.push_back(time_outs_table(analysis_));
+    figure_section({"exclusions", "What was left out", "Exclusions"}, lost, "");
     begin({"tests", "The tests", "Tests"});
     for (const Table& table :
          {tests_table(analysis_), anova_table(analysis_), mixed_model_table(analysis_)}) {

@@ -1,6 +1,8 @@
 #include "analysis/svg.h"
 
+#include <array>
 #include <charconv>
+#include <cstdint>
 #include <initializer_list>
 #include <utility>
 
@@ -126,15 +128,21 @@ void Svg::begin_group(std::string_view title) {
   body_ += "<g><title>" + escaped(title) + "</title>\n";
 }
 
+void Svg::begin_alone() { body_ += "<g class=\"alone\">\n"; }
+
 void Svg::end_group() { body_ += "</g>\n"; }
 
 std::string Svg::document(double width, double height, std::string_view title,
-                          std::string_view description, std::string_view id) const {
-  const std::string w = std::to_string(static_cast<int>(width)),
-                    h = std::to_string(static_cast<int>(height)), name = escaped(id);
-  return "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" + w + "\" height=\"" + h +
-         "\" viewBox=\"0 0 " + w + " " + h +
-         "\" style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
+                          std::string_view description, std::string_view id,
+                          const std::optional<Part>& shown) const {
+  const auto whole_px = [](double length) { return std::to_string(static_cast<int>(length)); };
+  const Part part = shown.value_or(Part{0, height});
+  const std::string w = whole_px(width), h = whole_px(part.bottom - part.top), name = escaped(id);
+  std::string size = attribute("width", w) + attribute("height", h) +
+                     attribute("viewBox", "0 " + whole_px(part.top) + " " + w + " " + h);
+  if (shown) size += attribute("data-whole", "0 0 " + w + " " + whole_px(height));
+  return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + size +
+         " style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
          "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
          "-description\" font-family=\"" + std::string(kFont) + "\">\n<title id=\"" + name +
          "-title\">" + escaped(title) + "</title>\n<desc id=\"" + name + "-description\">" +
@@ -142,7 +150,26 @@ std::string Svg::document(double width, double height, std::string_view title,
 }
 
 double text_width(std::string_view text, double size, bool bold) {
-  return static_cast<double>(width(text)) * size * (bold ? 0.52 : 0.48);
+  // DejaVu Sans from the space on, thousandths of the size: the widest of the fonts above, so what
+  // fits with these fits with the others.
+  constexpr std::array<short, 95> kWidths{
+      318, 401, 460, 838, 636, 950, 780, 275, 390, 390, 500, 838, 318, 361, 318, 337,
+      636, 636, 636, 636, 636, 636, 636, 636, 636, 636, 337, 337, 838, 838, 838, 531,
+      999, 684, 686, 698, 770, 632, 575, 775, 752, 295, 295, 656, 557, 863, 748, 787,
+      603, 787, 695, 635, 611, 732, 684, 989, 685, 611, 685, 390, 337, 390, 838, 500,
+      500, 613, 635, 550, 635, 615, 352, 635, 634, 278, 278, 579, 278, 974, 634, 612,
+      635, 635, 411, 521, 392, 634, 592, 818, 592, 592, 525, 636, 337, 636, 838};
+  constexpr double kBold = 1.13, kOther = 700, kWide = 1050;
+  double thousandths = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<std::uint8_t>(c);
+    if (byte >= 0x20 && byte < 0x7F) {
+      thousandths += kWidths[byte - 0x20];
+    } else if ((byte & 0xC0U) != 0x80) {  // the first of a character's bytes; from E3: East Asian
+      thousandths += byte >= 0xE3 ? kWide : kOther;
+    }
+  }
+  return thousandths / 1000 * size * (bold ? kBold : 1);
 }
 
 std::vector<std::string> lines_of(std::string_view text, double width, double size, bool bold) {

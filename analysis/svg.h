@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,15 +37,24 @@ class Svg {
   void text(double x, double y, std::string_view text, const TextStyle& style);
   /// What follows until end_group() shows `title` when pointed at.
   void begin_group(std::string_view title);
+  /// What follows until end_group() is for a file of its own: a page says it beside the drawing.
+  void begin_alone();
   void end_group();
 
   /// Puts the elements of another on top.
   void append(const Svg& other) { body_ += other.body_; }
 
+  /// From top to bottom, px.
+  struct Part {
+    double top = 0, bottom = 0;
+  };
+
   /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small.
   /// \param id starts the ids of title and description: unique within a page
+  /// \param shown the part that a page shows; the whole is in an attribute for whoever saves it
   std::string document(double width, double height, std::string_view title,
-                       std::string_view description, std::string_view id = "figure") const;
+                       std::string_view description, std::string_view id = "figure",
+                       const std::optional<Part>& shown = std::nullopt) const;
 
  private:
   std::string body_;

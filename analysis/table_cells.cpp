@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "analysis/text.h"
 
@@ -67,6 +68,28 @@ std::vector<std::string> row_names(const Analysis& analysis, const RendererPair&
 std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
                          const std::string& shape) {
   return several(analysis) ? shape + " (" + pair.renderer + ")" : shape;
+}
+
+std::string narrow_bootstrap_note(const Analysis& analysis) {
+  std::map<std::size_t, double> by_pairs;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (const PairedShape& shape : comparison.shapes) {
+      const auto coverage = bca_coverage(shape.n_pairs);
+      if (shape.bootstrap.log_ratio_ci95 && coverage) by_pairs[shape.n_pairs] = *coverage;
+    }
+  }
+  if (by_pairs.empty()) return {};
+  std::string text;
+  for (const auto& [pairs, coverage] : by_pairs) {
+    text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
+            std::to_string(pairs) + " pairs";
+  }
+  return "BCa intervals are too short for few participants: instead of 95 % they hold the truth "
+         "in " +
+         text +
+         " (simulated, normal differences; the t interval: 95 %). With skewed differences both "
+         "hold it "
+         "less often.";
 }
 
 void Reasons::add(const std::string& reason, const std::string& shape) {

@@ -40,6 +40,9 @@ std::vector<std::string> row_names(const Analysis& analysis, const RendererPair&
 std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
                          const std::string& shape);
 
+/// How short BCa's intervals are with as few pairs as there are; empty where there are enough.
+std::string narrow_bootstrap_note(const Analysis& analysis);
+
 /// A note for each reason, with the shapes that it holds for.
 class Reasons {
  public:

@@ -41,7 +41,7 @@ Table reduction_table(const Analysis& analysis) {
   table.notes = {
       "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
       " − mean log " + first.reference +
-      "; interval and p from the paired t-test on m, p adjusted over " +
+      "; interval and p from the paired t-test on m, the interval not adjusted, p over " +
       (several(analysis) ? "all shapes and comparisons" : "the shapes") + " (Holm). Positive: " +
       (several(analysis) ? "faster than with " + the(first.reference)
                          : the(first.renderer) + " is faster") +
@@ -156,6 +156,8 @@ Table tests_table(const Analysis& analysis) {
       "percent reduction, " +
       std::to_string(kResamples) + " resamples, seed " + std::to_string(analysis.settings.seed) +
       "."};
+  const std::string narrow = narrow_bootstrap_note(analysis);
+  if (!narrow.empty()) table.notes.push_back(narrow);
   reasons.put(table.notes);
   return table;
 }
@@ -200,8 +202,10 @@ Table provenance_table(const Analysis& analysis) {
 }
 
 std::vector<Table> all_tables(const Analysis& analysis) {
-  std::vector<Table> tables{reduction_table(analysis), times_table(analysis),
-                            accuracy_table(analysis)};
+  std::vector<Table> tables{reduction_table(analysis)};
+  if (analysis.time_outs.any) tables.push_back(censored_table(analysis));
+  tables.push_back(times_table(analysis));
+  tables.push_back(accuracy_table(analysis));
   if (analysis.table.renderers.size() > 1) tables.push_back(speed_accuracy_table(analysis));
   std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
   tables.push_back(tests_table(analysis));
@@ -210,6 +214,7 @@ std::vector<Table> all_tables(const Analysis& analysis) {
   tables.push_back(learning_table(analysis));
   if (analysis.table.renderers.size() > 1) tables.push_back(renderer_order_table(analysis));
   tables.push_back(exclusions_table(analysis));
+  if (analysis.time_outs.any) tables.push_back(time_outs_table(analysis));
   tables.push_back(provenance_table(analysis));
   return tables;
 }

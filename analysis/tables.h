@@ -19,6 +19,10 @@ struct Table {
 
 /// Percent reduction per comparison and shape with its interval, beside the paper's.
 Table reduction_table(const Analysis& analysis);
+/// The same with time-outs as censored times; without rows where nobody timed out.
+Table censored_table(const Analysis& analysis);
+/// Time-outs by cell; without rows where nobody timed out.
+Table time_outs_table(const Analysis& analysis);
 Table times_table(const Analysis& analysis);
 Table accuracy_table(const Analysis& analysis);
 /// Change of accuracy beside the change of time, per comparison: is speed bought with errors?

@@ -106,8 +106,10 @@ std::string paper_reduction(const RendererPair& pair, const std::string& shape) 
 }
 
 bool compares_as_paper(const Analysis& analysis) {
-  return std::ranges::any_of(analysis.comparisons, [](const Comparison& comparison) {
-    return comparison.pair.is_ray_minus_point();
+  return std::ranges::any_of(analysis.comparisons, [&](const Comparison& comparison) {
+    return std::ranges::any_of(analysis.table.shapes, [&](const std::string& shape) {
+      return !paper_reduction(comparison.pair, shape).empty();
+    });
   });
 }
 

@@ -122,6 +122,73 @@ TEST(Dropped, AreNamedWithTheRendererThatIsMissing) {
   EXPECT_TRUE(warns(analysis, "P1 (point: every shape) and P2 (ray: every shape)"));
 }
 
+TEST(Anova, IsUndefinedWhereEveryEffectIs) {
+  // Everybody gains alike and shapes differ alike; people differ. F would divide by 0.
+  const Analysis flat = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
+    trial.response_time = std::exp(1 + 0.3 * p + (trial.renderer == "ray" ? -0.2 : 0) +
+                                   (trial.shape == "cone" ? 0.5 : 0));
+    return true;
+  });
+  EXPECT_NE(flat.rm_anova.undefined, "");
+  for (const AnovaEffect& effect : flat.rm_anova.effects) {
+    EXPECT_NE(effect.undefined, "") << effect.name;
+    EXPECT_FALSE(effect.generalized_eta_squared.has_value()) << effect.name;
+  }
+  // One effect alone that does not vary leaves the others as they are.
+  const Analysis one = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
+    trial.response_time =
+        std::exp(1 + (trial.renderer == "ray" ? -0.2 : 0) + (trial.shape == "cone" ? 0.1 * p : 0));
+    return true;
+  });
+  EXPECT_EQ(one.rm_anova.undefined, "");
+  EXPECT_NE(one.rm_anova.effects[0].undefined, "");
+  EXPECT_TRUE(one.rm_anova.effects[0].generalized_eta_squared.has_value());
+  EXPECT_EQ(one.rm_anova.effects[1].undefined, "");
+}
+
+/// Point cones take 40 s and more, and end at 60 s: how many, by participant.
+Analysis with_time_outs(const std::vector<int>& timed_out) {
+  return analysis_with(static_cast<int>(timed_out.size()), 20, [&](int p, int i, RawTrial& trial) {
+    trial.response_time = std::exp(2 + 0.05 * p + 0.3 * std::sin(3.7 * i + p) +
+                                   (trial.renderer == "ray" ? 0.1 * (p % 2) : 0));
+    if (trial.shape == "cone" && trial.renderer == "point") {
+      trial.response_time *= 3;
+      if (i < timed_out[static_cast<std::size_t>(p)]) {
+        trial.response_time = 60;
+        trial.response = "";
+        trial.timed_out = true;
+        trial.correct = false;
+      }
+    }
+    return true;
+  });
+}
+
+TEST(TimeOuts, AreSaidOfTheCellThatHasThem) {
+  const Analysis analysis = with_time_outs({0, 1, 6, 0});
+  const TimeOutCell& cone = analysis.time_outs.cells[0][1];
+  EXPECT_EQ(cone.n_trials, 80U);
+  EXPECT_EQ(cone.n_timeouts, 7U);
+  EXPECT_EQ(cone.most_in, 2U);
+  EXPECT_DOUBLE_EQ(cone.largest_share, 0.3);
+  EXPECT_EQ(cone.lowest_limit, 60);
+  EXPECT_EQ(cone.highest_limit, 60);
+  EXPECT_EQ(analysis.time_outs.cells[0][0].n_timeouts, 0U);
+  // 7 of 160 trials with the point, 4.4 %: over all shapes nobody would look up.
+  EXPECT_FALSE(warns(analysis, "are not in the times"));
+  EXPECT_TRUE(warns(analysis, "cone 8.8 % with the point (30.0 % in P2) and 0.0 % with the ray"));
+  EXPECT_FALSE(warns(analysis, "sphere 0.0 %"));
+  ASSERT_EQ(analysis.comparisons[0].censored.size(), 2U);
+  EXPECT_EQ(analysis.comparisons[0].censored[1].n_censored, 7U);
+  EXPECT_LT(*analysis.comparisons[0].censored[1].log_ratio,
+            *analysis.comparisons[0].shapes[1].mean_log_ratio);
+  EXPECT_NEAR(*analysis.comparisons[0].censored[0].log_ratio,
+              *analysis.comparisons[0].shapes[0].mean_log_ratio, 1e-9)
+      << "nobody timed out with a sphere";
+  EXPECT_TRUE(with_time_outs({0, 0, 0, 0}).comparisons[0].censored.empty());
+  EXPECT_FALSE(warns(with_time_outs({1, 0, 0, 0}), "Time-outs")) << "1.3 % in one cell";
+}
+
 TEST(Answer, GoesByHolmsP) {
   Analysis analysis;
   analysis.table.shapes = {"sphere", "cone"};

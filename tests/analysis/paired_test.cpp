@@ -5,13 +5,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stimuli/random.h"
 
 namespace palpate {
 namespace {
+
+const std::string kPairedFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
 Bootstrap bootstrap(const std::vector<double>& differences) {
   Random random(5);
@@ -24,11 +29,22 @@ TEST(Undefined, NoPairsAndOnePair) {
     EXPECT_FALSE(t_test(d).t || t_test(d).p || t_test(d).log_ratio_ci95);
     EXPECT_FALSE(effect_size(d).undefined.empty());
     EXPECT_FALSE(effect_size(d).dz || effect_size(d).hedges_gz);
-    EXPECT_FALSE(wilcoxon(d).undefined.empty());
-    EXPECT_FALSE(wilcoxon(d).p.has_value());
     EXPECT_FALSE(bootstrap(d).undefined.empty());
     EXPECT_FALSE(bootstrap(d).log_ratio_ci95.has_value());
   }
+}
+
+TEST(Wilcoxon, OfOnePairIsDefinedAndSaysNothing) {
+  EXPECT_NE(wilcoxon({}).undefined, "");
+  EXPECT_FALSE(wilcoxon({}).p.has_value());
+  for (const double d : {-0.3, 0.2}) {
+    const Wilcoxon one = wilcoxon({d});
+    EXPECT_EQ(one.undefined, "");
+    EXPECT_EQ(one.n_nonzero, 1U);
+    EXPECT_EQ(one.positive_rank_sum, d > 0 ? 1.0 : 0.0);
+    EXPECT_EQ(one.p, 1.0) << "each sign has a chance of one half on its side";
+  }
+  EXPECT_EQ(wilcoxon({0}).undefined, "every difference is zero");
 }
 
 TEST(Undefined, TwoPairsHaveADzButNoHedgesG) {
@@ -103,6 +119,35 @@ TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
   EXPECT_TRUE(exact.exact);
   EXPECT_FALSE(approximate.exact);
   EXPECT_NEAR(exact.p.value(), approximate.p.value(), 0.05 * exact.p.value());
+}
+
+TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
+  // What is said against R's count (fixtures/bca_coverage.R), and against this program's own.
+  const auto counted = nlohmann::json::parse(std::ifstream(kPairedFixtures + "bca_coverage.json"));
+  for (const auto& [pairs, shares] : counted.items()) {
+    const auto n = static_cast<std::size_t>(std::stoi(pairs));
+    if (n == 20) {
+      EXPECT_FALSE(bca_coverage(n).has_value());
+      continue;
+    }
+    EXPECT_NEAR(*bca_coverage(n), shares["bca_normal"].get<double>(), 0.011) << n;
+    EXPECT_NEAR(shares["t_normal"].get<double>(), 0.95, 0.01) << n;
+  }
+  EXPECT_FALSE(bca_coverage(0) || bca_coverage(1));
+  constexpr int kStudies = 2000;
+  for (const std::uint64_t seed : {31, 32}) {
+    for (const std::size_t n : {2U, 5U, 7U, 12U}) {
+      Random random(seed, {n});
+      int held = 0;
+      for (int i = 0; i < kStudies; ++i) {
+        std::vector<double> d(n);
+        for (double& value : d) value = random.normal();
+        const auto ends = bootstrap_mean(d, random, 999).log_ratio_ci95;
+        held += ends && ends->low <= 0 && 0 <= ends->high;
+      }
+      EXPECT_NEAR(held / double{kStudies}, *bca_coverage(n), 0.03) << n << ", seed " << seed;
+    }
+  }
 }
 
 TEST(Bootstrap, RepeatsFromItsSeed) {

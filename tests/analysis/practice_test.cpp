@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "analysis/report_text.h"
 #include "analysis/speed_accuracy.h"
 #include "analysis/trial_table_builder.h"
+#include "stimuli/random.h"
 
 namespace palpate {
 namespace {
@@ -98,7 +100,100 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
     EXPECT_NEAR(effect.balanced_ci95->low, -0.2 - half, 1e-10);
     EXPECT_NEAR(effect.balanced_ci95->high, -0.2 + half, 1e-10);
   }
-  EXPECT_NE(report_text(analysis).find("depends on which renderer came first"), std::string::npos);
+  // One of several tests of practice at 5 %: the warning goes by the adjusted p.
+  EXPECT_EQ(analysis.practice.n_tests, 3U) << "two shapes, all shapes; nobody's slope varies";
+  EXPECT_NEAR(*practice.all_shapes.test.p_holm, 3 * 0.0321194160504168, 1e-10);
+  const auto warned = [](const Analysis& of) {
+    return report_text(of).find("depends on which renderer came first") != std::string::npos;
+  };
+  EXPECT_FALSE(warned(analysis));
+  EXPECT_TRUE(warned(analysis_of({{"A", "point", -0.5},
+                                  {"B", "point", -0.45},
+                                  {"C", "ray", 0.1},
+                                  {"D", "ray", 0},
+                                  {"E", "ray", 0.05}})));
+}
+
+/// Participants who cannot learn, of noise alone.
+Analysis study_without_learning(Random& random) {
+  TrialTableBuilder builder;
+  for (int p = 0; p < 7; ++p) {
+    const std::string name(1, static_cast<char>('A' + p));
+    for (int i = 0; i < 2 * kTrials; ++i) {
+      const bool ray = (i < kTrials) == (p % 2 == 0);
+      RawTrial raw;
+      raw.participant = name;
+      raw.renderer = ray ? "ray" : "point";
+      raw.shape = raw.response = i % 2 == 0 ? "cone" : "cube";
+      raw.trial = i + 1;
+      raw.correct = true;
+      raw.response_time = std::exp(2 + 0.4 * random.normal());
+      builder.add(raw);
+    }
+  }
+  return analyze(builder.finish({}), {}, "test");
+}
+
+TEST(Learning, IsNoVerdictAndPracticeIsOneFamilyOfTests) {
+  for (const std::uint64_t seed : {41, 42}) {
+    Random random(seed);
+    constexpr int kStudies = 400;
+    int any_raw = 0, any_adjusted = 0, warned = 0;
+    for (int i = 0; i < kStudies; ++i) {
+      const Analysis analysis = study_without_learning(random);
+      const Practice& practice = analysis.practice;
+      ASSERT_EQ(practice.n_tests, 6U);  // two slopes, their difference, two shapes, all shapes
+      bool raw = false, adjusted = false;
+      const auto look = [&](const TTest& test) {
+        raw = raw || *test.p < 0.05;
+        adjusted = adjusted || *test.p_holm < 0.05;
+      };
+      for (const Learning& learning : practice.learning) look(learning.slope);
+      look(practice.pairs[0].slope_difference);
+      look(practice.pairs[0].all_shapes.test);
+      for (const OrderEffect& shape : practice.pairs[0].shapes) look(shape.test);
+      any_raw += raw;
+      any_adjusted += adjusted;
+      warned += std::ranges::any_of(analysis.warnings, [](const std::string& warning) {
+        return warning.find("came first") != std::string::npos;
+      });
+      if (i > 3) continue;
+      const std::string text = report_text(analysis);
+      for (const char* verdict : {"faster with practice", "slower with time"}) {
+        EXPECT_EQ(text.find(verdict), std::string::npos);
+      }
+      EXPECT_NE(text.find("of time per 100 trials (95 % interval"), std::string::npos);
+    }
+    EXPECT_GT(any_raw, 0.12 * kStudies) << "unadjusted, they find something again and again";
+    EXPECT_LT(any_adjusted, 0.08 * kStudies);
+    EXPECT_LT(warned, 0.06 * kStudies);
+  }
+}
+
+TEST(Learning, SaysNothingOfFewTrials) {
+  TrialTableBuilder builder;
+  for (const std::string who : {"A", "B", "C"}) {
+    for (const std::string renderer : {"point", "ray"}) {
+      // With the ray one trial too few for a slope.
+      for (std::size_t i = 0; i < kSlopeTrials - (renderer == "ray" ? 1 : 0); ++i) {
+        RawTrial raw;
+        raw.participant = who;
+        raw.renderer = renderer;
+        raw.shape = raw.response = "cone";
+        raw.trial = static_cast<int>(i) + (renderer == "ray" ? 100 : 0);
+        raw.correct = true;
+        raw.response_time = 5 + 0.1 * static_cast<double>(i % 7) + (who == "A" ? 1 : 0);
+        builder.add(raw);
+      }
+    }
+  }
+  const Analysis analysis = analyze(builder.finish({}), {}, "test");
+  EXPECT_TRUE(analysis.practice.learning[0].mean_slope.has_value());
+  EXPECT_FALSE(analysis.practice.learning[1].mean_slope.has_value());
+  EXPECT_EQ(
+      analysis.practice.learning[1].slope.undefined,
+      "every participant has fewer than 32 times or no shape twice with it: too few for a slope");
+  EXPECT_FALSE(analysis.practice.pairs[0].mean_slope_difference.has_value());
 }
 
 TEST(RendererOrder, SaysWhyItCannotBeTold) {

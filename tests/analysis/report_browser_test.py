@@ -16,7 +16,7 @@ import report_chromium
 PALPATE, QUICK, FIXTURES = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 SVG = "{http://www.w3.org/2000/svg}"
 TITLE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
-FIGURES = ["figure15", "speedup", "times", "confusion", "speed-accuracy", "learning", "order", "servo", "exclusions"]
+FIGURES = ["figure15", "speedup", "times", "confusion", "speed-accuracy", "learning", "order", "exclusions"]
 # Whether the program was built with Vega: then its figures, not the fixed ones, are seen.
 DRAWN = "[...document.querySelectorAll('.drawing > div:not([hidden]) svg')]"
 
@@ -115,7 +115,7 @@ class Report(unittest.TestCase):
         for dark in (False, True):
             self.open(self.dir / "other.html", dark=dark)
             self.assertEqual([figure[0] for figure in self.shown()],
-                             [name for name in FIGURES if name not in ("servo", "order")])
+                             [name for name in FIGURES if name != "order"])
             self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b, .cards + b').length"), 0)
             self.assertIn(renderers[0], self.browser.run(DRAWN + "[0].textContent"))
             colours[dark] = set(self.browser.run(
@@ -229,6 +229,31 @@ class Report(unittest.TestCase):
         finally:
             self.browser.call("Emulation.setScriptExecutionDisabled", value=False)
         self.assertEqual([figure[0] for figure in self.shown()], FIGURES)
+        # Title and notes stand once: the page's, not the drawing's own as well.
+        seen = ("[...document.querySelectorAll('#%s h2, #%s figcaption, #%s .fixed text')]"
+                ".filter(e => e.getClientRects().length).map(e => [e.tagName, e.textContent])")
+        for name in FIGURES:
+            parts = self.browser.run(seen % (name, name, name))
+            caption = next(text for tag, text in parts if tag == "FIGCAPTION")
+            drawn = [text for tag, text in parts if tag == "text"]
+            self.assertTrue(drawn, name)
+            plain = caption.replace("\u00a0", " ")
+            self.assertEqual([t for t in drawn if len(t) > 40 and t in plain], [], name)
+            self.assertIn("SIMULATED PARTICIPANTS", drawn)
+
+    def test_every_text_of_a_figure_is_within_it(self):
+        self.run_palpate("analyze", "--csv", FIXTURES / "censored.csv", "--figures", self.dir / "censored")
+        files = [*(self.dir / "figures").glob("*.svg"), *(self.dir / "censored").glob("*.svg")]
+        self.assertGreater(len(files), 14)
+        outside = ("(() => { const s = document.documentElement, v = s.viewBox.baseVal; "
+                   "return [...document.querySelectorAll('text')].filter(t => { const b = t.getBBox(), "
+                   "m = t.getCTM(), at = (x, y) => new DOMPoint(x, y).matrixTransform(m); "
+                   "return [at(b.x, b.y), at(b.x + b.width, b.y + b.height)].some(p => p.x < -1 || "
+                   "p.y < -1 || p.x > v.width + 1 || p.y > v.height + 1); }).map(t => t.textContent); })()")
+        for path in files:
+            self.browser.window(1600, 1200)
+            self.browser.open(path)
+            self.assertEqual(self.browser.run(outside), [], path.name)
 
     def test_it_prints_and_is_as_before(self):
         self.open()

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -150,6 +151,115 @@ TEST(Text, WarnsOfExclusions) {
   EXPECT_TRUE(holds(text, "of the trials with ray are not in the times"));
   EXPECT_TRUE(holds(text, "Exclusions differ between renderers"));
   EXPECT_FALSE(holds(text, "of the trials with point are not"));
+}
+
+TEST(Reports, SayTimeOutsByCellAndLeaveThemOutWhereThereAreNone) {
+  Study study;
+  study.lost_with_ray = 0.3;
+  const Analysis lost = analysis_of_study(study), none = analysis_of_study({});
+  for (const auto& write : {report_text, page}) {
+    EXPECT_TRUE(holds(write(lost), "Time-outs: trials that ended at the limit"));
+    EXPECT_TRUE(holds(write(lost), "with time-outs"));
+    EXPECT_FALSE(holds(write(none), "ime-out as")) << "of a card";
+    EXPECT_FALSE(holds(write(none), "Time-outs:"));
+  }
+  EXPECT_TRUE(holds(page(lost), "as censored times"));
+  EXPECT_TRUE(holds(drawings(lost), "limit "));
+  EXPECT_FALSE(holds(drawings(none), "limit "));
+  const auto with = nlohmann::json::parse(report_json(lost)),
+             without = nlohmann::json::parse(report_json(none));
+  EXPECT_FALSE(without.contains("time_outs"));
+  EXPECT_FALSE(without["paired_by_shape"]["cone"].contains("censored"));
+  std::size_t counted = 0;
+  for (const auto& shape : with["time_outs"]["ray"]) {
+    std::size_t people = 0;
+    for (const auto& one : shape["participants"]) people += one["n_timeouts"].get<std::size_t>();
+    EXPECT_EQ(people, shape["n_timeouts"].get<std::size_t>());
+    counted += people;
+  }
+  EXPECT_EQ(counted, with["counts"]["n_timeouts"].get<std::size_t>());
+  EXPECT_EQ(with["paired_by_shape"]["cone"]["censored"]["status"], "ok");
+}
+
+TEST(Figures, EndAViolinAtTheLimitAndSayHowManyEndedThere) {
+  Study study;
+  study.lost_with_ray = 0.2;
+  study.repetitions = 20;
+  const Analysis analysis = analysis_of_study(study);
+  const auto figures = figures_of(analysis, {});
+  const auto times = std::ranges::find(figures, "times", &Figure::id);
+  ASSERT_NE(times, figures.end());
+  std::size_t texts = 0;
+  for (const Mark& mark : times->panels[0].marks) {
+    if (mark.kind == Mark::Kind::text && holds(mark.text, " (")) ++texts;
+    if (mark.kind != Mark::Kind::area) continue;
+    for (const auto& cell : analysis.time_outs.cells[1]) {
+      if (!holds(mark.text, "ray") || !cell.highest_limit) continue;
+      EXPECT_LE(*std::ranges::max_element(mark.y), times->panels[0].y.high);
+    }
+  }
+  EXPECT_EQ(texts, 4U) << "the ray's four shapes";
+  EXPECT_TRUE(holds(times->description, "time-outs of 100 trials"));
+}
+
+/// A study with a servo record: `bins` of the longest periods that trials had.
+ReportRecord servo_record(const std::vector<std::size_t>& bins) {
+  ReportRecord record;
+  for (const char* renderer : {"point", "ray"}) {
+    ServoQuality& servo = record.servo.emplace_back();
+    servo.renderer = renderer;
+    servo.n_trials = bins.size();
+    servo.longest_period = 0.001;
+    for (const std::size_t bin : bins) ++servo.longest_periods[bin];
+  }
+  return record;
+}
+
+TEST(Figures, OfTheServoAreLeftOutWhereEveryTrialIsAlike) {
+  Study study;
+  study.simulated = Simulated::yes;
+  const Analysis analysis = analysis_of_study(study);
+  const auto drawn = [&](const ReportRecord& record) {
+    return std::ranges::count(figures_of(analysis, record), "servo", &Figure::id);
+  };
+  EXPECT_EQ(drawn(servo_record({20, 20, 20})), 0);
+  EXPECT_EQ(drawn(servo_record({20, 20, 23})), 1);
+  const std::string text = report_html(analysis, servo_record({20, 20, 20}));
+  EXPECT_TRUE(holds(text, "alike in all trials"));
+  EXPECT_TRUE(holds(text, "virtual clock"));
+}
+
+TEST(Cards, NameBothWhereTheAdjustedPAndTheIntervalDisagree) {
+  Analysis analysis = analysis_of_study({});
+  PairedShape& cone = analysis.comparisons[0].shapes[1];
+  cone.t_test.p = 0.03;
+  cone.t_test.p_holm = 0.09;
+  cone.t_test.log_ratio_ci95 = Interval{std::log(0.8), std::log(0.99)};
+  const std::string text = page(analysis);
+  EXPECT_TRUE(holds(text, "1.0 to 20.0\u00a0%, not adjusted"));
+  EXPECT_TRUE(
+      holds(text, "no clear difference among 4 tests, adjusted p = 0.090 (by itself p = 0.030)"));
+}
+
+TEST(Paper, IsSilentWhereNothingMatchesIt) {
+  Study study;
+  study.shapes = {"Kugel", "L", "plate", "Würfel hart"};
+  study.lost_with_ray = 0.1;
+  for (const auto& write : {report_text, page, drawings}) {
+    const std::string text = write(analysis_of_study(study));
+    for (const char* word :
+         {"paper", "Ho et al", "Basdogan", "fig. 15", "figure 15", "Figure 15", "n.s."}) {
+      // The page's style names a colour, and what prints, "paper".
+      const std::size_t from = write == page ? text.find("<body>") : 0;
+      const std::size_t to = std::min(text.find("<script"), text.size());
+      EXPECT_FALSE(holds(text.substr(from, to - from).substr(0, std::string::npos), word) &&
+                   std::string(word) != "paper")
+          << word;
+    }
+    EXPECT_FALSE(holds(text, "the paper"));
+  }
+  study.shapes[0] = "sphere";
+  EXPECT_TRUE(holds(report_text(analysis_of_study(study)), "fig. 15"));
 }
 
 TEST(Reports, NeverPrintNanOrInfinity) {
