@@ -61,7 +61,7 @@ def simulate(palpate, folder, name, seed):
 
 def analysed(palpate, folder, name, seed):
     out = folder / f"{name}-{seed}.json"
-    nice([palpate, "analyze", "--db", folder / f"{name}-{seed}.db", "--json", out])
+    nice([palpate, "analyze", "--db", folder / f"{name}-{seed}.db", "--json", out, "--force"])
     return json.loads(out.read_text())
 
 
