@@ -113,7 +113,7 @@ void put_labels(Panel& panel, const std::vector<Label>& labels) {
         const bool outside = panel.width < kWide && (box.left < 0 || box.right > panel.width);
         const auto hits =
             std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); }) +
-            (outside ? 1 : 0);
+            (outside ? 3 : 0);
         if (hits >= fewest) continue;
         fewest = hits;
         best = std::move(mark);

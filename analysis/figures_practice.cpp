@@ -99,6 +99,7 @@ Figure learning_of(const Analysis& analysis) {
   panel.width = kWide;
   panel.height = 300;
   add_renderers(figure, analysis, renderers);
+  std::string slopes;
   for (std::size_t r = 0; r < renderers; ++r) {
     const std::string renderer = short_name(analysis.table.renderers[r]);
     const auto [role, shape] = look_of(analysis, analysis.table.renderers[r]);
@@ -120,16 +121,22 @@ Figure learning_of(const Analysis& analysis) {
       panel.marks.push_back(symbol(role, shape, x, y, 5, text));
     }
     if (line.x.size() > 1) panel.marks.push_back(std::move(line));
+    const LearningBin &first = learning[r].bins.front(), &last = learning[r].bins.back();
+    if (first.mean_log && last.mean_log) {
+      figure.description += renderer + ": " + seconds_text(std::exp(*first.mean_log)) +
+                            " in the first part, " + seconds_text(std::exp(*last.mean_log)) +
+                            " in the last. ";
+    }
     if (const auto& slope = learning[r].mean_slope) {
       std::string text = renderer + ": " + fixed(100 * std::expm1(*slope), 1) + " % per 100 trials";
       if (const auto& ends = learning[r].slope.log_ratio_ci95) {
         text += " (95 % interval " + fixed(100 * std::expm1(ends->low), 1) + " to " +
                 fixed(100 * std::expm1(ends->high), 1) + " %)";
       }
-      figure.description += text + ". ";
+      slopes += text + ". ";
     }
   }
-  const std::string slopes = figure.description;
+  figure.description += slopes;
   figure.panels.push_back(std::move(panel));
   figure.notes.push_back(
       "Each participant’s times relative to their own mean of the shape, then the mean over "

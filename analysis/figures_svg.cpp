@@ -193,7 +193,7 @@ class Drawing {
     }
     if (!panel.y.title.empty()) {
       const double x = place.left - left_room(panel) + 12;
-      svg_.text(x, place.top + panel.height / 2, panel.y.title,
+      svg_.text(x, place.top + panel.height / 2, fitting(panel.y.title, panel.height + 20, 12),
                 {12, colour(Role::soft), Svg::Anchor::middle, false, -90});
     }
     const double slot = panel.width / std::max(1.0, panel.x.high - panel.x.low);

@@ -145,7 +145,7 @@ void add_time_outs(Panel& panel, const TimeOutCell& cell, const Look& look, cons
                    double room, const std::string& name) {
   if (cell.n_timeouts == 0) return;
   const std::string share = fixed(100 * cell.share(), cell.share() < 0.0995 ? 1 : 0) + " %";
-  const double x = stand.x + 0.22 * stand.side;
+  const double x = stand.x + 0.25 * stand.side;
   constexpr double kSize = 11.5;
   for (const std::string& text : {std::to_string(cell.n_timeouts) + " (" + share + ")", share}) {
     if (text_width(text, kSize, true) > room) continue;
@@ -181,17 +181,17 @@ std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, s
   return limits;
 }
 
+/// A line for each limit, named where the axis has its ticks; those close by give way.
 void add_limits(Panel& panel, const std::vector<double>& limits) {
+  constexpr double kApart = 0.07;  // log10 of s: a line of text
   for (const double limit : limits) {
     const std::string seconds = fixed(std::pow(10, limit), limit < 1 ? 2 : 0) + " s";
     Mark line = line_mark(Role::amber, {panel.x.low, panel.x.high}, {limit, limit}, 1.4);
     line.text = "limit of " + seconds;
     panel.marks.push_back(std::move(line));
-    Mark name = text_mark(Role::amber, panel.x.low, limit, "limit " + seconds, 11.5);
-    name.anchor = -1;
-    name.dx = 4;
-    name.dy = -5;
-    panel.marks.push_back(std::move(name));
+    std::erase_if(panel.y.ticks,
+                  [&](const Tick& tick) { return std::fabs(tick.at - limit) < kApart; });
+    panel.y.ticks.push_back({limit, "limit " + seconds});
   }
 }
 
@@ -231,7 +231,7 @@ Figure times_of(const Analysis& analysis) {
       widest = std::max(widest, *std::ranges::max_element(shares[r][s]));
     }
   }
-  const double room = 0.95 * panel.width / static_cast<double>(shapes * renderers);
+  const double room = 0.85 * panel.width / static_cast<double>(shapes * renderers);
   for (std::size_t s = 0; s < shapes; ++s) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       const TimeOutCell& outs = analysis.time_outs.cells[r][s];
@@ -251,9 +251,10 @@ Figure times_of(const Analysis& analysis) {
                          " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
                          counted(times[r][s].size(), "time", "times");
       add_cell(panel, look, times[r][s], shares[r][s], stand,
-               outs.highest_limit ? std::max(std::log10(*outs.highest_limit),
-                                             static_cast<double>(times[r][s].back()))
-                                  : panel.y.high,
+               std::max(limits.empty()       ? panel.y.high
+                        : outs.highest_limit ? std::log10(*outs.highest_limit)
+                                             : limits.back(),
+                        static_cast<double>(times[r][s].back())),
                text);
       figure.description += text + ". ";
     }

@@ -22,7 +22,9 @@ using vega::signal;
 constexpr std::size_t kLongestLabel = 18;
 
 /// \param wide name of the signal that holds the panel's width
-Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& scales) {
+/// \param height px, of the panel
+Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, double height,
+             Json& scales) {
   Json values = Json::array(), labels = Json::array();
   for (const Tick& tick : axis.ticks) {
     values.push_back(digits(tick.at));
@@ -54,6 +56,7 @@ Json axis_of(const FigureAxis& axis, bool lower, const std::string& wide, Json& 
     out["titleFontWeight"] = "normal";
     out["titleColor"] = colour(Role::soft);
     out["titlePadding"] = 10;
+    if (!lower) out["titleLimit"] = height + 20;
   }
   Json update = {{"text", {{"scale", scale + "_labels"}, {"field", "value"}}}};
   if (lower && axis.names) {
@@ -105,8 +108,8 @@ Json panel_group(const Panel& panel, std::size_t number) {
                     {"nice", false},
                     {"zero", false},
                     {"range", {panel.height, 0}}});
-  Json axes =
-      Json::array({axis_of(panel.y, false, wide, scales), axis_of(panel.x, true, wide, scales)});
+  Json axes = Json::array({axis_of(panel.y, false, wide, panel.height, scales),
+                           axis_of(panel.x, true, wide, panel.height, scales)});
   Json group = {
       {"type", "group"},
       {"name", "panel_" + std::to_string(number)},

@@ -174,8 +174,10 @@ Json time_outs_json(const Analysis& analysis) {
       one["n_trials"] = cell.n_trials;
       one["n_timeouts"] = cell.n_timeouts;
       one["share"] = cell.n_trials > 0 ? Json(cell.share()) : Json(nullptr);
-      one["limit_s_low"] = number(cell.lowest_limit);
-      one["limit_s_high"] = number(cell.highest_limit);
+      if (cell.lowest_limit) {
+        one["limit_s_low"] = *cell.lowest_limit;
+        one["limit_s_high"] = *cell.highest_limit;
+      }
       Json& people = one["participants"] = Json::array();
       for (std::size_t g = 0; g < cell.groups.size(); ++g) {
         const TimeOutGroup& group = cell.groups[g];

@@ -172,6 +172,12 @@ double text_width(std::string_view text, double size, bool bold) {
   return thousandths / 1000 * size * (bold ? kBold : 1);
 }
 
+std::string fitting(std::string_view text, double width, double size) {
+  std::size_t columns = palpate::width(text);
+  while (columns > 1 && text_width(shortened(text, columns), size) > width) --columns;
+  return shortened(text, columns);
+}
+
 std::vector<std::string> lines_of(std::string_view text, double width, double size, bool bold) {
   return wrapped(text,
                  [&](std::string_view line) { return text_width(line, size, bold) <= width; });

@@ -62,6 +62,8 @@ class Svg {
 
 /// Rough width of a text in a sans-serif font, px.
 double text_width(std::string_view text, double size, bool bold = false);
+/// The text, cut with an ellipsis where it is wider than `width` px.
+std::string fitting(std::string_view text, double width, double size);
 /// The text in lines of at most `width` px.
 std::vector<std::string> lines_of(std::string_view text, double width, double size,
                                   bool bold = false);

@@ -41,7 +41,7 @@ Table reduction_table(const Analysis& analysis) {
   table.notes = {
       "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
       " − mean log " + first.reference +
-      "; interval and p from the paired t-test on m, the interval not adjusted, p over " +
+      "; interval (not adjusted) and p from the paired t-test on m, p adjusted over " +
       (several(analysis) ? "all shapes and comparisons" : "the shapes") + " (Holm). Positive: " +
       (several(analysis) ? "faster than with " + the(first.reference)
                          : the(first.renderer) + " is faster") +

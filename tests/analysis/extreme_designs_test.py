@@ -57,17 +57,17 @@ DESIGNS = {
     "190 shapes with gaps": (study("ABCDEF", 2, SOME, shapes=[f"s{i}" for i in range(190)],
                                    keep=lambda who, renderer, shape, i: DRAW.random() < 0.7), None,
                              None, None),
-    "constant": (study("ABCDE", 3, lambda *cell: 5), "undefined", "ok", "undefined"),
-    "constant by person": (study("ABCDE", 3, lambda who, *cell: ord(who)), "undefined", "ok",
+    "constant": (study("ABCDE", 3, lambda *cell: 5), "undefined", "undefined", "undefined"),
+    "constant by person": (study("ABCDE", 3, lambda who, *cell: ord(who)), "undefined", "undefined",
                            "undefined"),
-    "all at the least time": (study("ABC", 3, lambda *cell: 0.2), "undefined", "ok", "undefined"),
+    "all at the least time": (study("ABC", 3, lambda *cell: 0.2), "undefined", "undefined", "undefined"),
     "constant up to rounding": (study("ABCDE", 3, lambda who, renderer, shape, i:
                                       5.000000000000001 if (who, renderer, i) == ("A", "ray", 0)
-                                      else 5), "undefined", "ok", "undefined"),
+                                      else 5), "undefined", "undefined", "undefined"),
     "constant but one": (study("ABCDE", 3, lambda *cell: 6 if cell == ("A", "ray", "cube", 0)
                                else 5), "singular", "ok", None),
     "least against longest": (study("ABCDE", 3, lambda who, renderer, *cell:
-                                    1000000 if renderer == "ray" else 0.2), "undefined", "ok",
+                                    1000000 if renderer == "ray" else 0.2), "undefined", "undefined",
                               "undefined"),
     "least and longest mixed": (study("ABCDE", 5, lambda *cell:
                                       DRAW.choice([1000000, 0.2, 3])), None, "ok", None),

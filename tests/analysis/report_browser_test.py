@@ -119,7 +119,7 @@ class Report(unittest.TestCase):
             self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b, .cards + b').length"), 0)
             self.assertIn(renderers[0], self.browser.run(DRAWN + "[0].textContent"))
             colours[dark] = set(self.browser.run(
-                "[...document.querySelectorAll('#figure15 .fixed svg g > :not(title)')].map(e => e.getAttribute('fill'))"
+                "[...document.querySelectorAll('#figure15 .fixed svg g:not(.alone) > :not(title)')].map(e => e.getAttribute('fill'))"
                 ".filter(f => f && f !== 'none').map(f => { const p = document.createElement('p'); p.style.color = f; "
                 "document.body.append(p); const c = getComputedStyle(p).color; p.remove(); return c; })"))
             self.assertEqual(len(colours[dark]), 6, "of the first six renderers")

@@ -296,7 +296,8 @@ TEST(Json, IsTheSameAgainAndReadsBackExactly) {
 }
 
 TEST(Escaping, NothingFromAFileIsMarkup) {
-  EXPECT_EQ(escaped("<a href=\"x\">&'\x01\xFF"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;??");
+  EXPECT_EQ(escaped("<a href=\"x\">&'\x01\xFF"),
+            "&lt;a href=&quot;x&quot;&gt;&amp;&#39;\\u0001\\xff");
   Study study;
   study.people = {"<script>alert(1)</script>", "B", "C"};
   study.shapes = {"cone", "<script>"};
