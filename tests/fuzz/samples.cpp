@@ -1,0 +1,24 @@
+// Whatever a stored blob of samples holds: it is refused, or the samples come back the same when they
+// are packed again; and the memory that it asks for is in proportion to its bytes.
+
+#include <cstdlib>
+#include <string>
+
+#include "data/samples_codec.h"
+#include "data/store.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace palpate;
+  if (size < 4) return 0;
+  const int packing = 1 + data[0] % kSamplesPacking;
+  const std::int64_t count = data[1] + 256 * data[2] + 65536 * data[3];
+  try {
+    const auto samples = unpack_samples(data + 4, size - 4, count, packing);
+    if (static_cast<std::int64_t>(samples.size()) != count) std::abort();
+    const std::string again = pack_samples(samples);
+    const auto back = unpack_samples(again.data(), again.size(), count);
+    if (pack_samples(back) != again) std::abort();
+  } catch (const StoreError&) {
+  }
+  return 0;
+}
