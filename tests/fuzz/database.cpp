@@ -1,5 +1,5 @@
-// Whatever became of a database's bytes: it is refused, or all that it holds can be read. The input is
-// a list of changes to a sound one: three bytes of place, one of value.
+// Whatever became of a database's bytes: it is refused, or all that it holds can be read. The input
+// is a list of changes to a sound one: three bytes of place, one of value.
 
 #include <cstdlib>
 #include <filesystem>
@@ -7,12 +7,15 @@
 #include <iterator>
 #include <string>
 
+#include "data/checksum.h"
 #include "data/store.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {
 
 using namespace palpate;
+
+constexpr const char* kText = "{\"version\": 1}\n";
 
 TrialRecord a_trial(int number) {
   TrialRecord trial;
@@ -35,14 +38,15 @@ TrialRecord a_trial(int number) {
 /// The bytes of a database with two trials, one that was cut off, and notes.
 std::string sound_database() {
   const testing::InputFile folder("sound.db");
-  const std::string path = folder.write(nullptr, 0);
+  const std::uint8_t nothing = 0;
+  const std::string path = folder.write(&nothing, 0);
   std::filesystem::remove(path);
   {
     Store store = Store::open(path, Store::Mode::write_or_create);
-    const Participant participant =
-        store.enrol({"quick", "{\"version\": 1}\n", std::string(64, 'a')}, "P01");
+    const Participant participant = store.enrol({"quick", kText, checksum_hex(kText), {}}, "P01");
     RunInfo info;
     info.clock = {1'700'000'000'000'000'000, 5'000'000'000};
+    info.program_version = "0.1.0";
     info.device = "simulated";
     const Run run = store.begin_run(participant, info);
     for (int number = 1; number <= 3; ++number) {

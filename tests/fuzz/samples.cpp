@@ -1,5 +1,5 @@
-// Whatever a stored blob of samples holds: it is refused, or the samples come back the same when they
-// are packed again; and the memory that it asks for is in proportion to its bytes.
+// Whatever a stored blob of samples holds: it is refused, or the samples come back the same when
+// they are packed again; and the memory that it asks for is in proportion to its bytes.
 
 #include <cstdlib>
 #include <string>

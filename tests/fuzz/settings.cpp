@@ -1,5 +1,5 @@
-// Whatever a file of calibrations or of participants' settings holds: every fault is named, or all of
-// its numbers are such as the forces on a hand may go by.
+// Whatever a file of calibrations or of participants' settings holds: every fault is named, or all
+// of its numbers are such as the forces on a hand may go by.
 
 #include <cmath>
 #include <cstdlib>
