@@ -203,7 +203,8 @@ class Page {
       put_missing("No participant has times with both renderers, so there is nothing to compare.");
     }
     put_table(body_, reduction_table(analysis_));
-    if (analysis_.time_outs.any) put_table(body_, censored_table(analysis_));
+    const Table censored = censored_table(analysis_);
+    if (!censored.rows.empty()) put_table(body_, censored);
     end();
     if (figure("times")) {
       figure_section({"times", "Distributions of the times", "Times"}, {}, "");

@@ -203,7 +203,8 @@ Table provenance_table(const Analysis& analysis) {
 
 std::vector<Table> all_tables(const Analysis& analysis) {
   std::vector<Table> tables{reduction_table(analysis)};
-  if (analysis.time_outs.any) tables.push_back(censored_table(analysis));
+  Table censored = censored_table(analysis);
+  if (!censored.rows.empty()) tables.push_back(std::move(censored));
   tables.push_back(times_table(analysis));
   tables.push_back(accuracy_table(analysis));
   if (analysis.table.renderers.size() > 1) tables.push_back(speed_accuracy_table(analysis));

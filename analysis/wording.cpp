@@ -98,7 +98,7 @@ std::string with_renderer(const Analysis& analysis, const std::string& joint) {
 }
 
 std::string paper_reduction(const RendererPair& pair, const std::string& shape) {
-  if (!pair.is_ray_minus_point()) return {};
+  if (!pair.is_ray_minus_point() || !pair.in_data()) return {};
   if (shape == "cone") return "22 %";
   if (shape == "cube") return "11 %";
   if (shape == "sphere" || shape == "cylinder") return "n.s.";

@@ -18,7 +18,7 @@ std::string answer(const Analysis& analysis);
 std::string with_renderer(const Analysis& analysis, const std::string& joint);
 
 /// The paper's percent reduction for a shape (fig. 15): "22 %", "n.s.", or empty where it has none,
-/// as for any comparison but ray against point.
+/// as for any comparison but ray against point with trials of both.
 std::string paper_reduction(const RendererPair& pair, const std::string& shape);
 /// Whether the paper compared what one of the study's comparisons does, with one of its shapes.
 bool compares_as_paper(const Analysis& analysis);

@@ -260,6 +260,10 @@ TEST(Paper, IsSilentWhereNothingMatchesIt) {
   }
   study.shapes[0] = "sphere";
   EXPECT_TRUE(holds(report_text(analysis_of_study(study)), "fig. 15"));
+  study.renderers = {"ray"};  // nothing to compare, and so nothing to compare with
+  EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "fig. 15"));
+  EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "with time-outs"));
+  EXPECT_TRUE(holds(report_text(analysis_of_study(study)), "Time-outs: trials that ended"));
 }
 
 TEST(Reports, NeverPrintNanOrInfinity) {
