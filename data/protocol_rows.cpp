@@ -39,40 +39,30 @@ std::vector<std::pair<std::string, std::string>> sums_of(SQLite::Database& db,
   return all;
 }
 
-void keep_files(SQLite::Database& db, const std::string& path, std::int64_t protocol_id,
-                const ProtocolInfo& protocol) {
+void require_same_files(SQLite::Database& db, const std::string& path, std::int64_t protocol_id,
+                        const ProtocolInfo& protocol) {
   const auto stored = sums_of(db, protocol_id);
   for (const ProtocolFile& file : protocol.files) {
     const auto known = std::find_if(stored.begin(), stored.end(),
                                     [&](const auto& one) { return one.first == file.name; });
     const std::string sha256 = checksum_hex(file.bytes);
-    if (known != stored.end() && known->second != sha256) {
-      throw StoreRefused(path + ": " + file.name + " is not the file that protocol " +
-                         protocol.name + " was begun with here (SHA-256 " + shown(sha256) +
-                         ", stored " + shown(known->second) +
-                         "): participants would not touch the same shape; put back the file as it "
-                         "was (an export holds it), or give the changed one another name and name "
-                         "it in the protocol, which makes it another protocol");
-    }
-    if (known != stored.end()) continue;
-    SQLite::Statement add(
-        db, "INSERT INTO protocol_files (protocol_id, name, file_id) VALUES (?, ?, ?)");
-    Binder(add) << protocol_id << file.name << keep_bytes(db, file.bytes);
-    add.exec();
+    if (known == stored.end() || known->second == sha256) continue;
+    throw StoreRefused(path + ": " + file.name + " is not the file that protocol " + protocol.name +
+                       " was begun with here (SHA-256 " + shown(sha256) + ", stored " +
+                       shown(known->second) +
+                       "): participants would not touch the same shape; put back the file as it "
+                       "was (an export holds it), or give the changed one another name and name "
+                       "it in the protocol, which makes it another protocol");
   }
 }
 
 }  // namespace
 
-std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
-                           const ProtocolInfo& protocol) {
-  SQLite::Statement add(
-      db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?) ON CONFLICT DO NOTHING");
-  Binder(add) << protocol.sha256 << protocol.name << protocol.text;
-  add.exec();
+std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::string& path,
+                                          const ProtocolInfo& protocol) {
   SQLite::Statement find(db, "SELECT id, text FROM protocols WHERE sha256 = ?");
   Binder(find) << protocol.sha256;
-  find.executeStep();
+  if (!find.executeStep()) return std::nullopt;
   std::int64_t id = 0;
   std::string text;
   Row(find) >> id >> text;
@@ -80,8 +70,27 @@ std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
     throw StoreRefused(path + ": holds another protocol text under the same SHA-256 " +
                        protocol.sha256);
   }
-  keep_files(db, path, id, protocol);
+  require_same_files(db, path, id, protocol);
   return id;
+}
+
+std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
+                           const ProtocolInfo& protocol) {
+  std::optional<std::int64_t> id = find_protocol(db, path, protocol);
+  if (!id) {
+    SQLite::Statement add(db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?)");
+    Binder(add) << protocol.sha256 << protocol.name << protocol.text;
+    add.exec();
+    id = db.getLastInsertRowid();
+  }
+  for (const ProtocolFile& file : protocol.files) {
+    SQLite::Statement add(db,
+                          "INSERT INTO protocol_files (protocol_id, name, file_id) VALUES (?, ?, "
+                          "?) ON CONFLICT DO NOTHING");
+    Binder(add) << *id << file.name << keep_bytes(db, file.bytes);
+    add.exec();
+  }
+  return *id;
 }
 
 std::vector<ProtocolFile> files_of(SQLite::Database& db, std::int64_t protocol_id) {

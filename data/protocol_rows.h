@@ -4,6 +4,7 @@
 #include <SQLiteCpp/Database.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,13 @@
 
 namespace palpate {
 
-/// The id of a protocol, which is added where it is not there yet. One that came from a version
-/// without files gets them. \throws StoreRefused: its text or a file differs from what is stored.
+/// The id of a protocol; none where it is not there. \throws StoreRefused: its text or a file
+/// differs from what is stored.
+std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::string& path,
+                                          const ProtocolInfo& protocol);
+
+/// The same; it is added where it is not there yet. One that came from a version without files gets
+/// them.
 std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
                            const ProtocolInfo& protocol);
 

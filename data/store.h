@@ -6,7 +6,8 @@
 // at a time. Local disks only: SQLite's WAL needs shared memory.
 //
 // Live session:                          Simulated session:
-//   enrol, progress, begin_run             enrol, progress, begin_run
+//   look_up, progress                      enrol, progress, begin_run
+//   first trial: enrol, begin_run
 //   each trial: begin_attempt, show,       every so many trials: record_simulated
 //               finish_attempt             end_run
 //   end_run
@@ -132,6 +133,17 @@ class Store {
                     std::optional<int> wanted_number = std::nullopt, bool simulated = false,
                     std::optional<std::uint64_t> seed = std::nullopt);
 
+  /// Who `code` is in this protocol, or would be by enrol: with id 0, and the number that would be
+  /// given. Writes nothing. \throws as enrol.
+  Participant look_up(const ProtocolInfo& protocol, const std::string& code,
+                      std::optional<int> wanted_number = std::nullopt, bool simulated = false,
+                      std::optional<std::uint64_t> seed = std::nullopt);
+
+  /// \throws StoreRefused: what begin_run would not take of it, whatever is in the database.
+  void require_sound(const Participant& participant, const RunInfo& info) const;
+  /// \throws StoreRefused: what add_note would not take.
+  void require_sound(const std::string& note) const;
+
   /// Starts session `info.session` or goes on with it. \param shown_with a protocol that differs
   /// from the participant's in its texts only; nullptr: the participant's own. \throws
   /// StoreRefused: the session is done or withdrawn, already running in this store, or was
@@ -184,8 +196,12 @@ class Store {
   /// The files that a protocol names, by name.
   std::vector<ProtocolFile> files(const std::string& protocol_sha256);
   std::vector<Participant> participants(const std::string& protocol_sha256);  ///< by number
-  std::vector<StoredRun> runs();    ///< by protocol, participant number, session, start
-  std::vector<StoredNote> notes();  ///< same order
+  std::vector<std::string> codes();  ///< of all participants, in the order they came
+  std::vector<StoredRun> runs();     ///< by protocol, participant number, session, start
+  std::vector<StoredNote> notes();   ///< same order
+  /// When the last that is on record of live sessions happened, ns since 1970. Simulated studies
+  /// keep a calendar of their own.
+  std::optional<std::int64_t> newest_record();
   StoreCounts counts();
   Holdings holdings(const std::string& code);
   bool has_samples(const Participant& participant, int session);

@@ -119,6 +119,28 @@ std::vector<StoredNote> Store::notes() {
   });
 }
 
+std::optional<std::int64_t> Store::newest_record() {
+  return guarded(impl_->path, [&]() -> std::optional<std::int64_t> {
+    SQLite::Statement find(
+        *impl_->db,
+        "SELECT r.started_utc_ns, r.started_ns, max(r.started_ns, coalesce(r.ended_ns, "
+        "r.started_ns), "
+        "coalesce((SELECT max(max(a.began_ns, coalesce(a.response_ns, a.began_ns))) FROM attempts "
+        "a "
+        "WHERE a.run_id = r.id), r.started_ns)) FROM runs r JOIN sessions s ON s.id = r.session_id "
+        "JOIN participants pa ON pa.id = s.participant_id WHERE pa.seed IS NULL");
+    std::optional<std::int64_t> newest;
+    while (find.executeStep()) {
+      ClockStamp clock;
+      std::int64_t last_ns = 0;
+      Row(find) >> clock.utc_ns >> clock.monotonic_ns >> last_ns;
+      const std::int64_t at = to_unix_ns(clock, last_ns);
+      newest = std::max(newest.value_or(at), at);
+    }
+    return newest;
+  });
+}
+
 StoreCounts Store::counts() {
   return guarded(impl_->path, [&] {
     SQLite::Statement count(

@@ -40,9 +40,18 @@ void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& ru
   seals.attempt(id);
 }
 
-Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
-                         std::optional<int> wanted_number, bool simulated,
-                         std::optional<std::uint64_t> seed) {
+namespace {
+
+/// A database that is open, and what it is called in messages.
+struct Place {
+  SQLite::Database& db;
+  const std::string& path;
+  [[noreturn]] void refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
+};
+
+void require_enrollable(const std::string& path, const ProtocolInfo& protocol,
+                        const std::string& code, std::optional<int> wanted_number, bool simulated,
+                        std::optional<std::uint64_t> seed) {
   Checks checks;
   checks.expect(
       is_participant_code(code),
@@ -50,59 +59,88 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
   if (wanted_number) checks.positive("the participant's number", *wanted_number);
   checks.expect(simulated || !seed, "only a simulated participant has a seed");
   check(checks, protocol);
-  checks.raise(impl_->path + ": participant");
+  checks.raise(path + ": participant");
+}
+
+/// Who is in the protocol under this code. \throws StoreRefused: as somebody else.
+std::optional<Participant> enrolled(const Place& in, std::int64_t protocol,
+                                    const Participant& wanted, std::optional<int> number) {
+  SQLite::Statement find(
+      in.db,
+      "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
+      "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
+      "AND code = ?");
+  Binder(find) << protocol << wanted.code;
+  if (!find.executeStep()) return std::nullopt;
+  Participant person = wanted;
+  bool was_simulated = false;
+  std::optional<std::string> was_seed;
+  Row(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >> was_seed;
+  if (number && *number != person.number) {
+    in.refuse("participant " + person.code + " has number " + std::to_string(person.number) +
+              ", not " + std::to_string(*number) + "; leave the number out to go on");
+  }
+  if (was_simulated != person.simulated) {
+    in.refuse("participant " + person.code + " is " + (was_simulated ? "simulated" : "real") +
+              " in this database; use another code or another database");
+  }
+  const auto text = person.seed ? std::optional(std::to_string(*person.seed)) : std::nullopt;
+  if (was_seed != text) {
+    in.refuse("participant " + person.code + " was simulated with seed " +
+              was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
+              "; use that seed or another database");
+  }
+  return person;
+}
+
+/// The wanted number, or the smallest unused: the counterbalancing has no gaps.
+int free_number(const Place& in, std::optional<std::int64_t> protocol, std::optional<int> wanted) {
+  SQLite::Statement numbers(
+      in.db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
+  Binder(numbers) << protocol;
+  int next = 1;
+  while (numbers.executeStep()) {
+    const int number = numbers.getColumn(0).getInt();
+    if (wanted == number) {
+      in.refuse("number " + std::to_string(number) + " is taken by participant " +
+                numbers.getColumn(1).getString() +
+                "; leave the number out for the next unused one");
+    }
+    if (number == next) ++next;
+  }
+  return wanted.value_or(next);
+}
+
+}  // namespace
+
+Participant Store::look_up(const ProtocolInfo& protocol, const std::string& code,
+                           std::optional<int> wanted_number, bool simulated,
+                           std::optional<std::uint64_t> seed) {
+  require_enrollable(impl_->path, protocol, code, wanted_number, simulated, seed);
+  return guarded(impl_->path, [&] {
+    const Place in{*impl_->db, impl_->path};
+    Participant person{.code = code, .simulated = simulated, .seed = seed};
+    const auto protocol_id = find_protocol(in.db, in.path, protocol);
+    if (protocol_id) {
+      if (const auto known = enrolled(in, *protocol_id, person, wanted_number)) return *known;
+    }
+    if (Tombstones::read(in.db, in.path).holds(code)) {
+      in.refuse("the participant with code " + code +
+                " has withdrawn; the code is not given again, choose another");
+    }
+    person.number = person.enrolled_number = free_number(in, protocol_id, wanted_number);
+    return person;
+  });
+}
+
+Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
+                         std::optional<int> wanted_number, bool simulated,
+                         std::optional<std::uint64_t> seed) {
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
+    Participant person = look_up(protocol, code, wanted_number, simulated, seed);
     const std::int64_t protocol_id = keep_protocol(db, impl_->path, protocol);
-
-    Participant person{.code = code, .simulated = simulated, .seed = seed};
-    SQLite::Statement find(
-        db,
-        "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
-        "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
-        "AND code = ?");
-    Binder(find) << protocol_id << code;
-    if (find.executeStep()) {
-      bool was_simulated = false;
-      std::optional<std::string> was_seed;
-      Row(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
-          was_seed;
-      if (wanted_number && *wanted_number != person.number) {
-        impl_->refuse("participant " + code + " has number " + std::to_string(person.number) +
-                      ", not " + std::to_string(*wanted_number) +
-                      "; leave the number out to go on");
-      }
-      if (was_simulated != simulated) {
-        impl_->refuse("participant " + code + " is " + (was_simulated ? "simulated" : "real") +
-                      " in this database; use another code or another database");
-      }
-      const auto text = seed ? std::optional(std::to_string(*seed)) : std::nullopt;
-      if (was_seed != text) {
-        impl_->refuse("participant " + code + " was simulated with seed " +
-                      was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
-                      "; use that seed or another database");
-      }
-      return person;
-    }
-
-    if (Tombstones::read(db, impl_->path).holds(code)) {
-      impl_->refuse("the participant with code " + code +
-                    " has withdrawn; the code is not given again, choose another");
-    }
-    SQLite::Statement numbers(
-        db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
-    Binder(numbers) << protocol_id;
-    int next = 1;  // the smallest unused: the counterbalancing has no gaps
-    while (numbers.executeStep()) {
-      const int number = numbers.getColumn(0).getInt();
-      if (wanted_number == number) {
-        impl_->refuse("number " + std::to_string(number) + " is taken by participant " +
-                      numbers.getColumn(1).getString() +
-                      "; leave the number out for the next unused one");
-      }
-      if (number == next) ++next;
-    }
-    person.number = person.enrolled_number = wanted_number.value_or(next);
+    if (person.id != 0) return person;
     SQLite::Statement add(db,
                           "INSERT INTO participants (protocol_id, code, number, simulated, seed) "
                           "VALUES (?, ?, ?, ?, ?)");
@@ -114,12 +152,30 @@ Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
   });
 }
 
-Run Store::begin_run(const Participant& participant, const RunInfo& info,
-                     const ProtocolInfo* shown_with) {
+std::vector<std::string> Store::codes() {
+  return guarded(impl_->path, [&] {
+    std::vector<std::string> all;
+    SQLite::Statement find(*impl_->db,
+                           "SELECT code FROM participants GROUP BY code ORDER BY min(id)");
+    while (find.executeStep()) all.push_back(find.getColumn(0).getString());
+    return all;
+  });
+}
+
+void Store::require_sound(const Participant& participant, const RunInfo& info) const {
   Checks checks;
   check(checks, info, participant.simulated);
-  if (shown_with != nullptr) check(checks, *shown_with);
   checks.raise(impl_->path + ": session of participant " + participant.code);
+}
+
+Run Store::begin_run(const Participant& participant, const RunInfo& info,
+                     const ProtocolInfo* shown_with) {
+  require_sound(participant, info);
+  if (shown_with != nullptr) {
+    Checks checks;
+    check(checks, *shown_with);
+    checks.raise(impl_->path + ": protocol");
+  }
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
     const std::string name =
@@ -178,10 +234,14 @@ Run Store::begin_run(const Participant& participant, const RunInfo& info,
   });
 }
 
-void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text) {
+void Store::require_sound(const std::string& note) const {
   Checks checks;
-  checks.present("note", text);
+  checks.present("note", note);
   checks.raise(impl_->path + ": note");
+}
+
+void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text) {
+  require_sound(text);
   impl_->commit([&] {
     SQLite::Statement add(*impl_->db, "INSERT INTO notes (run_id, at_ns, text) VALUES (?, ?, ?)");
     Binder(add) << run.id << at_ns << text;

@@ -35,21 +35,17 @@ const char* word(Session::State state) {
 
 }  // namespace
 
-LiveSession::LiveSession(const Parts& parts, const Participant& participant, const Run& run,
-                         const ClockStamp& stamp, const SessionPlan& plan)
+LiveSession::LiveSession(const Parts& parts, const ClockStamp& stamp, const SessionPlan& plan)
     : parts_(parts),
-      run_(run),
       respondent_(parts.protocol, parts.screen, *this, parts.clock, parts.answer_by),
-      log_(parts.store, run),
-      session_({parts.protocol, parts.library, parts.servo, parts.clock, respondent_, log_, this},
+      session_({parts.protocol, parts.library, parts.servo, parts.clock, respondent_, parts.record,
+                this},
                plan, stamp),
       forces_(parts.servo, parts.guard, parts.clock),
       started_ns_(parts.clock.now_ns()) {
   state_.study = parts.protocol.name;
-  state_.participant = participant.code;
-  state_.session = run.session;
-  marker_.participant = participant.code;
-  marker_.session = run.session;
+  state_.participant = marker_.participant = parts.record.participant().code;
+  state_.session = marker_.session = parts.record.session();
 }
 
 LiveSession::Outcome LiveSession::run() {
@@ -64,10 +60,14 @@ LiveSession::Outcome LiveSession::run() {
   outcome.recorded = session_.plan().done();
   outcome.trials = session_.plan().size();
   stop_noise();
+  if (outcome.end == RunEnd::withdrawn) parts_.record.begin();  // whenever it comes
   const std::int64_t now = parts_.clock.now_ns();
-  if (!outcome.reason.empty()) parts_.store.add_note(run_, now, "ended: " + outcome.reason);
-  parts_.store.add_note(run_, now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
-  parts_.store.end_run(run_, outcome.end, now);
+  for (const std::string& text : parts_.record.waiting()) {
+    if (text.front() != '{') outcome.unkept.push_back(text);
+  }
+  if (!outcome.reason.empty()) parts_.record.note(now, "ended: " + outcome.reason);
+  parts_.record.note(now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
+  parts_.record.end(outcome.end, now);
   show_console();
   if (outcome.end != RunEnd::done) respondent_.show_message("");  // it was not the last object
   return outcome;
@@ -277,7 +277,7 @@ bool LiveSession::start_noise() {
     return false;
   }
   noise_noted_ = true;
-  parts_.store.add_note(run_, parts_.clock.now_ns(), to_json_text(*parts_.noise));
+  parts_.record.note(parts_.clock.now_ns(), to_json_text(*parts_.noise));
   return true;
 }
 
@@ -286,7 +286,7 @@ void LiveSession::stop_noise() {
   noise_noted_ = false;
   parts_.noise->turn_off();
   const NoiseReport heard = parts_.noise->report();
-  parts_.store.add_note(run_, parts_.clock.now_ns(), to_json_text(heard));
+  parts_.record.note(parts_.clock.now_ns(), to_json_text(heard));
   if (heard.underruns > 0)
     say("the masking noise had " + std::to_string(heard.underruns) + " gaps");
 }
@@ -301,7 +301,7 @@ void LiveSession::watch_noise() {
 
 void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   try {
-    parts_.store.add_note(run_, at_ns, text);
+    parts_.record.note(at_ns, text);
     say("note: " + text);
   } catch (const StoreRefused& refused) {  // empty, or no UTF-8
     say(refused.what());

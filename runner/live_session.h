@@ -6,11 +6,13 @@
 #include <deque>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "runner/guard.h"
 #include "runner/live_forces.h"
 #include "runner/markers.h"
 #include "runner/participants/keyboard.h"
+#include "runner/run_record.h"
 #include "runner/servo_thread.h"
 #include "runner/session.h"
 #include "runner/session_end.h"
@@ -27,7 +29,7 @@ class LiveSession final : public Attendant, private SessionEvents {
     ServoThread& servo;
     GuardedDevice* guard;  ///< may be none
     Clock& clock;
-    Store& store;
+    RunRecord& record;
     ParticipantScreen& screen;
     ExperimenterConsole& console;
     Markers& markers;
@@ -41,13 +43,13 @@ class LiveSession final : public Attendant, private SessionEvents {
     RunEnd end = RunEnd::done;
     std::string reason;  ///< empty when done
     std::size_t recorded = 0, trials = 0;
-    bool failed = false;  ///< a signal or a fault, not somebody's wish, was the end
+    bool failed = false;                ///< a signal or a fault, not somebody's wish, was the end
+    std::vector<std::string> unkept{};  ///< the experimenter's notes, where no run was begun
   };
 
-  LiveSession(const Parts& parts, const Participant& participant, const Run& run,
-              const ClockStamp& stamp, const SessionPlan& plan);
+  LiveSession(const Parts& parts, const ClockStamp& stamp, const SessionPlan& plan);
 
-  /// Until the session is over, for good or for today; the run's end is on record.
+  /// Until the session is over, for good or for today; the run's end is on record, if it has begun.
   /// \throws StoreError: what was not acknowledged is not on record; forces are zero.
   Outcome run();
 
@@ -85,9 +87,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   void recorded(const TrialRecord& record) override;
 
   Parts parts_;
-  Run run_;
   KeyboardRespondent respondent_;
-  DurableLog log_;
   Session session_;
   LiveForces forces_;
   ConsoleState state_;

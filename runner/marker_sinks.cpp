@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <netdb.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
@@ -46,13 +47,39 @@ std::int64_t now_ns() {
   return clock.now_ns();
 }
 
+/// Whether what is sent through a connected socket does not leave this computer: it goes to the
+/// loop back, or to the very address that it comes from.
+bool stays_here(int file) {
+  sockaddr_storage here{}, there{};
+  socklen_t here_size = sizeof here, there_size = sizeof there;
+  if (getsockname(file, reinterpret_cast<sockaddr*>(&here), &here_size) != 0 ||
+      getpeername(file, reinterpret_cast<sockaddr*>(&there), &there_size) != 0) {
+    return false;
+  }
+  constexpr std::uint32_t kLoopbackNet = 127;
+  if (there.ss_family == AF_INET) {
+    sockaddr_in from{}, to{};
+    std::memcpy(&from, &here, sizeof from);
+    std::memcpy(&to, &there, sizeof to);
+    return ntohl(to.sin_addr.s_addr) >> 24 == kLoopbackNet ||
+           from.sin_addr.s_addr == to.sin_addr.s_addr;
+  }
+  if (there.ss_family != AF_INET6) return false;
+  sockaddr_in6 from{}, to{};
+  std::memcpy(&from, &here, sizeof from);
+  std::memcpy(&to, &there, sizeof to);
+  return IN6_IS_ADDR_LOOPBACK(&to.sin6_addr) || IN6_ARE_ADDR_EQUAL(&from.sin6_addr, &to.sin6_addr);
+}
+
 class UdpSink final : public MarkerSink {
  public:
-  UdpSink(const std::string& host, const std::string& port) : socket_(connected(host, port)) {}
+  UdpSink(const std::string& host, const std::string& port, MarkerCodes codes)
+      : socket_(connected(host, port)),
+        with_code_(codes == MarkerCodes::everywhere || stays_here(socket_.get())) {}
 
   bool send(const Marker& marker) noexcept override {
     try {
-      const std::string line = to_json_line(marker, now_ns());
+      const std::string line = to_json_line(marker, now_ns(), with_code_);
       // A refusal is reported when the next line is sent, which then was not: once more.
       if (give(line)) return true;
       give(line);
@@ -83,6 +110,7 @@ class UdpSink final : public MarkerSink {
   }
 
   File socket_;
+  const bool with_code_;
 };
 
 speed_t speed_of(int baud) {
@@ -123,10 +151,11 @@ class SerialSink final : public MarkerSink {
 
 /// Lab Streaming Layer: a stream of type Markers, irregular, one JSON text each, stamped with the
 /// event's own time. liblsl's clock is CLOCK_MONOTONIC in seconds on Linux, but may be built
-/// otherwise: the event's age is what is handed over.
+/// otherwise: the event's age is what is handed over. Whoever is on the network may listen.
 class LslSink final : public MarkerSink {
  public:
-  explicit LslSink(const std::string& name) {
+  LslSink(const std::string& name, MarkerCodes codes)
+      : with_code_(codes == MarkerCodes::everywhere) {
     for (const char* library : {"liblsl.so.2", "liblsl.so", "liblsl.so.1"}) {
       library_ = dlopen(library, RTLD_NOW | RTLD_LOCAL);
       if (library_ != nullptr) break;
@@ -153,7 +182,7 @@ class LslSink final : public MarkerSink {
   bool send(const Marker& marker) noexcept override {
     try {
       const std::int64_t now = now_ns();
-      std::string line = to_json_line(marker, now);
+      std::string line = to_json_line(marker, now, with_code_);
       line.pop_back();
       const char* sample = line.c_str();
       const double age = static_cast<double>(now - marker.time_ns) * 1e-9;
@@ -170,6 +199,7 @@ class LslSink final : public MarkerSink {
     if (function == nullptr) fail("lsl", std::string("liblsl has no ") + name);
   }
 
+  const bool with_code_;
   void* library_ = nullptr;
   void* (*create_info_)(const char*, const char*, std::int32_t, double, int, const char*) = nullptr;
   void* (*create_outlet_)(void*, std::int32_t, std::int32_t) = nullptr;
@@ -188,11 +218,11 @@ class LslSink final : public MarkerSink {
 
 }  // namespace
 
-std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name) {
+std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCodes codes) {
   const std::size_t colon = name.find(':');
   const std::string kind = name.substr(0, colon);
   const std::string rest = colon == std::string::npos ? "" : name.substr(colon + 1);
-  if (kind == "lsl") return std::make_unique<LslSink>(rest.empty() ? "palpate" : rest);
+  if (kind == "lsl") return std::make_unique<LslSink>(rest.empty() ? "palpate" : rest, codes);
   const std::size_t last = rest.rfind(':');
   const std::string before = rest.substr(0, last);
   const std::string after = last == std::string::npos ? "" : rest.substr(last + 1);
@@ -201,7 +231,7 @@ std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name) {
   const bool numbered =
       !after.empty() && error == std::errc() && end == after.data() + after.size();
   if (kind == "udp" && numbered && number > 0 && number < 65536 && !before.empty())
-    return std::make_unique<UdpSink>(before, after);
+    return std::make_unique<UdpSink>(before, after, codes);
   if (kind == "serial" && numbered && !before.empty())
     return std::make_unique<SerialSink>(before, number);
   if (kind == "serial" && !rest.empty()) return std::make_unique<SerialSink>(rest, 9600);

@@ -28,7 +28,7 @@ const char* to_string(Marker::Kind kind) {
   return "";
 }
 
-std::string to_json_line(const Marker& marker, std::int64_t sent_ns) {
+std::string to_json_line(const Marker& marker, std::int64_t sent_ns, bool with_code) {
   nlohmann::ordered_json line = {
       {"marker", to_string(marker.kind)},
       {"time_ns", marker.time_ns},
@@ -41,6 +41,7 @@ std::string to_json_line(const Marker& marker, std::int64_t sent_ns) {
       {"renderer", marker.renderer},
       {"shape", marker.shape},
   };
+  if (!with_code) line["participant_id"] = nullptr;
   if (marker.kind == Marker::Kind::response) line["response"] = marker.response;
   return line.dump() + "\n";
 }

@@ -30,8 +30,13 @@ struct Marker {
   std::string renderer, shape, response;  ///< response: empty but for Kind::response
 };
 const char* to_string(Marker::Kind kind);  ///< "trial_start", ...
+/// Who may read a participant's code in a marker: what goes over a network goes in clear.
+enum class MarkerCodes {
+  this_computer,  ///< only receivers on this computer; others get null
+  everywhere,
+};
 /// One line of JSON with its newline; `sent_ns` is the present on the clock of time_ns.
-std::string to_json_line(const Marker& marker, std::int64_t sent_ns);
+std::string to_json_line(const Marker& marker, std::int64_t sent_ns, bool with_code);
 
 /// Where markers go. send() is called in the markers' own thread.
 class MarkerSink {
@@ -43,7 +48,7 @@ class MarkerSink {
 
 /// From what the user names: "udp:HOST:PORT", "serial:PATH[:BAUD]", "lsl[:NAME]".
 /// \throws std::invalid_argument for another text; std::runtime_error where it cannot be opened.
-std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name);
+std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCodes codes);
 
 class Markers {
  public:

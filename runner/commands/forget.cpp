@@ -6,6 +6,7 @@
 
 #include "data/store.h"
 #include "data/utc.h"
+#include "runner/commands/ask.h"
 #include "runner/commands/command.h"
 #include "stimuli/printable.h"
 
@@ -49,10 +50,12 @@ int forget_command(const std::vector<std::string>& args) {
   std::string database, code;
   auto add = line.options.add_options();
   add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
-  add("participant", po::value(&code)->required()->value_name("CODE"), "who has withdrawn");
+  add("participant", po::value(&code)->required()->value_name("CODE"),
+      "who has withdrawn; -: asked for, or a line of standard input");
   add("yes", po::bool_switch(), "remove without asking");
   const auto values = line.parse(args);
   if (!values) return 0;
+  code = given_or_asked(code, "participant code");
   const bool ask = !(*values)["yes"].as<bool>();
   if (ask && isatty(STDIN_FILENO) != 1) {
     throw UsageError("expected --yes, as there is no terminal to ask on\nUsage: " + line.usage);

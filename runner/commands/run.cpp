@@ -4,6 +4,7 @@
 #include <csignal>
 
 #include "data/checks.h"
+#include "runner/commands/ask.h"
 #include "runner/commands/command.h"
 #include "runner/commands/run_station.h"
 
@@ -12,7 +13,8 @@ namespace {
 
 namespace po = boost::program_options;
 
-void check(const RunSettings& settings) {
+void check(RunSettings& settings) {
+  settings.participant = given_or_asked(settings.participant, "participant code");
   if (!is_participant_code(settings.participant))
     throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
   if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
@@ -35,7 +37,8 @@ int run_command(const std::vector<std::string>& args) {
   line.summary =
       "A live session: resumes an unfinished one, else begins the next. Every trial is on disk "
       "before\nthe next one starts. The participant answers with the protocol's keys; Escape or "
-      "F12 turns the\nforces off. 'palpate devices' lists the devices.";
+      "F12 turns the\nforces off. 'palpate devices' lists the devices. Who is new is enrolled when "
+      "the first trial begins;\na code that was never seen before is asked about first.";
   line.example =
       "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
       "--hand right --consent 2024-05\n"
@@ -49,7 +52,10 @@ int run_command(const std::vector<std::string>& args) {
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
        "database; created, or gone on with")  //
       ("participant", po::value(&settings.participant)->required()->value_name("CODE"),
-       "pseudonym, 1 to 32 letters and digits")  //
+       "pseudonym, 1 to 32 letters and digits; -: asked for, or a line of standard input, so that "
+       "no other user of this computer sees it")  //
+      ("new-participant", po::bool_switch(&settings.new_participant),
+       "CODE is somebody new: do not ask, whatever it looks like")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
@@ -64,7 +70,11 @@ int run_command(const std::vector<std::string>& args) {
       ("response-latency", po::value(&latency)->value_name("SECONDS"),
        "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
-       "udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]; may be given several times")      //
+       "udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]; may be given several times")  //
+      ("marker-codes", po::bool_switch(&settings.marker_codes),
+       "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
+       "in "
+       "clear; without it participant_id is null there")                                   //
       ("no-window", po::bool_switch(&settings.no_window), "text only")                     //
       ("full-screen", po::bool_switch(&settings.full_screen), "the participant's window")  //
       ("participant-monitor", po::value(&settings.participant_monitor)->value_name("N"),

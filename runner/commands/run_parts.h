@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "runner/commands/admission.h"
 #include "runner/device_check.h"
 #include "runner/devices/registry.h"
 #include "runner/display/window.h"
@@ -24,7 +25,7 @@ struct RunSettings {
   std::optional<double> response_latency;
   int participant_monitor = 0, console_monitor = 0;
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
-       without_noise = false;
+       without_noise = false, new_participant = false, marker_codes = false;
 };
 
 /// What the session's thread works with; all of it is owned by the main thread.
@@ -43,6 +44,7 @@ struct RunParts {
   FaultSignals& signals;
   Participant participant;
   int session;
+  const Admission& admission;
   NoisePlayer* noise;  ///< may be none
   const std::vector<LimitedMaterial>& limited;
   const FeeblePush& push;

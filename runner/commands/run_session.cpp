@@ -55,6 +55,9 @@ int choose_session(Store& store, const Participant& participant, const Protocol&
   SessionProgress before;
   for (; session <= count; ++session) {
     const SessionProgress progress = store.progress(participant, session);
+    if (progress.last_end == RunEnd::withdrawn)
+      throw UsageError("session " + std::to_string(session) + " of participant " +
+                       participant.code + " is withdrawn and cannot be begun again");
     if (progress.last_end != RunEnd::done) break;
     before = progress;
   }
@@ -73,31 +76,33 @@ int choose_session(Store& store, const Participant& participant, const Protocol&
 }
 
 LiveSession::Outcome run_session(const RunParts& at) {
-  const PreflightRecord preflight = go_through_preflight(at);
-  const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
   const ClockStamp stamp = stamp_now(at.clock);
-  const Run run =
-      at.store.begin_run(at.participant, describe(at.settings, at.device, at.session, stamp));
+  RunRecord record(at.store, info_of(at.protocol), at.participant,
+                   describe(at.settings, at.device, at.session, stamp));
+  const PreflightRecord preflight = go_through_preflight(at);
+  if (at.participant.id != 0) record.begin();  // it is no news that takes a number
+  const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
   LiveSession session(
-      {at.protocol, at.library, at.servo, at.guard, at.clock, at.store, at.display.participant(),
+      {at.protocol, at.library, at.servo, at.guard, at.clock, record, at.display.participant(),
        at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
        [&at] { return at.signals.end_requested(); }, at.noise},
-      at.participant, run, stamp, plan);
+      stamp, plan);
+  for (const std::string& warning : at.admission.warnings) session.say(warning);
+  for (const std::string& note : at.admission.notes) record.note(stamp.monotonic_ns, note);
   for (const std::string& message : preflight.messages) session.say(message);  // it shows on
   if (at.kind.pushes) {
     std::string text = "pre-flight: ";
     for (const std::string& finding : preflight.findings) text += finding + "; ";
-    at.store.add_note(
-        run, stamp.monotonic_ns,
+    record.note(
+        stamp.monotonic_ns,
         text + (at.settings.without_calibration ? "WITHOUT calibration" : "calibration stored"));
   }
   if (!at.limited.empty()) {
-    at.store.add_note(run, stamp.monotonic_ns,
-                      to_json_text(at.limited, at.device, at.protocol.servo_rate));
+    record.note(stamp.monotonic_ns, to_json_text(at.limited, at.device, at.protocol.servo_rate));
   }
   if (at.protocol.masking_noise && at.noise == nullptr) {
     session.say("WITHOUT the protocol's masking noise");
-    at.store.add_note(run, stamp.monotonic_ns, R"({"masking_noise":"left out"})");
+    record.note(stamp.monotonic_ns, R"({"masking_noise":"left out"})");
   }
   const std::string& missing = at.servo.rights().missing;
   if (!missing.empty()) session.say(missing);

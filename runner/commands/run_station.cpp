@@ -21,6 +21,9 @@
 namespace palpate {
 namespace {
 
+constexpr const char* kNotEnrolledYet =
+    "the participant is enrolled, and the number taken, when the first trial begins\n";
+
 /// Stands for a device whether it is in this process or in a guard's.
 struct OpenDevice {
   std::unique_ptr<Device> device;
@@ -74,11 +77,12 @@ void check_fitness(const DeviceKind& kind, const Device& device, const RunSettin
                    "--without-calibration runs the session without");
 }
 
-std::vector<std::unique_ptr<MarkerSink>> open_markers(const std::vector<std::string>& names) {
+std::vector<std::unique_ptr<MarkerSink>> open_markers(const std::vector<std::string>& names,
+                                                      MarkerCodes codes) {
   std::vector<std::unique_ptr<MarkerSink>> sinks;
   for (const std::string& name : names) {
     try {
-      sinks.push_back(open_marker_sink(name));
+      sinks.push_back(open_marker_sink(name, codes));
     } catch (const std::invalid_argument& error) {
       throw UsageError(std::string("--markers: ") + error.what());
     }
@@ -149,9 +153,15 @@ void report_servo(const RunParts& at, std::int64_t started_ns) {
 
 /// \return the exit status
 int report(const RunParts& at, const LiveSession::Outcome& outcome) {
-  std::printf("%s, participant %s (number %d), session %d: %zu of %zu trials on record; %s\n",
-              at.protocol.name.c_str(), at.participant.code.c_str(), at.participant.number,
-              at.session, outcome.recorded, outcome.trials, to_string(outcome.end));
+  const Participant who = at.store.look_up(info_of(at.protocol), at.participant.code, std::nullopt,
+                                           at.participant.simulated);
+  const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
+  std::printf("%s, participant %s (%s), session %d: %zu of %zu trials on record; %s\n",
+              at.protocol.name.c_str(), who.code.c_str(), number.c_str(), at.session,
+              outcome.recorded, outcome.trials, to_string(outcome.end));
+  for (const std::string& note : outcome.unkept)
+    std::fprintf(stderr, "not on record, as nobody was enrolled: %s\n",
+                 printable_lines(note).c_str());
   if (!outcome.reason.empty())
     std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
   if (outcome.end == RunEnd::paused || outcome.end == RunEnd::aborted)
@@ -167,7 +177,10 @@ int report(const RunParts& at, const LiveSession::Outcome& outcome) {
 int run_station(const RunSettings& settings) {
   Protocol protocol = parse_protocol(settings.protocol);
   const DeviceKind& kind = kind_of(settings.device);
-  Markers markers(open_markers(settings.markers));
+  const Admission admission = admit(settings, protocol);
+  Markers markers(open_markers(settings.markers, settings.marker_codes
+                                                     ? MarkerCodes::everywhere
+                                                     : MarkerCodes::this_computer));
   FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);
   const Watch guard_watch(signals, open.guard);
@@ -182,12 +195,12 @@ int run_station(const RunSettings& settings) {
   RealClock clock;
   // What a simulated device gave is labelled simulated, whoever answered.
   const Participant participant =
-      store.enrol({protocol.name, protocol.source_text, protocol.sha256}, settings.participant,
-                  settings.number, able.simulated);
+      store.look_up(info_of(protocol), settings.participant, settings.number, able.simulated);
   const int session = choose_session(store, participant, protocol, settings, clock);
   std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
               participant.number, session, protocol.sessions.count);
   std::fflush(stdout);
+  if (participant.id == 0) std::fprintf(stderr, "%s", kNotEnrolledYet);
   if (able.simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
   if (settings.consent.empty())
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
@@ -207,9 +220,9 @@ int run_station(const RunSettings& settings) {
     servo.emergency_zero();
   };
   const auto display = open_display(settings, protocol, clock, *open.device, emergency);
-  const RunParts parts{settings,    protocol, library,     kind,     open.guard, able,
-                       servo,       clock,    store,       *display, markers,    signals,
-                       participant, session,  noise.get(), limited,  push};
+  const RunParts parts{settings,    protocol, library,   kind,        open.guard, able,
+                       servo,       clock,    store,     *display,    markers,    signals,
+                       participant, session,  admission, noise.get(), limited,    push};
   LiveSession::Outcome outcome;
   std::exception_ptr failure;
   std::jthread session_thread([&] {

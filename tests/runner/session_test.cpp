@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "protocols/parse.h"
+#include "runner/run_record.h"
 #include "tests/runner/fake_device.h"
 
 namespace palpate {
@@ -179,8 +180,7 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     Station station;
     const Protocol& protocol = station.protocol;
     Store store = Store::open(folder / "live.db", Store::Mode::write_or_create);
-    const Participant participant =
-        store.enrol({protocol.name, protocol.source_text, protocol.sha256}, "P01");
+    const Participant participant = store.enrol(info_of(protocol), "P01");
     RunInfo info;
     info.program_version = "0.0.0";
     info.device = "fake";
@@ -188,26 +188,24 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
       return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
     });
     Servo servo(failing, station.clock, 1000, ForceLimits{});
-    const palpate::Run first = store.begin_run(participant, info);
-    DurableLog log(store, first);
+    RunRecord log(store, info_of(protocol), participant, info);
     Scripted respondent({});
     Session session({protocol, station.library, servo, station.clock, respondent, log},
                     SessionPlan(protocol, participant.number, 1), {0, 0});
     EXPECT_THROW(run(session), SessionFault);
     EXPECT_EQ(failing.force, Vec3(0));
-    store.end_run(first, RunEnd::aborted, station.clock.now_ns());
+    log.end(RunEnd::aborted, station.clock.now_ns());
 
     const SessionProgress before = store.progress(participant, 1);
     EXPECT_EQ(before.completed.size(), 2u);
     EXPECT_EQ(before.cut_off, 1);
     SessionPlan plan(protocol, participant.number, 1);
     for (const TrialRecord& record : before.completed) plan.answered(record.correct);
-    const palpate::Run second = store.begin_run(participant, info);
-    DurableLog again(store, second);
+    RunRecord again(store, info_of(protocol), participant, info);
     Session resumed({protocol, station.library, station.servo, station.clock, respondent, again},
                     plan, {0, 0});
     run(resumed);
-    store.end_run(second, RunEnd::done, station.clock.now_ns());
+    again.end(RunEnd::done, station.clock.now_ns());
     const SessionProgress after = store.progress(participant, 1);
     ASSERT_EQ(after.completed.size(), 6u);
     for (const TrialRecord& record : after.completed) {

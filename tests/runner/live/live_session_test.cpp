@@ -121,7 +121,7 @@ class LiveSessions : public ::testing::Test {
     std::string pattern = ::testing::TempDir() + "live-XXXXXX";
     folder_ = mkdtemp(pattern.data());
     store_.emplace(Store::open(folder_ / "live.db", Store::Mode::write_or_create));
-    participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P01");
+    participant_ = store_->enrol(info_of(protocol_), "P01");
   }
   ~LiveSessions() override {
     store_.reset();
@@ -142,9 +142,11 @@ class LiveSessions : public ::testing::Test {
     std::vector<std::unique_ptr<MarkerSink>> sinks;
     sinks.push_back(std::make_unique<Collected>(markers_));
     Markers markers(std::move(sinks));
-    LiveSession session({protocol_, library_, servo, nullptr, clock_, *store_, screen_, console_,
+    RunRecord record(*store_, info_of(protocol_), participant_, info);
+    record.begin();
+    LiveSession session({protocol_, library_, servo, nullptr, clock_, record, screen_, console_,
                          markers, by, [this] { return signal_; }, noise_.get()},
-                        participant_, store_->begin_run(participant_, info), {0, 0}, plan);
+                        {0, 0}, plan);
     return session.run();
   }
 

@@ -51,9 +51,24 @@ class Live(unittest.TestCase):
         path.write_text(json.dumps(PROTOCOL | changes))
         return path
 
-    def run_session(self, *options, db=None, code="P01", **changes):
+    def run_session(self, *options, db=None, code="P01", sure=True, **changes):
+        """`sure`: the code is meant, nobody asks."""
+        new = ["--new-participant"] if sure and code not in self.codes(db or self.db) else []
         return Terminal([PALPATE, "run", self.protocol(**changes), "--db", db or self.db, "--participant", code,
-                         "--device", "simulated", "--no-window", *options])
+                         "--device", "simulated", "--no-window", *new, *options])
+
+    def run_piped(self, *options, code="P01", typed=b"", **changes):
+        """As a script would: no terminal."""
+        return subprocess.run([PALPATE, "run", self.protocol(**changes), "--db", self.db, "--participant", code,
+                               "--device", "simulated", "--no-window", *options], input=typed, capture_output=True,
+                              timeout=60)
+
+    @staticmethod
+    def codes(db):
+        if not os.path.exists(db):
+            return []
+        with contextlib.closing(sqlite3.connect(db)) as opened:
+            return [code for (code,) in opened.execute("SELECT code FROM participants ORDER BY id")]
 
     def begin(self, *options, **changes):
         """A session whose first trial is being felt."""
@@ -139,6 +154,7 @@ class Whole(Live):
             terminal.wait_for("participant P02 has number 1; session 1 of 2")
             terminal.type(":quit\n")
             self.finish(terminal)
+            self.assertIn("participant P02 (not enrolled)", terminal.text)
         with self.run_session(**sessions) as terminal:
             terminal.wait_for("session 1 was today as well", "has number 5; session 2 of 2")
             self.finish(terminal)
@@ -267,6 +283,143 @@ class Commands(Live):
         self.finish(terminal)
 
 
+class Enrolment(Live):
+    def test_a_number_is_taken_when_the_first_trial_begins(self):
+        for end in (":quit\n", ":note came late\n:quit feels unwell\n"):
+            with self.run_session(code="P01") as terminal:
+                terminal.wait_for("participant P01 has number 1", "[space bar: go on]")
+                terminal.wait_for("[space bar: go on]")
+                terminal.type(end)
+                self.finish(terminal)
+                self.assertIn("participant P01 (not enrolled), session 1: 0 of 4 trials on record", terminal.text)
+        self.assertIn("not on record, as nobody was enrolled: came late", terminal.text)
+        self.assertEqual(self.codes(self.db), [])
+        self.assertEqual(self.sql("SELECT count(*) FROM protocols"), [(0,)])
+        terminal = self.begin(code="P02")
+        self.assertEqual(self.codes(self.db), ["P02"])
+        terminal.type(":quit\n")
+        self.finish(terminal)
+        self.assertIn("participant P02 (number 1)", terminal.text)
+
+    def test_notes_of_before_the_first_trial_are_kept_when_it_begins(self):
+        terminal = self.run_session()
+        self.addCleanup(terminal.__exit__)
+        terminal.wait_for("[space bar: go on]")
+        terminal.type(":note wears a ring\n")
+        terminal.wait_for("note: wears a ring")
+        self.assertEqual(self.codes(self.db), [])
+        terminal.type(" ")
+        self.finish(terminal)
+        self.assertEqual(self.notes(), ["wears a ring"])
+
+    def test_who_withdraws_before_the_first_trial_is_on_record(self):
+        with self.run_session() as terminal:
+            terminal.wait_for("[space bar: go on]")
+            terminal.type(":quit withdrawn\n")
+            self.finish(terminal)
+        self.assertEqual(self.ends(), ["withdrawn"])
+        with self.run_session() as refused:
+            self.assertEqual(refused.finish(), 2)
+            self.assertIn("is withdrawn and cannot be begun again", refused.text)
+
+    def test_what_fails_before_the_first_trial_enrols_nobody(self):
+        without_display = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
+        done = subprocess.run([PALPATE, "run", self.protocol(), "--db", self.db, "--participant", "P01", "--device",
+                               "mouse"], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60,
+                              env=without_display)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual(self.run_piped(code="P02").returncode, 1)
+        self.assertEqual(self.codes(self.db), [])
+
+    def test_a_code_never_seen_before_is_asked_about(self):
+        with self.run_session(sure=False) as terminal:
+            terminal.wait_for("holds no participants yet", "Is P01 a new participant? [y/N]")
+            terminal.type("y\n")
+            self.finish(terminal)
+        with self.run_session(code="PO1", sure=False) as terminal:
+            terminal.wait_for("P01 is there: a slip of the hand?")
+            terminal.wait_for("Is PO1 a new participant? [y/N]")
+            terminal.type("\n")
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("nobody was enrolled", terminal.text)
+        with self.run_session(code="P02", sure=False) as terminal:
+            terminal.wait_for("others (P01)")
+            terminal.wait_for("Is P02 a new participant? [y/N]")
+            terminal.type("yes\n")
+            self.finish(terminal)
+        self.assertEqual(self.codes(self.db), ["P01", "P02"])
+        with self.run_session(sure=False) as known:
+            self.assertEqual(known.finish(), 2)
+            self.assertIn("has done every session", known.text)
+            self.assertNotIn("[y/N]", known.text)
+
+    def test_a_script_takes_new_codes_but_none_that_looks_like_another(self):
+        one = {"repetitions": 1, "blocks_per_renderer": 1, "texts": {}, "stimuli": PROTOCOL["stimuli"][:1],
+               "response": {"keys": {"1": "ball"}, "time_out_s": 0.3}}
+        def piped(code, *options):
+            process = subprocess.Popen([PALPATE, "run", self.protocol(**one), "--db", self.db, "--participant", code,
+                                        "--device", "simulated", "--no-window", *options], stdin=subprocess.PIPE,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            err = process.stderr.read()  # its input stays open until the time-out has ended the only trial
+            process.stdin.close()
+            process.stdout.close()
+            process.stderr.close()
+            return process.wait(60), err.decode()
+
+        status, err = piped("P01")
+        self.assertEqual(status, 0, err)
+        status, err = piped("P02")
+        self.assertEqual(status, 0, err)
+        self.assertIn(f"P02 is new in {self.db}", err)
+        for slip in ("p01", "P1", "PO1", "PP01"):
+            status, err = piped(slip)
+            self.assertEqual(status, 2, err)
+            self.assertIn(f"--participant {slip}: is not in {self.db}, but P01 is there", err)
+            self.assertIn("--new-participant", err)
+        self.assertEqual(piped("p01", "--new-participant")[0], 0)
+        status, err = piped("P02", "--new-participant")
+        self.assertEqual(status, 2)
+        self.assertIn("P02 is in", err)
+        self.assertEqual(self.codes(self.db), ["P01", "P02", "p01"])
+
+    def test_a_code_need_not_stand_in_the_command_line(self):
+        terminal = self.run_session(code="-", sure=False)
+        self.addCleanup(terminal.__exit__)
+        terminal.wait_for("participant code: ")
+        terminal.type("SECRET7\n")
+        terminal.wait_for("Is SECRET7 a new participant?")
+        terminal.type("y\n")
+        while terminal.wait_for(FEELING, "[space bar: go on]") != FEELING:
+            terminal.type(" ")
+        command = pathlib.Path(f"/proc/{terminal.process.pid}/cmdline").read_bytes()
+        self.assertNotIn(b"SECRET7", command)
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertEqual({row["participant_id"] for row in self.export()}, {"SECRET7"})
+        done = self.run_piped(code="-", typed=b"P09\r\n")  # then the input ends
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(b"participant P09 has number 2", done.stdout)
+        for typed in (b"", b"\n", b"Jane Doe\n", b"x" * 1000):
+            self.assertEqual(self.run_piped(code="-", typed=typed).returncode, 2, typed)
+        self.assertEqual(self.codes(self.db), ["SECRET7"])
+        forgotten = subprocess.run([PALPATE, "forget", "--db", self.db, "--participant", "-", "--yes"],
+                                   input=b"SECRET7\n", capture_output=True)
+        self.assertEqual(forgotten.returncode, 0, forgotten.stderr)
+        self.assertEqual(self.codes(self.db), [])
+
+    def test_a_clock_that_is_years_behind_is_told_and_on_record(self):
+        protocol = self.protocol()
+        later = time.time() + 5 * 365.25 * 86400
+        with unittest.mock.patch.object(self, "protocol", lambda **_: protocol):
+            os.utime(protocol, (later, later))
+            terminal = self.begin()
+        self.assertIn("CLOCK: the computer's clock says", terminal.text)
+        terminal.type("1")
+        self.finish(terminal)
+        (note,) = self.sql("SELECT text FROM notes WHERE text LIKE '%clock_warning%'")
+        self.assertIn("5 years before the protocol or the program was written", json.loads(note[0])["clock_warning"])
+
+
 class Broken(Live):
     def test_killed_in_mid_trial_it_goes_on_with_that_trial(self):
         terminal = self.begin()
@@ -365,10 +518,6 @@ class Broken(Live):
             self.assertRegex(terminal.text, "disk|space")
             os.remove(disk / "ballast")
             self.assertEqual([state for _, _, state in self.attempts()], ["running"])
-            with self.run_session(samples=False) as refused:  # another text is another protocol
-                refused.wait_for("session 1 of 1")
-                refused.type(":quit\n")
-                self.finish(refused)
             with self.run_session(samples=True) as again:
                 self.finish(again)
             self.assertIn((1, 2, "completed"), self.attempts())
@@ -534,6 +683,46 @@ class Marks(Live):
             self.assertGreaterEqual(line["sent_ns"], line["time_ns"])
         self.assertIn("markers were not taken", terminal.text)
 
+    def test_the_code_does_not_leave_this_computer_unless_asked_to(self):
+        other, listener = "10.98.7.6", self.dir / "listen.py"
+        network = ("ip link add here type veth peer name there && ip addr add 10.98.7.1/24 dev here && "
+                   "ip link set lo up && ip link set here up && ip link set there up && "
+                   f"ip neigh add {other} lladdr 02:00:00:00:00:06 dev here")
+        alone = ["unshare", "--map-root-user", "--net", "sh", "-c"]
+        if subprocess.run([*alone, network], capture_output=True).returncode:
+            self.skipTest("no network of one's own can be made here")
+        listener.write_text("""
+import os, socket, sys
+runner, wire = os.getppid(), socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))
+wire.bind((sys.argv[1], 0))
+wire.settimeout(0.2)
+print("listening", flush=True)
+while os.getppid() == runner:
+    try:
+        frame = wire.recv(4096)
+    except TimeoutError:
+        continue
+    if b'{"marker"' in frame:
+        open(sys.argv[2], "ab").write(frame[frame.index(b"{"):])
+""")
+        def heard(wire, host, code, *options):
+            said = self.dir / f"heard-{code}"
+            run = [PALPATE, "run", self.protocol(repetitions=1, blocks_per_renderer=1, texts={}), "--db", self.db,
+                   "--participant", code, "--new-participant", "--device", "simulated", "--no-window", "--markers",
+                   f"udp:{host}:4000", *options]
+            listen = f"'{sys.executable}' '{listener}' {wire} '{said}' & sleep 1"
+            terminal = Terminal([*alone, f'{network}; {listen}; exec "$@"', "sh", *run])
+            self.addCleanup(terminal.__exit__)
+            terminal.wait_for("listening")
+            terminal.wait_for(FEELING)
+            terminal.type("1")
+            self.finish(terminal)
+            return {json.loads(line)["participant_id"] for line in said.read_text().splitlines()}
+
+        self.assertEqual(heard("there", other, "CODEA"), {None})
+        self.assertEqual(heard("there", other, "CODEB", "--marker-codes"), {"CODEB"})
+        self.assertEqual(heard("lo", "10.98.7.1", "CODEC"), {"CODEC"})
+
     def test_lab_streaming_layer(self):
         said = self.dir / "lsl.txt"
         here = {"LD_LIBRARY_PATH": FAKE_LSL, "PALPATE_FAKE_LSL": str(said)}
@@ -549,6 +738,7 @@ class Marks(Live):
             at, text = sample.split(" ", 1)
             marker = json.loads(text)
             kinds.append(marker["marker"])
+            self.assertIsNone(marker["participant_id"], "whoever is on the network may listen")
             self.assertAlmostEqual(float(at), marker["time_ns"] / 1e9, delta=0.05)
         self.assertEqual([kind for kind in kinds if kind != "first_contact"], ["trial_start", "response"] * 2)
 

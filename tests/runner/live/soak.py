@@ -100,8 +100,8 @@ def type_trials(terminal, minutes):
 def soak(palpate, minutes, folder):
     (folder / "protocol.json").write_text(json.dumps(PROTOCOL))
     began = time.monotonic()
-    with Terminal([palpate, "run", folder / "protocol.json", "--db", folder / "soak.db", "--participant", "P01", "--device",
-                   "simulated", "--no-window"]) as terminal:
+    with Terminal([palpate, "run", folder / "protocol.json", "--db", folder / "soak.db", "--participant", "P01",
+                   "--new-participant", "--device", "simulated", "--no-window"]) as terminal:
         await_trial(terminal)
         typing_began = time.monotonic()
         points, faults = type_trials(terminal, minutes)
