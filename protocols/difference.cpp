@@ -15,7 +15,7 @@ using nlohmann::json;
 
 constexpr std::array<std::string_view, 4> kTexts = {"$schema", "title", "description", "texts"};
 constexpr std::array<std::string_view, 11> kDesign = {
-    "renderers",    "renderer_order", "stimuli",  "repetitions", "order", "blocks_per_renderer",
+    "renderers",   "renderer_order", "stimuli",  "repetitions", "order", "blocks_per_renderer",
     "orientation", "practice",       "sessions", "material",    "seed"};
 
 template <std::size_t n>
@@ -48,7 +48,8 @@ void compare(const json* before, const json* after, const std::string& pointer,
   }
 }
 
-/// A key's answer may be a stimulus, or a stimulus with a label: written alike, the label is a text.
+/// A key's answer may be a stimulus, or a stimulus with a label: written alike, the label is a
+/// text.
 json with_answers_alike(json protocol) {
   const auto response = protocol.find("response");
   if (response == protocol.end() || !response->is_object()) return protocol;

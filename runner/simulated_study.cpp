@@ -85,7 +85,7 @@ class QueueLog final : public TrialLog {
 };
 
 SessionPlan plan_of(const Protocol& protocol, const Work& work) {
-  SessionPlan plan(protocol, work.participant.number, work.session);
+  SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
   for (const bool correct : work.answers) plan.answered(correct);
   return plan;
 }

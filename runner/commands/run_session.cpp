@@ -39,7 +39,7 @@ RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, 
 }
 
 SessionPlan plan_of(const RunParts& at, const SessionProgress& before) {
-  SessionPlan plan(at.protocol, at.participant.number, at.session);
+  SessionPlan plan(at.protocol, at.participant.enrolled_number, at.session);
   for (const TrialRecord& record : before.completed) plan.answered(record.correct);
   return plan;
 }

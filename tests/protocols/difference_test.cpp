@@ -85,7 +85,8 @@ TEST(ProtocolDifference, AllElseIsASetting) {
 TEST(ProtocolDifference, ALongListIsCut) {
   json more = kProtocol;
   for (int i = 0; i < 12; ++i) more["texts"]["t" + std::to_string(10 + i)] = "x";
-  EXPECT_TRUE(in_words(difference(kProtocol.dump(), more.dump())).ends_with("/texts/t17 and 4 more"));
+  EXPECT_TRUE(
+      in_words(difference(kProtocol.dump(), more.dump())).ends_with("/texts/t17 and 4 more"));
 }
 
 }  // namespace
