@@ -26,8 +26,8 @@ const Column kSimulated{"simulated",
                         {{"0", "a person"}, {"1", "SIMULATED: no person, or no real device"}}};
 const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
 const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
-const Column kNumber{"participant_number", "Orders the counterbalancing, unique within a protocol",
-                     "1"};
+const Column kNumber{"participant_number",
+                     "Orders the counterbalancing; two stations may have given the same one", "1"};
 const Column kOrientation[] = {
     {"orientation_w", "Orientation of the stimulus, unit quaternion, w", "1"},
     {"orientation_x", "Orientation of the stimulus, unit quaternion, x", "1"},

@@ -113,11 +113,11 @@ void sync_file(const std::string& file) {
 }  // namespace
 
 Merged merge(const std::string& out, const std::vector<std::string>& inputs,
-             const std::function<void(std::int64_t, std::int64_t)>& progress) {
+             const std::function<void(std::int64_t, std::int64_t)>& progress, NumberClash clash) {
   require_free(out);
   const DraftFolder folder(out);
   std::deque<Station> stations = open_stations(inputs, folder);
-  const MergePlan plan = plan_merge(stations);
+  const MergePlan plan = plan_merge(stations, clash);
   const std::string draft = folder / "merged.db";
   create_database(draft);
   guarded(out, [&] {
@@ -130,7 +130,7 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
     db.exec("PRAGMA journal_mode = WAL");
   });
   for (const Station& station : stations) station.require_unchanged();
-  Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out};
+  Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out, plan.renumbered};
   sync_file(draft);
   if (!name_new_file(draft, out)) {
     throw StoreRefused(out + ": has come there meanwhile; nothing was written, give another name");

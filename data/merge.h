@@ -14,9 +14,22 @@ struct LeftOut {
   std::string code, path;  ///< of the database that still holds the participant
 };
 
+/// A participant whose number is another's as well.
+struct Renumbered {
+  std::string code, other, path;  ///< path: of the database that holds `code`
+  int from = 0, to = 0;           ///< from: orders the trials, also those to come
+};
+
 struct Merged {
   StoreCounts counts;  ///< of the new database
   std::vector<LeftOut> left_out;
+  std::vector<Renumbered> renumbered;
+};
+
+/// What becomes of one number for two codes: two stations counted for themselves.
+enum class NumberClash {
+  refuse,
+  renumber,  ///< who began later gets the next number after all; the store keeps both
 };
 
 /// Makes one database of several stations' databases: every protocol, participant, session, run,
@@ -29,9 +42,11 @@ struct Merged {
 /// replaced. \param progress called after every session with its number and the number of all; may
 /// throw to stop.
 /// \throws StoreRefused with every conflict: a participant with different content (number, a
-/// session of the same number, sessions at the same time), one number for two codes, different
-/// protocols under one name; an input that Store::open would refuse, or that is open for writing.
+/// session of the same number, sessions at the same time), one number for two codes (see
+/// NumberClash), different protocols under one name; an input that Store::open would refuse, or
+/// that is open for writing.
 Merged merge(const std::string& out, const std::vector<std::string>& inputs,
-             const std::function<void(std::int64_t, std::int64_t)>& progress = {});
+             const std::function<void(std::int64_t, std::int64_t)>& progress = {},
+             NumberClash clash = NumberClash::refuse);
 
 }  // namespace palpate

@@ -1,7 +1,9 @@
 #include "data/merge_plan.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
+#include <tuple>
 
 #include "data/checks.h"
 #include "data/protocol_rows.h"
@@ -66,36 +68,36 @@ Span span_of(const PlannedSession& session) {
 
 class Planner {
  public:
-  MergePlan plan(std::deque<Station>& stations);
+  MergePlan plan(std::deque<Station>& stations, NumberClash clash);
 
  private:
   void add_protocols(Station& station);
   void add_files(ProtocolInfo& known, Station& station, std::int64_t protocol_id);
   void add_participant(PlannedProtocol& protocol, FoundParticipant found);
+  void settle_numbers(PlannedProtocol& protocol, NumberClash clash);
   void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
   void require_one_meaning_per_name(const std::deque<Station>& stations);
+  /// \param without_numbers so many conflicts are of another kind
+  [[noreturn]] void raise(std::size_t without_numbers) const;
 
   MergePlan plan_;
-  std::map<std::string, PlannedProtocol> protocols_;                              // by checksum
+  std::map<std::string, PlannedProtocol> protocols_;                       // by checksum
+  std::map<std::string, std::map<std::string, FoundParticipant>> people_;  // checksum -> by code
   std::map<std::string, std::map<const Station*, std::set<std::string>>> names_;  // -> checksums
   std::map<std::string, bool> withdrawn_;  // codes that were looked up
   std::vector<std::string> conflicts_;
 };
 
-MergePlan Planner::plan(std::deque<Station>& stations) {
+MergePlan Planner::plan(std::deque<Station>& stations, NumberClash clash) {
   for (Station& station : stations) {
     guarded(station.path(),
             [&] { plan_.tombstones.add(Tombstones::read(station.db(), station.path())); });
   }
   for (Station& station : stations) guarded(station.path(), [&] { add_protocols(station); });
   require_one_meaning_per_name(stations);
-  if (!conflicts_.empty()) {
-    std::string message = "these databases cannot be merged; nothing was written:";
-    for (const std::string& one : conflicts_) message += "\n  " + one;
-    throw StoreRefused(message +
-                       "\nLeave one of the databases out, or remove a participant who is in the "
-                       "wrong place from a copy of it with palpate forget");
-  }
+  const std::size_t without_numbers = conflicts_.size();
+  for (auto& [sha256, protocol] : protocols_) settle_numbers(protocol, clash);
+  if (!conflicts_.empty()) raise(without_numbers);
   for (auto& [sha256, protocol] : protocols_) {
     for (const auto& [number, person] : protocol.participants) {
       plan_.sessions += static_cast<std::int64_t>(person.sessions.size());
@@ -106,6 +108,23 @@ MergePlan Planner::plan(std::deque<Station>& stations) {
     return std::pair(a.info.name, a.info.sha256) < std::pair(b.info.name, b.info.sha256);
   });
   return std::move(plan_);
+}
+
+void Planner::raise(std::size_t without_numbers) const {
+  std::string message = "these databases cannot be merged; nothing was written:";
+  for (const std::string& one : conflicts_) message += "\n  " + one;
+  if (conflicts_.size() > without_numbers) {
+    message +=
+        "\nTwo stations gave the same number: --renumber gives another one to who began later, and "
+        "keeps on record whose order of trials was shown. From now on keep the stations' numbers "
+        "apart with palpate run --number";
+  }
+  if (without_numbers > 0) {
+    message +=
+        "\nLeave one of the databases out, or remove a participant who is in the wrong place from "
+        "a copy of it with palpate forget";
+  }
+  throw StoreRefused(message);
 }
 
 void Planner::add_protocols(Station& station) {
@@ -155,30 +174,67 @@ void Planner::add_files(ProtocolInfo& known, Station& station, std::int64_t prot
 }
 
 void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found) {
-  const std::string& code = found.person.code;
-  for (auto& [number, known] : protocol.participants) {
-    const std::string where = " (" + known.station->path() + ", " + found.person.station->path() +
-                              ", protocol " + protocol.info.name + ")";
-    if (number == found.number && known.code != code) {
-      conflicts_.push_back("number " + std::to_string(number) + " is that of participant " +
-                           known.code + " and of participant " + code + where);
-      return;
-    }
-    if (known.code != code) continue;
-    if (number != found.number) {
-      conflicts_.push_back("participant " + code + " has number " + std::to_string(number) +
-                           " and number " + std::to_string(found.number) + where);
-    } else if (known.simulated != found.person.simulated || known.seed != found.person.seed) {
-      conflicts_.push_back("participant " + code +
-                           " is simulated at one station and a person at the other, or simulated "
-                           "with another seed" +
-                           where);
-    } else {
-      add_sessions(known, found.person);
-    }
+  const std::string code = found.person.code;
+  auto& people = people_[protocol.info.sha256];
+  const auto at = people.find(code);
+  if (at == people.end()) {
+    people.emplace(code, std::move(found));
     return;
   }
-  protocol.participants.emplace(found.number, std::move(found.person));
+  FoundParticipant& known = at->second;
+  const std::string where = " (" + known.person.station->path() + ", " +
+                            found.person.station->path() + ", protocol " + protocol.info.name + ")";
+  const int known_order = known.person.enrolled_number, order = found.person.enrolled_number;
+  if (known_order != order) {
+    conflicts_.push_back("participant " + code + " has number " + std::to_string(known_order) +
+                         " and number " + std::to_string(order) + where);
+  } else if (known.person.simulated != found.person.simulated ||
+             known.person.seed != found.person.seed) {
+    conflicts_.push_back("participant " + code +
+                         " is simulated at one station and a person at the other, or simulated "
+                         "with another seed" +
+                         where);
+  } else {
+    // One of the two was given another number by a merge: that stands.
+    if (known.number == order) {
+      known.number = found.number;
+    } else if (found.number != order) {
+      known.number = std::min(known.number, found.number);
+    }
+    add_sessions(known.person, found.person);
+  }
+}
+
+/// Who began first keeps a number that several have, unless it is not the one of the own trials.
+void Planner::settle_numbers(PlannedProtocol& protocol, NumberClash clash) {
+  std::vector<std::pair<std::tuple<int, bool, double, std::string>, FoundParticipant*>> ordered;
+  for (auto& [code, one] : people_[protocol.info.sha256]) {
+    double began = std::numeric_limits<double>::infinity();
+    for (const auto& [number, session] : one.person.sessions)
+      began = std::min(began, span_of(session).begin);
+    ordered.push_back({{one.number, one.number != one.person.enrolled_number, began, code}, &one});
+  }
+  std::sort(ordered.begin(), ordered.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  int last = ordered.empty() ? 0 : ordered.back().second->number;
+  for (auto& [rank, one] : ordered) {
+    const auto holder = protocol.participants.find(one->number);
+    int number = one->number;
+    if (holder != protocol.participants.end()) {
+      const PlannedParticipant& other = holder->second;
+      if (clash == NumberClash::refuse) {
+        conflicts_.push_back("number " + std::to_string(number) + " is that of participant " +
+                             other.code + " and of participant " + one->person.code + " (" +
+                             other.station->path() + ", " + one->person.station->path() +
+                             ", protocol " + protocol.info.name + ")");
+        continue;
+      }
+      number = ++last;
+      plan_.renumbered.push_back({one->person.code, other.code, one->person.station->path(),
+                                  one->person.enrolled_number, number});
+    }
+    protocol.participants.emplace(number, std::move(one->person));
+  }
 }
 
 void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& found) {
@@ -234,6 +290,8 @@ void Planner::require_one_meaning_per_name(const std::deque<Station>& stations) 
 
 }  // namespace
 
-MergePlan plan_merge(std::deque<Station>& stations) { return Planner().plan(stations); }
+MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash) {
+  return Planner().plan(stations, clash);
+}
 
 }  // namespace palpate

@@ -37,10 +37,11 @@ struct MergePlan {
   std::vector<PlannedProtocol> protocols;  ///< by name, then checksum
   Tombstones tombstones;
   std::vector<LeftOut> left_out;
+  std::vector<Renumbered> renumbered;
   std::int64_t sessions = 0;
 };
 
 /// \throws StoreRefused with every conflict, a line each.
-MergePlan plan_merge(std::deque<Station>& stations);
+MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash);
 
 }  // namespace palpate

@@ -14,7 +14,7 @@ void put_trial_but_who(TableRow& row, const StoredTrial& trial) {
   for (const double q : record.orientation_wxyz) row << q;
   row << record.practice << record.timed_out << record.first_contact_time << record.onset_utc
       << trial.run.device << trial.participant.simulated << record.missed_ticks << record.attempt
-      << trial.protocol_sha256 << trial.run.program_version << trial.participant.number
+      << trial.protocol_sha256 << trial.run.program_version << trial.participant.enrolled_number
       << record.started_inside << record.ticks
       << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
       << trial.run.observer_sha256 << (!record.response.empty() && !record.first_contact_time)
@@ -28,7 +28,7 @@ void put_attempt(TableRow& row, const StoredTrial& attempt) {
   for (const double q : record.orientation_wxyz) row << q;
   row << record.practice << record.onset_utc << attempt.cut_off_reason << attempt.run.device
       << attempt.participant.simulated << attempt.protocol_sha256 << attempt.run.program_version
-      << attempt.participant.number;
+      << attempt.participant.enrolled_number;
 }
 
 void put_sample(TableRow& row, const SampleRecord& sample) {

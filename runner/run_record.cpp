@@ -9,8 +9,12 @@ ProtocolInfo info_of(const Protocol& protocol) {
 }
 
 RunRecord::RunRecord(Store& store, const ProtocolInfo& protocol, const Participant& participant,
-                     const RunInfo& info)
-    : store_(store), protocol_(protocol), participant_(participant), info_(info) {
+                     const RunInfo& info, const std::optional<ProtocolInfo>& shown_with)
+    : store_(store),
+      protocol_(protocol),
+      participant_(participant),
+      info_(info),
+      shown_with_(shown_with) {
   store_.require_sound(participant_, info_);
 }
 
@@ -18,7 +22,7 @@ void RunRecord::begin() {
   if (run_) return;
   participant_ = store_.enrol(protocol_, participant_.code, participant_.number,
                               participant_.simulated, participant_.seed);
-  run_ = store_.begin_run(participant_, info_);
+  run_ = store_.begin_run(participant_, info_, shown_with_ ? &*shown_with_ : nullptr);
   for (const Note& note : std::exchange(waiting_, {}))
     store_.add_note(*run_, note.at_ns, note.text);
 }

@@ -19,8 +19,9 @@ ProtocolInfo info_of(const Protocol& protocol);
 class RunRecord final : public TrialLog {
  public:
   /// \param participant  from Store::look_up. \throws StoreRefused: the store takes no such run.
+  /// \param shown_with  where other texts are shown than those of the participant's protocol
   RunRecord(Store& store, const ProtocolInfo& protocol, const Participant& participant,
-            const RunInfo& info);
+            const RunInfo& info, const std::optional<ProtocolInfo>& shown_with = std::nullopt);
 
   const Participant& participant() const { return participant_; }
   int session() const { return info_.session; }
@@ -48,6 +49,7 @@ class RunRecord final : public TrialLog {
   const ProtocolInfo protocol_;
   Participant participant_;
   const RunInfo info_;
+  const std::optional<ProtocolInfo> shown_with_;
   std::optional<Run> run_;  ///< none: not begun
   std::vector<Note> waiting_;
 };

@@ -6,12 +6,17 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <set>
+#include <utility>
 
+#include "data/checks.h"
 #include "data/store.h"
+#include "protocols/difference.h"
+#include "protocols/parse.h"
 #include "runner/clock_check.h"
 #include "runner/commands/ask.h"
 #include "runner/commands/command.h"
+#include "runner/commands/protocol_choice.h"
 #include "runner/commands/run_parts.h"
 #include "runner/near_codes.h"
 #include "stimuli/printable.h"
@@ -21,25 +26,57 @@ namespace {
 
 namespace fs = std::filesystem;
 
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
+
 /// What the database holds already.
 struct Known {
-  std::vector<std::string> codes;  ///< in the order they came
-  bool enrolled = false;           ///< the code, in this protocol
+  std::vector<std::string> codes;          ///< in the order they came
+  bool enrolled = false;                   ///< the code, in this protocol
+  std::optional<EarlierProtocol> earlier;  ///< of the code, where it is not enrolled in this one
+  std::vector<std::string> others;         ///< what differs in protocols of the same name, in words
+  std::optional<int> number;               ///< that somebody new is to get, where texts changed
   std::optional<std::int64_t> newest_ns;
 };
 
+/// Other texts, the same trials: one counterbalancing, so numbers count on.
+void count_on(Store& store, const Protocol& protocol, const RunSettings& settings, Known& known) {
+  std::set<int> taken;
+  for (const ProtocolInfo& info : store.protocols()) {
+    if (info.name != protocol.name) continue;
+    const bool same = info.sha256 == protocol.sha256;
+    const ProtocolDifference differs = difference(info.text, protocol.source_text);
+    const std::vector<Participant> people = store.participants(info.sha256);
+    if (!same && !people.empty()) known.others.push_back(in_words(differs));
+    if (!differs.only_texts()) continue;
+    for (const Participant& one : people) {
+      taken.insert(one.number);
+      if (settings.number == one.number && !same)
+        throw UsageError("--number: " + std::to_string(one.number) + " is taken by participant " +
+                         one.code + ", with other texts of the same protocol");
+    }
+  }
+  if (known.others.empty()) return;
+  int next = 1;
+  while (taken.contains(next)) ++next;
+  known.number = settings.number.value_or(next);
+}
+
 /// In a moment: nothing is held open while somebody thinks about a question, or a guard is forked.
-Known look_into(const RunSettings& settings, const Protocol& protocol) {
+Known look_into(const RunSettings& settings, const Protocol& protocol, const std::string& code) {
   Known known;
   std::error_code error;
   if (!fs::exists(settings.database, error)) return known;
   Store store = Store::open(settings.database, Store::Mode::write_or_create);
   known.codes = store.codes();
   for (const Participant& one : store.participants(protocol.sha256))
-    known.enrolled = known.enrolled || one.code == settings.participant;
+    known.enrolled = known.enrolled || one.code == code;
   known.newest_ns = store.newest_record();
+  if (known.enrolled) return known;
+  known.earlier = earlier_protocol(store, protocol, code);
+  if (known.earlier) return known;
+  count_on(store, protocol, settings, known);
   // Whether the code and the number can be given is said before anything is asked.
-  if (!known.enrolled) store.look_up(info_of(protocol), settings.participant, settings.number);
+  store.look_up(info_of(protocol), code, known.number ? known.number : settings.number);
   return known;
 }
 
@@ -53,8 +90,8 @@ std::string latest(const std::vector<std::string>& codes) {
   return all + in_words(last);
 }
 
-void confirm_new(const RunSettings& settings, const std::vector<std::string>& codes) {
-  const std::string& code = settings.participant;
+void confirm_new(const RunSettings& settings, const std::string& code,
+                 const std::vector<std::string>& codes) {
   const std::vector<std::string> near = near_codes(code, codes);
   const std::string alike = in_words(near) + (near.size() == 1 ? " is" : " are");
   if (settings.new_participant) return;
@@ -64,7 +101,7 @@ void confirm_new(const RunSettings& settings, const std::vector<std::string>& co
                        alike + " there: give the code that was meant, or add --new-participant " +
                        "if " + code + " is somebody new");
     }
-    std::fprintf(stderr, "%s is new in %s\n", code.c_str(), printable(settings.database).c_str());
+    say(code + " is new in " + settings.database);
     return;
   }
   std::string question = codes.empty() ? settings.database + " holds no participants yet.\n"
@@ -76,20 +113,21 @@ void confirm_new(const RunSettings& settings, const std::vector<std::string>& co
     throw UsageError("nobody was enrolled, nothing was begun; the same command asks again");
 }
 
-void confirm_participant(const RunSettings& settings, const Known& known) {
-  const std::string& code = settings.participant;
-  if (known.enrolled) {
+void confirm_participant(const RunSettings& settings, const std::string& code, const Known& known) {
+  if (known.enrolled || known.earlier) {
     if (!settings.new_participant) return;
     throw UsageError("--new-participant: " + code + " is in " + settings.database +
                      " already; leave the option out to go on with " + code +
                      ", or give the new participant another code");
   }
   if (std::find(known.codes.begin(), known.codes.end(), code) == known.codes.end()) {
-    confirm_new(settings, known.codes);
+    confirm_new(settings, code, known.codes);
   } else {
-    std::fprintf(stderr, "%s is known from another protocol in %s\n", code.c_str(),
-                 printable(settings.database).c_str());
+    say(code + " is known from another protocol in " + settings.database);
   }
+  for (const std::string& difference : known.others)
+    say("others were enrolled with another text of this protocol (" + difference + ")" +
+        (known.number ? "; numbers count on where only texts differ" : ""));
 }
 
 std::optional<std::int64_t> written_ns(const std::string& file) {
@@ -107,18 +145,45 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
   evidence.newest_file_ns = std::max(written_ns(settings.protocol), written_ns("/proc/self/exe"));
   const std::string doubt = clock_doubt(evidence);
   if (doubt.empty()) return;
-  std::fprintf(stderr, "CLOCK: %s\n", doubt.c_str());
+  say("CLOCK: " + doubt);
   admission.warnings.push_back("CLOCK: " + doubt);
   admission.notes.push_back(nlohmann::json{{"clock_warning", doubt}}.dump());
 }
 
+std::string ask_new_code() {
+  const auto code = ask("The new code: ");
+  if (!code || !is_participant_code(*code))
+    throw UsageError("a pseudonym of 1 to 32 letters and digits was expected");
+  return *code;
+}
+
 }  // namespace
 
-Admission admit(const RunSettings& settings, const Protocol& protocol) {
+Admission admit(const RunSettings& settings) {
   Admission admission;
-  const Known known = look_into(settings, protocol);
+  admission.protocol = parse_protocol(settings.protocol);
+  admission.participant = settings.participant;
+  admission.number = settings.number;
+  Known known = look_into(settings, admission.protocol, admission.participant);
   check_clock(settings, known, admission);
-  confirm_participant(settings, known);
+  confirm_participant(settings, admission.participant, known);
+  while (known.earlier) {
+    const ChangedProtocol changed{*known.earlier, admission.protocol, settings.protocol,
+                                  admission.participant, settings.changed_protocol};
+    const ProtocolChoice choice = choose_protocol(changed);
+    admission.notes.push_back(to_json_text(changed, choice));
+    if (choice != ProtocolChoice::new_code) {
+      Protocol stored = parse_protocol_text(known.earlier->info.text, settings.protocol);
+      admission.enrolled = info_of(stored);
+      if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
+      return admission;
+    }
+    admission.participant = ask_new_code();
+    known = look_into(settings, admission.protocol, admission.participant);
+    confirm_participant(settings, admission.participant, known);
+  }
+  if (known.number) admission.number = known.number;
+  admission.enrolled = info_of(admission.protocol);
   return admission;
 }
 

@@ -1,23 +1,29 @@
 #pragma once
-// Before a device moves: who is to take part, and is that meant?
+// Before a device moves: who is to take part, with which protocol, and is that meant?
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "data/record.h"
+#include "protocols/protocol.h"
 
 namespace palpate {
 
 struct RunSettings;
-struct Protocol;
 
-/// What the checks found that goes on record with the run.
 struct Admission {
+  std::string participant;    ///< may be another one than was named
+  std::optional<int> number;  ///< to be given; none: the next unused one
+  ProtocolInfo enrolled;      ///< the protocol that the participant is, or will be, enrolled in
+  Protocol protocol;          ///< to be shown; but for its texts the same
   std::vector<std::string> warnings;  ///< for the experimenter, also on the console
-  std::vector<std::string> notes;     ///< JSON
+  std::vector<std::string> notes;     ///< JSON, for the record
 };
 
 /// Looks into the database, if there is one, and lets it go again. Asks at the terminal, where
-/// there is one, before somebody new takes part. \throws UsageError: not meant, or told otherwise
-/// than it is; StoreError.
-Admission admit(const RunSettings& settings, const Protocol& protocol);
+/// there is one, before somebody new takes part, and with what somebody goes on whose protocol was
+/// changed. \throws UsageError: not meant, or told otherwise than it is; InputError; StoreError.
+Admission admit(const RunSettings& settings);
 
 }  // namespace palpate

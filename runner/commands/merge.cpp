@@ -16,11 +16,12 @@ namespace po = boost::program_options;
 
 int merge_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate merge --out ALL.db A.db B.db ...";
+  line.usage = "palpate merge --out ALL.db A.db B.db ... [--renumber]";
   line.summary =
       "Makes one new database of several stations' databases, which are only read. Refuses, with\n"
       "every reason, what cannot be one study: a participant with different content, one number\n"
-      "for two codes, different protocols under one name. Who has withdrawn at one station is "
+      "for two codes (unless --renumber), different protocols under one name. Who has withdrawn at "
+      "one station is "
       "left\n"
       "out from all. Merging a merged database again with its parts changes nothing.";
   line.example =
@@ -32,6 +33,9 @@ int merge_command(const std::vector<std::string>& args) {
   add("out", po::value(&out)->required()->value_name("FILE"), "the new database");
   add("input", po::value(&inputs)->value_name("FILE"),
       "a station's database; --input itself may be left out");
+  add("renumber", po::bool_switch(),
+      "two stations gave one number to two codes: who began later gets the next number after all; "
+      "the number whose order of trials was shown stays on record and orders those to come");
   line.positional.add("input", -1);
   const auto values = line.parse(args);
   if (!values) return 0;
@@ -41,15 +45,23 @@ int merge_command(const std::vector<std::string>& args) {
   const std::atomic<bool>& stop_asked = watch_stop_signals();
   try {
     ProgressLine progress("sessions");
-    const Merged done = merge(out, inputs, [&](std::int64_t session, std::int64_t all) {
-      if (stop_asked) throw std::runtime_error("stopped; nothing was written");
-      progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
-    });
+    const Merged done = merge(
+        out, inputs,
+        [&](std::int64_t session, std::int64_t all) {
+          if (stop_asked) throw std::runtime_error("stopped; nothing was written");
+          progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
+        },
+        (*values)["renumber"].as<bool>() ? NumberClash::renumber : NumberClash::refuse);
     progress.clear();
     warn_of_exposure(out);
     std::cout << printable(out) << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";
+    for (const Renumbered& one : done.renumbered) {
+      std::cout << one.code << " (" << printable(one.path) << ") has number " << one.to
+                << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
+                << one.code << " keep the order of number " << one.from << "\n";
+    }
     for (const LeftOut& one : done.left_out) {
       std::cerr << printable(one.code) << " has withdrawn and is left out, but is still in "
                 << printable(one.path) << "; remove with: palpate forget --db '"

@@ -18,6 +18,9 @@ void check(RunSettings& settings) {
   if (!is_participant_code(settings.participant))
     throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
   if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
+  const std::string& changed = settings.changed_protocol;
+  if (!changed.empty() && changed != "stored" && changed != "texts")
+    throw UsageError("--changed-protocol: stored or texts was expected");
   if (settings.session && *settings.session < 1)
     throw UsageError("--session: 1 or more was expected");
   if (!settings.hand.empty() && settings.hand != "left" && settings.hand != "right")
@@ -58,6 +61,11 @@ int run_command(const std::vector<std::string>& args) {
        "CODE is somebody new: do not ask, whatever it looks like")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
+      (
+          "changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
+          "where CODE began with another text of the protocol: go on with it as it is stored (the "
+          "default), or, where only texts differ, with the new texts; without it a terminal is "
+          "asked")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
        "falcon, falcon2, mouse or simulated")  //
       ("session", po::value(&session)->value_name("N"),

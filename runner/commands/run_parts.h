@@ -20,7 +20,7 @@ namespace palpate {
 struct RunSettings {
   std::string protocol, database, participant, device;
   std::optional<int> number, session;
-  std::string consent, hand, firmware, calibration, sound_device = "default";
+  std::string consent, hand, firmware, changed_protocol, calibration, sound_device = "default";
   std::vector<std::string> serials, markers;
   std::optional<double> response_latency;
   int participant_monitor = 0, console_monitor = 0;

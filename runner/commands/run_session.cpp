@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 
 #include "data/utc.h"
@@ -77,8 +78,11 @@ int choose_session(Store& store, const Participant& participant, const Protocol&
 
 LiveSession::Outcome run_session(const RunParts& at) {
   const ClockStamp stamp = stamp_now(at.clock);
-  RunRecord record(at.store, info_of(at.protocol), at.participant,
-                   describe(at.settings, at.device, at.session, stamp));
+  const ProtocolInfo shown = info_of(at.protocol);
+  const bool other_texts = shown.sha256 != at.admission.enrolled.sha256;
+  RunRecord record(at.store, at.admission.enrolled, at.participant,
+                   describe(at.settings, at.device, at.session, stamp),
+                   other_texts ? std::optional(shown) : std::nullopt);
   const PreflightRecord preflight = go_through_preflight(at);
   if (at.participant.id != 0) record.begin();  // it is no news that takes a number
   const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));

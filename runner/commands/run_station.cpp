@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "protocols/parse.h"
 #include "runner/commands/command.h"
 #include "runner/commands/run_session.h"
 #include "runner/display/text_display.h"
@@ -153,7 +152,7 @@ void report_servo(const RunParts& at, std::int64_t started_ns) {
 
 /// \return the exit status
 int report(const RunParts& at, const LiveSession::Outcome& outcome) {
-  const Participant who = at.store.look_up(info_of(at.protocol), at.participant.code, std::nullopt,
+  const Participant who = at.store.look_up(at.admission.enrolled, at.participant.code, std::nullopt,
                                            at.participant.simulated);
   const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
   std::printf("%s, participant %s (%s), session %d: %zu of %zu trials on record; %s\n",
@@ -174,10 +173,12 @@ int report(const RunParts& at, const LiveSession::Outcome& outcome) {
 
 }  // namespace
 
-int run_station(const RunSettings& settings) {
-  Protocol protocol = parse_protocol(settings.protocol);
-  const DeviceKind& kind = kind_of(settings.device);
-  const Admission admission = admit(settings, protocol);
+int run_station(const RunSettings& named) {
+  const DeviceKind& kind = kind_of(named.device);
+  Admission admission = admit(named);
+  RunSettings settings = named;
+  settings.participant = admission.participant;
+  Protocol& protocol = admission.protocol;
   Markers markers(open_markers(settings.markers, settings.marker_codes
                                                      ? MarkerCodes::everywhere
                                                      : MarkerCodes::this_computer));
@@ -195,11 +196,15 @@ int run_station(const RunSettings& settings) {
   RealClock clock;
   // What a simulated device gave is labelled simulated, whoever answered.
   const Participant participant =
-      store.look_up(info_of(protocol), settings.participant, settings.number, able.simulated);
+      store.look_up(admission.enrolled, settings.participant, admission.number, able.simulated);
   const int session = choose_session(store, participant, protocol, settings, clock);
   std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
               participant.number, session, protocol.sessions.count);
   std::fflush(stdout);
+  if (participant.enrolled_number != participant.number)
+    std::fprintf(stderr,
+                 "renumbered when databases were merged: the trials are those of number %d\n",
+                 participant.enrolled_number);
   if (participant.id == 0) std::fprintf(stderr, "%s", kNotEnrolledYet);
   if (able.simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
   if (settings.consent.empty())

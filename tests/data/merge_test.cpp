@@ -123,6 +123,54 @@ class Merging : public ::testing::Test {
   const std::string a_ = folder_ / "a.db", b_ = folder_ / "b.db", out_ = folder_ / "all.db";
 };
 
+TEST_F(Merging, NumbersGivenTwiceAreRenumberedOnRequestAndTheTrialsKeepTheirOrder) {
+  const std::string c = folder_ / "c.db", again = folder_ / "again.db";
+  {
+    Store a = write(a_), b = write(b_), third = write(c);
+    show_session(a, "P1", 1);
+    show_session(a, "P2", 2, 2);  // a day later than the other number 2
+    show_session(b, "Q1", 1);
+    show_session(b, "Q2", 2);
+    show_session(third, "R1", 4);
+  }
+  const std::string message = refusal({a_, b_});
+  EXPECT_TRUE(contains(message, "number 1 is that of participant P1 and of participant Q1"));
+  EXPECT_TRUE(contains(message, "number 2 is that of participant Q2 and of participant P2"));
+  EXPECT_TRUE(contains(message, "--renumber"));
+  EXPECT_TRUE(contains(message, "run --number"));
+  EXPECT_FALSE(contains(message, "forget")) << "nobody has to go";
+
+  Lines parts = exported(a_, export_folder_);
+  parts.merge(exported(b_, export_folder_));
+  const Merged done = merge(out_, {b_, a_}, {}, NumberClash::renumber);
+  ASSERT_EQ(done.renumbered.size(), 2u);
+  EXPECT_EQ(done.renumbered[0].code + done.renumbered[0].other, "Q1P1");
+  EXPECT_EQ(done.renumbered[0].from, 1);
+  EXPECT_EQ(done.renumbered[0].to, 3);
+  EXPECT_EQ(done.renumbered[1].code + done.renumbered[1].other, "P2Q2");
+  EXPECT_EQ(done.renumbered[1].to, 4);
+  EXPECT_EQ(exported(out_, export_folder_), parts) << "also the number that ordered the trials";
+  {
+    Store all = write(out_);
+    const Participant person = all.look_up(a_protocol(), "P2");
+    EXPECT_EQ(person.number, 4);
+    EXPECT_EQ(person.enrolled_number, 2);
+    EXPECT_EQ(all.look_up(a_protocol(), "NEW").number, 5);
+  }
+  // The merged one with its parts again, in any order: nothing changes, and nobody asks again.
+  const Merged repeated = merge(again, {a_, out_, b_});
+  EXPECT_TRUE(repeated.renumbered.empty());
+  EXPECT_EQ(exported(again, export_folder_), parts);
+  EXPECT_EQ(write(again).look_up(a_protocol(), "Q1").number, 3);
+  fs::remove(again);
+  // A number that was given away by a merge is no claim against a station that counted so far.
+  const Merged more = merge(again, {out_, c}, {}, NumberClash::renumber);
+  ASSERT_EQ(more.renumbered.size(), 1u);
+  EXPECT_EQ(more.renumbered[0].code + more.renumbered[0].other, "P2R1");
+  EXPECT_EQ(more.renumbered[0].from, 2);
+  EXPECT_EQ(more.renumbered[0].to, 5);
+}
+
 TEST_F(Merging, HoldsWhatTheStationsHold) {
   {
     Store a = write(a_), b = write(b_);

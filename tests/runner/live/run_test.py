@@ -420,6 +420,138 @@ class Enrolment(Live):
         self.assertIn("5 years before the protocol or the program was written", json.loads(note[0])["clock_warning"])
 
 
+class Changed(Live):
+    """The protocol's file is edited while somebody is half way through it."""
+
+    TEXTS = {"texts": PROTOCOL["texts"] | {"break": "sit down"}}
+    DESIGN = TEXTS | {"seed": 8}
+
+    def setUp(self):
+        super().setUp()
+        terminal = self.begin(code="K1")
+        terminal.type(":stop\n1")
+        self.finish(terminal)
+
+    def changes(self):
+        return [json.loads(text)["protocol_change"] for (text,) in
+                self.sql("SELECT text FROM notes WHERE text LIKE '{\"protocol_change%' ORDER BY id")]
+
+    def shown_texts(self):
+        """Of every run, where it was not the participant's own protocol."""
+        return [text and json.loads(text)["texts"]["break"] for (text,) in self.sql(
+            "SELECT p.text FROM runs r LEFT JOIN protocols p ON p.id = r.protocol_id ORDER BY r.id")]
+
+    def test_the_stored_protocol_goes_on_unless_told_otherwise(self):
+        with self.run_session(code="K1", **self.TEXTS) as terminal:
+            terminal.wait_for("K1 began with another text of protocol two (1 trials on record, last run on ")
+            terminal.wait_for("has changed since (only texts: /texts/break)")
+            terminal.wait_for("t  go on with the new texts", "which? ")
+            terminal.wait_for("which? ")
+            terminal.type("\n")
+            terminal.wait_for("participant K1 has number 1; session 1 of 1")
+            self.finish(terminal)
+            self.assertIn("have a rest", terminal.text)
+            self.assertNotIn("sit down", terminal.text)
+            self.assertIn("4 of 4 trials on record; done", terminal.text)
+        self.assertEqual(self.codes(self.db), ["K1"])
+        self.assertEqual(self.sql("SELECT count(*) FROM protocols"), [(1,)])
+        (change,) = self.changes()
+        self.assertEqual((change["shown"], change["texts"], change["stimuli_and_order"]),
+                         ("stored", ["/texts/break"], []))
+        with self.run_session(code="K1", **self.DESIGN) as terminal:
+            terminal.wait_for("which? ")
+            terminal.type("s\n")
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("K1 has done every session", terminal.text)
+
+    def test_new_texts_where_only_texts_differ(self):
+        with self.run_session(code="K1", **self.TEXTS) as terminal:
+            terminal.wait_for("which? ")
+            terminal.type("t\n")
+            terminal.wait_for("[space bar: go on]")
+            terminal.type(" ")
+            terminal.wait_for(FEELING)
+            terminal.type(":stop\n1")
+            self.finish(terminal)
+            self.assertIn("2 of 4 trials on record", terminal.text)
+        with self.run_session(code="K1", **self.TEXTS) as terminal:  # that has been answered
+            terminal.wait_for("going on with these texts, as in the last run")
+            self.finish(terminal)
+            self.assertIn("sit down", terminal.text)
+            self.assertNotIn("which?", terminal.text)
+        self.assertEqual(self.shown_texts(), [None, "sit down", "sit down"])
+        self.assertEqual(self.codes(self.db), ["K1"])
+        self.assertEqual([change["shown"] for change in self.changes()], ["new texts"] * 2)
+        schedule = subprocess.run([PALPATE, "schedule", self.protocol(), "--participant", "1", "--format", "csv"],
+                                  check=True, capture_output=True, text=True).stdout
+        self.assertEqual([row["shape"] for row in self.export()],
+                         [row["shape"] for row in csv.DictReader(schedule.splitlines())])
+
+    def test_another_order_is_no_new_text(self):
+        with self.run_session(code="K1", **self.DESIGN) as terminal:
+            terminal.wait_for("(stimuli and order: /seed; texts: /texts/break)")
+            terminal.wait_for("which? ")
+            self.assertNotIn("t  go on with the new texts", terminal.text)
+            terminal.type("t\n")
+            terminal.wait_for("which? ")
+            terminal.type("q\n")
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("nothing was begun", terminal.text)
+        done = self.run_piped("--changed-protocol", "texts", code="K1", **self.DESIGN)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(b"--changed-protocol texts: K1 began with another text", done.stderr)
+        self.assertEqual(self.run_piped("--changed-protocol", "new", code="K1").returncode, 2)
+        self.assertEqual(self.ends(), ["paused"])
+
+    def test_begun_anew_under_a_new_code(self):
+        with self.run_session(code="K1", **self.DESIGN) as terminal:
+            terminal.wait_for("which? ")
+            terminal.type("n\n")
+            terminal.wait_for("The new code: ")
+            terminal.type("M1\n")
+            terminal.wait_for("Is M1 a new participant? [y/N]")
+            terminal.type("y\n")
+            terminal.wait_for("participant M1 has number 1; session 1 of 1")
+            self.finish(terminal)
+            self.assertIn("4 of 4 trials on record; done", terminal.text)
+        self.assertEqual(self.codes(self.db), ["K1", "M1"])
+        (change,) = self.changes()
+        self.assertEqual((change["shown"], change["earlier_code"]), ("begun anew", "K1"))
+
+    def test_a_script_goes_on_with_the_stored_protocol_and_is_told(self):
+        done = self.run_piped(code="K1", **self.TEXTS)  # its input ends at once
+        self.assertIn(b"going on with the protocol as it is stored. --changed-protocol texts shows", done.stderr)
+        self.assertIn(b"1 of 4 trials on record; aborted", done.stdout)
+        done = self.run_piped("--changed-protocol", "texts", code="K1", **self.TEXTS)
+        self.assertIn(b"going on with the new texts", done.stderr)
+        self.assertEqual(self.shown_texts(), [None, None, "sit down"])
+        done = self.run_piped("--changed-protocol", "stored", code="K1", **self.TEXTS)
+        self.assertIn(b"going on with the protocol as it is stored\n", done.stderr)
+        self.assertEqual(self.codes(self.db), ["K1"])
+
+    def test_layout_alone_asks_nobody(self):
+        path = self.protocol()
+        path.write_text(json.dumps(PROTOCOL, indent=3, sort_keys=True))
+        with unittest.mock.patch.object(self, "protocol", lambda **_: path):
+            with self.run_session(code="K1") as terminal:
+                terminal.wait_for("(only its layout); going on with the protocol as it is stored")
+                self.finish(terminal)
+        self.assertEqual(self.codes(self.db), ["K1"])
+
+    def test_others_who_come_new_to_other_texts_get_the_next_number(self):
+        terminal = self.begin(code="K2", **self.TEXTS)
+        self.assertIn("participant K2 has number 2; session 1 of 1", terminal.text)
+        self.assertIn("with another text of this protocol (only texts: /texts/break); numbers count on", terminal.text)
+        terminal.type(":quit\n")
+        self.finish(terminal)
+        done = self.run_piped("--number", "1", code="K3", **self.TEXTS)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(b"--number: 1 is taken by participant K1", done.stderr)
+        done = self.run_piped(code="K3", **self.DESIGN)
+        self.assertIn(b"participant K3 has number 1", done.stdout)
+        self.assertIn(b"(stimuli and order: /seed; texts: /texts/break)", done.stderr)
+
+
 class Broken(Live):
     def test_killed_in_mid_trial_it_goes_on_with_that_trial(self):
         terminal = self.begin()
