@@ -35,9 +35,9 @@ void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines
 std::string what_happened(const ChangedProtocol& changed, const ProtocolDifference& difference) {
   const EarlierProtocol& earlier = changed.earlier;
   return changed.code + " began with another text of protocol " + changed.now.name + " (" +
-         std::to_string(earlier.trials) + " trials on record" +
-         (earlier.last_run.empty() ? "" : ", last run on " + earlier.last_run) + "). " +
-         changed.path + " has changed since (" + in_words(difference) + ")";
+         std::to_string(earlier.trials) + (earlier.trials == 1 ? " trial" : " trials") +
+         " on record" + (earlier.last_run.empty() ? "" : ", last run on " + earlier.last_run) +
+         "). " + changed.path + " has changed since (" + in_words(difference) + ")";
 }
 
 ProtocolChoice ask_which(const std::string& code, bool only_texts) {

@@ -443,7 +443,7 @@ class Changed(Live):
 
     def test_the_stored_protocol_goes_on_unless_told_otherwise(self):
         with self.run_session(code="K1", **self.TEXTS) as terminal:
-            terminal.wait_for("K1 began with another text of protocol two (1 trials on record, last run on ")
+            terminal.wait_for("K1 began with another text of protocol two (1 trial on record, last run on ")
             terminal.wait_for("has changed since (only texts: /texts/break)")
             terminal.wait_for("t  go on with the new texts", "which? ")
             terminal.wait_for("which? ")
