@@ -35,6 +35,41 @@ TEST_F(StoreSession, ParticipantsGetTheSmallestUnusedNumberOrTheWantedOne) {
   EXPECT_EQ(store.counts().participants, 5);
 }
 
+TEST_F(StoreSession, ALookWritesNothingAndSaysWhatWouldBeGiven) {
+  Store store = open();
+  EXPECT_EQ(store.look_up(a_protocol(), "A").number, 1);
+  EXPECT_EQ(store.look_up(a_protocol(), "A", 4).number, 4);
+  EXPECT_EQ(store.look_up(a_protocol(), "A").id, 0);
+  EXPECT_EQ(store.counts().participants + store.counts().protocols, 0);
+  store.enrol(a_protocol(), "A", 2);
+  store.enrol(a_protocol('b'), "Z");
+  EXPECT_NE(store.look_up(a_protocol(), "A").id, 0);
+  EXPECT_EQ(store.look_up(a_protocol(), "B").number, 1);
+  EXPECT_TRUE(
+      contains(error_of([&] { store.look_up(a_protocol(), "B", 2); }), "taken by participant A"));
+  store.enrol(a_protocol(), "GONE");
+  store.forget("GONE");
+  EXPECT_TRUE(contains(error_of([&] { store.look_up(a_protocol(), "GONE"); }), "has withdrawn"));
+  EXPECT_EQ(store.codes(), (std::vector<std::string>{"A", "Z"}));
+}
+
+TEST_F(StoreSession, TheNewestRecordIsOfALiveSession) {
+  Store store = open();
+  EXPECT_EQ(store.newest_record(), std::nullopt);
+  RunInfo info = a_run();
+  info.observer_sha256 = std::string(64, 'f');
+  store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 7), info);
+  EXPECT_EQ(store.newest_record(), std::nullopt) << "a simulated study has its own calendar";
+  info = a_run();
+  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), info);
+  EXPECT_EQ(store.newest_record(), info.clock.utc_ns);
+  show(store, run, 2);
+  const std::int64_t answered_ns = a_record(2).response_ns - info.clock.monotonic_ns;
+  EXPECT_EQ(store.newest_record(), info.clock.utc_ns + answered_ns);
+  store.end_run(run, RunEnd::paused, info.clock.monotonic_ns + 3'600'000'000'000);
+  EXPECT_EQ(store.newest_record(), info.clock.utc_ns + 3'600'000'000'000);
+}
+
 TEST_F(StoreSession, NumbersAndCodesThatClashAreRefused) {
   Store store = open();
   store.enrol(a_protocol(), "A", 2);

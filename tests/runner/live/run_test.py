@@ -519,14 +519,26 @@ class Changed(Live):
         self.assertEqual((change["shown"], change["earlier_code"]), ("begun anew", "K1"))
 
     def test_a_script_goes_on_with_the_stored_protocol_and_is_told(self):
-        done = self.run_piped(code="K1", **self.TEXTS)  # its input ends at once
-        self.assertIn(b"going on with the protocol as it is stored. --changed-protocol texts shows", done.stderr)
-        self.assertIn(b"1 of 4 trials on record; aborted", done.stdout)
-        done = self.run_piped("--changed-protocol", "texts", code="K1", **self.TEXTS)
-        self.assertIn(b"going on with the new texts", done.stderr)
-        self.assertEqual(self.shown_texts(), [None, None, "sit down"])
-        done = self.run_piped("--changed-protocol", "stored", code="K1", **self.TEXTS)
-        self.assertIn(b"going on with the protocol as it is stored\n", done.stderr)
+        def piped(*options):
+            """Up to the trial that is due; then the input ends."""
+            process = subprocess.Popen([PALPATE, "run", self.protocol(**self.TEXTS), "--db", self.db, "--participant",
+                                        "K1", "--device", "simulated", "--no-window", *options], stdin=subprocess.PIPE,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            said = ""
+            while FEELING not in said:
+                said += (line := process.stderr.readline())
+                self.assertTrue(line, said)
+                if "[instructions]" in line or "[block begins" in line:
+                    process.stdin.write(" ")
+                    process.stdin.flush()
+            out, err = process.communicate(timeout=60)
+            self.assertIn("1 of 4 trials on record; aborted", out)
+            return said + err
+
+        self.assertIn("going on with the protocol as it is stored. --changed-protocol texts shows", piped())
+        self.assertIn("going on with the new texts", piped("--changed-protocol", "texts"))
+        self.assertIn("going on with the protocol as it is stored\n", piped("--changed-protocol", "stored"))
+        self.assertEqual(self.shown_texts(), [None, None, "sit down", None])
         self.assertEqual(self.codes(self.db), ["K1"])
 
     def test_layout_alone_asks_nobody(self):
@@ -835,7 +847,7 @@ while os.getppid() == runner:
     except TimeoutError:
         continue
     if b'{"marker"' in frame:
-        open(sys.argv[2], "ab").write(frame[frame.index(b"{"):])
+        open(sys.argv[2], "ab").write(frame[frame.index(b'{"marker"'):])
 """)
         def heard(wire, host, code, *options):
             said = self.dir / f"heard-{code}"
