@@ -76,7 +76,7 @@ std::optional<Participant> enrolled(const Place& in, std::int64_t protocol,
   bool was_simulated = false;
   std::optional<std::string> was_seed;
   Row(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >> was_seed;
-  if (number && *number != person.number) {
+  if (number && *number != person.number && *number != person.enrolled_number) {
     in.refuse("participant " + person.code + " has number " + std::to_string(person.number) +
               ", not " + std::to_string(*number) + "; leave the number out to go on");
   }

@@ -105,7 +105,8 @@ struct Shared {
 
 void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue) {
   const Protocol& protocol = shared.protocol;
-  const SimulatedSettings own = individual(shared.settings, shared.seed, work.participant.number);
+  const SimulatedSettings own =
+      individual(shared.settings, shared.seed, work.participant.enrolled_number);
   SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
                          1 / protocol.servo_rate);
   VirtualClock clock(work.clock_ns);
@@ -113,7 +114,7 @@ void run_session(const Shared& shared, const Work& work, std::size_t index, Queu
               {protocol.workspace.centre, protocol.workspace.scale});
   if (protocol.passivity_controller) servo.control_passivity();
   SimulatedParticipant participant(own, shared.hypotheses, stylus, protocol, shared.seed,
-                                   work.participant.number);
+                                   work.participant.enrolled_number);
   QueueLog log(queue, index);
   Session session({protocol, shared.library, servo, clock, participant, log},
                   plan_of(protocol, work), work.info.clock);

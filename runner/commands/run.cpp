@@ -61,11 +61,10 @@ int run_command(const std::vector<std::string>& args) {
        "CODE is somebody new: do not ask, whatever it looks like")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
-      (
-          "changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
-          "where CODE began with another text of the protocol: go on with it as it is stored (the "
-          "default), or, where only texts differ, with the new texts; without it a terminal is "
-          "asked")  //
+      ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
+       "where CODE began with another text of the protocol: go on with it as it is stored (the "
+       "default), or, where only texts differ, with the new texts; without it a terminal is "
+       "asked")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
        "falcon, falcon2, mouse or simulated")  //
       ("session", po::value(&session)->value_name("N"),
