@@ -106,6 +106,9 @@ struct RunInfo {
   std::string consent_version;
   std::optional<std::int64_t> consent_utc_ns;
   std::string hand;  ///< "left", "right"
+  /// The participant has withdrawn and asks to take part again: else no session of theirs that was
+  /// withdrawn is begun. Not stored by itself.
+  bool after_withdrawal = false;
   /// Of the protocol that the run was shown with, where only its texts differ from that of the
   /// participant; "": the participant's own.
   std::string protocol_sha256;

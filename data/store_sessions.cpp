@@ -197,7 +197,8 @@ Run Store::begin_run(const Participant& participant, const RunInfo& info,
       Binder(last) << run.session_id;
       const RunEnd end =
           last.executeStep() ? run_end_of(last.getColumn(0).getString()) : RunEnd::paused;
-      if (end == RunEnd::done || end == RunEnd::withdrawn || end == RunEnd::running) {
+      const bool left = end == RunEnd::withdrawn && !info.after_withdrawal;
+      if (end == RunEnd::done || left || end == RunEnd::running) {
         impl_->refuse(name + " is " + to_string(end) + " and cannot be begun again");
       }
     } else {

@@ -30,6 +30,7 @@ void Preflight::finish(const std::string& finding) {
 
 void Preflight::add(const Sample& sample) {
   const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
+  trouble_ = sample.trouble;
   if (lost) {  // also later: a device that was lost has to be homed again
     homed_ = 0;
     if (step_ == Step::done) return;
@@ -118,6 +119,9 @@ void Preflight::skip() {
 std::string Preflight::instruction() const {
   switch (step_) {
     case Step::homing:
+      if (trouble_ != DeviceTrouble::none && trouble_ != DeviceTrouble::not_homed &&
+          trouble_ != DeviceTrouble::guarded)
+        return advice(trouble_);
       return "home the device: pull the grip fully out, then push it straight in";
     case Step::limits:
       if (push_ == Push::given)

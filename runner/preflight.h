@@ -51,7 +51,8 @@ class Preflight {
 
   PreflightNeeds needs_;
   Step step_ = Step::homing;
-  int homed_ = 0;  ///< samples in a row
+  int homed_ = 0;                                ///< samples in a row
+  DeviceTrouble trouble_ = DeviceTrouble::none;  ///< while it is lost
   enum class Push { not_yet, due, given } push_ = Push::not_yet;
   std::string push_fault_;  ///< of the last one
   Vec3 least_, most_;

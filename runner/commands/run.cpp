@@ -59,6 +59,8 @@ int run_command(const std::vector<std::string>& args) {
        "no other user of this computer sees it")  //
       ("new-participant", po::bool_switch(&settings.new_participant),
        "CODE is somebody new: do not ask, whatever it looks like")  //
+      ("after-withdrawal", po::bool_switch(&settings.after_withdrawal),
+       "CODE has withdrawn and asks to take part again; recorded")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
       ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),

@@ -25,7 +25,8 @@ struct RunSettings {
   std::optional<double> response_latency;
   int participant_monitor = 0, console_monitor = 0;
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
-       without_noise = false, new_participant = false, marker_codes = false;
+       without_noise = false, new_participant = false, after_withdrawal = false,
+       marker_codes = false;
 };
 
 /// What the session's thread works with; all of it is owned by the main thread.

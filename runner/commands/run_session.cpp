@@ -9,6 +9,7 @@
 #include "data/utc.h"
 #include "runner/build_info.h"
 #include "runner/commands/command.h"
+#include "runner/commands/resumption.h"
 #include "runner/commands/run_preflight.h"
 
 namespace palpate {
@@ -36,6 +37,7 @@ RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, 
   info.consent_version = settings.consent;
   if (!settings.consent.empty()) info.consent_utc_ns = stamp.utc_ns;
   info.hand = settings.hand;
+  info.after_withdrawal = settings.after_withdrawal;
   return info;
 }
 
@@ -45,10 +47,31 @@ SessionPlan plan_of(const RunParts& at, const SessionProgress& before) {
   return plan;
 }
 
-}  // namespace
+/// What the experimenter should know before anything else.
+std::vector<std::string> news(const RunParts& at, const SessionPlan& plan) {
+  std::vector<std::string> out;
+  const std::string resumed = resumption(at.store, at.participant, at.session, plan);
+  if (!resumed.empty()) out.push_back(resumed);
+  return out;
+}
 
-int choose_session(Store& store, const Participant& participant, const Protocol& protocol,
-                   const RunSettings& settings, Clock& clock) {
+/// Before the first trial. Only what must not be lost begins a run: that somebody withdrew, and
+/// notes on somebody who has a number already.
+LiveSession::Outcome ended_early(const RunParts& at, RunRecord& record, const SessionPlan& plan,
+                                 const EndOfSession& end) {
+  LiveSession::Outcome outcome{end.end, end.what(), plan.done(), plan.size(), end.failed};
+  if (end.end == RunEnd::withdrawn || (at.participant.id != 0 && !record.waiting().empty()))
+    record.begin();
+  outcome.unkept = record.waiting();
+  const std::int64_t now = at.clock.now_ns();
+  if (record.begun()) record.note(now, "ended: " + outcome.reason);
+  record.end(end.end, now);
+  return outcome;
+}
+
+/// As choose_session, but for withdrawals.
+int session_due(Store& store, const Participant& participant, const Protocol& protocol,
+                const RunSettings& settings, Clock& clock) {
   const int count = protocol.sessions.count;
   if (settings.session && *settings.session > count)
     throw UsageError("--session: the protocol has " + std::to_string(count));
@@ -56,9 +79,6 @@ int choose_session(Store& store, const Participant& participant, const Protocol&
   SessionProgress before;
   for (; session <= count; ++session) {
     const SessionProgress progress = store.progress(participant, session);
-    if (progress.last_end == RunEnd::withdrawn)
-      throw UsageError("session " + std::to_string(session) + " of participant " +
-                       participant.code + " is withdrawn and cannot be begun again");
     if (progress.last_end != RunEnd::done) break;
     before = progress;
   }
@@ -76,6 +96,33 @@ int choose_session(Store& store, const Participant& participant, const Protocol&
   return session;
 }
 
+/// \throws UsageError: the participant has withdrawn, and nobody said that this is known.
+void check_withdrawal(Store& store, const Participant& participant, int session,
+                      const RunSettings& settings) {
+  const std::string& code = participant.code;
+  const std::string when = withdrawn_when(store, code);
+  const bool here = store.progress(participant, session).last_end == RunEnd::withdrawn;
+  if (!here && when.empty()) {
+    if (settings.after_withdrawal)
+      throw UsageError("--after-withdrawal: participant " + code +
+                       " has not withdrawn; leave the option out");
+  } else if (!settings.after_withdrawal) {
+    throw UsageError("participant " + code + " has withdrawn" +
+                     (when.empty() ? "" : " (" + when + ")") +
+                     " and is not begun again: add --after-withdrawal where the participant asks "
+                     "to take part again; 'palpate forget' removes what is on record");
+  }
+}
+
+}  // namespace
+
+int choose_session(Store& store, const Participant& participant, const Protocol& protocol,
+                   const RunSettings& settings, Clock& clock) {
+  const int session = session_due(store, participant, protocol, settings, clock);
+  check_withdrawal(store, participant, session, settings);
+  return session;
+}
+
 LiveSession::Outcome run_session(const RunParts& at) {
   const ClockStamp stamp = stamp_now(at.clock);
   const ProtocolInfo shown = info_of(at.protocol);
@@ -83,9 +130,16 @@ LiveSession::Outcome run_session(const RunParts& at) {
   RunRecord record(at.store, at.admission.enrolled, at.participant,
                    describe(at.settings, at.device, at.session, stamp),
                    other_texts ? std::optional(shown) : std::nullopt);
-  const PreflightRecord preflight = go_through_preflight(at);
-  if (at.participant.id != 0) record.begin();  // it is no news that takes a number
   const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
+  PreflightRecord preflight;
+  try {
+    preflight = go_through_preflight(at, record, news(at, plan));
+  } catch (const EndOfSession& end) {
+    return ended_early(at, record, plan, end);
+  }
+  if (at.participant.id != 0) record.begin();  // it is no news that takes a number
+  if (at.settings.after_withdrawal)
+    record.note(stamp.monotonic_ns, "begun again after a withdrawal");
   LiveSession session(
       {at.protocol, at.library, at.servo, at.guard, at.clock, record, at.display.participant(),
        at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,

@@ -159,6 +159,49 @@ class Preflight(unittest.TestCase):
         self.assertIn("ended by the experimenter", terminal.text)
         self.assertEqual(self.notes(), [])
 
+    def ends(self):
+        with contextlib.closing(sqlite3.connect(self.database)) as db:
+            return db.execute("SELECT end_reason FROM runs ORDER BY id").fetchall()
+
+    def test_a_withdrawal_in_the_pre_flight_is_on_record_with_its_notes(self):
+        terminal = self.run_session("--calibration", self.calibration(0))
+        terminal.wait_for("(go: push)")
+        terminal.type(":note the grip is cold\n")
+        terminal.wait_for("note: the grip is cold")
+        terminal.type(":quit WITHDRAWN, is cold\n")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+        self.assertIn("0 of 2 trials on record; withdrawn", terminal.text)
+        self.assertEqual(self.ends(), [("withdrawn",)])
+        self.assertEqual(self.notes(), ["the grip is cold", "ended: the participant withdrew: WITHDRAWN, is cold"])
+        refused = self.run_session("--calibration", self.calibration(0))
+        self.assertEqual(refused.finish(), 2, refused.text)
+        self.assertIn("--after-withdrawal", refused.text)
+
+    def test_ended_in_the_pre_flight_with_trials_on_record_these_are_counted(self):
+        terminal = self.run_session("--calibration", self.calibration(0))
+        terminal.wait_for("(go: push)")
+        self.pushed_and_felt(terminal)
+        terminal.type(":note a note\n:go\n")
+        terminal.wait_for("move the stylus")
+        terminal.type(":go\n")  # left unchecked
+        self.hand(*AWAY)
+        terminal.wait_for("[homing, ")
+        terminal.type(":stop\n")
+        while True:
+            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
+            if came == "on record; ":
+                break
+            terminal.type("1" if came == "[trial, " else ":clear\n:go\n")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+        self.assertIn("a note", self.notes())
+        again = self.run_session("--calibration", self.calibration(0))
+        again.wait_for("1 of 2 trials done, last run ")
+        again.wait_for("(go: push)")
+        again.type(":note another\n:quit\n")
+        self.assertEqual(again.finish(), 0, again.text)
+        self.assertIn("1 of 2 trials on record; aborted", again.text)
+        self.assertIn("another", self.notes())
+
     def test_a_full_disk_in_contact_leaves_no_force(self):
         disk = self.folder / "disk"
         disk.mkdir()

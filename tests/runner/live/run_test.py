@@ -257,7 +257,56 @@ class Commands(Live):
         self.assertEqual(self.ends(), ["aborted", "withdrawn"])
         with self.run_session() as refused:
             self.assertEqual(refused.finish(), 2)
-            self.assertIn("withdrawn and cannot be begun again", refused.text)
+            self.assertIn("--after-withdrawal", refused.text)
+
+    def test_who_withdrew_is_begun_again_only_where_that_is_said(self):
+        terminal = self.begin()
+        terminal.type(":QUIT Withdrawn.\n")
+        self.finish(terminal)
+        self.assertIn("; withdrawn", terminal.text)
+        for changes in ({}, {"texts": {"instructions": "other words"}}):
+            with self.run_session(**changes) as refused:
+                self.assertEqual(refused.finish(), 2)
+                self.assertIn("--after-withdrawal", refused.text)
+        with self.run_session("--after-withdrawal") as again:
+            again.wait_for("[space bar: go on]")
+            again.type(":stop\n ")
+            self.finish(again)
+        self.assertEqual(self.ends(), ["withdrawn", "paused"])
+        self.assertIn("begun again after a withdrawal", self.notes())
+        with self.run_session("--after-withdrawal") as mistaken:
+            self.assertEqual(mistaken.finish(), 2)
+            self.assertIn("has not withdrawn", mistaken.text)
+        with self.run_session() as on:
+            self.finish(on)
+        self.assertEqual(self.ends()[-1], "done")
+
+    def test_a_session_that_goes_on_begins_by_saying_so(self):
+        terminal = self.begin()
+        self.assertNotIn("goes on with trial", terminal.text)
+        terminal.type(":stop\n1")
+        self.finish(terminal)
+        with self.run_session() as again:
+            again.wait_for("1 of 4 trials done, last run today ", " (paused), goes on with trial 2")
+            self.finish(again)
+
+    def test_a_stop_can_be_taken_back(self):
+        terminal = self.begin()
+        terminal.type(":stop\n:stop\n1")
+        self.finish(terminal)
+        self.assertIn("the stop is taken back", terminal.text)
+        self.assertEqual(self.ends(), ["done"])
+
+    def test_after_an_abort_nobody_reads_that_it_is_over(self):
+        terminal = self.begin()
+        terminal.type(":quit\n")
+        self.finish(terminal)
+        self.assertNotIn("good bye", terminal.text)
+
+    def test_the_end_is_no_trial(self):
+        terminal = self.begin()
+        self.finish(terminal)
+        self.assertRegex(terminal.text, r"\[end, [^\n]*trial 4 of 4")
 
     def test_emergency_holds_until_it_is_cleared(self):
         terminal = self.begin()
@@ -320,7 +369,7 @@ class Enrolment(Live):
         self.assertEqual(self.ends(), ["withdrawn"])
         with self.run_session() as refused:
             self.assertEqual(refused.finish(), 2)
-            self.assertIn("is withdrawn and cannot be begun again", refused.text)
+            self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and is not begun again")
 
     def test_what_fails_before_the_first_trial_enrols_nobody(self):
         without_display = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
