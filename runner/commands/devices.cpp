@@ -24,10 +24,14 @@ namespace po = boost::program_options;
 using Json = nlohmann::ordered_json;
 
 Json to_json(const DeviceCapabilities& c) {
+  // What pushes nothing has no limits of pushing; what stands there keeps scenes from being cut.
+  const auto of_pushing = [&c](double limit) {
+    return c.actuated_freedom > 0 ? Json(limit) : Json();
+  };
   return {{"sensed_freedom", c.sensed_freedom},
           {"actuated_freedom", c.actuated_freedom},
-          {"max_force_n", c.max_force},
-          {"max_stiffness_n_per_m", c.max_stiffness},
+          {"max_force_n", of_pushing(c.max_force)},
+          {"max_stiffness_n_per_m", of_pushing(c.max_stiffness)},
           {"max_rate_hz", c.max_rate},
           {"workspace_radius_m", c.workspace_radius},
           {"resolution_m", c.resolution},
@@ -39,11 +43,15 @@ Json to_json(const DeviceCapabilities& c) {
 }
 
 void print_limits(const DeviceCapabilities& c) {
-  std::printf(
-      "    senses %d degrees of freedom, drives %d; up to %g N, %g N/m, %g Hz;\n"
-      "    reaches %g mm about its centre, resolves %g um\n",
-      c.sensed_freedom, c.actuated_freedom, c.max_force, c.max_stiffness, c.max_rate,
-      c.workspace_radius * 1e3, c.resolution * 1e6);
+  std::printf("    senses %d degrees of freedom, ", c.sensed_freedom);
+  if (c.actuated_freedom > 0) {
+    std::printf("drives %d; up to %g N, %g N/m, %g Hz;\n", c.actuated_freedom, c.max_force,
+                c.max_stiffness, c.max_rate);
+  } else {
+    std::printf("drives none: nothing is felt; up to %g Hz;\n", c.max_rate);
+  }
+  std::printf("    reaches %g mm about its centre, resolves %g um\n", c.workspace_radius * 1e3,
+              c.resolution * 1e6);
   if (!c.serial.empty()) std::printf("    serial number %s\n", printable(c.serial).c_str());
   if (!c.calibration.empty())
     std::printf("    calibration: %s\n", printable(c.calibration).c_str());

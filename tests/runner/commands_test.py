@@ -48,6 +48,15 @@ class Devices(FromOutside):
             if "time" not in test["what"]:  # a busy machine
                 self.assertTrue(test["passed"], test)
 
+    def test_what_pushes_nothing_has_no_limits_of_pushing(self):
+        out = self.dir / "devices.json"
+        text = self.palpate("devices", "--device", "mouse", "--json", out).stdout
+        self.assertIn("drives none: nothing is felt", text)
+        self.assertNotIn(" N,", text)
+        (device,) = json.loads(out.read_text())["devices"]
+        self.assertIsNone(device["limits"]["max_force_n"])
+        self.assertIsNone(device["limits"]["max_stiffness_n_per_m"])
+
     def test_the_machine_is_judged_in_a_sentence_that_fits_the_figures(self):
         out = self.dir / "timing.json"
         command = [PALPATE, "devices", "--timing", "--seconds", "0.5", "--rate", "2000", "--json", str(out)]

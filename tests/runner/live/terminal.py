@@ -53,6 +53,11 @@ class Terminal:
             if time.monotonic() > end or not self._gather(0.2):
                 raise AssertionError(f"none of {words} came after:\n{self.text}")
 
+    def hear(self):
+        """All that has been said so far."""
+        self._gather(0)
+        return self.text
+
     def type(self, keys):
         os.write(self.master, keys.encode())
 
