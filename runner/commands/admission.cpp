@@ -17,6 +17,7 @@
 #include "runner/commands/ask.h"
 #include "runner/commands/command.h"
 #include "runner/commands/protocol_choice.h"
+#include "runner/commands/resumption.h"
 #include "runner/commands/run_parts.h"
 #include "runner/near_codes.h"
 #include "stimuli/printable.h"
@@ -67,6 +68,7 @@ Known look_into(const RunSettings& settings, const Protocol& protocol, const std
   std::error_code error;
   if (!fs::exists(settings.database, error)) return known;
   Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  if (!settings.after_withdrawal) refuse_withdrawn(store, code);
   known.codes = store.codes();
   for (const Participant& one : store.participants(protocol.sha256))
     known.enrolled = known.enrolled || one.code == code;

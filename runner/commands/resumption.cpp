@@ -5,6 +5,8 @@
 #include <ctime>
 #include <optional>
 
+#include "runner/commands/command.h"
+
 namespace palpate {
 namespace {
 
@@ -71,6 +73,18 @@ std::string withdrawn_when(Store& store, const std::string& code) {
       newest_run(store, [&code](const StoredRun& run) { return run.participant.code == code; });
   if (!last || last->end != RunEnd::withdrawn) return "";
   return spoken_time(last->info.clock.utc_ns, utc_now());
+}
+
+void throw_withdrawn(const std::string& code, const std::string& when) {
+  throw UsageError("participant " + code + " has withdrawn" +
+                   (when.empty() ? "" : " (" + when + ")") +
+                   " and is not begun again: add --after-withdrawal where the participant asks to "
+                   "take part again; 'palpate forget' removes what is on record");
+}
+
+void refuse_withdrawn(Store& store, const std::string& code) {
+  const std::string when = withdrawn_when(store, code);
+  if (!when.empty()) throw_withdrawn(code, when);
 }
 
 }  // namespace palpate

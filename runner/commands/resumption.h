@@ -16,8 +16,14 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 std::string resumption(Store& store, const Participant& participant, int session,
                        const SessionPlan& plan);
 
-/// Where the newest run of somebody with this code, in whatever protocol, ended with a withdrawal:
-/// when that was. Empty: it did not.
+/// Has the newest run of somebody with this code ended with a withdrawal, in whatever protocol?
+/// \throws UsageError: it has
+void refuse_withdrawn(Store& store, const std::string& code);
+
+/// \param when  in words; empty: not said
+[[noreturn]] void throw_withdrawn(const std::string& code, const std::string& when);
+
+/// When that was; empty: it has not.
 std::string withdrawn_when(Store& store, const std::string& code);
 
 }  // namespace palpate

@@ -107,10 +107,7 @@ void check_withdrawal(Store& store, const Participant& participant, int session,
       throw UsageError("--after-withdrawal: participant " + code +
                        " has not withdrawn; leave the option out");
   } else if (!settings.after_withdrawal) {
-    throw UsageError("participant " + code + " has withdrawn" +
-                     (when.empty() ? "" : " (" + when + ")") +
-                     " and is not begun again: add --after-withdrawal where the participant asks "
-                     "to take part again; 'palpate forget' removes what is on record");
+    throw_withdrawn(code, when);
   }
 }
 
