@@ -5,18 +5,10 @@
 #include <cstdint>
 
 #include "rendering/contact.h"
+#include "rendering/render_fault.h"
 #include "rendering/scene.h"
 
 namespace palpate {
-
-/// Bits of Rendering::faults.
-namespace render_fault {
-inline constexpr std::uint32_t kNonFinite = 1;  ///< pose or force was not finite: zero force
-inline constexpr std::uint32_t kStartedInside =
-    2;                                           ///< an object gives no force until it is left once
-inline constexpr std::uint32_t kWalkCapped = 4;  ///< a walk met its limit of steps
-inline constexpr std::uint32_t kContactsDropped = 8;  ///< more contacts than kMaxContacts
-}  // namespace render_fault
 
 /// What a tick renders. World frame.
 struct Rendering {
@@ -27,8 +19,8 @@ struct Rendering {
   Contact deepest;  ///< type none in free space
   LineProbe ideal;  ///< of the deepest contact; the virtual probe itself in free space
   int contacts = 0;
-  int object = -1;  ///< of the deepest contact
-  std::uint32_t faults = 0;
+  int object = -1;           ///< of the deepest contact
+  std::uint32_t faults = 0;  ///< render_fault
 };
 
 class Renderer {

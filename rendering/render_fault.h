@@ -1,0 +1,39 @@
+#pragma once
+// The fault bits of a renderer, and the one table that says what they mean: names in files, words
+// on screens and codebooks are made from it.
+
+#include <array>
+#include <cstdint>
+
+namespace palpate {
+
+/// What a fault bit is called and what it means.
+struct FaultBit {
+  std::uint32_t bit;
+  const char* name;      ///< in files
+  const char* words;     ///< on a screen
+  const char* meaning;   ///< in a codebook
+  const char* why = "";  ///< why forces went off, in a sentence; "" where they do not
+};
+
+/// Bits of Rendering::faults.
+namespace render_fault {
+inline constexpr std::uint32_t kNonFinite = 1;
+inline constexpr std::uint32_t kStartedInside = 2;
+inline constexpr std::uint32_t kWalkCapped = 4;
+inline constexpr std::uint32_t kContactsDropped = 8;
+}  // namespace render_fault
+
+inline constexpr std::array<FaultBit, 4> kRenderFaults = {{
+    {render_fault::kNonFinite, "non-finite", "not a finite number",
+     "the pose or the force was not a finite number: zero force until cleared",
+     "a force or pose was not finite"},
+    {render_fault::kStartedInside, "started-inside", "started inside",
+     "the stylus was inside an object at first: no force from it until it has been left once"},
+    {render_fault::kWalkCapped, "walk-capped", "search cut short",
+     "the search for the deepest contact met its limit of steps: the force may not be the last"},
+    {render_fault::kContactsDropped, "contacts-dropped", "too many contacts",
+     "more objects were touched at once than are rendered: the force is too small"},
+}};
+
+}  // namespace palpate
