@@ -1,7 +1,6 @@
 #include "analysis/csv_reader.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstring>
 #include <stdexcept>
 #include <utility>
@@ -12,7 +11,7 @@ namespace {
 
 constexpr std::size_t kBlock = std::size_t{1} << 18;
 constexpr std::string_view kTooLong =
-    "record of more than 1 MiB: expected one trial a line (is a quote left open?)";
+    "record of more than 1 MiB: expected one row a line (is a quote left open?)";
 
 constexpr std::string_view kBareCr =
     "holds a CR that no LF follows (do lines end in CR alone?): expected lines that end in LF or "
@@ -24,8 +23,7 @@ const char* find(const char* from, const char* to, char what) {
 
 }  // namespace
 
-CsvReader::CsvReader(const std::string& path) : file_(std::fopen(path.c_str(), "rb")) {
-  if (!file_) throw std::runtime_error(std::strerror(errno));
+CsvReader::CsvReader(const std::string& path) : file_(std::make_unique<InputFile>(path, kMaxFile)) {
   buffer_.resize(CsvReader::kMaxRecord + kBlock);
   fill();
   if (end_ >= 3 && std::memcmp(buffer_.data(), "\xEF\xBB\xBF", 3) == 0) begin_ = 3;
@@ -37,8 +35,12 @@ bool CsvReader::fill() {
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
-  const std::size_t got =
-      std::fread(buffer_.data() + end_, 1, std::min(kBlock, buffer_.size() - end_), file_.get());
+  std::size_t got = 0;
+  try {
+    got = file_->read(buffer_.data() + end_, std::min(kBlock, buffer_.size() - end_));
+  } catch (const std::runtime_error& error) {
+    trouble_ = error.what();
+  }
   end_ += got;
   if (got == 0) at_end_ = true;
   return got > 0;
@@ -65,8 +67,7 @@ bool CsvReader::next() {
       }
       seen = end_ - begin_;
       if (fill()) continue;
-      if (std::ferror(file_.get()))
-        return end_with("cannot be read: " + std::string(std::strerror(errno)));
+      if (!trouble_.empty()) return end_with("cannot be read: " + trouble_);
       if (begin_ == end_) return false;
       newline = buffer_.data() + end_;
     }
@@ -81,6 +82,7 @@ bool CsvReader::next() {
         seen = 0;
         continue;
       }
+      if (!trouble_.empty()) return end_with("cannot be read: " + trouble_);
       return end_with("a quote is opened in this record and never closed");
     }
     std::string_view text(start, static_cast<std::size_t>(newline - start));

@@ -2,11 +2,13 @@
 // RFC 4180 in a stream: constant memory, fields as views into one buffer.
 
 #include <cstddef>
-#include <cstdio>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "stimuli/input_file.h"
 
 namespace palpate {
 
@@ -16,6 +18,7 @@ class CsvReader {
  public:
   /// A record may have at most so many bytes: a forgotten quote shall not swallow the file.
   static constexpr std::size_t kMaxRecord = std::size_t{1} << 20;
+  static constexpr std::uintmax_t kMaxFile = std::uintmax_t{1} << 32;
 
   /// \throws std::runtime_error where the file cannot be opened.
   explicit CsvReader(const std::string& path);
@@ -31,9 +34,6 @@ class CsvReader {
   std::size_t line() const { return line_; }
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
   enum class Quoted { complete, incomplete };
 
   bool fill();
@@ -41,13 +41,13 @@ class CsvReader {
   Quoted split_quoted();
   bool end_with(std::string fault);
 
-  std::unique_ptr<std::FILE, Close> file_;
+  std::unique_ptr<InputFile> file_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< unread bytes of buffer_
   bool at_end_ = false, stopped_ = false;
   std::vector<std::string_view> fields_;
-  std::string unquoted_;  ///< holds the text of quoted fields, the quotes taken off
-  std::string fault_;
+  std::string unquoted_;         ///< holds the text of quoted fields, the quotes taken off
+  std::string fault_, trouble_;  ///< trouble_: reading failed
   std::size_t line_ = 0, next_line_ = 1;
 };
 

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <filesystem>
-#include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <utility>
+
+#include "stimuli/input_file.h"
 
 namespace palpate {
 namespace {
@@ -14,6 +15,8 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMaxDepth = 64;             // objects and arrays within each other
+constexpr std::size_t kMaxKeyBytes = 256;         // the longest that is known has 20
+constexpr std::size_t kMaxValues = 200'000;       // a long list of orientations has 50,000
 constexpr std::uintmax_t kMaxBytes = 16u << 20u;  // a long list of orientations has about 1 MB
 
 /// Walks over the text and tells how far the reader has come: its callbacks do not.
@@ -71,11 +74,17 @@ class Builder : public nlohmann::json_sax<json> {
   bool end_array() override { return close(); }
 
   bool key(string_t& name) override {
+    if (name.size() > kMaxKeyBytes) {
+      faults_.add(here(), "keys of at most " + std::to_string(kMaxKeyBytes) +
+                              " bytes, found one of " + std::to_string(name.size()) + " on line " +
+                              std::to_string(line()));
+      return false;
+    }
     key_ = name;
     if (open_.back().value->contains(name)) {
-      const std::string pointer = child_pointer(open_.back().pointer, name);
-      faults_.set_line(pointer, line());
-      faults_.add(pointer, "each key at most once; this one is given again");
+      faults_.set_line(open_.back().place.child(name), line());
+      faults_.add(faults_.full() ? std::string() : child_pointer(here(), name),
+                  "each key at most once; this one is given again");
     }
     return true;
   }
@@ -105,8 +114,17 @@ class Builder : public nlohmann::json_sax<json> {
  private:
   struct Open {
     json* value;
-    std::string pointer;
+    PointerHash place;
+    std::string token;  // key or index in the one around it
   };
+
+  /// The pointer of the innermost object or array that is open. Built where a fault needs it: a
+  /// pointer for every value would copy the keys around it as often as there are values.
+  std::string here() const {
+    std::string pointer;
+    for (std::size_t i = 1; i < open_.size(); ++i) pointer = child_pointer(pointer, open_[i].token);
+    return pointer;
+  }
 
   // The last character that was read may belong to what follows (a number ends where it does not
   // go on), so it does not count yet.
@@ -117,36 +135,44 @@ class Builder : public nlohmann::json_sax<json> {
     return line_;
   }
 
+  /// nullptr where there are too many.
   json* put(json value) {
-    std::string pointer;
-    json* place = &root_;
+    if (++values_ > kMaxValues) {
+      faults_.add(here(), "at most " + std::to_string(kMaxValues) +
+                              " values in all; this one is on line " + std::to_string(line()));
+      return nullptr;
+    }
+    token_.clear();
+    place_ = PointerHash();
+    json* put = &root_;
     if (!open_.empty()) {
       Open& parent = open_.back();
       if (parent.value->is_array()) {
-        pointer = child_pointer(parent.pointer, parent.value->size());
+        token_ = std::to_string(parent.value->size());
         parent.value->push_back(std::move(value));
-        place = &parent.value->back();
+        put = &parent.value->back();
       } else {
-        pointer = child_pointer(parent.pointer, key_);
-        place = &(*parent.value)[key_];
-        *place = std::move(value);
+        token_ = key_;
+        put = &(*parent.value)[key_];
+        *put = std::move(value);
       }
+      place_ = parent.place.child(token_);
     } else {
       root_ = std::move(value);
     }
-    faults_.set_line(pointer, line());
-    pointer_ = pointer;
-    return place;
+    faults_.set_line(place_, line());
+    return put;
   }
 
   bool open(json value) {
     if (open_.size() == kMaxDepth) {
-      faults_.add(open_.back().pointer, "objects and arrays at most " + std::to_string(kMaxDepth) +
-                                            " deep within each other");
+      faults_.add(here(), "objects and arrays at most " + std::to_string(kMaxDepth) +
+                              " deep within each other");
       return false;
     }
-    json* const place = put(std::move(value));
-    open_.push_back({place, pointer_});
+    json* const opened = put(std::move(value));
+    if (opened == nullptr) return false;
+    open_.push_back({opened, place_, token_});
     return true;
   }
 
@@ -162,13 +188,47 @@ class Builder : public nlohmann::json_sax<json> {
   int line_ = 1;
   json root_;
   std::vector<Open> open_;
-  std::string key_, pointer_;
+  std::size_t values_ = 0;
+  std::string key_, token_;  // token_, place_: of the value that was put last
+  PointerHash place_;
 };
+
+/// With ~ and / escaped (RFC 6901).
+void escape(std::string_view token, std::string& out) {
+  for (const char c : token) {
+    if (c == '~') {
+      out += "~0";
+    } else if (c == '/') {
+      out += "~1";
+    } else {
+      out += c;
+    }
+  }
+}
 
 }  // namespace
 
+void PointerHash::add(std::string_view characters) {
+  for (const char c : characters) {
+    value_ ^= static_cast<unsigned char>(c);
+    value_ *= 1099511628211U;
+  }
+}
+
+PointerHash PointerHash::child(std::string_view token) const {
+  std::string escaped = "/";
+  escape(token, escaped);
+  PointerHash out = *this;
+  out.add(escaped);
+  return out;
+}
+
 void FaultList::add(const std::string& pointer, const std::string& expected) {
-  faults_.push_back({file_, pointer.empty() ? "/" : pointer, expected, line_of(pointer)});
+  if (full()) {
+    ++unlisted_;
+  } else {
+    faults_.push_back({file_, pointer.empty() ? "/" : pointer, expected, line_of(pointer)});
+  }
 }
 
 void FaultList::add_syntax_error(int line, int column, const std::string& expected) {
@@ -177,30 +237,27 @@ void FaultList::add_syntax_error(int line, int column, const std::string& expect
 }
 
 void FaultList::throw_if_any() const {
-  if (!faults_.empty()) throw InputError(faults_);
+  if (faults_.empty()) return;
+  std::vector<Fault> all = faults_;
+  if (unlisted_ > 0) {
+    all.push_back({file_, "further places", "and " + std::to_string(unlisted_) + " more faults"});
+  }
+  throw InputError(std::move(all));
 }
 
-int FaultList::line_of(std::string pointer) const {
+int FaultList::line_of(std::string_view pointer) const {
   // What is missing has no line; then that of the object that lacks it.
   for (;;) {
-    const auto found = lines_.find(pointer);
+    const auto found = lines_.find(PointerHash(pointer).value());
     if (found != lines_.end()) return found->second;
     if (pointer.empty()) return 0;
-    pointer.resize(pointer.rfind('/'));
+    pointer = pointer.substr(0, pointer.rfind('/'));
   }
 }
 
 std::string child_pointer(const std::string& parent, const std::string& key) {
   std::string pointer = parent + "/";
-  for (const char c : key) {
-    if (c == '~') {
-      pointer += "~0";
-    } else if (c == '/') {
-      pointer += "~1";
-    } else {
-      pointer += c;
-    }
-  }
+  escape(key, pointer);
   return pointer;
 }
 
@@ -211,24 +268,11 @@ std::string child_pointer(const std::string& parent, std::size_t index) {
 json read_json(const std::string& text, FaultList& faults) { return Builder(text, faults).build(); }
 
 std::string read_text_file(const std::string& path) {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError({{path, "(file)", "a readable JSON file: " + why, 0}});
-  };
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) refuse("this is a folder");
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream)
-    refuse(std::filesystem::exists(path, error) ? "it cannot be opened" : "there is none");
-  std::string text;
-  std::array<char, 1 << 16> buffer{};
-  while (stream.read(buffer.data(), buffer.size()) || stream.gcount() > 0) {
-    text.append(buffer.data(), static_cast<std::size_t>(stream.gcount()));
-    if (text.size() > kMaxBytes) {
-      refuse("it has more than " + std::to_string(kMaxBytes >> 20u) + " MB");
-    }
+  try {
+    return read_whole(path, kMaxBytes);
+  } catch (const std::runtime_error& error) {
+    throw InputError({{path, "(file)", std::string("a readable JSON file: ") + error.what(), 0}});
   }
-  if (stream.bad()) refuse("reading it failed");
-  return text;
 }
 
 }  // namespace palpate

@@ -1,16 +1,35 @@
 #pragma once
 // A JSON text with what its own reader drops: the line of every value, and keys given twice.
 
-#include <map>
+#include <cstddef>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "protocols/parse.h"
 
 namespace palpate {
 
-/// What is wrong with one file, in the order in which it is found.
+/// Stands for a JSON pointer: FNV-1a of its characters, which goes on from that of its parent. Two
+/// pointers with the same hash would at worst show each other's line.
+class PointerHash {
+ public:
+  PointerHash() = default;
+  explicit PointerHash(std::string_view pointer) { add(pointer); }
+  /// Of a member or element.
+  PointerHash child(std::string_view token) const;
+  std::uint64_t value() const { return value_; }
+
+ private:
+  void add(std::string_view characters);
+  std::uint64_t value_ = 14695981039346656037U;
+};
+
+/// What is wrong with one file, in the order in which it is found: the first ones in full, the rest
+/// as a number.
 class FaultList {
  public:
   explicit FaultList(std::string file) : file_(std::move(file)) {}
@@ -18,19 +37,24 @@ class FaultList {
   /// pointer: JSON pointer of the value, or of where a missing one should be.
   void add(const std::string& pointer, const std::string& expected);
   void add_syntax_error(int line, int column, const std::string& expected);
-  void set_line(const std::string& pointer, int line) { lines_[pointer] = line; }
+  void set_line(PointerHash pointer, int line) { lines_[pointer.value()] = line; }
 
   bool empty() const { return faults_.empty(); }
+  /// Whether faults are only counted from here on: then nobody reads what was expected.
+  bool full() const { return faults_.size() >= kMostListed; }
   const std::string& file() const { return file_; }
   /// \throws InputError unless the list is empty.
   void throw_if_any() const;
 
  private:
-  int line_of(std::string pointer) const;
+  static constexpr std::size_t kMostListed = 1000;
+
+  int line_of(std::string_view pointer) const;
 
   std::string file_;
-  std::map<std::string, int> lines_;  // by JSON pointer
+  std::unordered_map<std::uint64_t, int> lines_;  // by PointerHash
   std::vector<Fault> faults_;
+  std::size_t unlisted_ = 0;
 };
 
 /// The pointer of a member or element, with ~ and / escaped (RFC 6901).
@@ -38,7 +62,8 @@ std::string child_pointer(const std::string& parent, const std::string& key);
 std::string child_pointer(const std::string& parent, std::size_t index);
 
 /// Reads JSON (RFC 8259, UTF-8). Keys given twice become faults. \throws InputError with line and
-/// column where the text is no JSON, or is nested too deeply.
+/// column where the text is no JSON; with the place where it is nested too deeply, has too many
+/// values or too long a key. Memory is in proportion to the text.
 nlohmann::json read_json(const std::string& text, FaultList& faults);
 
 /// The bytes of a file. \throws InputError where it cannot be read or is beyond all reason large.

@@ -89,12 +89,39 @@ std::size_t edits(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+constexpr std::size_t kShown = 60;  // characters of a value in a message
+
+/// The first `most` characters of a value as JSON, or some more: a long one is not written out to
+/// be cut.
+void put_start(const json& value, std::size_t most, std::string& out) {
+  // A truncated character must not make the message ill-formed: other than ASCII is escaped.
+  const auto ascii = [](const json& word) {
+    return word.dump(-1, ' ', true, json::error_handler_t::replace);
+  };
+  if (value.is_string()) {
+    const auto& text = value.get_ref<const std::string&>();
+    out += text.size() > most ? ascii(text.substr(0, most)) : ascii(value);
+  } else if (value.is_structured()) {
+    const bool object = value.is_object();
+    out += object ? '{' : '[';
+    for (const auto& [key, member] : value.items()) {
+      if (out.size() >= most) return;
+      if (out.back() != '{' && out.back() != '[') out += ',';
+      if (object) out += ascii(key) + ':';
+      put_start(member, most, out);
+    }
+    out += object ? '}' : ']';
+  } else {
+    out += ascii(value);
+  }
+}
+
 }  // namespace
 
 std::string found(const json& value) {
-  // A truncated character must not make the message ill-formed: other than ASCII is escaped.
-  std::string text = value.dump(-1, ' ', true, json::error_handler_t::replace);
-  if (text.size() > 60) text = text.substr(0, 57) + "...";
+  std::string text;
+  put_start(value, kShown + 1, text);
+  if (text.size() > kShown) text = text.substr(0, kShown - 3) + "...";
   return ", found " + text;
 }
 
@@ -207,13 +234,16 @@ void ObjectReader::name(const char* key, std::string& out) {
     const auto fits = [](char c) {
       return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
     };
-    if (!word.empty() && word.size() <= kMaxName && std::all_of(word.begin(), word.end(), fits)) {
+    // At the start of a cell spreadsheets take '-' for a formula.
+    if (!word.empty() && word.size() <= kMaxName && word.front() != '-' &&
+        std::all_of(word.begin(), word.end(), fits)) {
       out = word;
       return;
     }
   }
   faults_.add(pointer(key), "expected a name of 1 to " + std::to_string(kMaxName) +
-                                " letters (a-z, A-Z), digits and '-'" + found(*value));
+                                " letters (a-z, A-Z), digits and '-', which does not begin it" +
+                                found(*value));
 }
 
 void ObjectReader::vector(const char* key, Vec3& out, const Interval& interval) {
@@ -234,6 +264,10 @@ void ObjectReader::refuse_unknown_keys() {
   if (object_ == nullptr) return;
   for (const auto& [key, value] : object_->items()) {
     if (known_.count(key) != 0) continue;
+    if (faults_.full()) {
+      faults_.add({}, {});
+      continue;
+    }
     std::string nearest, all;
     std::size_t distance = key.size() / 2 + 1;  // more edits than that are another word
     for (const std::string& known : known_) {

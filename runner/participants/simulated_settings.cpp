@@ -1,11 +1,11 @@
 #include "runner/participants/simulated_settings.h"
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <sstream>
 
+#include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/sha256.h"
 #include "runner/participants/simulated_defaults.h"
@@ -40,14 +40,9 @@ void check_patch(const json& patch, const json& defaults, const std::string& fil
 
 json with_patch(json settings, const std::string& path) {
   if (path.empty()) return settings;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError({{path, "", "a readable file was expected"}});
-  json patch;
-  try {
-    patch = json::parse(in);
-  } catch (const json::parse_error& error) {
-    throw InputError({{path, "byte " + std::to_string(error.byte), "JSON was expected"}});
-  }
+  FaultList found(path);
+  const json patch = read_json(read_text_file(path), found);
+  found.throw_if_any();
   std::vector<Fault> faults;
   check_patch(patch, settings, path, "", faults);
   if (!faults.empty()) throw InputError(faults);

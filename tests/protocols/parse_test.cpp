@@ -11,6 +11,7 @@
 
 #include "protocols/sha256.h"
 #include "stimuli/random.h"
+#include "tests/shared/peak_memory.h"
 
 namespace palpate {
 namespace {
@@ -223,10 +224,59 @@ TEST(Parse, KeysCannotBreakTheListOfFaults) {
     FAIL();
   } catch (const InputError& error) {
     const std::string what = error.what();
-    EXPECT_NE(what.find("/a??[2Jb: unknown key"), std::string::npos) << what;
+    EXPECT_NE(what.find("/a\\u000a\\u001b[2Jb: unknown key"), std::string::npos) << what;
     EXPECT_EQ(std::count(what.begin(), what.end(), '\n') + 1,
               std::ptrdiff_t(error.faults().size()));
   }
+}
+
+/// Peak of what reading the text adds; it is refused, in few words.
+std::size_t peak_of_refusing(const std::string& text) {
+  const auto peak = peak_memory([&] {
+    try {
+      parse_protocol_text(text, "p.json");
+    } catch (const InputError& error) {
+      if (std::string(error.what()).size() < 4U << 20U) return;
+    }
+    _exit(2);
+  });
+  EXPECT_TRUE(peak) << text.substr(0, 60);
+  return peak.value_or(0);
+}
+
+std::string repeated(const std::string& piece, int times) {
+  std::string text;
+  for (int i = 0; i < times; ++i) text += (i > 0 ? "," : "") + piece;
+  return text;
+}
+
+// Small texts that would grow: each value with the keys around it, each fault with its place.
+TEST(Parse, MemoryIsInProportionToTheText) {
+  constexpr std::size_t kMost = 32U << 20U;
+  const std::string key(200'000, 'k'), fair(250, 'k');
+  EXPECT_LT(peak_of_refusing("{\"" + key + "\": [" + repeated("1", 20'000) + "]}"), kMost);
+  EXPECT_LT(peak_of_refusing("{\"stimuli\": [" + repeated("{}", 20'000) + "]}"), kMost);
+  EXPECT_LT(peak_of_refusing("{" + repeated("\"" + fair + "\": 1", 2'000) + "}"), kMost);
+  std::string deep, end;
+  for (int i = 0; i < 60; ++i) {
+    deep += "{\"" + fair + "\": ";
+    end += "}";
+  }
+  EXPECT_LT(peak_of_refusing(deep + "[" + repeated("1", 20'000) + "]" + end), kMost);
+  EXPECT_LT(peak_of_refusing("[" + repeated("1", 4'000'000) + "]"), kMost);
+}
+
+TEST(Parse, SaysWhatIsTooMuch) {
+  const auto first = [](const std::string& text) { return faults_of(text).at(0); };
+  const Fault key = first("{\n\"" + std::string(300, 'k') + "\": 1}");
+  EXPECT_EQ(key.place, "/");
+  EXPECT_NE(key.expected.find("at most 256 bytes, found one of 300 on line 2"), std::string::npos);
+  const Fault values = first("{\"a\": [\n" + repeated("1", 300'000) + "]}");
+  EXPECT_EQ(values.place, "/a");
+  EXPECT_NE(values.expected.find("at most 200000 values"), std::string::npos);
+  const std::vector<Fault> many = faults_of("{" + repeated("\"\": 1", 5'000) + "}");
+  EXPECT_EQ(many.size(), 1001u);
+  EXPECT_EQ(many.back().expected.substr(0, 4), "and ");
 }
 
 TEST(Parse, UnreadableFilesAreInputErrors) {
