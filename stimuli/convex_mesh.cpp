@@ -111,7 +111,13 @@ class ConvexMesh::Builder {
         edge_of_(outlines.side_count(), HalfEdges::kNone),
         vertex_of_(mesh.points.size(), HalfEdges::kNone) {}
 
+  /// From regions of faces that lie in one plane each; half filled where there are faults.
+  /// \return false where a region is no polygon
+  static bool fill(ConvexMesh& out, const HalfEdges& mesh, const std::vector<Index>& region_of,
+                   Index count, MeshFaults& faults);
+
   void build() {
+    clear();
     const std::vector<Index> order = order_in_space(mesh_, outlines_);
     for (Index f = 0; f < order.size(); ++f) number_of_[order[f]] = f;
     out_.facets_.reserve(order.size());
@@ -126,6 +132,16 @@ class ConvexMesh::Builder {
   const std::vector<Index>& soup_vertex() const { return soup_vertex_; }
 
  private:
+  void clear() {
+    out_.vertices_.clear();
+    out_.facets_.clear();
+    out_.sides_.clear();
+    out_.edges_.clear();
+    out_.fan_first_.clear();
+    out_.fan_edges_.clear();
+    out_.radius_ = 0;
+  }
+
   Index vertex(Index outline_side) {
     const Index point = mesh_.origin[outlines_.start[outline_side]];
     if (vertex_of_[point] == HalfEdges::kNone) {
@@ -224,24 +240,39 @@ class ConvexMesh::Builder {
   std::vector<Vec3> corners_;
 };
 
+bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
+                               const std::vector<Index>& region_of, Index count,
+                               MeshFaults& faults) {
+  const FacetOutlines outlines = facet_outlines(mesh, region_of, count, faults);
+  if (!faults.empty()) return false;
+  Builder builder(out, mesh, outlines);
+  builder.build();
+  check_convexity(out, builder.soup_vertex(), mesh.error, faults);
+  return true;
+}
+
 ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   MeshFaults faults;
   const HalfEdges mesh = link_half_edges(soup, faults);
   const std::vector<FaceShape> shapes = shapes_of(mesh);
   check_solid(mesh, shapes, faults);
   faults.throw_if_any();
-  Index region_count = 0;
-  const std::vector<Index> region_of = coplanar_regions(mesh, shapes, region_count);
-  if (region_count == 0) {
+  Index count = 0;
+  const std::vector<Index> merged = coplanar_regions(mesh, shapes, count);
+  if (count == 0) {
     faults.add("flat", [] { return "expected a solid, found lines only"; });
     faults.throw_if_any();
   }
-  const FacetOutlines outlines = facet_outlines(mesh, region_of, region_count, faults);
-  faults.throw_if_any();
-  Builder builder(*this, mesh, outlines);
-  builder.build();
-  check_convexity(*this, builder.soup_vertex(), mesh.error, faults);
-  faults.throw_if_any();
+  if (Builder::fill(*this, mesh, merged, count, faults)) {
+    faults.throw_if_any();
+    return;
+  }
+  // Where corners crowd together their error hides the folds between some faces and not between
+  // others, and what is merged then may be no polygon. The faces as they came may be a solid still.
+  MeshFaults single_faults;
+  const std::vector<Index> single = single_regions(mesh, shapes, count);
+  Builder::fill(*this, mesh, single, count, single_faults);
+  if (!single_faults.empty()) faults.throw_if_any();
 }
 
 }  // namespace palpate

@@ -123,6 +123,16 @@ void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
   }
 }
 
+// Numbered as the faces come: what follows then walks through memory and does not jump.
+void renumber(std::vector<Index>& region_of, Index& count) {
+  std::vector<Index> number(count, HalfEdges::kNone);
+  Index next = 0;
+  for (Index& region : region_of) {
+    if (number[region] == HalfEdges::kNone) number[region] = next++;
+    region = number[region];
+  }
+}
+
 }  // namespace
 
 std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
@@ -180,13 +190,24 @@ std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<Fac
   }
   if (count == 0) return region_of;
   place_thin_faces(mesh, std::move(thin), region_of);
-  // Numbered as the faces come: what follows then walks through memory and does not jump.
-  std::vector<Index> number(count, HalfEdges::kNone);
-  Index next = 0;
-  for (Index& region : region_of) {
-    if (number[region] == HalfEdges::kNone) number[region] = next++;
-    region = number[region];
+  renumber(region_of, count);
+  return region_of;
+}
+
+std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                                  Index& count) {
+  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone), thin;
+  count = 0;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (shapes[f].thin) {
+      thin.push_back(f);
+    } else {
+      region_of[f] = count++;
+    }
   }
+  if (count == 0) return region_of;
+  place_thin_faces(mesh, std::move(thin), region_of);
+  renumber(region_of, count);
   return region_of;
 }
 

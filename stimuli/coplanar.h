@@ -32,4 +32,9 @@ std::vector<HalfEdges::Index> coplanar_regions(const HalfEdges& mesh,
                                                const std::vector<FaceShape>& shapes,
                                                HalfEdges::Index& count);
 
+/// The same with nothing merged but faces that have no plane of their own.
+std::vector<HalfEdges::Index> single_regions(const HalfEdges& mesh,
+                                             const std::vector<FaceShape>& shapes,
+                                             HalfEdges::Index& count);
+
 }  // namespace palpate

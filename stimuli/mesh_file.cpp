@@ -49,7 +49,11 @@ PolygonSoup read_mesh_file(const std::string& path) {
   faults.throw_if_any();
   const std::string bytes = contents(path, faults);
   faults.throw_if_any();
-  PolygonSoup soup = is_obj ? read_obj(bytes, faults) : read_stl(bytes, faults);
+  std::string_view text = bytes;
+  // Some editors begin a text so. A binary file has no text to begin.
+  if (text.starts_with("\xEF\xBB\xBF") && (is_obj || text.substr(3, 5) == "solid"))
+    text.remove_prefix(3);
+  PolygonSoup soup = is_obj ? read_obj(text, faults) : read_stl(text, faults);
   faults.throw_if_any();
   return soup;
 }

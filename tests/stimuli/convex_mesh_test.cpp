@@ -228,6 +228,30 @@ TEST(ConvexMesh, SurfacesFinerThanTheirErrorStayRound) {
   }
 }
 
+// Where corners crowd together, the error of their coordinates hides the folds between some faces
+// and not between others: what is merged may be no polygon, but the faces are a solid.
+TEST(ConvexMesh, HullsOfCrowdedPointsAreNotRefused) {
+  for (const double spread : {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5}) {
+    for (std::uint64_t seed = 1; seed < 4; ++seed) {
+      Random random(seed, {77});
+      const Vec3 crowd = uniform_rotation(random) * Vec3(0, 0, 1);
+      std::vector<Vec3> points;
+      for (int i = 0; i < 1200; ++i) {
+        const Vec3 anywhere = uniform_rotation(random) * Vec3(0, 0, 1);
+        const double away = spread * random.unit();
+        points.push_back(0.03 * (i % 10 == 0 ? anywhere : glm::normalize(crowd + away * anywhere)));
+      }
+      const ConvexMesh mesh(testing::hull_of(points));
+      for (const Vec3& point : points) {
+        for (const Facet& facet : mesh.facets()) {
+          ASSERT_LE(glm::dot(facet.normal, point) - facet.offset, 1e-9 * mesh.size())
+              << "spread " << spread << " seed " << seed;
+        }
+      }
+    }
+  }
+}
+
 // Facets that follow each other in memory are near each other: most neighbours of a facet of a
 // large sphere are within the same small part of the array.
 TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {

@@ -202,6 +202,19 @@ TEST_F(MeshFile, ReadsTheFormsOfObj) {
   }
 }
 
+TEST_F(MeshFile, AByteOrderMarkHidesNothing) {
+  const std::string mark = "\xEF\xBB\xBF";
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const PolygonSoup marked = read("marked.obj", mark + obj), plain = read("plain.obj", obj);
+  EXPECT_EQ(marked.vertices, plain.vertices);
+  EXPECT_EQ(marked.faces, plain.faces);
+  const std::string stl =
+      "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+      "vertex 0 1 0\nendloop\nendfacet\nendsolid s\n";
+  EXPECT_EQ(read("marked.stl", mark + stl).vertices, read("plain.stl", stl).vertices);
+}
+
 TEST_F(MeshFile, ObjFaultsNameTheLine) {
   const std::string head = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   expect_fault("a.obj", head + "v 1 x 0\nf 1 2 3", ": line 4: expected three finite coordinates");
