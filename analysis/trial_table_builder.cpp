@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
+
+#include "analysis/text.h"
 
 namespace palpate {
 
@@ -62,6 +65,7 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   places_.push_back({row.participant, raw.session, raw.block, raw.trial,
                      static_cast<std::uint32_t>(rows_.size())});
   rows_.push_back(row);
+  if (raw.line > 0) lines_.push_back(static_cast<std::uint32_t>(raw.line));
 }
 
 void TrialTableBuilder::number_places() {
@@ -79,29 +83,71 @@ void TrialTableBuilder::number_places() {
   }
 }
 
+std::string TrialTableBuilder::lines_of(
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& rows) const {
+  constexpr std::size_t kShown = 10;
+  if (lines_.size() != rows_.size()) return "";
+  std::string text;
+  for (std::size_t i = 0; i < std::min(rows.size(), kShown); ++i) {
+    text += (i == 0 ? " (lines " : ", ") + std::to_string(lines_[rows[i].first]) + " and " +
+            std::to_string(lines_[rows[i].second]);
+  }
+  if (rows.size() > kShown) text += ", and " + std::to_string(rows.size() - kShown) + " more";
+  return text + ")";
+}
+
 void TrialTableBuilder::check_places(TrialTable& table) {
-  std::size_t repeated = 0, doubled = 0;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> repeated, doubled;
+  const auto same_time = [](double x, double y) {
+    return x == y || (std::isnan(x) && std::isnan(y));
+  };
   for (std::size_t i = 1; i < places_.size(); ++i) {
     const Place &a = places_[i - 1], &b = places_[i];
     if (a.participant != b.participant || a.session != b.session || a.block != b.block ||
         a.trial != b.trial) {
       continue;
     }
-    ++repeated;
+    repeated.emplace_back(a.row, b.row);
     const TrialRow &x = rows_[a.row], &y = rows_[b.row];
-    doubled += x.renderer == y.renderer && x.shape == y.shape && x.answer == y.answer &&
-               x.response_time == y.response_time;
+    if (x.renderer == y.renderer && x.shape == y.shape && x.answer == y.answer &&
+        same_time(x.response_time, y.response_time)) {
+      doubled.emplace_back(a.row, b.row);
+    }
   }
-  if (doubled > 0) {
+  if (!doubled.empty()) {
     throw std::runtime_error(
-        plural(doubled, "row stands", "rows stand") +
-        " twice (same participant, session, block, trial and the same answer after the same "
-        "time): expected each trial once");
+        plural(doubled.size(), "row stands", "rows stand") + " twice" + lines_of(doubled) +
+        ", with the same participant, session, block, trial and the same answer after the same "
+        "time: expected each trial once");
   }
-  if (repeated > 0) {
-    table.warnings.push_back(plural(repeated, "row repeats", "rows repeat") +
-                             " the participant, session, block and trial of another row.");
+  if (!repeated.empty()) {
+    table.warnings.push_back(plural(repeated.size(), "row repeats", "rows repeat") +
+                             " the participant, session, block and trial of another row" +
+                             lines_of(repeated) + ".");
   }
+}
+
+void TrialTableBuilder::fill_times(TrialTable& table) {
+  std::size_t unknown = 0;
+  double limit = 0, longest = 0;
+  for (const TrialRow& row : rows_) {
+    if (std::isnan(row.response_time)) {
+      ++unknown;
+    } else {
+      longest = std::max(longest, row.response_time);
+      if (row.timed_out) limit = std::max(limit, row.response_time);
+    }
+  }
+  if (unknown == 0) return;
+  if (!(longest > 0)) throw std::runtime_error("expected the time of one trial at least, above 0");
+  const double taken = limit > 0 ? limit : longest;
+  for (TrialRow& row : rows_) {
+    if (std::isnan(row.response_time)) row.response_time = taken;
+  }
+  table.warnings.push_back(plural(unknown, "time-out has", "time-outs have") +
+                           " no time; the limit was taken as " + fixed(taken, 3) + " s, the " +
+                           (limit > 0 ? "longest of the other time-outs."
+                                      : "longest time of all trials: it was that at least."));
 }
 
 TrialTable TrialTableBuilder::finish(Provenance provenance,
@@ -110,6 +156,7 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   TrialTable table;
   number_places();
   check_places(table);
+  fill_times(table);
   table.provenance = std::move(provenance);
   table.participants.assign(participants_.names().begin(), participants_.names().end());
   table.n_practice = n_practice_;

@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "analysis/trials.h"
@@ -29,12 +31,16 @@ class Interner {
   std::uint32_t last_ = 0;
 };
 
+/// A time-out whose limit the source does not tell.
+inline constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
+
 /// A row as a source has it.
 struct RawTrial {
   std::string_view participant, renderer, shape, response;
   int session = 1, block = 1, trial = 1;
   bool correct = false, practice = false, timed_out = false, simulated = false;
-  double response_time = 0;  ///< s
+  double response_time = 0;  ///< s; kNoTime only for a time-out
+  std::size_t line = 0;      ///< of the file; 0: it has none
 };
 
 /// Turns rows into a TrialTable: leaves practice out, numbers names, orders levels, and warns of
@@ -59,12 +65,17 @@ class TrialTableBuilder {
   /// Sorts the places and numbers the rows by them.
   void number_places();
   void check_places(TrialTable& table);
+  /// "lines 2 and 7, 3 and 8 and 4 more": of rows that share a place, the first and the next.
+  std::string lines_of(const std::vector<std::pair<std::uint32_t, std::uint32_t>>& rows) const;
+  /// Time-outs without a time get the limit as far as the others tell it.
+  void fill_times(TrialTable& table);
 
   Interner participants_, renderers_, stimuli_;
   /// By number of stimulus: 1 for the one shown first, 2, ...; 0: never shown, only answered.
   std::vector<std::uint32_t> shown_;
   std::uint32_t n_shown_ = 0;
   std::vector<TrialRow> rows_;
+  std::vector<std::uint32_t> lines_;  ///< of each row, where the source has lines
   std::vector<Place> places_;
   std::size_t n_practice_ = 0, n_simulated_ = 0, n_contradicting_ = 0, n_late_answers_ = 0;
 };

@@ -163,6 +163,14 @@ class CsvTrials {
     return value;
   }
 
+  /// What R, pandas, BIDS and spreadsheets write where there is nothing.
+  static bool missing(std::string_view text) {
+    for (const std::string_view nothing : {"", "NA", "n/a", "N/A", "NaN", "nan"}) {
+      if (text == nothing) return true;
+    }
+    return false;
+  }
+
   bool truth(Column column) {
     if (at_[column] == kAbsent) return false;
     const std::string_view text = field(column);
@@ -177,7 +185,8 @@ class CsvTrials {
     // An underflow is a time of 0; from_chars does not say which way it left the range.
     if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
         value < 0 || value > kMaxTime) {
-      fault(column, "a time in s, 0 to 1000000, with a decimal point");
+      fault(column,
+            "a time in s, 0 to 1000000, with a decimal point (empty or NA for a time-out alone)");
     }
     return value;
   }
@@ -200,12 +209,16 @@ class CsvTrials {
     raw.trial = number(trial);
     raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
-    if (!field(response).empty()) raw.response = name(response, stimuli_);
-    raw.correct = truth(correct);
-    raw.response_time = time(response_time);
-    raw.practice = truth(practice);
+    if (!missing(field(response)) || stimuli_.holds(field(response)))
+      raw.response = name(response, stimuli_);
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
+    // A time-out has neither a time nor a judgement of its own.
+    raw.correct = !(raw.timed_out && missing(field(correct))) && truth(correct);
+    raw.response_time =
+        raw.timed_out && missing(field(response_time)) ? kNoTime : time(response_time);
+    raw.practice = truth(practice);
     raw.simulated = truth(simulated);
+    raw.line = reader.line();
     if (!ok_ || too_many_) return;
     names_.number(raw.participant);
     renderers_.number(raw.renderer);

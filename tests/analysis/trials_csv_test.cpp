@@ -263,8 +263,37 @@ TEST_F(TrialsCsv, ManyFaultsAreListedThenCounted) {
 
 TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
   const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
-  expect_fault(kHeader + row + row, "file", "twice");
-  EXPECT_EQ(read(kHeader + row + "P1,1,1,1,ray,cone,cone,1,2.5\n").warnings.size(), 1U);
+  expect_fault(kHeader + row + "\n" + row, "file", "1 row stands twice (lines 2 and 4)");
+  const TrialTable repeated = read(kHeader + row + "P1,1,1,1,ray,cone,cone,1,2.5\n");
+  ASSERT_EQ(repeated.warnings.size(), 1U);
+  EXPECT_NE(repeated.warnings[0].find("(lines 2 and 3)"), std::string::npos);
+  const std::string late = "P1,1,1,2,ray,cone,,0,NA\n";
+  expect_fault(kHeader + row + late + late, "file", "(lines 3 and 4)");
+}
+
+TEST_F(TrialsCsv, TimeOutsNeedNoTime) {
+  const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
+  for (const char* nothing : {"", "NA", "n/a", "nan"}) {
+    const std::string late = std::string("P1,1,1,2,ray,cone,") + nothing + "," + nothing + ",";
+    const TrialTable alone = read(kHeader + row + late + nothing + "\n");
+    ASSERT_EQ(alone.rows.size(), 2U) << nothing;
+    EXPECT_TRUE(alone.rows[1].timed_out);
+    EXPECT_FALSE(alone.rows[1].correct);
+    EXPECT_EQ(alone.rows[1].answer, -1);
+    EXPECT_EQ(alone.rows[1].response_time, 2);
+    ASSERT_EQ(alone.warnings.size(), 1U);
+    EXPECT_NE(alone.warnings[0].find("at least"), std::string::npos);
+    const TrialTable two = read(kHeader + row + late + nothing + "\nP1,1,1,3,ray,cone,,0,60\n");
+    EXPECT_EQ(two.rows[1].response_time, 60);
+  }
+  const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",timed_out\n";
+  EXPECT_EQ(
+      read(header + "P1,1,1,1,ray,cone,cone,1,2,0\nP1,1,1,2,ray,cone,NA,NA,NA,1\n").rows.size(),
+      2U);
+  expect_fault(header + "P1,1,1,1,ray,cone,cone,1,NA,0\n", "line 2, column response_time",
+               "for a time-out alone");
+  expect_fault(header + "P1,1,1,1,ray,cone,cone,NA,2,0\n", "line 2, column correct", "0 or 1");
+  expect_fault(kHeader + "P1,1,1,1,ray,cone,,0,NA\n", "file", "the time of one trial");
 }
 
 TEST_F(TrialsCsv, ContradictionsAreWarnedOf) {
