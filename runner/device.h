@@ -21,9 +21,10 @@ struct DeviceCapabilities {
   bool simulated = false;
   std::string serial = {};  ///< of the device or devices; empty: none
   std::string calibration =
-      {};               ///< what is known of its force scale, with its date; empty: nothing
-  double damping = 0;   ///< N s/m, viscous, physical, of the whole device; 0: not known
-  double friction = 0;  ///< N, Coulomb, of the whole device; 0: not known
+      {};                 ///< what is known of its force scale, with its date; empty: nothing
+  double damping = 0;     ///< N s/m, viscous, physical, of the whole device; 0: not known
+  double friction = 0;    ///< N, Coulomb, of the whole device; 0: not known
+  bool any_rate = false;  ///< has no rate of its own: max_rate is what was asked for
 };
 
 /// What is wrong with a reading.

@@ -62,6 +62,20 @@ double shown_rate(const Protocol& protocol, const DeviceCapabilities& device) {
   return std::min(protocol.servo_rate, device.max_rate);
 }
 
+/// What the passivity controller would do for a material that cannot be shown whole.
+std::string passivity_advice(const Protocol& protocol, const Material& material,
+                             const DeviceCapabilities& device, const ShowableMaterial& without) {
+  if (protocol.passivity_controller) return "";
+  const double with =
+      showable(material, device, shown_rate(protocol, device), protocol.workspace.scale, true)
+          .share;
+  if (with <= without.share) return "(/servo/passivity_controller would not help here) ";
+  return sentence("set /servo/passivity_controller to true (",
+                  with < 1 ? sentence("then up to ", stiffest(material) * with, " N/m")
+                           : std::string("then it can be shown"),
+                  "), ");
+}
+
 }  // namespace
 
 ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
@@ -180,9 +194,9 @@ std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary
           showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
                    protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
-      add("stimulus '", stimulus.name, "' has ", can.reason,
-          ": soften /material, raise /servo/rate_hz, or have it limited by "
-          "/servo/material_limit \"limit\"");
+      add("stimulus '", stimulus.name, "' has ", can.reason, ": soften /material, raise ",
+          "/servo/rate_hz, ", passivity_advice(protocol, material, device, can),
+          "or have it limited by /servo/material_limit \"limit\"");
     };
     visit_materials(stimulus.object, check_material);
     const double needed =

@@ -209,7 +209,34 @@ class Recorder {
   std::map<std::size_t, Run> runs_;
 };
 
+std::vector<ObjectSpec> shapes_of(const Protocol& protocol) {
+  std::vector<ObjectSpec> shapes;
+  for (const StimulusSpec& stimulus : protocol.stimuli) shapes.push_back(stimulus.object);
+  return shapes;
+}
+
 }  // namespace
+
+std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+                                           const SimulatedSettings& settings) {
+  SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
+                         protocol.stylus.grip, 1 / protocol.servo_rate);
+  std::vector<std::string> faults = misfits(protocol, library, device.capabilities());
+  bool known = true;
+  for (const StimulusSpec& stimulus : protocol.stimuli) {
+    const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
+    if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
+    known = known && fault.empty();
+  }
+  if (!known) return faults;
+  try {  // settings that were patched
+    const ShapeHypotheses hypotheses(shapes_of(protocol));
+    SimulatedParticipant(individual(settings, 0, 1), hypotheses, device, protocol, 0, 1);
+  } catch (const std::invalid_argument& error) {
+    faults.emplace_back(error.what());
+  }
+  return faults;
+}
 
 std::string simulated_code(int number) {
   std::string digits = std::to_string(number);
@@ -220,17 +247,14 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
                              const SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
-  std::vector<ObjectSpec> shapes;
-  for (const StimulusSpec& stimulus : protocol.stimuli) shapes.push_back(stimulus.object);
-  Shared shared{protocol,  settings, StimulusLibrary(protocol), ShapeHypotheses(shapes),
-                plan.seed, stop};
-  const SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
-                               protocol.stylus.grip, 1 / protocol.servo_rate);
+  StimulusLibrary library(protocol);
   std::string reasons;
-  for (const std::string& misfit : misfits(protocol, shared.library, device.capabilities())) {
-    reasons += (reasons.empty() ? "" : "\n") + misfit;
+  for (const std::string& fault : simulation_faults(protocol, library, settings)) {
+    reasons += (reasons.empty() ? "" : "\n") + fault;
   }
   if (!reasons.empty()) throw std::invalid_argument(reasons);
+  Shared shared{protocol,  settings, std::move(library), ShapeHypotheses(shapes_of(protocol)),
+                plan.seed, stop};
 
   StudyProgress progress;
   std::vector<Work> work = unfinished_work(protocol, store, settings, plan, progress);

@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "data/store.h"
 #include "protocols/protocol.h"
 #include "runner/participants/simulated_settings.h"
+#include "runner/scene_builder.h"
 
 namespace palpate {
 
@@ -26,6 +28,10 @@ struct StudyProgress {
   std::int64_t this_run = 0;     ///< recorded since this call
   double simulated_seconds = 0;  ///< of session time since this call
 };
+
+/// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
+std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+                                           const SimulatedSettings& settings);
 
 /// Runs what has no record yet. The same seed gives the same records whatever the number of jobs
 /// and of interruptions: each trial has a random stream, each session a virtual clock and calendar

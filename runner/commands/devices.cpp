@@ -32,7 +32,7 @@ Json to_json(const DeviceCapabilities& c) {
           {"actuated_freedom", c.actuated_freedom},
           {"max_force_n", of_pushing(c.max_force)},
           {"max_stiffness_n_per_m", of_pushing(c.max_stiffness)},
-          {"max_rate_hz", c.max_rate},
+          {"max_rate_hz", c.any_rate ? Json() : Json(c.max_rate)},
           {"workspace_radius_m", c.workspace_radius},
           {"resolution_m", c.resolution},
           {"damping_ns_per_m", c.damping},
@@ -43,12 +43,14 @@ Json to_json(const DeviceCapabilities& c) {
 }
 
 void print_limits(const DeviceCapabilities& c) {
+  std::string rate = "at any rate that is asked for";
+  if (!c.any_rate) rate = "up to " + std::to_string(std::lround(c.max_rate)) + " Hz";
   std::printf("    senses %d degrees of freedom, ", c.sensed_freedom);
   if (c.actuated_freedom > 0) {
-    std::printf("drives %d; up to %g N, %g N/m, %g Hz;\n", c.actuated_freedom, c.max_force,
-                c.max_stiffness, c.max_rate);
+    std::printf("drives %d; up to %g N, %g N/m, %s;\n", c.actuated_freedom, c.max_force,
+                c.max_stiffness, rate.c_str());
   } else {
-    std::printf("drives none: nothing is felt; up to %g Hz;\n", c.max_rate);
+    std::printf("drives none: nothing is felt; %s;\n", rate.c_str());
   }
   std::printf("    reaches %g mm about its centre, resolves %g um\n", c.workspace_radius * 1e3,
               c.resolution * 1e6);

@@ -68,6 +68,11 @@ int simulate_command(const std::vector<std::string>& args) {
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
   for (const LimitedMaterial& one : limited)
     std::fprintf(stderr, "%s\n", printable(one.text).c_str());
+  // Before the database is made: what is refused leaves nothing behind.
+  std::string reasons;
+  for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), settings))
+    reasons += "\n" + fault;
+  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
   StudyPlan plan{participants, seed, jobs, ""};
   if (!limited.empty())
     plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
@@ -76,15 +81,10 @@ int simulate_command(const std::vector<std::string>& args) {
   const auto start = std::chrono::steady_clock::now();
   ProgressLine progress_line("trials");
   StudyProgress progress;
-  try {
-    progress = simulate_study(
-        protocol, store, settings, plan, watch_stop_signals(), [&](const StudyProgress& p) {
-          progress_line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
-        });
-  } catch (const std::invalid_argument& error) {
-    progress_line.clear();
-    throw UsageError(std::string("this protocol cannot be simulated:\n") + error.what());
-  }
+  progress = simulate_study(
+      protocol, store, settings, plan, watch_stop_signals(), [&](const StudyProgress& p) {
+        progress_line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
+      });
   progress_line.clear();
   const double elapsed = seconds_since(start);
   std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),

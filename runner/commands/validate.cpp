@@ -7,6 +7,10 @@
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
 #include "runner/commands/command.h"
+#include "runner/device_check.h"
+#include "runner/devices/registry.h"
+#include "runner/devices/simulated.h"
+#include "runner/simulated_study.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "stimuli/printable.h"
@@ -87,12 +91,46 @@ void print_summary(const Protocol& protocol, std::ostream& out) {
       << "  sha256      " << protocol.sha256 << "\n";
 }
 
+void print_verdict(const std::string& what, const std::vector<std::string>& misfits,
+                   const std::vector<LimitedMaterial>& limited, std::ostream& out) {
+  out << "    " << std::left << std::setw(12) << what
+      << (misfits.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
+  for (const std::string& misfit : misfits) out << "      " << printable(misfit) << "\n";
+  if (!misfits.empty()) return;
+  for (const LimitedMaterial& one : limited) out << "      " << printable(one.text) << "\n";
+}
+
+/// For which devices, and for simulation; all that is in the way.
+void print_fitness(const Protocol& protocol, std::ostream& out) {
+  DeviceOrder order;
+  order.rate = protocol.servo_rate;
+  order.stylus_length = protocol.stylus.length;
+  order.stylus_grip = protocol.stylus.grip;
+  const StimulusLibrary library(protocol);
+  out << "  can be shown by (run --device NAME)\n";
+  for (const DeviceKind& kind : device_kinds()) {
+    const DeviceCapabilities can = nominal_capabilities(kind, order);
+    Protocol shown = protocol;
+    const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
+    print_verdict(kind.name, misfits(shown, library, can), limited, out);
+  }
+  const SimulatedSettings settings = load_simulated_settings("");
+  const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
+                               protocol.stylus.grip, 1 / protocol.servo_rate);
+  Protocol shown = protocol;
+  const std::vector<LimitedMaterial> limited = limit_materials(shown, stylus.capabilities());
+  out << "  can be tried with simulated participants\n";
+  print_verdict("simulate", simulation_faults(shown, library, settings), limited, out);
+}
+
 }  // namespace
 
 int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate validate PROTOCOL.json";
-  line.summary = "Checks a protocol with its meshes and its schedule, and lists all faults.";
+  line.summary =
+      "Checks a protocol with its meshes and its schedule, and lists all faults. Says for which\n"
+      "devices, and for simulation, it is fit, and what is in the way of others.";
   line.example = "  palpate validate protocols/ho2000.json";
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
@@ -106,6 +144,7 @@ int validate_command(const std::vector<std::string>& args) {
   }
   if (!faults.empty()) throw InputError(faults);
   print_summary(protocol, std::cout);
+  print_fitness(protocol, std::cout);
   return 0;
 }
 

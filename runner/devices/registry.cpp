@@ -1,8 +1,10 @@
 #include "runner/devices/registry.h"
 
 #include <stdexcept>
+#include <string_view>
 
 #include "runner/devices/falcon_open.h"
+#include "runner/devices/falcon_parameters.h"
 #include "runner/devices/mouse.h"
 #include "runner/devices/stroking.h"
 
@@ -35,6 +37,19 @@ constexpr DeviceKind kKinds[] = {
 }  // namespace
 
 std::span<const DeviceKind> device_kinds() { return kKinds; }
+
+DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceOrder& order) {
+  if (!kind.pushes) return kind.open(order)->capabilities();
+  const int freedom = std::string_view(kind.name) == "falcon" ? 3 : 5;
+  DeviceCapabilities can;
+  can.name = kind.name;
+  can.sensed_freedom = can.actuated_freedom = freedom;
+  can.max_stiffness = falcon::kMaxStiffness;
+  can.max_rate = falcon::kMaxRate;
+  can.workspace_radius = falcon::kWorkspaceRadius;
+  can.resolution = falcon::kResolution;
+  return can;
+}
 
 const DeviceKind& device_kind(const std::string& name) {
   std::string known;

@@ -40,6 +40,8 @@ struct DeviceKind {
 };
 
 std::span<const DeviceKind> device_kinds();
+/// What such a device is built for, without one: its force, serial and calibration stay open.
+DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceOrder& order);
 /// \throws std::invalid_argument naming those there are
 const DeviceKind& device_kind(const std::string& name);
 

@@ -74,7 +74,8 @@ SimulatedStylus::SimulatedStylus(const SimulatedDeviceSettings& device, const Ha
                    "",
                    "",
                    device.damping,
-                   device.friction};
+                   device.friction,
+                   true};
 }
 
 void SimulatedStylus::reset(const HandTarget& target) {

@@ -77,8 +77,9 @@ std::vector<Mat3> distinct_rotations(ShapeKind kind) {
 
 bool usable(double length) { return std::isfinite(length) && length > 0; }
 
-/// Empty if a simulated participant knows the shape.
-std::string fault_of(const ObjectSpec& stimulus) {
+}  // namespace
+
+std::string ShapeHypotheses::fault_of(const ObjectSpec& stimulus) {
   switch (stimulus.shape) {
     case ShapeKind::sphere:
       return usable(stimulus.radius) ? "" : "its radius is not positive";
@@ -93,8 +94,6 @@ std::string fault_of(const ObjectSpec& stimulus) {
       return "a simulated participant knows sphere, cone, cylinder and cube, not mesh or compound";
   }
 }
-
-}  // namespace
 
 ShapeHypotheses::ShapeHypotheses(const std::vector<ObjectSpec>& stimuli) {
   std::string faults;

@@ -30,6 +30,9 @@ class ShapeHypotheses {
     int count = 0;        ///< of hypotheses, without the padding
   };
 
+  /// Why a simulated participant does not know a stimulus; empty: it does.
+  static std::string fault_of(const ObjectSpec& stimulus);
+
   /// Shape i is stimulus i in its own frame; poses and materials are ignored.
   /// \throws std::invalid_argument naming every stimulus that is no sphere, cone, cylinder or cube
   /// or has a size that is not positive; also for an empty list.

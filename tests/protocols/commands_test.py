@@ -9,6 +9,7 @@ import json
 import pathlib
 import subprocess
 import sys
+import tempfile
 import unittest
 
 PALPATE, SOURCE = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
@@ -40,6 +41,47 @@ class Validate(unittest.TestCase):
         self.assertEqual(len(lines), len(places))
         for place in places:
             self.assertTrue(any(f": {place}: expected" in line for line in lines), place)
+
+    def test_says_who_can_show_it_and_why_not_all_at_once(self):
+        fit = run("validate", HO2000).stdout.decode()
+        self.assertRegex(fit, r"\n +falcon +no:\n +renderer 'ray' needs a device that senses 5")
+        self.assertRegex(fit, r"\n +simulate +yes\n")
+        mesh = SOURCE / "tests" / "protocols" / "good" / "tetrahedron.obj"
+        protocol = {"version": 1, "name": "own", "renderers": ["point"], "repetitions": 1, "stimuli": [
+            {"name": "ball", "shape": "sphere", "radius_m": 0.02},
+            {"name": "piece", "shape": "mesh", "file": str(mesh)},
+            {"name": "pair", "shape": "compound", "parts": [{"shape": "cube", "edge_m": 0.02}]},
+            {"name": "hard", "shape": "cube", "edge_m": 0.02, "stiffness_n_per_m": 3000}],
+            "response": {"keys": {"1": "ball", "2": "piece", "3": "pair", "4": "hard"}}}
+        with tempfile.TemporaryDirectory() as folder:
+            path, database = pathlib.Path(folder) / "own.json", pathlib.Path(folder) / "own.db"
+            path.write_text(json.dumps(protocol), "utf-8")
+            said = run("validate", str(path))
+            self.assertEqual(said.returncode, 0, said.stderr)
+            simulated = said.stdout.decode().split("simulated participants")[1]
+            refused = run("simulate", str(path), "--db", str(database))
+            self.assertEqual(refused.returncode, 2)
+            for text in (simulated, refused.stderr.decode()):
+                for words in ("stimulus 'piece'", "stimulus 'pair'", "stimulus 'hard' has 3000 N/m",
+                              "passivity_controller"):
+                    self.assertIn(words, text)
+            self.assertEqual(sorted(p.name for p in pathlib.Path(folder).iterdir()), ["own.json"])
+
+    def test_no_text_reaches_the_terminal_as_a_command(self):
+        text = pathlib.Path(HO2000).read_text("utf-8")
+        title = "A\x1b[31m\x07\u009b2J\u202etxet\u2066\x7f"
+        protocol = dict(json.loads(text), title=title)
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "\x1b[2Jname.json"
+            path.write_text(json.dumps(protocol), "utf-8")
+            said = run("validate", str(path))
+            self.assertIn(rb"A\u001b[31m\u0007\u009b2J\u202etxet\u2066\u007f", said.stdout)
+            path.write_text(json.dumps(dict(protocol, **{"\x1b]0;x\x07": 1})), "utf-8")
+            refused = run("validate", str(path))
+            self.assertEqual(refused.returncode, 2)
+            unknown = run("validate", str(path) + "\u009b")
+            for output in (said.stdout, refused.stderr, unknown.stderr, run("\x1b[2J").stderr):
+                self.assertNotRegex(output, rb"[\x00-\x09\x0b-\x1f\x7f]|\xc2[\x80-\x9f]|\xe2\x80\xae")
 
     def test_missing_file_and_wrong_usage(self):
         self.assertEqual(run("validate", "nowhere.json").returncode, 2)

@@ -90,6 +90,14 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
   ASSERT_EQ(refused.size(), 1u);
   EXPECT_NE(refused[0].find("'ball' has 2500 N/m and 0.1 N s/m"), std::string::npos) << refused[0];
   EXPECT_NE(refused[0].find("material_limit"), std::string::npos);
+  EXPECT_NE(refused[0].find("set /servo/passivity_controller to true (then up to 2000 N/m)"),
+            std::string::npos)
+      << refused[0];
+  protocol.stimuli[0].object.material = of(1e5);
+  const auto stiff = misfits(protocol, StimulusLibrary(protocol), some_device());
+  ASSERT_EQ(stiff.size(), 1u);
+  EXPECT_NE(stiff[0].find("passivity_controller"), std::string::npos) << stiff[0];
+  protocol.stimuli[0].object.material = of(2500, 0.1);
 
   protocol.material_limit = MaterialLimit::limit;
   const auto limited = limit_materials(protocol, some_device());
