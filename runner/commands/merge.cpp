@@ -1,6 +1,7 @@
 #include "data/merge.h"
 
 #include <atomic>
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -41,6 +42,12 @@ int merge_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   if (inputs.empty()) {
     throw UsageError("missing the databases to merge\nUsage: " + line.usage + "\nMore: add --help");
+  }
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (std::filesystem::is_directory(input, error))
+      throw UsageError(input + ": this is a folder; name the databases in it, such as " +
+                       (std::filesystem::path(input) / "*.db").lexically_normal().string());
   }
   const std::atomic<bool>& stop_asked = watch_stop_signals();
   try {
