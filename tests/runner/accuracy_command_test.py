@@ -1,6 +1,7 @@
 """palpate accuracy from outside. Usage: accuracy_command_test.py PALPATE"""
 
 import json
+import math
 import pathlib
 import re
 import subprocess
@@ -35,6 +36,19 @@ class Accuracy(unittest.TestCase):
         # 80 triangles are too few for a sphere and enough for a cube.
         self.assertIsNone(result["recommended"][0]["triangles_for_device"])
         self.assertEqual(result["recommended"][3]["triangles_for_device"], 12)
+        # What is recommended keeps the demands in the same file's rows; the next coarser one does not.
+        def keeps(row):
+            errors = row["against_shape"]
+            return (errors["lost"] == 0 and errors["phantom"] == 0 and errors["depth"]["p999_m"] < 1e-3 and
+                    math.degrees(errors["direction"]["p999_rad"]) < 10)
+
+        for one in result["recommended"]:
+            rows = [r for r in result["rows"] if r["shape"] == one["shape"] and r["method"] == "tick"]
+            chosen = one["triangles_for_hand"] or math.inf
+            self.assertTrue(all(keeps(r) for r in rows if r["triangles"] >= chosen), one)
+            coarser = {r["triangles"] for r in rows if r["triangles"] < chosen}
+            if coarser:
+                self.assertFalse(all(keeps(r) for r in rows if r["triangles"] == max(coarser)), one)
         methods = {m["name"] for m in result["methods"]}
         self.assertLessEqual({"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"}, methods)
         self.assertEqual(methods - {"bullet", "fcl"}, {"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"})
