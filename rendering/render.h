@@ -85,13 +85,17 @@ template <class Probe>
 template <class Probe, bool kFriction>
 Rendering add_up(const Tick<Probe>& tick, std::span<LoadedContact> contacts) {
   std::size_t deepest = 0;
-  Vec3 deepest_shift(0);
+  Vec3 deepest_shift(0), object_shift(0);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    // Where the ideal probe is: moved by all contacts with the same object.
-    Vec3 shift(0);
-    for (const auto& c : contacts) {
-      if (c.object == contacts[i].object) shift += c.share * c.contact.normal;
+    // Where the ideal probe is: moved by all contacts with the same object, which stand side by
+    // side.
+    const int object = contacts[i].object;
+    if (i == 0 || object != contacts[i - 1].object) {
+      object_shift = Vec3(0);
+      for (std::size_t k = i; k < contacts.size() && contacts[k].object == object; ++k)
+        object_shift += contacts[k].share * contacts[k].contact.normal;
     }
+    Vec3 shift = object_shift;
     tick.state.parts[contacts[i].part].share = contacts[i].share * contacts[i].contact.normal;
     shift = tick.template place<kFriction>(contacts[i], shift);
     if (i == 0 || contacts[i].contact.depth > contacts[deepest].contact.depth) {

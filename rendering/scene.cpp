@@ -49,7 +49,7 @@ RenderState Scene::initial_state() const {
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
   if (!needs().several_parts) state.near_parts.push_back(0);  // and stays: one part is not surveyed
-  state.contacts.reserve(std::min(parts_.size(), kMaxContacts));
+  state.contacts.reserve(parts_.size());
   return state;
 }
 

@@ -18,8 +18,6 @@
 
 namespace palpate {
 
-inline constexpr std::size_t kMaxContacts = 32;  ///< parts that may be touched at once
-
 /// One convex part to be placed in a scene.
 struct SceneObject {
   std::shared_ptr<const ConvexMesh> mesh;

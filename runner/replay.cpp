@@ -53,7 +53,7 @@ void replay(const Protocol& protocol, const TrialRecord& recorded, RendererKind 
 bool equals_record(const SampleRecord& recorded, const Sample& again) {
   const Rendering& r = again.rendering;
   return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
-         recorded.depth == r.deepest.depth && recorded.contacts == r.contacts &&
+         recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
          recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
          (recorded.faults & kRendererFaults) == (r.faults & kRendererFaults);
 }

@@ -1,6 +1,7 @@
 #pragma once
 // What happens in one servo tick, and what is asked of the servo between ticks. Plain values.
 
+#include <algorithm>
 #include <cstdint>
 
 #include "rendering/renderer.h"
@@ -42,6 +43,11 @@ struct Sample {
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;
 };
+
+/// As a sample keeps it: 255 stands for more as well.
+inline std::uint8_t recorded_contacts(int contacts) {
+  return static_cast<std::uint8_t>(std::min(contacts, 255));
+}
 
 /// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.
 struct HomeZone {

@@ -206,7 +206,7 @@ void Session::keep(const Sample& sample) {
   kept.device1 = values(sample.device1);
   kept.device2 = values(sample.device2);
   kept.depth = rendering.deepest.depth;
-  kept.contacts = static_cast<std::uint8_t>(rendering.contacts);
+  kept.contacts = recorded_contacts(rendering.contacts);
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
   kept.faults = sample.faults;

@@ -1,112 +1,17 @@
-#include <algorithm>
-#include <array>
-#include <charconv>
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 
 #include "protocols/parse.h"
 #include "runner/commands/command.h"
 #include "runner/commands/outputs.h"
 #include "runner/commands/render_explain.h"
+#include "runner/commands/trajectory_csv.h"
 #include "runner/scene_builder.h"
+#include "stimuli/printable.h"
 
 namespace palpate {
 namespace {
 
 namespace po = boost::program_options;
-
-struct TrajectoryRow {
-  double t = 0;
-  LineProbe probe;
-};
-
-constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
-constexpr const char* kForceHeader =
-    "t,force_x,force_y,force_z,torque_x,torque_y,torque_z,ideal_tip_x,ideal_tip_y,ideal_tip_z,"
-    "ideal_tail_x,ideal_tail_y,ideal_tail_z,contact_x,contact_y,contact_z,device1_x,device1_y,"
-    "device1_z,"
-    "device2_x,device2_y,device2_z,depth,contacts,contact_type,object";
-
-/// The seven numbers of a line. Empty where it holds anything else.
-std::optional<std::array<double, 7>> seven_numbers(const std::string& line) {
-  std::array<double, 7> out{};
-  const char* at = line.data();
-  const char* const end = at + line.size();
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    if (i > 0 && (at == end || *at++ != ',')) return std::nullopt;
-    const auto [next, error] = std::from_chars(at, end, out[i]);
-    if (error != std::errc{}) return std::nullopt;
-    at = next;
-  }
-  if (at != end) return std::nullopt;
-  return out;
-}
-
-std::vector<TrajectoryRow> read_trajectory(const std::string& path) {
-  constexpr std::size_t kFaultsShown = 20;
-  std::ifstream in(path, std::ios::binary);
-  if (!in) throw InputError({{path, "", "a readable file was expected"}});
-  std::vector<TrajectoryRow> rows;
-  std::vector<Fault> faults;
-  std::string line;
-  for (std::size_t number = 1; std::getline(in, line) && faults.size() < kFaultsShown; ++number) {
-    const std::string place = "line " + std::to_string(number);
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (number == 1) {
-      if (line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
-      if (line != kTrajectoryHeader) {
-        throw InputError(
-            {{path, place, std::string("the header ") + kTrajectoryHeader + " was expected"}});
-      }
-      continue;
-    }
-    if (line.empty()) continue;
-    const auto values = seven_numbers(line);
-    if (!values) {
-      faults.push_back({path, place, "seven numbers were expected"});
-    } else if (!std::isfinite((*values)[0])) {
-      faults.push_back({path, place, "a finite time was expected"});
-    } else if (!rows.empty() && (*values)[0] <= rows.back().t) {
-      faults.push_back({path, place, "a time later than the line before was expected"});
-    } else {
-      const auto& v = *values;
-      rows.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}});
-    }
-  }
-  if (faults.size() == kFaultsShown)
-    faults.push_back({path, "", "and perhaps more; the first are shown"});
-  if (!faults.empty()) throw InputError(std::move(faults));
-  if (rows.empty()) throw InputError({{path, "", "at least one row was expected"}});
-  return rows;
-}
-
-void append(std::string& out, double value) {
-  char text[40];
-  out.append(text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.17g", value)));
-}
-
-void append(std::string& out, const Vec3& v) {
-  for (int k = 0; k < 3; ++k) {
-    out += ',';
-    append(out, v[k]);
-  }
-}
-
-void append_row(std::string& out, double t, const Rendering& r) {
-  append(out, t);
-  for (const Vec3& v :
-       {r.force, r.torque, r.ideal.tip, r.ideal.tail, r.deepest.point, r.device1, r.device2}) {
-    append(out, v);
-  }
-  out += ',';
-  append(out, r.deepest.depth);
-  out += ',' + std::to_string(r.contacts) + ',' + to_string(r.deepest.type) + ',' +
-         std::to_string(r.object) + '\n';
-}
 
 Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& objects,
                   const Renderer& renderer) {
@@ -135,16 +40,15 @@ void explain_scene(Outputs& outputs, const Scene& scene, const Renderer& rendere
   outputs.write();
 }
 
-std::string forces_along(const Scene& scene, const Renderer& renderer,
-                         const std::vector<TrajectoryRow>& rows) {
+ForceTable forces_along(const Scene& scene, const Renderer& renderer,
+                        const std::vector<TimedPose>& poses) {
   RenderState state = scene.initial_state();
-  std::string out = std::string(kForceHeader) + '\n';
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const double dt = i > 0 ? rows[i].t - rows[i - 1].t : 0;
-    const Rendering rendering = renderer.tick(scene, state, rows[i].probe, dt);
-    append_row(out, rows[i].t, rendering);
+  ForceTable table;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
+    table.add(poses[i], renderer.tick(scene, state, poses[i].probe, dt));
   }
-  return out;
+  return table;
 }
 
 }  // namespace
@@ -157,7 +61,8 @@ int render_command(const std::vector<std::string>& args) {
       "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
   line.summary =
       "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
-      "in. Or tells what a tick over the scene consists of, what was left out and why, and what "
+      "in; what a tick could not render stands in its column 'faults'. Or tells what a tick over "
+      "the scene consists of, what was left out and why, and what "
       "each stage costs.";
   line.example =
       "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
@@ -166,7 +71,8 @@ int render_command(const std::vector<std::string>& args) {
       ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
-       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader + " (s, m)")
+       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
+        " (s, m); at most " + std::to_string(kMostPoses) + " rows")
            .c_str())                                                                              //
       ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
       ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
@@ -195,9 +101,12 @@ int render_command(const std::vector<std::string>& args) {
   given(*values, "out", "unless --explain is given");
   const std::vector<ObjectSpec> objects = parse_scene(scene_path);
   for (const ObjectSpec& object : objects) outputs.keep(object);
-  const std::vector<TrajectoryRow> rows = read_trajectory(trajectory);
-  outputs.put("out", forces_along(build_scene(scene_path, objects, renderer), renderer, rows));
+  const std::vector<TimedPose> poses = read_trajectory(trajectory);
+  const ForceTable table =
+      forces_along(build_scene(scene_path, objects, renderer), renderer, poses);
+  outputs.put("out", table.text());
   outputs.write();
+  std::cerr << printable_lines(table.warnings(trajectory));
   return 0;
 }
 

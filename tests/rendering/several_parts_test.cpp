@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "runner/allocation_count.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
@@ -132,6 +133,23 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
   if (GetParam()->side_contact()) {
     EXPECT_GT(both_touched, 500);
   }
+}
+
+TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
+  constexpr int kObjects = 300;
+  constexpr double kPressed = 1e-3, kSoft = 2;  // m, N/m
+  std::vector<SceneObject> objects;
+  for (int i = 0; i < kObjects; ++i)
+    objects.push_back(placed_object(box({-0.05, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kSoft, i));
+  const Scene scene(objects);
+  RenderState state = scene.initial_state();
+  tick(scene, state, upright(0, -0.01));
+  const std::uint64_t before = allocations();
+  const Rendering r = tick(scene, state, upright(0, kPressed));
+  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(r.contacts, kObjects);
+  EXPECT_NEAR(r.force.z, kObjects * kSoft * kPressed, 1e-9);
+  EXPECT_EQ(r.faults, 0u);
 }
 
 TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {

@@ -57,6 +57,13 @@ class Devices(FromOutside):
         self.assertIsNone(device["limits"]["max_force_n"])
         self.assertIsNone(device["limits"]["max_stiffness_n_per_m"])
 
+    def test_a_rate_that_is_asked_for_is_not_the_devices_own(self):
+        out = self.dir / "devices.json"
+        text = self.palpate("devices", "--device", "simulated", "--rate", "3210", "--json", out).stdout
+        self.assertIsNone(json.loads(out.read_text())["devices"][0]["limits"]["max_rate_hz"])
+        self.assertNotIn("3210 Hz;", text)
+        self.assertIn("at any rate that is asked for", text)
+
     def test_the_machine_is_judged_in_a_sentence_that_fits_the_figures(self):
         out = self.dir / "timing.json"
         command = [PALPATE, "devices", "--timing", "--seconds", "0.5", "--rate", "2000", "--json", str(out)]
@@ -111,6 +118,18 @@ class Usage(FromOutside):
             self.assertTrue(done.stderr)
         self.assertEqual(list(self.dir.iterdir()), [])
 
+    def test_numbers_without_a_sign_take_none_and_all_are_finite(self):
+        quick = PROTOCOLS / "quick.json"
+        for args in (["simulate", quick, "--db", self.dir / "s.db", "--seed", "-1"],
+                     ["simulate", quick, "--db", self.dir / "s.db", "--seed=-1"],
+                     ["accuracy", "--search", "10", "--seed", "-1"], ["plan", "--seed", "-1"],
+                     ["devices", "--rate", "nan"], ["analyze", "--csv", "x.csv", "--too-fast-s", "inf"]):
+            self.assertIn("expected a", self.palpate(*args, status=2).stderr)
+        self.assertEqual(list(self.dir.iterdir()), [])
+
+    def test_a_folder_is_no_database_to_merge(self):
+        self.assertIn("this is a folder", self.palpate("merge", "--out", self.dir / "all.db", ".", status=2).stderr)
+
     def test_results_that_cannot_be_written_are_a_failure(self):
         with open("/dev/full", "w") as full:
             done = subprocess.run([PALPATE, "--help"], stdout=full, stderr=subprocess.PIPE)
@@ -127,7 +146,8 @@ class Render(FromOutside):
         self.palpate("render", "--scene", self.write("scene.json", scene), "--renderer", renderer, "--trajectory",
                      self.write("path.csv", path), "--out", out, "--force")
         with open(out, newline="") as file:
-            return [{k: v if k == "contact_type" else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+            words = ("contact_type", "faults")
+            return [{k: v if k in words else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
     def test_explain_lists_what_runs_and_what_was_left_out(self):
         scene, out = self.write("scene.json", self.CUBE), self.dir / "stages.json"
@@ -181,6 +201,58 @@ class Render(FromOutside):
         z = [0.02, 0.021, 0.03, 0.024]
         rows = self.render(self.CUBE, "ray", [[0.001 * i, 0, 0, h, 0, 0, h + 0.12] for i, h in enumerate(z)])
         self.assertEqual([row["contacts"] for row in rows], [0, 0, 0, 1])
+        self.assertEqual([row["faults"] for row in rows], ["started-inside", "started-inside", "", ""])
+        self.assertEqual(list(rows[0])[-1], "faults")
+
+    def test_poses_that_are_no_numbers_are_faults_and_counted(self):
+        path = self.write("path.csv", self.HEADER + "0,0,0,0.03,0,0,0.15\n1,nan,0,0.024,0,0,0.15\n"
+                          "2,0,0,0.024,inf,0,0.15\n3,0,0,-1e308,0,0,0.15\n4,0,0,0.024,0,0,0.15\n")
+        for renderer in ("point", "ray"):
+            out = self.dir / f"{renderer}.csv"
+            done = self.palpate("render", "--scene", self.write("scene.json", self.CUBE), "--renderer", renderer,
+                                "--trajectory", path, "--out", out)
+            with open(out, newline="") as file:
+                rows = list(csv.DictReader(file))
+            self.assertEqual([row["faults"] for row in rows], ["", "non-finite", "non-finite", "non-finite", ""])
+            self.assertEqual([float(row["force_z"]) > 0 for row in rows], [False, False, False, False, True])
+            self.assertIn("non-finite in 3 of 5 rows, first on line 3", done.stderr)
+
+    def test_forty_objects_are_felt_and_no_fault(self):
+        cube = '{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 100}'
+        scene = '{"objects": [' + ", ".join([cube] * 40) + "]}"
+        row = self.render(scene, "ray", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [1, 0.01, 0, 0.024, 0.01, 0, 0.144]])[1]
+        self.assertEqual((row["contacts"], row["faults"]), (40, ""))
+        self.assertAlmostEqual(row["force_z"], 4.0, 9)
+
+    def test_paths_without_end_or_writer_are_refused_in_words(self):
+        scene, out, pipe = self.write("scene.json", self.CUBE), self.dir / "out.csv", self.dir / "pipe"
+        os.mkfifo(pipe)
+        long = self.write("long.csv", self.HEADER + "0," * 800_000 + "\n")
+        def render(path):
+            return ["render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", out]
+
+        empty = "nothing was written into this pipe for 10 s"
+        cases = [(render("/dev/zero"), "1 MiB"), (render(long), "1 MiB"), (render("/dev/null"), "at least one row"),
+                 (["validate", "/dev/zero"], "16 MB"), (["analyze", "--csv", "/dev/zero"], "1 MiB"),
+                 (["analyze", "--db", pipe], "is not a file"), (render(pipe), empty), (["validate", pipe], empty),
+                 (["analyze", "--csv", pipe], empty), (["plan", "--csv", pipe], empty),
+                 (["simulate", PROTOCOLS / "quick.json", "--db", self.dir / "s.db", "--settings", pipe], empty),
+                 (["render", "--scene", pipe, *render(long)[3:]], empty)]
+        running = [subprocess.Popen([PALPATE, *map(str, args)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+                   for args, _ in cases]
+        for (args, words), done in zip(cases, running):
+            message = done.communicate(timeout=300)[1]
+            self.assertEqual(done.returncode, 2, (args, message))
+            self.assertIn(words, message, args)
+        self.assertFalse(out.exists())
+
+    def test_a_path_comes_through_a_pipe(self):
+        pipe, out = self.dir / "pipe", self.dir / "out.csv"
+        os.mkfifo(pipe)
+        with subprocess.Popen(["sh", "-c", f"sleep 0.2; printf '{self.HEADER}0,0,0,1,0,0,2\n' > {pipe}"]):
+            self.palpate("render", "--scene", self.write("scene.json", self.CUBE), "--renderer", "ray", "--trajectory",
+                         pipe, "--out", out)
+        self.assertEqual(len(out.read_text().splitlines()), 2)
 
     def test_bad_input_lists_every_fault_and_writes_nothing(self):
         scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": -1, "colour": 3}, {"shape": "egg"}]}')
