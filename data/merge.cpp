@@ -93,12 +93,7 @@ void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
     }
   }
   // Nothing of theirs was ever in this file: there is nothing to clear.
-  SQLite::Statement bury(db, "INSERT INTO tombstones (code_hash, cleared) VALUES (?, 1)");
-  for (const std::string& hash : plan.tombstones.hashes()) {
-    bury.reset();
-    Binder(bury) << hash;
-    bury.exec();
-  }
+  for (const auto& tombstone : plan.tombstones.all()) Tombstones::put(db, tombstone, true);
 }
 
 void sync_file(const std::string& file) {

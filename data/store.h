@@ -87,8 +87,9 @@ struct Holdings {
   bool withdrawn_before = false;  ///< the code has a tombstone
   std::int64_t protocols = 0;     ///< it is enrolled in
   std::int64_t sessions = 0, trials = 0, cut_off = 0;
-  std::int64_t mentions = 0;          ///< notes on others that say the code
-  std::vector<ExportRecord> exports;  ///< that hold it, also those of before a withdrawal
+  std::int64_t mentions = 0;           ///< notes on others that say the code
+  std::vector<ExportRecord> exports;   ///< that hold it, also those of before a withdrawal
+  std::vector<std::string> elsewhere;  ///< files and folders beside it that name the code
 };
 
 /// What was done about backups when a participant was forgotten.

@@ -10,6 +10,7 @@
 #include "data/private_files.h"
 #include "data/store_impl.h"
 #include "data/tombstones.h"
+#include "data/traces.h"
 
 namespace palpate {
 namespace {
@@ -51,16 +52,6 @@ void delete_rows(SQLite::Database& db, const std::string& code) {
     Binder(remove) << code;
     remove.exec();
   }
-}
-
-/// Whether `text` says `code` as a word of its own.
-bool mentions(const std::string& text, const std::string& code) {
-  for (std::size_t at = text.find(code); at != std::string::npos; at = text.find(code, at + 1)) {
-    const bool begins = at == 0 || !is_participant_code(text.substr(at - 1, 1));
-    const std::size_t end = at + code.size();
-    if (begins && (end == text.size() || !is_participant_code(text.substr(end, 1)))) return true;
-  }
-  return false;
 }
 
 /// The name of an export may say the code as well: it is crossed out, where that leaves other words
@@ -129,7 +120,7 @@ Holdings Store::holdings(const std::string& code) {
   return guarded(impl_->path, [&] {
     SQLite::Database& db = *impl_->db;
     Holdings found;
-    const std::string hash = Tombstones::read(db, impl_->path).find(code);
+    const std::string hash = Tombstones::read(db, impl_->path).find(code).hash;
     found.withdrawn_before = !hash.empty();
     found.protocols = count(db, "participants WHERE code = ?", code);
     found.sessions = count(db, std::string("sessions WHERE participant_id IN ") + kTheirs, code);
@@ -155,6 +146,9 @@ Holdings Store::holdings(const std::string& code) {
     while (notes.executeStep()) {
       found.mentions += mentions(notes.getColumn(0).getString(), code) ? 1 : 0;
     }
+    std::vector<std::string> known = backups_of(impl_->file);
+    for (const ExportRecord& one : found.exports) known.push_back(one.path);
+    found.elsewhere = find_traces(impl_->file, code, known);
     return found;
   });
 }
@@ -167,17 +161,21 @@ Withdrawal Store::forget(const std::string& code) {
     db.exec("PRAGMA secure_delete = ON");
     return Tombstones::read(db, impl_->path);
   });
-  std::string hash = tombstones.find(code);
-  if (hash.empty()) {
-    if (holdings(code).protocols == 0) impl_->refuse("there is no participant " + code + " here");
-    hash = tombstones.hash_for(code);
+  Tombstones::Tombstone tombstone = tombstones.find(code);
+  const std::string before = tombstone.hash;
+  if (before.empty() && holdings(code).protocols == 0) {
+    impl_->refuse("there is no participant " + code + " here");
   }
+  // One of before there were secrets gets one: the code is known once more.
+  if (tombstone.secret.empty()) tombstone = tombstones.made_for(code);
+  const std::string& hash = tombstone.hash;
   impl_->commit([&] {
-    SQLite::Statement tombstone(db,
-                                "INSERT INTO tombstones (code_hash, cleared) VALUES (?, 0) ON "
-                                "CONFLICT (code_hash) DO UPDATE SET cleared = 0");
-    Binder(tombstone) << hash;
-    tombstone.exec();
+    if (!before.empty() && before != hash) {
+      SQLite::Statement again(db, "UPDATE tombstones SET code_hash = ? WHERE code_hash = ?");
+      Binder(again) << hash << before;
+      again.exec();
+    }
+    Tombstones::put(db, tombstone, false);
     SQLite::Statement exports(
         db,
         "INSERT OR IGNORE INTO tombstone_exports SELECT t.id, e.export_id FROM tombstones t, "

@@ -2,12 +2,16 @@
 
 #include <SQLiteCpp/Statement.h>
 #include <crypt.h>
+#include <nettle/hmac.h>
+#include <sys/random.h>
 
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <optional>
 
-#include "data/store.h"
+#include "data/checksum.h"
+#include "data/store_impl.h"
 
 namespace palpate {
 namespace {
@@ -41,15 +45,39 @@ std::string hash_with(const std::string& code, const std::string& salt) {
   return hash;
 }
 
+std::string new_secret() {
+  std::string secret(32, '\0');
+  if (::getrandom(secret.data(), secret.size(), 0) != static_cast<ssize_t>(secret.size())) {
+    throw StoreError("no secret can be made: the system gives no random numbers");
+  }
+  return secret;
+}
+
+/// What is hashed of a code.
+std::string keyed(const std::string& code, const std::string& secret) {
+  if (secret.empty()) return code;
+  hmac_sha256_ctx context;
+  hmac_sha256_set_key(&context, secret.size(),
+                      reinterpret_cast<const unsigned char*>(secret.data()));
+  hmac_sha256_update(&context, code.size(), reinterpret_cast<const unsigned char*>(code.data()));
+  Checksum sum;
+  hmac_sha256_digest(&context, sum.size(), sum.data());
+  return to_hex(sum);
+}
+
 }  // namespace
 
 Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
   Tombstones all;
-  if (!db.tableExists("tombstones")) return all;
   const std::string cost = cost_of(new_salt());
-  SQLite::Statement find(db, "SELECT code_hash FROM tombstones");
+  SQLite::Statement find(db,
+                         "SELECT t.code_hash, s.secret FROM tombstones t LEFT JOIN "
+                         "tombstone_secrets s ON s.id = t.secret_id");
   while (find.executeStep()) {
-    const std::string hash = find.getColumn(0).getString(), salt = salt_of(hash);
+    std::string hash;
+    std::optional<std::string> secret;
+    Row(find) >> hash >> secret;
+    const std::string salt = salt_of(hash);
     const bool clean = std::all_of(hash.begin(), hash.end(), [](char c) {
       return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
              c == '$' || c == '.' || c == '/';
@@ -57,38 +85,65 @@ Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
     if (!clean || cost_of(salt) != cost || salt.size() == hash.size() || hash.size() > 200) {
       throw StoreRefused(path + ": a tombstone is none of palpate's; restore a backup");
     }
-    all.by_salt_[salt].push_back(hash);
+    all.by_key_[{secret.value_or(""), salt}].push_back(hash);
   }
   return all;
 }
 
-std::string Tombstones::find(const std::string& code) const {
-  for (const auto& [salt, hashes] : by_salt_) {
-    std::string hash = hash_with(code, salt);
-    if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return hash;
+Tombstones::Tombstone Tombstones::find(const std::string& code) const {
+  for (const auto& [key, hashes] : by_key_) {
+    std::string hash = hash_with(keyed(code, key.secret), key.salt);
+    if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return {hash, key.secret};
   }
-  return "";
+  return {};
 }
 
-std::string Tombstones::hash_for(const std::string& code) const {
-  return hash_with(code, by_salt_.empty() ? new_salt() : by_salt_.begin()->first);
+Tombstones::Tombstone Tombstones::made_for(const std::string& code) const {
+  const auto known = std::find_if(by_key_.begin(), by_key_.end(),
+                                  [](const auto& one) { return !one.first.secret.empty(); });
+  const Key key = known != by_key_.end() ? known->first : Key{new_secret(), new_salt()};
+  return {hash_with(keyed(code, key.secret), key.salt), key.secret};
+}
+
+void Tombstones::put(SQLite::Database& db, const Tombstone& tombstone, bool cleared) {
+  std::optional<std::int64_t> secret;
+  if (!tombstone.secret.empty()) {
+    const auto bind = [&](SQLite::Statement& statement) {
+      statement.bind(1, static_cast<const void*>(tombstone.secret.data()),
+                     static_cast<int>(tombstone.secret.size()));
+    };
+    SQLite::Statement keep(
+        db, "INSERT INTO tombstone_secrets (secret) VALUES (?) ON CONFLICT DO NOTHING");
+    bind(keep);
+    keep.exec();
+    SQLite::Statement find(db, "SELECT id FROM tombstone_secrets WHERE secret = ?");
+    bind(find);
+    find.executeStep();
+    secret = find.getColumn(0).getInt64();
+  }
+  SQLite::Statement add(db,
+                        "INSERT INTO tombstones (code_hash, secret_id, cleared) VALUES (?, ?, ?) "
+                        "ON CONFLICT (code_hash) DO UPDATE SET cleared = excluded.cleared, "
+                        "secret_id = excluded.secret_id");
+  Binder(add) << tombstone.hash << secret << cleared;
+  add.exec();
 }
 
 void Tombstones::add(const Tombstones& others) {
-  for (const auto& [salt, hashes] : others.by_salt_) {
-    auto& mine = by_salt_[salt];
+  for (const auto& [key, hashes] : others.by_key_) {
+    auto& mine = by_key_[key];
     for (const auto& hash : hashes) {
       if (std::find(mine.begin(), mine.end(), hash) == mine.end()) mine.push_back(hash);
     }
   }
 }
 
-std::vector<std::string> Tombstones::hashes() const {
-  std::vector<std::string> all;
-  for (const auto& salted : by_salt_) {
-    all.insert(all.end(), salted.second.begin(), salted.second.end());
+std::vector<Tombstones::Tombstone> Tombstones::all() const {
+  std::vector<Tombstone> all;
+  for (const auto& [key, hashes] : by_key_) {
+    for (const auto& hash : hashes) all.push_back({hash, key.secret});
   }
-  std::sort(all.begin(), all.end());
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.hash < b.hash; });
   return all;
 }
 

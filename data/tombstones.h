@@ -3,6 +3,7 @@
 
 #include <SQLiteCpp/Database.h>
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
@@ -10,26 +11,40 @@
 namespace palpate {
 
 /// The tombstones of one or more databases. A tombstone is a salted hash that is slow to make
-/// (yescrypt): codes are short, and nobody shall find them by trying all of them in a second.
+/// (yescrypt), of the code keyed with a secret (HMAC-SHA256): nobody finds a short code by trying
+/// all of them who has the tombstone alone. The secret is in the database, or merge could not
+/// honour its tombstones: who has the whole database can still try codes, a few hundred a second.
 class Tombstones {
  public:
-  /// Of an open database; none where its schema is too old to have any. \throws StoreRefused: one
+  struct Tombstone {
+    std::string hash;
+    std::string secret;  ///< 32 bytes; "": of a palpate that had none, the code was hashed as it is
+    bool operator==(const Tombstone&) const = default;
+  };
+
+  /// Of an open database; \throws StoreRefused: one
   /// of them is no hash that we make.
   static Tombstones read(SQLite::Database& db, const std::string& path);
 
-  bool holds(const std::string& code) const { return !find(code).empty(); }
-  std::string find(const std::string& code) const;  ///< the tombstone of a code, "" for none
+  bool holds(const std::string& code) const { return !find(code).hash.empty(); }
+  Tombstone find(const std::string& code) const;  ///< of a code; without a hash: there is none
 
-  /// The hash to keep of a code. Uses the salt of those there are, so that a code is hashed once to
-  /// be compared with all. \throws StoreError: no randomness to be had.
-  std::string hash_for(const std::string& code) const;
+  /// What to keep of a code. Uses a secret and salt that are there, so that a code is hashed once
+  /// to be compared with all of them. \throws StoreError: no randomness to be had.
+  Tombstone made_for(const std::string& code) const;
+  /// Within a transaction. \param cleared  as the column of that name.
+  static void put(SQLite::Database& db, const Tombstone& tombstone, bool cleared);
 
-  bool empty() const { return by_salt_.empty(); }
+  bool empty() const { return by_key_.empty(); }
   void add(const Tombstones& others);
-  std::vector<std::string> hashes() const;  ///< sorted
+  std::vector<Tombstone> all() const;  ///< sorted
 
  private:
-  std::map<std::string, std::vector<std::string>> by_salt_;
+  struct Key {
+    std::string secret, salt;
+    auto operator<=>(const Key&) const = default;
+  };
+  std::map<Key, std::vector<std::string>> by_key_;
 };
 
 }  // namespace palpate

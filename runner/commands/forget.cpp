@@ -75,6 +75,13 @@ int forget_command(const std::vector<std::string>& args) {
     std::cout << printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
   list_exports(holdings, std::cout);
+  if (!holdings.elsewhere.empty()) {
+    std::cout << "These lie beside the database or its exports and name " << code
+              << "; they are not changed: delete them, or give the command for each database:\n";
+    for (const std::string& path : holdings.elsewhere) {
+      std::cout << "  " << printable(path) << "\n";
+    }
+  }
   if (holdings.mentions > 0) {
     std::cout << "Notes on other participants that say " << printable(code) << ": "
               << holdings.mentions << "; they are left as they are\n";

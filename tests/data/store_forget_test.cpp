@@ -1,5 +1,6 @@
 // Withdrawal: after it, nothing of the participant is in any byte of the database or its backups.
 
+#include <crypt.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -7,10 +8,13 @@
 #include <chrono>
 #include <random>
 #include <thread>
+#include <tuple>
 
 #include "data/export_log.h"
+#include "data/merge.h"
 #include "data/schema.h"
 #include "data/store.h"
+#include "data/tombstones.h"
 #include "tests/data/child_process.h"
 #include "tests/data/store_fixture.h"
 
@@ -252,6 +256,88 @@ TEST_F(Forgetting, KilledAtAnyMomentItIsAllThereOrTheSameCallFinishes) {
   }
   EXPECT_GT(all_there, 0);
   EXPECT_GT(finished, 0);
+}
+
+TEST(TombstonesOf, ADatabaseCannotBeGuessedWithoutItsSecret) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "s.db";
+  {
+    Store store = Store::open(path, Store::Mode::write_or_create);
+    store.enrol(a_protocol(), "P07");
+    store.enrol(a_protocol(), "P08");
+    store.forget("P07");
+    store.forget("P08");
+  }
+  SQLite::Database db(path, SQLite::OPEN_READWRITE);
+  EXPECT_EQ(db.execAndGet("SELECT count(*) FROM tombstone_secrets").getInt(), 1);
+  EXPECT_TRUE(Tombstones::read(db, path).holds("P07"));
+  EXPECT_FALSE(Tombstones::read(db, path).holds("P09"));
+  db.exec("UPDATE tombstone_secrets SET secret = randomblob(32)");
+  EXPECT_FALSE(Tombstones::read(db, path).holds("P07"));
+}
+
+TEST(TombstonesOf, SeveralStationsAreAllHonouredByAMergeAndByMergesOfIt) {
+  const TemporaryFolder folder;
+  const std::string a = folder / "a.db", b = folder / "b.db", c = folder / "c.db";
+  for (const auto& [path, gone, number] : {std::tuple(a, "P1", 1), std::tuple(b, "P2", 2)}) {
+    Store store = Store::open(path, Store::Mode::write_or_create);
+    store.enrol(a_protocol(), gone, number);
+    store.forget(gone);
+  }
+  {
+    Store store = Store::open(c, Store::Mode::write_or_create);
+    for (const char* code : {"P1", "P2", "P3"}) store.enrol(a_protocol(), code);
+  }
+  merge(folder / "ab.db", {a, b});
+  const Merged done = merge(folder / "all.db", {folder / "ab.db", c});
+  EXPECT_EQ(done.left_out.size(), 2u);
+  EXPECT_EQ(done.counts.participants, 1);
+  Store all = Store::open(folder / "all.db", Store::Mode::write_or_create);
+  for (const char* code : {"P1", "P2"}) {
+    EXPECT_THROW(all.enrol(a_protocol(), code), StoreRefused) << code;
+  }
+}
+
+TEST(TombstonesOf, OneWithoutASecretGetsItWhenTheCodeIsForgottenAgain) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "s.db";
+  {
+    Store store = Store::open(path, Store::Mode::write_or_create);
+    store.enrol(a_protocol(), "P1");
+    store.forget("P1");
+  }
+  std::string unkeyed;
+  {
+    SQLite::Database db(path, SQLite::OPEN_READWRITE);
+    const std::string salt =
+        db.execAndGet("SELECT substr(code_hash, 1, 29) FROM tombstones").getString();
+    unkeyed = crypt("P1", salt.c_str());
+    db.exec("UPDATE tombstones SET secret_id = NULL, code_hash = '" + unkeyed + "'");
+    EXPECT_TRUE(Tombstones::read(db, path).holds("P1"));
+  }
+  Store::open(path, Store::Mode::write_or_create).forget("P1");
+  SQLite::Database db(path, SQLite::OPEN_READWRITE);
+  EXPECT_TRUE(Tombstones::read(db, path).holds("P1"));
+  EXPECT_EQ(db.execAndGet("SELECT count(*) FROM tombstones WHERE secret_id IS NULL").getInt(), 0);
+  EXPECT_NE(db.execAndGet("SELECT code_hash FROM tombstones").getString(), unkeyed);
+}
+
+TEST(Traces, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "s.db";
+  {
+    Store store = Store::open(path, Store::Mode::write_or_create);
+    store.enrol(a_protocol(), "P07");
+  }
+  std::filesystem::copy_file(path, folder / "s.db.bak");
+  Store::open(folder / "other.db", Store::Mode::write_or_create).enrol(a_protocol(), "P08");
+  write_file(folder / "trials.csv", "participant_id\r\nP07\r\n");
+  write_file(folder / "report.html", "<td>P07</td>");
+  write_file(folder / "unrelated.txt", "P070, XP07");
+  std::filesystem::create_directories(folder / "bids/sub-P07");
+  EXPECT_EQ(Store::open(path, Store::Mode::write_or_create).holdings("P07").elsewhere,
+            (std::vector<std::string>{folder / "bids", folder / "report.html", folder / "s.db.bak",
+                                      folder / "trials.csv"}));
 }
 
 }  // namespace
