@@ -216,6 +216,11 @@ Run Store::begin_run(const Participant& participant, const RunInfo& info,
     if (shown_with != nullptr) {
       const std::int64_t shown = keep_protocol(db, impl_->path, *shown_with);
       if (shown != own_protocol) other_protocol = shown;
+      const std::string files = files_checksum(db, own_protocol);
+      if (!files.empty() && files_checksum(db, shown) != files) {
+        impl_->refuse("the files that the protocol names now are not those that participant " +
+                      participant.code + " began with; put them back as they were");
+      }
     }
     SQLite::Statement add(
         db,

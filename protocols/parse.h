@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -27,10 +28,16 @@ class InputError : public std::runtime_error {
   std::vector<Fault> faults_;
 };
 
+/// Bytes of files by name, as a protocol names them.
+using StoredFiles = std::map<std::string, std::string>;
+
 /// Reads and checks a protocol, also that its schedule can be built. \throws InputError with every
 /// fault.
 Protocol parse_protocol(const std::string& path);
-Protocol parse_protocol_text(const std::string& text, const std::string& file_name);
+/// \param stored  files that it names and that are taken from here; others from the folder of
+/// `file_name`
+Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
+                             const StoredFiles& stored = {});
 
 /// Reads and checks a scene file: {"objects": [...]}. Mesh files are resolved relative to it.
 /// \throws InputError with every fault.

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <filesystem>
 
+#include "stimuli/mesh_file.h"
+
 namespace palpate {
 namespace {
 
@@ -23,28 +25,37 @@ constexpr int kMaxCompounds = 8;  // within each other
 constexpr std::size_t kMaxParts = 1000;
 
 ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
-                       const std::string& folder, int compounds);
+                       const MeshFiles& files, int compounds);
 
-void read_file(ObjectReader& reader, const std::string& folder, ObjectSpec& spec) {
+void read_file(ObjectReader& reader, const MeshFiles& files, ObjectSpec& spec) {
   std::string name;
   reader.text("file", name);
   const json* const value = reader.member("file", Need::required);
   if (value == nullptr || !value->is_string()) return;
-  const std::filesystem::path path = std::filesystem::path(folder) / name;
+  const std::filesystem::path path = std::filesystem::path(files.folder) / name;
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::error_code error;
   if (extension != ".obj" && extension != ".stl") {
     reader.faults().add(reader.pointer("file"), "expected a file .obj or .stl" + found(*value));
+  } else if (const auto kept = files.kept.find(name); kept != files.kept.end()) {
+    spec.file_bytes = std::make_shared<const std::string>(kept->second);
   } else if (!std::filesystem::is_regular_file(path, error)) {
     reader.faults().add(reader.pointer("file"),
                         "expected an existing file; there is no " + path.string());
+  } else {
+    try {
+      spec.file_bytes = std::make_shared<const std::string>(mesh_file_bytes(path.string()));
+    } catch (const MeshError& unreadable) {
+      reader.faults().add(reader.pointer("file"), unreadable.what());
+    }
   }
+  spec.file_name = name;
   spec.file = path.string();
 }
 
-void read_parts(ObjectReader& reader, const std::string& folder, int compounds, ObjectSpec& spec) {
+void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds, ObjectSpec& spec) {
   const json* const parts = reader.array("parts", 1, kMaxParts, Need::required);
   if (parts == nullptr) return;
   if (compounds == kMaxCompounds) {
@@ -55,13 +66,13 @@ void read_parts(ObjectReader& reader, const std::string& folder, int compounds, 
   }
   for (std::size_t i = 0; i < parts->size(); ++i) {
     ObjectReader part((*parts)[i], child_pointer(reader.pointer("parts"), i), reader.faults());
-    spec.parts.push_back(read_nested(part, spec.material, folder, compounds + 1));
+    spec.parts.push_back(read_nested(part, spec.material, files, compounds + 1));
     part.refuse_unknown_keys();
   }
 }
 
 ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
-                       const std::string& folder, int compounds) {
+                       const MeshFiles& files, int compounds) {
   ObjectSpec spec;
   spec.material = default_material;
   reader.vector("position_m", spec.pose.position, kPosition);
@@ -101,10 +112,10 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
       reader.number("edge_m", spec.edge, kLength, Need::required);
       break;
     case ShapeKind::mesh:
-      read_file(reader, folder, spec);
+      read_file(reader, files, spec);
       break;
     case ShapeKind::compound:
-      read_parts(reader, folder, compounds, spec);
+      read_parts(reader, files, compounds, spec);
       break;
   }
   return spec;
@@ -154,8 +165,8 @@ void read_material(ObjectReader& reader, Material& material) {
 }
 
 ObjectSpec read_object(ObjectReader& reader, const Material& default_material,
-                       const std::string& folder) {
-  return read_nested(reader, default_material, folder, 0);
+                       const MeshFiles& files) {
+  return read_nested(reader, default_material, files, 0);
 }
 
 std::string folder_of(const std::string& file) {

@@ -3,15 +3,22 @@
 #include <string>
 
 #include "protocols/object_reader.h"
+#include "protocols/parse.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate {
 
+/// Where the files are that a scene or protocol names.
+struct MeshFiles {
+  std::string folder;     ///< on the disk
+  StoredFiles kept = {};  ///< that need not be there any more
+};
+
 /// Reads an object of a scene (contracts, "Scene") from an open reader, with the keys that its
-/// shape takes; `folder` is where mesh files are looked for. The caller refuses unknown keys, for a
+/// shape takes. The caller refuses unknown keys, for a
 /// stimulus has some more of its own.
 ObjectSpec read_object(ObjectReader& reader, const Material& default_material,
-                       const std::string& folder);
+                       const MeshFiles& files);
 
 /// Reads stiffness_n_per_m and damping_ns_per_m.
 void read_material(ObjectReader& reader, Material& material);

@@ -45,8 +45,7 @@ void read_renderers(ObjectReader& reader, Protocol& protocol) {
   }
 }
 
-StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol,
-                           const std::string& folder) {
+StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol, const MeshFiles& files) {
   StimulusSpec stimulus;
   reader.name("name", stimulus.name);
   Material material = protocol.material;
@@ -59,19 +58,19 @@ StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol,
       }
     }
   });
-  stimulus.object = read_object(reader, material, folder);
+  stimulus.object = read_object(reader, material, files);
   reader.refuse_unknown_keys();
   return stimulus;
 }
 
-void read_stimuli(ObjectReader& reader, Protocol& protocol, const std::string& folder) {
+void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
   const json* const list = reader.array("stimuli", 1, kMaxStimuli, Need::required);
   if (list == nullptr) return;
   std::set<std::string> names;
   for (std::size_t i = 0; i < list->size(); ++i) {
     const std::string place = child_pointer(reader.pointer("stimuli"), i);
     ObjectReader item((*list)[i], place, reader.faults());
-    protocol.stimuli.push_back(read_stimulus(item, protocol, folder));
+    protocol.stimuli.push_back(read_stimulus(item, protocol, files));
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
@@ -244,7 +243,8 @@ Protocol parse_protocol(const std::string& path) {
   return parse_protocol_text(read_text_file(path), path);
 }
 
-Protocol parse_protocol_text(const std::string& text, const std::string& file_name) {
+Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
+                             const StoredFiles& stored) {
   FaultList faults(file_name);
   const json root = read_json(text, faults);
   Protocol protocol;
@@ -261,7 +261,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
                  {"interleaved", RendererOrder::interleaved}});
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
-  read_stimuli(reader, protocol, folder_of(file_name));
+  read_stimuli(reader, protocol, {folder_of(file_name), stored});
   reader.integer("repetitions", protocol.repetitions, kRepetitions, Need::required);
   reader.section("order", [&](ObjectReader& section) {
     section.choice("kind", protocol.order.kind,

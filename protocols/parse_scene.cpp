@@ -14,7 +14,7 @@ std::vector<ObjectSpec> parse_scene(const std::string& path) {
   if (const auto* const list = scene.array("objects", 1, kMaxObjects, Need::required)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       ObjectReader object((*list)[i], child_pointer("/objects", i), faults);
-      objects.push_back(read_object(object, Material{}, folder_of(path)));
+      objects.push_back(read_object(object, Material{}, {folder_of(path)}));
       object.refuse_unknown_keys();
     }
   }

@@ -4,10 +4,6 @@
 
 namespace palpate {
 
-ProtocolInfo info_of(const Protocol& protocol) {
-  return {protocol.name, protocol.source_text, protocol.sha256};
-}
-
 RunRecord::RunRecord(Store& store, const ProtocolInfo& protocol, const Participant& participant,
                      const RunInfo& info, const std::optional<ProtocolInfo>& shown_with)
     : store_(store),

@@ -7,11 +7,10 @@
 
 #include "data/store.h"
 #include "protocols/protocol.h"
+#include "runner/protocol_info.h"
 #include "runner/trial_log.h"
 
 namespace palpate {
-
-ProtocolInfo info_of(const Protocol& protocol);
 
 /// Somebody new is enrolled, and takes a number, when the first trial begins and not before: who
 /// came as far as the pre-flight only, or stood before a display that did not open, is nobody to

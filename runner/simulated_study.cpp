@@ -14,6 +14,7 @@
 #include "runner/build_info.h"
 #include "runner/device_check.h"
 #include "runner/participants/simulated.h"
+#include "runner/protocol_info.h"
 #include "runner/session.h"
 
 namespace palpate {
@@ -129,10 +130,10 @@ std::vector<Work> unfinished_work(const Protocol& protocol, Store& store,
                                   const SimulatedSettings& settings, const StudyPlan& plan,
                                   StudyProgress& progress) {
   std::vector<Work> todo;
+  const ProtocolInfo info = info_of(protocol);
   for (int number = 1; number <= plan.participants; ++number) {
     const Participant participant =
-        store.enrol({protocol.name, protocol.source_text, protocol.sha256}, simulated_code(number),
-                    number, true, plan.seed);
+        store.enrol(info, simulated_code(number), number, true, plan.seed);
     for (int session = 1; session <= protocol.sessions.count; ++session) {
       Work work;
       work.participant = participant;

@@ -37,17 +37,35 @@ std::string contents(const std::string& path, FileFaults& faults) {
   return bytes;
 }
 
-}  // namespace
-
-PolygonSoup read_mesh_file(const std::string& path) {
-  FileFaults faults(path);
+/// Or .stl.
+bool is_obj_file(const std::string& path, FileFaults& faults) {
   const std::string extension = lower_extension(path);
   const bool is_obj = extension == ".obj";
   if (!is_obj && extension != ".stl") {
     faults.add("", "a name that ends in .obj or .stl", in_quotes(extension));
   }
+  return is_obj;
+}
+
+}  // namespace
+
+PolygonSoup read_mesh_file(const std::string& path) {
+  FileFaults faults(path);
+  is_obj_file(path, faults);  // before it is read
   faults.throw_if_any();
-  const std::string bytes = contents(path, faults);
+  return read_mesh(path, mesh_file_bytes(path));
+}
+
+std::string mesh_file_bytes(const std::string& path) {
+  FileFaults faults(path);
+  std::string bytes = contents(path, faults);
+  faults.throw_if_any();
+  return bytes;
+}
+
+PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
+  FileFaults faults(path);
+  const bool is_obj = is_obj_file(path, faults);
   faults.throw_if_any();
   std::string_view text = bytes;
   // Some editors begin a text so. A binary file has no text to begin.

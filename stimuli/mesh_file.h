@@ -11,4 +11,11 @@ namespace palpate {
 /// \throws MeshError with file, line (text formats) or byte (binary) and what was expected.
 PolygonSoup read_mesh_file(const std::string& path);
 
+/// The same of a file that has been read. \param path names it, for its format and in messages
+PolygonSoup read_mesh(const std::string& path, const std::string& bytes);
+
+/// The bytes of a mesh file, whatever they are. \throws MeshError: it cannot be read or is too
+/// large.
+std::string mesh_file_bytes(const std::string& path);
+
 }  // namespace palpate

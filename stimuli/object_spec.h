@@ -2,6 +2,7 @@
 // What a scene file or a protocol says of an object, as plain values (contracts: "Scene").
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -33,12 +34,15 @@ struct Material {
 /// +height/2, base at -height/2.
 struct ObjectSpec {
   ShapeKind shape = ShapeKind::sphere;
-  double radius = 0.03;           ///< m; sphere, cone, cylinder
-  double height = 0.06;           ///< m; cone, cylinder
-  double edge = 0.06;             ///< m; cube
-  int subdivisions = 4;           ///< sphere: an icosphere of 20 * 4^subdivisions triangles
-  int segments = 64;              ///< cone, cylinder: corners of the rim
-  std::string file;               ///< mesh: resolved path of an .obj or .stl file
+  double radius = 0.03;   ///< m; sphere, cone, cylinder
+  double height = 0.06;   ///< m; cone, cylinder
+  double edge = 0.06;     ///< m; cube
+  int subdivisions = 4;   ///< sphere: an icosphere of 20 * 4^subdivisions triangles
+  int segments = 64;      ///< cone, cylinder: corners of the rim
+  std::string file_name;  ///< mesh: as the scene or protocol names its file
+  std::string file;       ///< mesh: resolved path of an .obj or .stl file
+  /// mesh: what the file held when it was named; nullptr: to be read from the disk.
+  std::shared_ptr<const std::string> file_bytes;
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
   Pose pose;
   Material material;

@@ -169,7 +169,7 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
     case ShapeKind::cube:
       return cube(spec.edge);
     case ShapeKind::mesh:
-      return read_mesh_file(spec.file);
+      return spec.file_bytes ? read_mesh(spec.file, *spec.file_bytes) : read_mesh_file(spec.file);
     case ShapeKind::compound:
       break;
   }

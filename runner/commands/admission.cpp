@@ -175,7 +175,10 @@ Admission admit(const RunSettings& settings) {
     const ProtocolChoice choice = choose_protocol(changed);
     admission.notes.push_back(to_json_text(changed, choice));
     if (choice != ProtocolChoice::new_code) {
-      Protocol stored = parse_protocol_text(known.earlier->info.text, settings.protocol);
+      StoredFiles files;
+      for (const ProtocolFile& file : known.earlier->info.files)
+        files.emplace(file.name, file.bytes);
+      Protocol stored = parse_protocol_text(known.earlier->info.text, settings.protocol, files);
       admission.enrolled = info_of(stored);
       if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
       return admission;

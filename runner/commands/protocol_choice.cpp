@@ -67,6 +67,7 @@ std::optional<EarlierProtocol> earlier_protocol(Store& store, const Protocol& pr
     for (const Participant& person : store.participants(info.sha256)) {
       if (person.code != code) continue;
       EarlierProtocol one{info, "", 0, ""};
+      one.info.files = store.files(info.sha256);
       std::int64_t latest_ns = 0;
       std::set<int> sessions;
       for (const StoredRun& run : runs) {

@@ -252,7 +252,8 @@ int replay_command(const std::vector<std::string>& args) {
   add("protocol", po::value(&protocol_name)->value_name("NAME"),
       "of which protocol, where the code is in several");
   add("meshes", po::value(&folder)->value_name("DIR"),
-      "where the protocol's mesh files are; default: the working directory");
+      "where the protocol's mesh files are, for a database of before they were kept in it;\n"
+      "default: the working directory");
   add("compare", "also show what the other renderer would have shown");
   add("out", po::value(&out)->value_name("FILE.csv"), "write every tick");
   add("json", po::value(&json)->value_name("FILE"), "write the figures as JSON");
@@ -264,12 +265,17 @@ int replay_command(const std::vector<std::string>& args) {
   Store store = Store::open(db, Store::Mode::read_only);
   const StoredTrial stored = find_trial(store, name, protocol_name);
   const TrialRecord& record = stored.record;
+  // Where a run was shown with another text, it differs in words only.
   std::string text;
   for (const ProtocolInfo& info : store.protocols()) {
     if (info.sha256 == stored.protocol_sha256) text = info.text;
   }
+  StoredFiles files;
+  for (ProtocolFile& file : store.files(stored.protocol_sha256)) {
+    files.emplace(file.name, std::move(file.bytes));
+  }
   Protocol protocol = parse_protocol_text(
-      text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string());
+      text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string(), files);
   const auto& stimuli = protocol.stimuli;
   for (const StimulusSpec& stimulus : stimuli) outputs.keep(stimulus.object);
   if (std::none_of(stimuli.begin(), stimuli.end(),

@@ -316,5 +316,19 @@ TEST(Parse, SurvivesDamage) {
   EXPECT_GT(refused, 1000);
 }
 
+TEST(MeshFiles, AreReadWithTheProtocolAndStoredOnesStandIn) {
+  const std::string text =
+      R"({"version": 1, "name": "own", "renderers": ["point"], "repetitions": 1,
+          "stimuli": [{"name": "wedge", "shape": "mesh", "file": "no-such-folder/wedge.obj"}],
+          "response": {"keys": {"1": "wedge"}}})";
+  EXPECT_THROW(parse_protocol_text(text, "own.json"), InputError);
+  const Protocol kept =
+      parse_protocol_text(text, "own.json", {{"no-such-folder/wedge.obj", "v 0 0 0\n"}});
+  const ObjectSpec& object = kept.stimuli.at(0).object;
+  EXPECT_EQ(object.file_name, "no-such-folder/wedge.obj");
+  ASSERT_TRUE(object.file_bytes);
+  EXPECT_EQ(*object.file_bytes, "v 0 0 0\n");
+}
+
 }  // namespace
 }  // namespace palpate
