@@ -9,6 +9,10 @@ import sys
 import tempfile
 import unittest
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "data"))
+import seals  # noqa: E402
+
 PALPATE = sys.argv[1]
 
 
@@ -83,6 +87,7 @@ class Replay(unittest.TestCase):
             self.assertGreater(result["recorded"]["max_force_n"], 0)
         with sqlite3.connect(db) as base:
             base.execute("UPDATE notes SET text = replace(text, '60000', '50000')")
+            seals.seal_again(base)
         base.close()
         refused = self.palpate("replay", "--db", db, "--trial", "S001/1/1", status=2)
         self.assertIn("limits another material", refused.stderr)
@@ -112,7 +117,14 @@ class Replay(unittest.TestCase):
     def test_a_record_that_was_changed_differs(self):
         db, trials = self.study()
         with sqlite3.connect(db) as base:
+            self.assertEqual(seals.faults(base), [])
             base.execute("UPDATE attempts SET orientation_w = orientation_x, orientation_x = orientation_w")
+            self.assertEqual(len(seals.faults(base)), len(trials))
+        base.commit()
+        refused = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=2)
+        self.assertIn(f"{db}: participant S001, session 1, trial 1, attempt 1: was changed", refused.stderr)
+        seals.seal_again(base)
+        self.assertEqual(seals.faults(base), [])
         base.close()
         done = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=1)
         self.assertRegex(done.stdout, r"ticks differ from the record, the first is tick \d+")
@@ -121,6 +133,7 @@ class Replay(unittest.TestCase):
         db, trials = self.study()
         with sqlite3.connect(db) as base:
             base.execute("UPDATE attempts SET shape = 'torus'")
+            seals.seal_again(base)
         base.close()
         done = self.palpate("replay", "--db", db, "--trial", trials[0][0], status=2)
         for said in (str(db), trials[0][0], "'torus'"):

@@ -21,8 +21,10 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import bids_checks
 import psychds_checks
+import seals
 
 PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
 KEYS = {"1": "sphere", "2": "cone", "3": "cylinder", "4": "cube"}
@@ -54,7 +56,7 @@ def cut_off_some(database):
         "2, block, renderer, shape, practice, orientation_w, orientation_x, orientation_y, orientation_z, onset_ns - 5, "
         "'cut_off', 'said \"stop\", then left' FROM attempts WHERE trial = 3"
     )
-    db.commit()
+    seals.seal_again(db)
     db.close()
 
 
