@@ -35,6 +35,10 @@ class Sound {
   void number(const char* field, double value) const {
     if (!std::isfinite(value)) fail(field, "is not a finite number");
   }
+  void amount(const char* field, double value) const {
+    number(field, value);
+    if (value < 0) fail(field, "is below zero");
+  }
   void run() const {
     if (!is_participant_code(trial_.participant.code)) {
       throw SQLite::Exception("a participant's code is not 1 to 32 letters and digits",
@@ -59,9 +63,9 @@ class Sound {
     text("response", record.response);
     text("reason", trial_.cut_off_reason);
     for (const double q : record.orientation_wxyz) number("orientation", q);
-    number("response_time", record.response_time);
-    number("first_contact_time", record.first_contact_time.value_or(0));
-    number("max_force", record.max_force);
+    amount("response_time", record.response_time);
+    amount("first_contact_time", record.first_contact_time.value_or(0));
+    amount("max_force", record.max_force);
   }
 
  private:

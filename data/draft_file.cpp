@@ -23,6 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLetters = 6;
+constexpr std::string_view kMark = ".palpate-";
 
 std::string random_letters() {
   constexpr std::string_view kAlphabet =
@@ -47,22 +48,13 @@ bool leads_to(int folder, const std::string& name, int descriptor) {
          named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
 }
 
-}  // namespace
-
-std::string draft_stem(const std::string& target) {
-  const fs::path path(target);
-  constexpr std::size_t kMost = 200;  // bytes; a name has at most 255
-  return (path.parent_path() / ("." + path.filename().string().substr(0, kMost) + ".palpate-"))
-      .string();
-}
-
-void remove_dead_drafts(const std::string& target) {
-  const std::string stem = draft_stem(target);
-  const fs::path folder = fs::path(target).parent_path();
+/// Removes what has such a name, is ours, and is locked by nobody.
+template <class IsDraft>
+void remove_dead(const fs::path& folder, IsDraft is_draft) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
+    if (!is_draft(entry.path().filename().string())) continue;
     const std::string path = (folder / entry.path().filename()).string();
-    if (!path.starts_with(stem) || path.size() != stem.size() + kLetters) continue;
     struct stat found {};
     if (::lstat(path.c_str(), &found) != 0 || found.st_uid != ::geteuid()) continue;
     if (!S_ISDIR(found.st_mode) && !(S_ISREG(found.st_mode) && found.st_nlink == 1)) continue;
@@ -71,6 +63,31 @@ void remove_dead_drafts(const std::string& target) {
     if (::flock(draft, LOCK_EX | LOCK_NB) == 0) fs::remove_all(path, error);
     ::close(draft);
   }
+}
+
+}  // namespace
+
+std::string draft_stem(const std::string& target) {
+  const fs::path path(target);
+  constexpr std::size_t kMost = 200;  // bytes; a name has at most 255
+  return (path.parent_path() /
+          ("." + path.filename().string().substr(0, kMost) + std::string(kMark)))
+      .string();
+}
+
+void remove_dead_drafts(const std::string& target) {
+  const std::string stem = fs::path(draft_stem(target)).filename().string();
+  remove_dead(fs::path(target).parent_path(), [&](const std::string& name) {
+    return name.starts_with(stem) && name.size() == stem.size() + kLetters;
+  });
+}
+
+void remove_dead_drafts_in(const std::string& folder) {
+  remove_dead(folder, [](const std::string& name) {
+    const std::size_t letters = name.rfind(kMark);
+    return name.starts_with('.') && letters != std::string::npos && letters > 1 &&
+           name.size() == letters + kMark.size() + kLetters;
+  });
 }
 
 FollowedPath follow_own_links(const std::string& path) {

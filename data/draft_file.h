@@ -15,6 +15,8 @@ std::string draft_stem(const std::string& target);
 /// Removes drafts for `target`, files and folders, that are ours and that nobody holds a lock on:
 /// their program is dead.
 void remove_dead_drafts(const std::string& target);
+/// The same for all targets in a folder.
+void remove_dead_drafts_in(const std::string& folder);
 
 struct FollowedPath {
   std::string path;   ///< absolute, without links

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "data/checks.h"
+#include "data/draft_file.h"
 #include "data/private_files.h"
 #include "data/store_impl.h"
 #include "data/tombstones.h"
@@ -199,6 +200,7 @@ Withdrawal Store::forget(const std::string& code) {
     (found == Backup::holds && !fs::exists(backup) ? done.backups_removed : done.backups_left)
         .push_back(backup);
   }
+  remove_dead_drafts_in(fs::path(impl_->file).parent_path());  // of exports that were killed
   if (done.backups_left.empty()) {
     impl_->commit([&] {
       SQLite::Statement cleared(db, "UPDATE tombstones SET cleared = 1 WHERE code_hash = ?");

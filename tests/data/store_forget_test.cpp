@@ -156,6 +156,24 @@ TEST_F(Forgetting, DeletesTheBackupsThatHoldTheParticipant) {
   expect_gone();
 }
 
+TEST_F(Forgetting, DraftsOfKilledExportsGoAndOthersFilesStay) {
+  const std::string draft = folder_ / ".trials.csv.palpate-Ab3-_9",
+                    dataset = folder_ / ".bids.palpate-XyZ012";
+  write_file(draft, "P01,1\n");
+  fs::create_directory(dataset);
+  write_file(dataset + "/participants.tsv", "P01\n");
+  const std::string others[] = {folder_ / "trials.csv.palpate-Ab3-_9", folder_ / ".palpate-Ab3-_9",
+                                folder_ / ".trials.csv.palpate-long-name", folder_ / "poetry.lock"};
+  for (const std::string& other : others) write_file(other, "P01\n");
+  {
+    Store store = open();
+    store.forget(kGone);
+  }
+  EXPECT_FALSE(fs::exists(draft));
+  EXPECT_FALSE(fs::exists(dataset));
+  for (const std::string& other : others) EXPECT_TRUE(fs::exists(other)) << other;
+}
+
 TEST_F(Forgetting, ABackupThatCannotBeReadIsNamed) {
   write_file(path_ + ".v1.backup", "not a database");
   Store store = open();
