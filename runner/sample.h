@@ -6,20 +6,9 @@
 
 #include "rendering/renderer.h"
 #include "runner/device.h"
+#include "runner/servo_fault.h"
 
 namespace palpate {
-
-/// Bits of Sample::faults; the renderer's bits are the low ones.
-namespace servo_fault {
-inline constexpr std::uint32_t kForceLimited = 16;  ///< the force was cut in size or change
-inline constexpr std::uint32_t kDeviceLost = 32;    ///< zero force for good
-inline constexpr std::uint32_t kMissedTicks = 64;   ///< too many in a row: zero force for good
-inline constexpr std::uint32_t kTripped = 128;    ///< forces are off until the experimenter clears
-inline constexpr std::uint32_t kEmergency = 256;  ///< somebody asked for zero force
-inline constexpr std::uint32_t kSamplesLost = 512;  ///< the ring was full: ticks before are missing
-inline constexpr std::uint32_t kStalled = 1024;     ///< the servo's thread gives no more samples
-inline constexpr std::uint32_t kOldReading = 2048;  ///< the device's last reading again
-}  // namespace servo_fault
 
 enum class Phase : std::uint8_t {
   idle,     ///< no forces

@@ -22,16 +22,17 @@ bool SessionFault::passed() const {
 }
 
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
-  if (faults & servo_fault::kEmergency) return "zero force was asked for";
-  if (faults & servo_fault::kStalled) return "the servo gives no more samples";
-  if (faults & servo_fault::kDeviceLost) {
-    const std::string why = advice(trouble);
-    if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) return why;
-    return "the device was lost" + (why.empty() ? why : ": " + why);
+  using namespace servo_fault;
+  for (const std::uint32_t bit :
+       {kEmergency, kStalled, kDeviceLost, kMissedTicks, render_fault::kNonFinite}) {
+    if ((faults & bit) == 0) continue;
+    const std::string why = bit == kDeviceLost ? advice(trouble) : "";
+    if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
+      if (!why.empty()) return why;
+    }
+    return fault_bit(bit).why + (why.empty() ? why : ": " + why);
   }
-  if (faults & servo_fault::kMissedTicks) return "too many ticks were missed in a row";
-  if (faults & render_fault::kNonFinite) return "a force or pose was not finite";
-  return "they had not been cleared since the last fault";
+  return fault_bit(kTripped).why;
 }
 
 Session::Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp)

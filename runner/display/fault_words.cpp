@@ -1,33 +1,18 @@
-#include <array>
+#include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "rendering/renderer.h"
 #include "runner/display/console_panels.h"
-#include "runner/sample.h"
+#include "runner/servo_fault.h"
 
 namespace palpate {
 
 std::string fault_words(std::uint32_t faults) {
-  constexpr std::array<std::pair<std::uint32_t, const char*>, 11> kWords = {{
-      {render_fault::kNonFinite, "not a finite number"},
-      {render_fault::kStartedInside, "started inside"},
-      {render_fault::kWalkCapped, "search cut short"},
-      {render_fault::kContactsDropped, "too many contacts"},
-      {servo_fault::kForceLimited, "force limited"},
-      {servo_fault::kDeviceLost, "device lost"},
-      {servo_fault::kMissedTicks, "ticks missed"},
-      {servo_fault::kTripped, "forces off"},
-      {servo_fault::kEmergency, "emergency"},
-      {servo_fault::kSamplesLost, "samples lost"},
-      {servo_fault::kStalled, "servo stalled"},
-  }};
   std::string out;
-  for (const auto& [bit, words] : kWords) {
-    if ((faults & bit) == 0) continue;
+  for (const FaultBit& fault : kFaultBits) {
+    if ((faults & fault.bit) == 0) continue;
     if (!out.empty()) out += ", ";
-    out += words;
-    faults &= ~bit;
+    out += fault.words;
+    faults &= ~fault.bit;
   }
   if (faults != 0) {
     if (!out.empty()) out += ", ";
