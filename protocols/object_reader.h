@@ -28,9 +28,9 @@ enum class Need { optional, required };
 std::string found(const nlohmann::json& value);
 
 /// One of some words. False and a fault otherwise.
-template <class T>
+template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
 bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out,
-                 std::initializer_list<std::pair<const char*, T>> options, FaultList& faults) {
+                 const Options& options, FaultList& faults) {
   std::string words;
   for (const auto& [word, meaning] : options) {
     if (value.is_string() && value.get_ref<const std::string&>() == word) {
@@ -72,9 +72,8 @@ class ObjectReader {
   void vector(const char* key, Vec3& out, const Interval& interval);
   void quaternion(const char* key, Quat& out);
 
-  template <class T>
-  void choice(const char* key, T& out, std::initializer_list<std::pair<const char*, T>> options,
-              Need need = Need::optional) {
+  template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
+  void choice(const char* key, T& out, const Options& options, Need need = Need::optional) {
     const nlohmann::json* const value = member(key, need);
     if (value != nullptr) read_choice(*value, pointer(key), out, options, faults_);
   }

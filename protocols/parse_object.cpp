@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "stimuli/mesh_file.h"
+#include "stimuli/shapes.h"
 
 namespace palpate {
 namespace {
@@ -80,14 +84,9 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
   read_material(reader, spec.material);
 
   std::optional<ShapeKind> shape;
-  reader.choice<std::optional<ShapeKind>>("shape", shape,
-                                          {{"sphere", ShapeKind::sphere},
-                                           {"cone", ShapeKind::cone},
-                                           {"cylinder", ShapeKind::cylinder},
-                                           {"cube", ShapeKind::cube},
-                                           {"mesh", ShapeKind::mesh},
-                                           {"compound", ShapeKind::compound}},
-                                          Need::required);
+  std::vector<std::pair<const char*, std::optional<ShapeKind>>> shapes;
+  for (const ShapeKind kind : kShapes) shapes.emplace_back(needs_of(kind).name, kind);
+  reader.choice<std::optional<ShapeKind>>("shape", shape, shapes, Need::required);
   if (!shape) {
     // Which keys belong here cannot be told: none of the shapes' is called unknown.
     for (const char* key :
@@ -97,27 +96,14 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
     return spec;
   }
   spec.shape = *shape;
-  switch (spec.shape) {
-    case ShapeKind::sphere:
-      reader.number("radius_m", spec.radius, kLength, Need::required);
-      reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
-      break;
-    case ShapeKind::cone:
-    case ShapeKind::cylinder:
-      reader.number("radius_m", spec.radius, kLength, Need::required);
-      reader.number("height_m", spec.height, kLength, Need::required);
-      reader.integer("segments", spec.segments, kSegments);
-      break;
-    case ShapeKind::cube:
-      reader.number("edge_m", spec.edge, kLength, Need::required);
-      break;
-    case ShapeKind::mesh:
-      read_file(reader, files, spec);
-      break;
-    case ShapeKind::compound:
-      read_parts(reader, files, compounds, spec);
-      break;
-  }
+  const ShapeNeeds needs = needs_of(spec.shape);
+  if (needs.radius) reader.number("radius_m", spec.radius, kLength, Need::required);
+  if (needs.height) reader.number("height_m", spec.height, kLength, Need::required);
+  if (needs.edge) reader.number("edge_m", spec.edge, kLength, Need::required);
+  if (needs.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
+  if (needs.segments) reader.integer("segments", spec.segments, kSegments);
+  if (spec.shape == ShapeKind::mesh) read_file(reader, files, spec);
+  if (spec.shape == ShapeKind::compound) read_parts(reader, files, compounds, spec);
   return spec;
 }
 

@@ -4,28 +4,23 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <set>
+#include <stdexcept>
 
 #include "rendering/hand_path.h"
 #include "stimuli/primitives.h"
+#include "stimuli/shapes.h"
 
 namespace palpate {
 namespace {
 
-constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                 ShapeKind::cube};
 constexpr double kPi = 3.14159265358979324;
 
-const char* name_of(ShapeKind shape) {
-  switch (shape) {
-    case ShapeKind::sphere:
-      return "sphere";
-    case ShapeKind::cone:
-      return "cone";
-    case ShapeKind::cylinder:
-      return "cylinder";
-    default:
-      return "cube";
+std::vector<ShapeKind> analytic_shapes() {
+  std::vector<ShapeKind> all;
+  for (const ShapeKind shape : kShapes) {
+    if (needs_of(shape).analytic) all.push_back(shape);
   }
+  return all;
 }
 
 /// A path with the exact answers of the shape, and of the polyhedron at some ticks.
@@ -134,9 +129,13 @@ int triangles_of(const ObjectSpec& spec) {
       return 2 * spec.segments - 2;
     case ShapeKind::cylinder:
       return 4 * spec.segments - 4;
-    default:
+    case ShapeKind::cube:
       return 12;
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
   }
+  throw std::invalid_argument("triangles_of: a mesh or compound is no analytic primitive");
 }
 
 std::vector<ObjectSpec> tessellations(ShapeKind shape, int most_triangles) {
@@ -149,7 +148,7 @@ std::vector<ObjectSpec> tessellations(ShapeKind shape, int most_triangles) {
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));
     if (triangles_of(spec) > most_triangles && !all.empty()) break;
     all.push_back(spec);
-    if (shape == ShapeKind::cube) break;
+    if (!needs_of(shape).subdivisions && !needs_of(shape).segments) break;  // nothing to refine
   }
   return all;
 }
@@ -160,14 +159,15 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
   const std::vector<MethodKind> methods = accuracy_methods();
   // Finer tessellations take longer, though less than in proportion.
   const auto weight = [](const ObjectSpec& spec) { return 100 + std::sqrt(triangles_of(spec)); };
+  const std::vector<ShapeKind> shapes = analytic_shapes();
   double work = 0, done = 0;
-  for (const ShapeKind shape : kShapes) {
+  for (const ShapeKind shape : shapes) {
     for (const ObjectSpec& spec : tessellations(shape, settings.most_triangles)) {
       work += 2 * weight(spec) * static_cast<double>(methods.size());
     }
   }
   std::vector<AccuracyRow> rows;
-  for (const ShapeKind shape : kShapes) {
+  for (const ShapeKind shape : shapes) {
     const auto specs = tessellations(shape, settings.most_triangles);
     for (const bool segment : {true, false}) {
       std::vector<Course> all = courses(specs.front(), settings, segment);
@@ -188,13 +188,12 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
           Run run(kind, mesh, segment, stride, now);
           for (const Course& course : all) run.over(course, settings.timings);
           AccuracyRow row;
-          row.shape = name_of(shape);
+          row.shape = needs_of(shape).name;
           row.triangles = triangles_of(spec);
           row.facets = mesh.facets().size();
           row.edges = mesh.edges().size();
-          row.subdivisions = shape == ShapeKind::sphere ? spec.subdivisions : 0;
-          row.segments =
-              shape == ShapeKind::cone || shape == ShapeKind::cylinder ? spec.segments : 0;
+          row.subdivisions = needs_of(shape).subdivisions ? spec.subdivisions : 0;
+          row.segments = needs_of(shape).segments ? spec.segments : 0;
           row.probe = segment ? "ray" : "point";
           row.method = kind.name;
           run.report(row);

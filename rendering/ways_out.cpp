@@ -83,11 +83,15 @@ double outside_by(const ObjectSpec& s, const Vec3& p) {
       return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) - s.edge / 2;
     case ShapeKind::cylinder:
       return std::max(out - s.radius, std::abs(p.z) - s.height / 2);
-    default: {
+    case ShapeKind::cone: {
       const Vec3 side = cone_normal(s, Vec3(1, 0, 0));
       return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
     }
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
   }
+  throw std::invalid_argument("ways_out: a mesh or compound is no analytic primitive");
 }
 
 /// Some point of the probe is within the shape: the least of a convex function by thirds.
@@ -142,8 +146,12 @@ std::vector<WayOut> ways_out(const ObjectSpec& primitive, const LineProbe& probe
     case ShapeKind::cylinder:
       ways::out_of_cylinder(s);
       break;
-    default:
+    case ShapeKind::cone:
       ways::out_of_cone(s);
+      break;
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;  // refused above
   }
   return s.sorted();
 }

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "stimuli/shapes.h"
+
 namespace palpate {
 namespace {
 
@@ -70,9 +72,13 @@ std::vector<Mat3> distinct_rotations(ShapeKind kind) {
       return spiral_axes(kCylinderAxes, 0);
     case ShapeKind::cube:
       return cube_rotations();
-    default:
+    case ShapeKind::sphere:
       return {Mat3(1)};
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;  // fault_of has refused them
   }
+  return {};
 }
 
 bool usable(double length) { return std::isfinite(length) && length > 0; }
@@ -80,19 +86,19 @@ bool usable(double length) { return std::isfinite(length) && length > 0; }
 }  // namespace
 
 std::string ShapeHypotheses::fault_of(const ObjectSpec& stimulus) {
-  switch (stimulus.shape) {
-    case ShapeKind::sphere:
-      return usable(stimulus.radius) ? "" : "its radius is not positive";
-    case ShapeKind::cone:
-    case ShapeKind::cylinder:
-      return usable(stimulus.radius) && usable(stimulus.height)
-                 ? ""
-                 : "its radius or height is not positive";
-    case ShapeKind::cube:
-      return usable(stimulus.edge) ? "" : "its edge is not positive";
-    default:
-      return "a simulated participant knows sphere, cone, cylinder and cube, not mesh or compound";
+  const ShapeNeeds needs = needs_of(stimulus.shape);
+  if (!needs.analytic) {
+    std::string known;
+    for (const ShapeKind shape : kShapes) {
+      if (!needs_of(shape).analytic) continue;
+      known += (known.empty() ? "" : ", ") + std::string(needs_of(shape).name);
+    }
+    return std::string("a simulated participant knows ") + known + ", not " + needs.name;
   }
+  if (needs.radius && !usable(stimulus.radius)) return "its radius is not positive";
+  if (needs.height && !usable(stimulus.height)) return "its height is not positive";
+  if (needs.edge && !usable(stimulus.edge)) return "its edge is not positive";
+  return "";
 }
 
 ShapeHypotheses::ShapeHypotheses(const std::vector<ObjectSpec>& stimuli) {
@@ -114,7 +120,7 @@ void ShapeHypotheses::append(const ObjectSpec& stimulus) {
   shape.kind = stimulus.shape;
   shape.radius = static_cast<float>(stimulus.radius);
   shape.half_size =
-      static_cast<float>((stimulus.shape == ShapeKind::cube ? stimulus.edge : stimulus.height) / 2);
+      static_cast<float>((needs_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
   shape.first = padded_size();
   shape.count = static_cast<int>(rotations.size());
   shapes_.push_back(shape);

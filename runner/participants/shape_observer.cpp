@@ -200,8 +200,12 @@ void ShapeObserver::update(const Percept& percept) {
       case ShapeKind::cube:
         update_shape<CubeLine>(*hypotheses_, shape, query, settings_, l);
         break;
-      default:
+      case ShapeKind::sphere:
         update_shape<SphereLine>(*hypotheses_, shape, query, settings_, l);
+        break;
+      case ShapeKind::mesh:
+      case ShapeKind::compound:
+        break;  // ShapeHypotheses refuses them
     }
   }
   find_posterior();

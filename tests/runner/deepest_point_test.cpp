@@ -29,9 +29,13 @@ void for_block(const ObjectSpec& object, const ShapeHypotheses& hypotheses, cons
       return check(AxialLine<CylinderProfile>(hypotheses, shape, 0, line));
     case ShapeKind::cube:
       return check(CubeLine(hypotheses, shape, 0, line));
-    default:
+    case ShapeKind::sphere:
       return check(SphereLine(hypotheses, shape, 0, line));
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
   }
+  throw std::invalid_argument("no analytic shape");
 }
 
 struct Case {
