@@ -6,8 +6,8 @@
 
 namespace palpate {
 
-/// The analysis as JSON (contracts: "Analysis"): numbers read back exactly; an undefined one is
-/// null, beside "status": "undefined" and a "reason".
+/// The analysis as JSON, its keys as in report_json.cpp: numbers read back exactly; an undefined
+/// one is null, beside "status": "undefined" and a "reason".
 std::string report_json(const Analysis& analysis);
 
 }  // namespace palpate

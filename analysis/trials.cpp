@@ -11,6 +11,7 @@
 #include "analysis/csv_reader.h"
 #include "analysis/text.h"
 #include "analysis/trial_table_builder.h"
+#include "data/spreadsheet_text.h"
 #include "protocols/parse.h"
 
 namespace palpate {
@@ -140,8 +141,9 @@ class CsvTrials {
         "expected " + std::string(expected) + "; found '" + printable(field(column), 40) + "'");
   }
 
+  /// A name as it was before an export guarded it from spreadsheets.
   std::string_view name(Column column, const Interner& known) {
-    const std::string_view text = field(column);
+    const std::string_view text = unguarded(field(column));
     if (known.holds(text)) return text;
     if (text.empty() || text.size() > kMaxName || !is_plain_utf8(text)) {
       fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");

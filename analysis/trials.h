@@ -1,5 +1,6 @@
 #pragma once
-// The rows that the analysis works on, from a CSV file (contracts: "Trials") or a database.
+// The rows that the analysis works on, from a CSV file (the columns of data/columns.cpp) or a
+// database.
 
 #include <cstddef>
 #include <cstdint>
@@ -47,10 +48,10 @@ struct TrialTable {
   std::vector<std::string> warnings;  ///< odd, but no fault
 };
 
-/// Reads trials from CSV: the contract's first nine columns in any order, `practice`, `timed_out`,
-/// `simulated`, `protocol_sha256` and `program_version` where they exist; others are ignored. Any
-/// names of renderers.
-/// \throws InputError with every fault (a count of the rest past kMaxFaults); never half a table.
+/// Reads trials from CSV: the first nine columns of data/columns.cpp in any order, `practice`,
+/// `timed_out`, `simulated`, `protocol_sha256` and `program_version` where they exist; others are
+/// ignored. Any names of renderers. \throws InputError with every fault (a count of the rest past
+/// kMaxFaults); never half a table.
 TrialTable read_trials_csv(const std::string& path);
 
 /// Reads the completed trials of a database. \throws InputError where there are none, what

@@ -1,59 +1,138 @@
 #include "data/bids_recording.h"
 
-#include <string>
+#include <algorithm>
+#include <cmath>
 
-#include "data/dataset.h"
+#include "data/sample_slots.h"
 #include "data/table_fields.h"
+#include "data/utc.h"
 
 namespace palpate {
 namespace {
 
-constexpr std::uint32_t kLongestGap = 600'000;  // ticks: ten minutes at 1 kHz
+constexpr double kLongestGap = 60;  // s
 
-void require_sound_ticks(const StoredTrial& trial) {
-  const auto& samples = trial.record.samples;
-  for (std::size_t i = 1; i < samples.size(); ++i) {
-    const std::uint32_t before = samples[i - 1].tick, tick = samples[i].tick;
-    if (tick > before && tick - before <= kLongestGap) continue;
-    throw StoreRefused("participant " + trial.participant.code + ", session " +
-                       std::to_string(trial.record.session) + ", trial " +
-                       std::to_string(trial.record.trial) + ": the samples are damaged: tick " +
-                       std::to_string(tick) + " follows tick " + std::to_string(before));
+const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the tick is of", "1"};
+
+const std::string& empty_row() {
+  static const std::string row = [] {
+    TableRow all(TableStyle::tsv);
+    all << "";
+    for (std::size_t k = 0; k < sample_columns().size(); ++k) all << "";
+    return all.end();
+  }();
+  return row;
+}
+
+/// Files stand elsewhere in a dataset than beside the protocol.
+void rename_files(nlohmann::ordered_json& object, const StudyLabel& study) {
+  if (const auto file = object.find("file"); file != object.end() && file->is_string()) {
+    const auto found = study.files.find(file->get<std::string>());
+    if (found != study.files.end()) {
+      *file = "bids::stimuli/" + study.label + "/" + found->second;
+    }
   }
+  if (const auto parts = object.find("parts"); parts != object.end() && parts->is_array()) {
+    for (auto& part : *parts) {
+      if (part.is_object()) rename_files(part, study);
+    }
+  }
+}
+
+nlohmann::ordered_json objects_of(const StudyLabel& study) {
+  nlohmann::ordered_json objects = nlohmann::ordered_json::object();
+  for (const StimulusFacts& stimulus : study.facts.stimuli) {
+    auto& object = objects[in_table(stimulus.name)] =
+        nlohmann::ordered_json::parse(stimulus.object);
+    rename_files(object, study);
+  }
+  return objects;
 }
 
 }  // namespace
 
-nlohmann::ordered_json describe_recording(const StoredTrial& trial, double servo_rate) {
-  require_sound_ticks(trial);
-  nlohmann::ordered_json json{
-      {"SamplingFrequency", servo_rate},
-      {"StartTime", trial.record.samples.front().tick / servo_rate},
-      {"StartTimeReference", "onset in the beh.tsv of the same run: the first tick with forces on"},
-      {"Simulated", trial.participant.simulated},
-      {"Device", trial.run.device}};
-  for (const Column& column : sample_columns()) json["Columns"].push_back(column.name);
-  for (const Column& column : sample_columns()) {
-    auto& about = json[column.name] = {{"Description", column.description}};
-    if (*column.unit != '\0') about["Units"] = column.unit;
-    if (const auto levels = levels_of(column, {}); !levels.is_null()) about["Levels"] = levels;
-  }
-  return json;
+BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study)
+    : study_(study),
+      run_(first.run),
+      simulated_(first.participant.simulated),
+      begin_ns_(to_unix_ns(first.run.clock, first.record.onset_ns)) {}
+
+std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
+  if (unix_ns < begin_ns_) return std::nullopt;
+  constexpr double kMostSlots = 1e12;  // years: damaged times
+  const auto since = static_cast<std::uint64_t>(unix_ns) - static_cast<std::uint64_t>(begin_ns_);
+  const double slot = std::round(static_cast<double>(since) / 1e9 * study_.facts.servo_rate);
+  if (slot > kMostSlots) return std::nullopt;
+  return static_cast<std::int64_t>(slot);
 }
 
-void write_recording(const std::vector<SampleRecord>& samples, TextSink& out) {
-  GzipSink gzip(out);
+bool BidsRecording::goes_on_with(const StoredTrial& trial) const {
+  const ClockStamp &a = run_.clock, &b = trial.run.clock;
+  if (a.utc_ns != b.utc_ns || a.monotonic_ns != b.monotonic_ns) return false;
+  const auto slot = slot_of(to_unix_ns(b, trial.record.onset_ns));
+  if (!slot || *slot < free_) return false;
+  return static_cast<double>(*slot - free_) <= kLongestGap * study_.facts.servo_rate;
+}
+
+void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
+  const TrialRecord& record = trial.record;
+  const std::int64_t onset = slot_of(to_unix_ns(trial.run.clock, record.onset_ns)).value_or(free_);
+  const double length = std::ceil(record.response_time * study_.facts.servo_rate);
+  free_ = onset + static_cast<std::int64_t>(std::clamp(length, 0.0, 1e9));
+  if (record.samples.empty()) return;
+  SampleSlots slots(trial, study_.facts.servo_rate);
   TableRow row(TableStyle::tsv);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    for (std::uint32_t lost = i > 0 ? samples[i - 1].tick + 1 : samples[i].tick;
-         lost < samples[i].tick; ++lost) {
-      for (std::size_t k = 0; k < sample_columns().size(); ++k) row << "";
-      gzip.write(row.end());
+  std::int64_t first = 0;
+  for (const SampleRecord& sample : record.samples) {
+    const std::int64_t slot = onset + slots.next();
+    if (!file_) {
+      file_.emplace(path);
+      first_row_ = next_row_ = slot;
     }
-    put_sample(row, samples[i]);
-    gzip.write(row.end());
+    if (&sample == &record.samples.front()) first = slot;
+    for (; next_row_ < slot; ++next_row_) file_->gzip.write(empty_row());
+    row << record.trial;
+    put_sample(row, sample);
+    file_->gzip.write(row.end());
+    ++next_row_;
   }
-  gzip.finish();
+  free_ = std::max(free_, next_row_);
+  trials_.push_back({{"trial", record.trial},
+                     {"onset", static_cast<double>(onset) / study_.facts.servo_rate},
+                     {"first_row", first - first_row_},
+                     {"rows", next_row_ - first},
+                     {"renderer", in_table(record.renderer)},
+                     {"shape", in_table(record.shape)},
+                     {"orientation_wxyz", record.orientation_wxyz}});
+}
+
+std::optional<nlohmann::ordered_json> BidsRecording::finish(
+    const std::vector<FaultMeaning>& fault_bits) {
+  if (!file_) return std::nullopt;
+  file_->gzip.finish();
+  file_->sink.close(false);
+  nlohmann::ordered_json json{
+      {"SamplingFrequency", study_.facts.servo_rate},
+      {"StartTime", static_cast<double>(first_row_) / study_.facts.servo_rate},
+      {"StartTimeReference",
+       "onset 0 in the beh.tsv of the same run: the first tick with forces on of its first trial"},
+      {"Simulated", simulated_},
+      {"Device", run_.device}};
+  json["Columns"].push_back(kTrialOfSample.name);
+  for (const Column& column : sample_columns()) json["Columns"].push_back(column.name);
+  json[kTrialOfSample.name] = describe(kTrialOfSample, {}, fault_bits);
+  for (const Column& column : sample_columns()) {
+    json[column.name] = describe(column, {}, fault_bits);
+  }
+  json["TrialsDescription"] =
+      "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "
+      "of that name in Objects, turned by the quaternion about the origin of the world frame";
+  json["Trials"] = trials_;
+  json["ObjectsDescription"] =
+      "The protocol's stimuli: position_m, where it is there, and orientation_wxyz place the "
+      "object before it is turned; lengths in m";
+  json["Objects"] = objects_of(study_);
+  return json;
 }
 
 }  // namespace palpate

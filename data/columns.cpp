@@ -152,16 +152,35 @@ std::vector<Column> make_samples() {
   };
 }
 
-}  // namespace
-
-std::span<const Column> trial_columns() {
-  static const std::vector<Column> all = make_trials();
-  return all;
+/// The same with dates that are shifted, and the seconds between them.
+std::vector<Column> made_relative(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "onset_utc") {
+      column.description =
+          "First tick with forces on, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    } else if (name == "began_utc") {
+      column.description =
+          "When the attempt was begun, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    }
+  }
+  columns.push_back(
+      {"elapsed", "The moment of the row's date, from the participant's first trial", "s"});
+  return columns;
 }
 
-std::span<const Column> attempt_columns() {
-  static const std::vector<Column> all = make_attempts();
-  return all;
+}  // namespace
+
+std::span<const Column> trial_columns(Times times) {
+  static const std::vector<Column> absolute = make_trials(), relative = made_relative(absolute);
+  return times == Times::absolute ? absolute : relative;
+}
+
+std::span<const Column> attempt_columns(Times times) {
+  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute);
+  return times == Times::absolute ? absolute : relative;
 }
 
 std::span<const Column> sample_columns() {

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/export.h"
+
 namespace palpate {
 
 struct Column {
@@ -17,8 +19,9 @@ struct Column {
   std::vector<std::pair<const char*, const char*>> levels = {};
 };
 
-std::span<const Column> trial_columns();    ///< of trials.csv, in order
-std::span<const Column> attempt_columns();  ///< of attempts.csv, in order
-std::span<const Column> sample_columns();   ///< of a servo tick, in order
+/// Of trials.csv, in order; relative times have one more at the end.
+std::span<const Column> trial_columns(Times times);
+std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
+std::span<const Column> sample_columns();              ///< of a servo tick, in order
 
 }  // namespace palpate

@@ -10,16 +10,37 @@
 
 namespace palpate {
 
+struct StimulusFacts {
+  std::string name;
+  std::string object;  ///< JSON: what the protocol says of it but for its name
+};
+
 /// What an export needs to know of a protocol beyond its text.
 struct ProtocolFacts {
-  std::string title = {};                 ///< "" for none
-  double servo_rate = 1000;               ///< Hz
-  std::vector<std::string> stimuli = {};  ///< names
+  std::string title = {};    ///< "" for none
+  double servo_rate = 1000;  ///< Hz
+  std::vector<StimulusFacts> stimuli = {};
+};
+
+/// What a bit of the columns `faults` means.
+struct FaultMeaning {
+  std::uint32_t bit = 0;
+  std::string text;
+};
+
+enum class Times {
+  absolute,  ///< on the calendar
+  /// Seconds from the participant's first trial; where a date has to stand, it is shifted so that
+  /// this trial is at the beginning of 1900 (BIDS: before 1925, so that nobody takes it for real).
+  relative,
 };
 
 struct ExportSettings {
   bool force = false;                ///< replace what is there, if it is an export of ours
   std::string program_version = {};  ///< "0.1.0"
+  Times times = Times::absolute;
+  std::string codebook = {};  ///< csv: a file that describes the columns; "" for none
+  std::vector<FaultMeaning> fault_bits = {};  ///< lowest first
   /// Reads a protocol's text; asked only by exports that describe themselves. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};
   /// Called after every so many trials with their number; may throw to stop the export, which then

@@ -11,16 +11,18 @@ namespace palpate {
 ///
 ///   dataset_description.json, README, participants.tsv and .json
 ///   sub-CODE/ses-S/beh/sub-CODE_ses-S_task-T_beh.tsv and .json   a session, one row a trial
-///   sourcedata/T_protocol.json                                   the protocol's text, byte for
-///   byte sourcedata/attempts.csv                                      attempts that were cut off
+///   sourcedata/T_protocol.json   the protocol's text, byte for byte
+///   sourcedata/attempts.csv      attempts that were cut off
+///   stimuli/T/                   the files that the protocol names (meshes)
 ///
 /// T is the protocol's name without '-'. Rows are sorted by onset (s, from the session's first
 /// trial); their other columns are those of trials.csv but for participant_id.
 ///
-/// Where servo samples are stored, every trial of the session is a BIDS run of its own, run-N for
-/// trial N: ..._run-0007_beh.tsv with one row, onset 0, and
-/// ..._run-0007_recording-haptic_physio.tsv.gz with one row a servo tick. Its StartTime is counted
-/// from that onset. Ticks that were not recorded are rows of n/a.
+/// Where servo samples are stored, the session is split into BIDS runs: a new one with every start
+/// of the program and after more than a minute without a trial. Each has a table,
+/// ..._run-1_beh.tsv, and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row a
+/// servo period (bids_recording.h); its sidecar has the trials' places, poses and renderers and the
+/// objects. Trials come one at a time: memory holds the samples of one.
 ///
 /// Experimenter's notes are not exported. The folder is made whole or not at all.
 /// \throws StoreRefused: `path` is taken (see require_replaceable), there are no trials, a text

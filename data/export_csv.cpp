@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "data/attempts_file.h"
+#include "data/codebook.h"
 #include "data/draft_file.h"
 #include "data/export_log.h"
 #include "data/output_check.h"
@@ -50,17 +51,23 @@ ExportDone export_csv(Store& store, const std::string& path, const ExportSetting
   const bool with_attempts = store.counts().cut_off > 0;
   require_place(trials_path, settings.force, taken);
   if (with_attempts) require_place(attempts_path, settings.force, taken);
+  if (!settings.codebook.empty()) {
+    taken.add(trials_path.string(), "the trials go there");
+    taken.add(attempts_path.string(), "that name is kept for the attempts that were cut off");
+    require_place(settings.codebook, settings.force, taken);
+  }
 
   ExportDone done;
   ExportedPeople people;
   ProgressCounter counter(settings);
+  const ExportClock clock(store, settings.times);
   TableRow row(TableStyle::csv);
   std::deque<DraftFile> drafts;
   FileSink trials = sink_of(drafts.emplace_back(trials_path.string()), trials_path);
-  row << trial_columns();
+  row << trial_columns(settings.times);
   trials.write(row.end());
   store.for_each_trial([&](const StoredTrial& trial) {
-    put_trial(row, trial);
+    put_trial(row, trial, clock);
     trials.write(row.end());
     people.add(trial.participant);
     ++done.trials;
@@ -69,9 +76,14 @@ ExportDone export_csv(Store& store, const std::string& path, const ExportSetting
   trials.close(true);
   if (with_attempts) {
     FileSink attempts = sink_of(drafts.emplace_back(attempts_path.string()), attempts_path);
-    done.attempts = write_attempts(store, attempts, people, counter);
+    done.attempts = write_attempts(store, attempts, clock, people, counter);
     attempts.close(true);
     done.attempts_path = attempts_path.string();
+  }
+  if (!settings.codebook.empty()) {
+    FileSink codebook = sink_of(drafts.emplace_back(settings.codebook), settings.codebook);
+    write_codebook(codebook, all_facts(label_protocols(store, settings)), settings);
+    codebook.close(true);
   }
   done.simulated = people.any_simulated();
   done.not_recorded = people.record(store.path(), path, "csv");

@@ -9,10 +9,11 @@ namespace palpate {
 
 /// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
 /// in the same folder. UTF-8, no BOM, RFC 4180 (lines end in CRLF, fields quoted only where
-/// needed), numbers as the shortest text that reads back exactly, texts exactly as they are stored
-/// (also one that a spreadsheet would take for a formula: protocols do not allow such names). Each
-/// file is written to a temporary one beside it, synced and renamed: it is whole or it is not
-/// there. The database records that the export was made.
+/// needed), numbers as the shortest text that reads back exactly; texts that a spreadsheet would
+/// run are guarded (spreadsheet_text.h), the others as they are stored. What the columns mean goes
+/// to `settings.codebook` where that is named. Each file is written to a temporary one beside it,
+/// synced and renamed: it is whole or it is not there. The database records that the export was
+/// made.
 ///
 /// Columns: columns.h.
 ///

@@ -6,6 +6,7 @@
 #include "data/attempts_file.h"
 #include "data/draft_folder.h"
 #include "data/export.h"
+#include "data/export_clock.h"
 #include "data/export_log.h"
 #include "data/store.h"
 #include "data/text_sink.h"
@@ -25,7 +26,8 @@ ExportDone export_dataset(Store& store, const std::string& path, const ExportSet
   ExportDone done;
   ExportedPeople people;
   ProgressCounter counter(settings);
-  Writer writer(store, path, settings);
+  const ExportClock clock(store, settings.times);
+  Writer writer(store, path, settings, clock);
   store.for_each_trial(
       [&](const StoredTrial& trial) {
         writer.add(trial);
@@ -38,11 +40,11 @@ ExportDone export_dataset(Store& store, const std::string& path, const ExportSet
   done.samples = writer.samples();
   if (store.counts().cut_off > 0) {
     FileSink file(writer.folder().place(writer.begin_attempts()));
-    done.attempts = write_attempts(store, file, people, counter);
+    done.attempts = write_attempts(store, file, clock, people, counter);
     file.close(false);
   }
   done.simulated = people.any_simulated();
-  writer.describe_dataset(settings.program_version, done.simulated);
+  writer.describe_dataset(done.simulated);
   done.not_recorded = people.record(store.path(), path, format);
   writer.folder().give_name(settings.force);
   return done;

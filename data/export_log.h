@@ -10,15 +10,23 @@
 namespace palpate {
 
 struct ExportRecord {
-  std::string path;    ///< absolute
+  std::string path;    ///< as recorded_path() has it
   std::string format;  ///< "csv", "bids", "psych-ds"
   std::int64_t made_utc_ns = 0;
 };
 
-/// Adds an export that holds these participants (the store's keys), in place of an earlier one at
-/// the same path. Works beside a writer; brings a database of an older schema up to date first.
-/// \throws StoreRefused: a participant has been withdrawn since the data were read; StoreError: the
-/// database may not be written to.
+/// What is put on record of an export at `path`: relative to the database's folder, or, for a place
+/// outside of it, its name with a tag of the place, "trials.csv (elsewhere, 1f3c9a02)". A database
+/// that is handed on tells nothing of the folders of a computer.
+std::string recorded_path(const std::string& database, const std::string& path);
+
+/// Where that is; "" for a place outside of the database's folder.
+std::string place_of_record(const std::string& database, const std::string& recorded);
+
+/// Adds an export (`made.path`: where it is) that holds these participants (the store's keys), in
+/// place of an earlier one at the same path. Works beside a writer; brings a database of an older
+/// schema up to date first. \throws StoreRefused: a participant has been withdrawn since the data
+/// were read; StoreError: the database may not be written to.
 void log_export(const std::string& database, const ExportRecord& made,
                 const std::vector<std::int64_t>& participants);
 

@@ -14,6 +14,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -206,6 +207,9 @@ class Store {
   StoreCounts counts();
   Holdings holdings(const std::string& code);
   bool has_samples(const Participant& participant, int session);
+  /// Code -> its first completed trial in any protocol (where there is none: the first attempt), ns
+  /// since 1970.
+  std::map<std::string, std::int64_t, std::less<>> first_onsets();
 
   /// Completed trials by protocol, participant number, session and trial, one at a time: they need
   /// not fit into memory. `visit` must not write to this store.

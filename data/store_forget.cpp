@@ -148,7 +148,10 @@ Holdings Store::holdings(const std::string& code) {
       found.mentions += mentions(notes.getColumn(0).getString(), code) ? 1 : 0;
     }
     std::vector<std::string> known = backups_of(impl_->file);
-    for (const ExportRecord& one : found.exports) known.push_back(one.path);
+    for (const ExportRecord& one : found.exports) {
+      const std::string place = place_of_record(impl_->file, one.path);
+      if (!place.empty()) known.push_back(place);
+    }
     found.elsewhere = find_traces(impl_->file, code, known);
     return found;
   });

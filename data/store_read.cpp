@@ -202,4 +202,32 @@ bool Store::has_samples(const Participant& participant, int session) {
   });
 }
 
+std::map<std::string, std::int64_t, std::less<>> Store::first_onsets() {
+  return guarded(impl_->path, [&] {
+    std::map<std::string, std::int64_t, std::less<>> firsts;
+    for (const char* kind : {"onset_ns) AS first FROM attempts WHERE state = 'completed'",
+                             "began_ns) AS first FROM attempts WHERE state = 'cut_off'"}) {
+      std::map<std::string, std::int64_t, std::less<>> found;
+      SQLite::Statement find(*impl_->db,
+                             std::string("SELECT pa.code, r.started_utc_ns, r.started_ns, x.first "
+                                         "FROM (SELECT run_id, min(") +
+                                 kind +
+                                 " GROUP BY run_id) x JOIN runs r ON r.id = "
+                                 "x.run_id JOIN sessions s ON s.id = r.session_id JOIN "
+                                 "participants pa ON pa.id = s.participant_id");
+      while (find.executeStep()) {
+        std::string code;
+        ClockStamp clock;
+        std::int64_t first_ns = 0;
+        Row(find) >> code >> clock.utc_ns >> clock.monotonic_ns >> first_ns;
+        const std::int64_t unix_ns = to_unix_ns(clock, first_ns);
+        const auto [at, added] = found.emplace(code, unix_ns);
+        if (!added) at->second = std::min(at->second, unix_ns);
+      }
+      firsts.merge(found);  // a code that is there already stays as it is
+    }
+    return firsts;
+  });
+}
+
 }  // namespace palpate

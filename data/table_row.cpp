@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "data/spreadsheet_text.h"
 #include "data/store.h"
 
 namespace palpate {
@@ -33,6 +34,10 @@ TableRow& TableRow::raw(std::string_view text) {
 }
 
 TableRow& TableRow::operator<<(std::string_view text) {
+  return needs_guard(text) ? cell("'" + std::string(text)) : cell(text);
+}
+
+TableRow& TableRow::cell(std::string_view text) {
   if (style_ == TableStyle::tsv) {
     if (!fits_tsv(text)) {
       throw StoreRefused("the text '" + std::string(text) +
@@ -51,6 +56,18 @@ TableRow& TableRow::operator<<(std::string_view text) {
 TableRow& TableRow::operator<<(std::span<const Column> names) {
   for (const Column& column : names) raw(column.name);
   return *this;
+}
+
+TableRow& TableRow::rounded(double value, int decimals) {
+  std::array<char, 400> text{};  // the largest double has 309 digits
+  const auto made = std::to_chars(text.data(), text.data() + text.size(), value,
+                                  std::chars_format::fixed, decimals);
+  std::string_view shown(text.data(), static_cast<std::size_t>(made.ptr - text.data()));
+  if (shown.find('.') != std::string_view::npos) {
+    shown.remove_suffix(shown.size() - 1 - shown.find_last_not_of('0'));
+    if (shown.back() == '.') shown.remove_suffix(1);
+  }
+  return raw(shown == "-0" ? "0" : shown);
 }
 
 const std::string& TableRow::end() {

@@ -24,8 +24,9 @@ class TableRow {
  public:
   explicit TableRow(TableStyle style) : style_(style) {}
 
-  /// "" is a missing value. \throws StoreRefused: a text that this style cannot hold (TSV: tabs,
-  /// line breaks, the text "n/a").
+  /// "" is a missing value; what a spreadsheet would run is guarded (spreadsheet_text.h).
+  /// \throws StoreRefused: a text that this style cannot hold (TSV: tabs, line breaks, the text
+  /// "n/a").
   TableRow& operator<<(std::string_view text);
   TableRow& operator<<(const char* text) { return *this << std::string_view(text); }
   TableRow& operator<<(bool value) { return raw(value ? "1" : "0"); }
@@ -35,6 +36,8 @@ class TableRow {
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
     return raw({text.data(), static_cast<std::size_t>(end.ptr - text.data())});
   }
+  /// With at most so many decimals, zeros at the end left out.
+  TableRow& rounded(double value, int decimals);
   template <class T>
   TableRow& operator<<(const std::optional<T>& value) {
     return value ? *this << *value : *this << std::string_view();
@@ -46,6 +49,7 @@ class TableRow {
 
  private:
   TableRow& raw(std::string_view text);
+  TableRow& cell(std::string_view text);
   TableStyle style_;
   std::string row_;
   bool ended_ = true;

@@ -14,7 +14,7 @@ struct MeshFiles {
   StoredFiles kept = {};  ///< that need not be there any more
 };
 
-/// Reads an object of a scene (contracts, "Scene") from an open reader, with the keys that its
+/// Reads an object of a scene (scene.schema.json) from an open reader, with the keys that its
 /// shape takes. The caller refuses unknown keys, for a
 /// stimulus has some more of its own.
 ObjectSpec read_object(ObjectReader& reader, const Material& default_material,

@@ -1,6 +1,6 @@
 #pragma once
-// An experiment's design as plain values; what each key means and its default: contracts,
-// "Protocol".
+// An experiment's design as plain values; what each key means and its default:
+// protocol.schema.json.
 
 #include <cstdint>
 #include <map>

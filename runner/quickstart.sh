@@ -17,14 +17,15 @@ palpate=.build/release/runner/palpate
 
 echo "Simulating 7 participants x 2 renderers x 304 trials into $out ..." >&2
 "$palpate" simulate protocols/ho2000.json --db "$out/study.db" --participants 7
-"$palpate" export --db "$out/study.db" --format csv --out "$out/trials.csv" --force
+"$palpate" export --db "$out/study.db" --format csv --out "$out/trials.csv" \
+  --codebook "$out/codebook.csv" --force
 "$palpate" analyze --db "$out/study.db" --json "$out/analysis.json" --report "$out/report.html" \
   --figures "$out" --force > "$out/report.txt"
 echo
 sed '/^Response times/,$d' "$out/report.txt"
 cat << END
 Database      $out/study.db
-Trials        $out/trials.csv
+Trials        $out/trials.csv (what its columns mean: codebook.csv)
 Report        $out/report.html (the same as text: report.txt; as numbers: analysis.json)
 Figure 15     $out/figure15.svg (and the other figures beside it)
 END

@@ -1,5 +1,6 @@
 #pragma once
-// What a scene file or a protocol says of an object, as plain values (contracts: "Scene").
+// What a scene file or a protocol says of an object, as plain values (the keys:
+// protocols/scene.schema.json).
 
 #include <array>
 #include <memory>

@@ -12,6 +12,7 @@
 #include "runner/commands/command.h"
 #include "runner/commands/progress_line.h"
 #include "runner/commands/stop_signal.h"
+#include "runner/servo_fault.h"
 #include "stimuli/printable.h"
 
 namespace palpate {
@@ -43,7 +44,7 @@ class Progress {
 /// Reads what is needed and no more: the text is a record, and exports must work years after the
 /// protocol's rules have changed.
 ProtocolFacts facts_of(const ProtocolInfo& info) {
-  const auto json = nlohmann::json::parse(info.text, nullptr, false);
+  const auto json = nlohmann::ordered_json::parse(info.text, nullptr, false);
   if (!json.is_object()) throw StoreRefused("the text of protocol " + info.name + " is damaged");
   ProtocolFacts facts{.servo_rate = Protocol{}.servo_rate};
   if (json.contains("title") && json["title"].is_string()) facts.title = json["title"];
@@ -56,9 +57,26 @@ ProtocolFacts facts_of(const ProtocolInfo& info) {
   for (const auto& stimulus : json["stimuli"]) {
     if (!stimulus.is_object() || !stimulus.contains("name") || !stimulus["name"].is_string())
       continue;
-    facts.stimuli.push_back(stimulus["name"]);
+    nlohmann::ordered_json object = stimulus;
+    object.erase("name");
+    facts.stimuli.push_back({stimulus["name"], object.dump()});
   }
   return facts;
+}
+
+std::vector<FaultMeaning> fault_bits() {
+  std::vector<FaultMeaning> all;
+  for (const FaultBit& fault : kFaultBits) {
+    all.push_back({fault.bit, std::string(fault.name) + ": " + fault.meaning});
+  }
+  return all;
+}
+
+Times times_of(const std::string& word, const std::string& format, const std::string& usage) {
+  if (word == "absolute") return Times::absolute;
+  if (word == "relative") return Times::relative;
+  if (word.empty()) return format == "csv" ? Times::absolute : Times::relative;
+  throw UsageError("no times '" + word + "'; there are: absolute, relative\nUsage: " + usage);
 }
 
 ExportDone export_as(const std::string& format, Store& store, const std::string& out,
@@ -72,30 +90,48 @@ ExportDone export_as(const std::string& format, Store& store, const std::string&
 
 int export_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate export --db FILE --format csv|bids|psych-ds --out PATH [--force]";
+  line.usage =
+      "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
+      "       [--times relative|absolute] [--codebook FILE] [--force]";
   line.summary =
       "Writes the trials of a database for others, whole or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
       "off, where there are any, to attempts.csv in the same folder. bids, psych-ds: a folder\n"
-      "that describes itself, with the servo-rate samples where they were kept.";
+      "that describes itself, with the servo-rate samples where they were kept.\n"
+      "Times are relative in bids and psych-ds: dates are shifted so that a participant's first\n"
+      "trial is at 1900-01-01T00:00:00Z, and the column elapsed counts the seconds from it. csv "
+      "has\n"
+      "the true onset_utc unless --times relative is given.\n"
+      "Texts that a spreadsheet would run (= + - @ in front) get a ' in front; analyze --csv takes "
+      "it\n"
+      "away again.";
   line.example =
       "  palpate export --db study.db --format csv --out trials.csv\n"
+      "  palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv\n"
       "  palpate export --db study.db --format bids --out study-bids\n"
       "  palpate export --db study.db --format psych-ds --out study-psychds --force   (replaces "
       "an\n"
       "      earlier export; a folder that palpate did not make is never replaced)";
-  std::string database, format, out;
+  std::string database, format, out, times, codebook;
   auto add = line.options.add_options();
   add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
   add("format", po::value(&format)->required()->value_name("NAME"), "csv, bids or psych-ds");
   add("out", po::value(&out)->required()->value_name("PATH"),
       "the file (csv) or folder (others) to write");
+  add("times", po::value(&times)->value_name("WORD"),
+      "relative (default of bids and psych-ds) or absolute (default of csv)");
+  add("codebook", po::value(&codebook)->value_name("FILE"),
+      "csv only: what every column, value and fault bit means, as a table");
   add("force", po::bool_switch(), "replace an export that is there already");
   const auto values = line.parse(args);
   if (!values) return 0;
   if (format != "csv" && format != "bids" && format != "psych-ds") {
     throw UsageError("no format '" + format +
                      "'; there are: csv, bids, psych-ds\nUsage: " + line.usage);
+  }
+  const Times told = times_of(times, format, line.usage);
+  if (!codebook.empty() && format != "csv") {
+    throw UsageError("--codebook is for csv; " + format + " describes its columns in JSON files");
   }
   try {
     Store store = Store::open(database, Store::Mode::read_only);
@@ -104,6 +140,9 @@ int export_command(const std::vector<std::string>& args) {
     settings.force = (*values)["force"].as<bool>();
     settings.program_version = PALPATE_VERSION;
     settings.facts = facts_of;
+    settings.times = told;
+    settings.codebook = codebook;
+    settings.fault_bits = fault_bits();
     ExportDone done;
     {
       Progress progress(store, watch_stop_signals());
@@ -117,6 +156,7 @@ int export_command(const std::vector<std::string>& args) {
       std::cerr << printable(done.attempts_path) << ": " << done.attempts
                 << " attempts that were cut off\n";
     }
+    if (!codebook.empty()) std::cerr << printable(codebook) << ": what the columns mean\n";
     if (!done.not_recorded.empty()) {
       std::cerr << "warning: 'palpate forget' will not list this export: "
                 << printable(done.not_recorded) << "\n";

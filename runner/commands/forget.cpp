@@ -15,13 +15,17 @@ namespace {
 
 namespace po = boost::program_options;
 
-void list_exports(const Holdings& holdings, std::ostream& out) {
+/// \param database whose folder the paths are relative to
+void list_exports(const Holdings& holdings, const std::string& database, std::ostream& out) {
   if (holdings.exports.empty()) return;
   out << "These exports hold the participant; delete them and their copies, or export again:\n";
   for (const ExportRecord& one : holdings.exports) {
     std::error_code error;
-    out << "  " << printable(one.path) << " (" << one.format << ", " << format_utc(one.made_utc_ns)
-        << (std::filesystem::exists(one.path, error) ? ")" : "; not there any more)") << "\n";
+    const std::string place = place_of_record(database, one.path);
+    const std::string path = place.empty() ? one.path : place;
+    out << "  " << printable(path) << " (" << one.format << ", " << format_utc(one.made_utc_ns)
+        << (place.empty() || std::filesystem::exists(path, error) ? ")" : "; not there any more)")
+        << "\n";
   }
 }
 
@@ -74,7 +78,7 @@ int forget_command(const std::vector<std::string>& args) {
   } else {
     std::cout << printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
-  list_exports(holdings, std::cout);
+  list_exports(holdings, database, std::cout);
   if (!holdings.elsewhere.empty()) {
     std::cout << "These lie beside the database or its exports and name " << code
               << "; they are not changed: delete them, or give the command for each database:\n";

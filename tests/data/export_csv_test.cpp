@@ -7,6 +7,7 @@
 #include <charconv>
 #include <map>
 
+#include "data/spreadsheet_text.h"
 #include "tests/data/store_fixture.h"
 
 namespace palpate {
@@ -179,10 +180,26 @@ TEST_F(ExportCsv, NumbersReadBackExactly) {
 }
 
 TEST_F(ExportCsv, HostileTextsAreQuotedAndOnlyThose) {
-  const std::vector<std::string> texts{
-      "a,b",   "say \"cube\"",       "\"",     "two\r\nlines", "lf\nonly",
-      "=1+1",  "+cmd|' /C calc'!A0", "Würfel", " padded ",     "'); DROP TABLE attempts;--",
-      "a;b\tc"};
+  const std::vector<std::string> texts{"a,b",
+                                       "say \"cube\"",
+                                       "\"",
+                                       "two\r\nlines",
+                                       "lf\nonly",
+                                       "=1+1",
+                                       "+cmd|' /C calc'!A0",
+                                       "Würfel",
+                                       " padded ",
+                                       "'); DROP TABLE attempts;--",
+                                       "a;b\tc",
+                                       "-5",
+                                       "@x",
+                                       "\tx",
+                                       "\rx",
+                                       "\nx",
+                                       "'=1",
+                                       "''+1",
+                                       "'quoted'",
+                                       "-"};
   int trial = 0;
   for (const auto& text : texts) {
     TrialRecord record = a_record(++trial);
@@ -193,13 +210,83 @@ TEST_F(ExportCsv, HostileTextsAreQuotedAndOnlyThose) {
   const Rows all = rows();
   ASSERT_EQ(all.size(), texts.size() + 1);
   for (std::size_t i = 0; i < texts.size(); ++i) {
-    EXPECT_EQ(by_name(all, i + 1).at("shape"), texts[i]);
-    EXPECT_EQ(by_name(all, i + 1).at("response"), texts[i]);
+    const std::string shape = by_name(all, i + 1).at("shape");
+    EXPECT_EQ(unguarded(shape), texts[i]);
+    EXPECT_EQ(by_name(all, i + 1).at("response"), shape);
+    EXPECT_EQ(std::string("=+-@\t\r\n").find(shape[0]), std::string::npos) << shape;
   }
   const std::string raw = contents_of(out_);
   EXPECT_TRUE(contains(raw, ",\"say \"\"cube\"\"\","));
-  EXPECT_TRUE(contains(raw, ",=1+1,")) << "data are not changed";
+  EXPECT_TRUE(contains(raw, ",'=1+1,"));
+  EXPECT_TRUE(contains(raw, ",''=1,")) << "not to be taken for =1";
+  EXPECT_TRUE(contains(raw, ",'quoted',"));
+  EXPECT_TRUE(contains(raw, ",0.5,-0.5,0.1,")) << "negative numbers stay numbers";
   EXPECT_TRUE(contains(raw, ", padded ,"));
+}
+
+TEST_F(ExportCsv, RelativeTimesTellNoDateButTheIntervals) {
+  store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
+  store_.cut_off_attempt(run_, "device fault");
+  for (const int trial : {1, 2}) {
+    TrialRecord record = a_record(trial);
+    record.attempt = store_.begin_attempt(run_, record, record.onset_ns);
+    store_.finish_attempt(run_, record);
+  }
+  export_csv(store_, out_, ExportSettings{.times = Times::relative});
+  const Rows all = rows();
+  EXPECT_EQ(by_name(all, 1).at("onset_utc"), "1900-01-01T00:00:00.000000Z");
+  EXPECT_EQ(by_name(all, 1).at("elapsed"), "0");
+  EXPECT_EQ(by_name(all, 2).at("onset_utc"), "1900-01-01T00:00:20.000000Z");
+  EXPECT_EQ(by_name(all, 2).at("elapsed"), "20");
+  EXPECT_EQ(all[0].back(), "elapsed") << "the other columns as ever";
+  const auto cut_off = by_name(parse_rfc4180(contents_of(out_folder_ / "attempts.csv")), 1);
+  EXPECT_EQ(cut_off.at("began_utc"), "1899-12-31T23:59:39.000000Z");
+  EXPECT_EQ(cut_off.at("elapsed"), "-21");
+}
+
+TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
+  TrialRecord record = a_record(1);
+  record.shape = record.response = "-cube";
+  show(record);
+  ExportSettings settings;
+  settings.codebook = out_folder_ / "codebook.csv";
+  settings.fault_bits = {{16, "force-limited: ..."}, {2048, "old-reading: ..."}};
+  settings.facts = [](const ProtocolInfo&) {
+    return ProtocolFacts{.stimuli = {{"-cube", "{}"}, {"cone", "{}"}}};
+  };
+  export_csv(store_, out_, settings);
+  const Rows book = parse_rfc4180(contents_of(settings.codebook));
+  EXPECT_EQ(book[0], (std::vector<std::string>{"table", "column", "unit", "value", "meaning"}));
+  std::vector<std::string> described;
+  std::map<std::string, std::string> bits, shapes;
+  for (std::size_t i = 1; i < book.size(); ++i) {
+    const auto row = by_name(book, i);
+    EXPECT_NE(row.at("meaning"), "");
+    if (row.at("table") != "trials") continue;
+    if (row.at("value").empty()) described.push_back(row.at("column"));
+    if (row.at("column") == "faults") bits[row.at("value")] = row.at("meaning");
+    if (row.at("column") == "shape") shapes[row.at("value")] = row.at("meaning");
+  }
+  EXPECT_EQ(described, rows()[0]);
+  EXPECT_EQ(bits.at("16"), "force-limited: ...");
+  EXPECT_EQ(bits.at("2048"), "old-reading: ...");
+  EXPECT_TRUE(shapes.contains("'-cube")) << "as it stands in the table";
+  EXPECT_EQ(by_name(rows(), 1).at("shape"), "'-cube");
+}
+
+TEST_F(ExportCsv, TheCodebookTakesNoOtherFilesPlace) {
+  show(a_record(1));
+  ExportSettings settings;
+  for (const std::string& taken :
+       {out_, out_folder_ / "attempts.csv", folder_ / "study.db", out_folder_.path()}) {
+    settings.codebook = taken;
+    EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused) << taken;
+  }
+  settings.codebook = out_folder_ / "mine.csv";
+  write_file(settings.codebook, "mine");
+  EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused);
+  EXPECT_EQ(contents_of(settings.codebook), "mine");
+  EXPECT_EQ(files(), 1) << "nothing else was written";
 }
 
 TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {

@@ -282,14 +282,14 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
   }
 }
 
-TEST_F(Hostile, TextsComeOutOfTheCsvAsTheyWentIn) {
+TEST_F(Hostile, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
     db.exec("UPDATE attempts SET shape = '=1+1', response = ',\"\r\n\t' WHERE id = 1");
     seal_again(db);
   }
   use(path_);
-  EXPECT_TRUE(contains(contents_of(folder_ / "out/trials.csv"), ",=1+1,\",\"\"\r\n\t\","));
+  EXPECT_TRUE(contains(contents_of(folder_ / "out/trials.csv"), ",'=1+1,\",\"\"\r\n\t\","));
   Store store = Store::open(path_, Store::Mode::read_only);
   EXPECT_TRUE(
       contains(error_of([&] { export_bids(store, folder_ / "out/bids2", ExportSettings{}); }),

@@ -15,7 +15,7 @@ NAME = re.compile(
 NUMBERS = (
     "onset duration session block trial correct response_time orientation_w orientation_x orientation_y orientation_z "
     "practice timed_out first_contact_time simulated missed_ticks attempt participant_number started_inside ticks "
-    "longest_period faults max_force before_contact"
+    "longest_period faults max_force before_contact elapsed"
 ).split()
 MAY_BE_MISSING = {"response", "first_contact_time", "observer_sha256", "response_device"}
 
@@ -72,9 +72,6 @@ def table_faults(path):
             faults.append(f"{path.name}: onsets are not sorted")
         if onsets and float(onsets[0]) != 0:
             faults.append(f"{path.name}: the first onset is not 0")
-    run = NAME.fullmatch(path.name)["run"]
-    if run and [dict(zip(header, row))["trial"] for row in rows] != [str(int(run))]:
-        faults.append(f"{path.name}: run {run} is not trial {run}")
     return faults
 
 
@@ -91,20 +88,47 @@ def recording_faults(path):
     if not table.is_file():
         return faults + [f"{path.name}: no table of the same run"]
     header, rows = read_tsv(table)
-    trial = dict(zip(header, rows[0]))
+    told = {row["trial"]: row for row in (dict(zip(header, row)) for row in rows)}
     with gzip.open(path, "rt", newline="") as file:
         samples = [line[:-1].split("\t") for line in file]
     if any(len(row) != len(columns) for row in samples):
-        faults.append(f"{path.name}: rows do not have {len(columns)} fields")
+        return faults + [f"{path.name}: rows do not have {len(columns)} fields"]
     if any(value != "n/a" and not is_number(value) for row in samples for value in row):
-        faults.append(f"{path.name}: a value is no number")
-    first = round(sidecar.get("StartTime", 0) * sidecar.get("SamplingFrequency", 0))
+        return faults + [f"{path.name}: a value is no number"]
+    if any(0 < row.count("n/a") < len(row) for row in samples):
+        faults.append(f"{path.name}: a row is n/a in part")
+    rate, start = sidecar.get("SamplingFrequency", 0), sidecar.get("StartTime", 0)
+    places = {}  # trial -> the rows of its ticks
     for i, row in enumerate(samples):
-        if row[0] not in ("n/a", str(first + i)):
-            faults.append(f"{path.name}: row {i} is tick {row[0]}: the recording is not regular")
-            break
-    if len(samples) > int(trial["ticks"]):
-        faults.append(f"{path.name}: more samples than the trial has ticks")
+        if row[0] == "n/a":
+            continue
+        place = places.setdefault(row[0], [])
+        if place and int(row[1]) <= int(samples[place[-1]][1]):
+            faults.append(f"{path.name}: row {i}: the ticks are out of order")
+        place.append(i)
+    listed = {str(trial["trial"]): trial for trial in sidecar.get("Trials", [])}
+    if set(listed) != set(places):
+        faults.append(f"{path.name}: Trials lists others than there are")
+    for trial, place in places.items():
+        if trial not in told:
+            faults.append(f"{path.name}: trial {trial} is not in the table")
+            continue
+        onset = start + (place[0] - int(samples[place[0]][1])) / rate if rate > 0 else 0
+        if abs(onset - float(told[trial]["onset"])) * rate > 1:
+            faults.append(f"{path.name}: trial {trial} does not stand at its onset")
+        about = listed.get(trial, {})
+        if about.get("first_row") != place[0] or about.get("rows") != place[-1] + 1 - place[0]:
+            faults.append(f"{path.name}: trial {trial} does not stand where Trials says")
+        if len(place) > int(told[trial]["ticks"]):
+            faults.append(f"{path.name}: more samples of trial {trial} than the trial has ticks")
+        for name in ("renderer", "shape"):
+            if about.get(name) != told[trial][name]:
+                faults.append(f"{path.name}: trial {trial}: another {name} than in the table")
+        pose = [float(told[trial][f"orientation_{axis}"]) for axis in "wxyz"]
+        if about.get("orientation_wxyz") != pose:
+            faults.append(f"{path.name}: trial {trial}: another pose than in the table")
+        if about.get("shape") not in sidecar.get("Objects", {}):
+            faults.append(f"{path.name}: trial {trial}: its object is not in Objects")
     return faults
 
 
