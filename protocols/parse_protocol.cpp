@@ -17,7 +17,8 @@ using nlohmann::json;
 // What a laboratory may need, with room to spare; beyond it a value is a slip.
 constexpr std::size_t kMaxStimuli = 100;
 constexpr std::size_t kMaxOrientations = 10000;
-constexpr std::size_t kMaxKey = 32;  // bytes of a response key's name
+constexpr std::size_t kMaxKey = 32;    // bytes of a response key's name
+constexpr std::size_t kMaxLabel = 80;  // bytes of what an answer is called
 constexpr long long kMaxTrials = 1000000;
 constexpr Interval kRepetitions{1, 1e6};
 constexpr Interval kCount{1, 1e6};
@@ -103,6 +104,41 @@ void read_orientation(ObjectReader& reader, Protocol& protocol) {
   }
 }
 
+/// The stimulus that a key stands for: its name, or an object of it and a label. No string and a
+/// fault otherwise.
+json read_answer(const json& value, const std::string& place, std::string& label,
+                 FaultList& faults) {
+  if (!value.is_object()) return value;
+  ObjectReader answer(value, place, faults);
+  const json* const stimulus = answer.member("stimulus", Need::required);
+  const json* const words = answer.member("label");
+  answer.refuse_unknown_keys();
+  if (words != nullptr) {
+    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
+    label = words->is_string() ? words->get<std::string>() : "";
+    if (label.empty() || label.size() > kMaxLabel ||
+        !std::all_of(label.begin(), label.end(), printable)) {
+      faults.add(answer.pointer("label"), "expected a text of 1 to " + std::to_string(kMaxLabel) +
+                                              " bytes without control characters" + found(*words));
+      label.clear();
+    }
+  }
+  return stimulus != nullptr ? *stimulus : json();
+}
+
+/// Two answers that read the same cannot be told apart.
+void check_labels(const Protocol& protocol, const std::string& place, FaultList& faults) {
+  std::map<std::string, std::string> key_of;  // by what is read
+  for (const auto& [key, stimulus] : protocol.response.keys) {
+    const std::string& label = answer_label(protocol, stimulus);
+    const auto [before, is_new] = key_of.emplace(label, key);
+    if (is_new || protocol.response.keys.at(before->second) == stimulus) continue;
+    faults.add(child_pointer(place, key), "expected a label of its own; '" + label +
+                                              "' is what the key '" + before->second +
+                                              "' says already");
+  }
+}
+
 void read_keys(ObjectReader& response, Protocol& protocol) {
   const json* const keys = response.member("keys", Need::required);
   if (keys == nullptr) return;
@@ -121,9 +157,17 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
       faults.add(here, "expected a key's name of 1 to " + std::to_string(kMaxKey) +
                            " bytes without control characters");
     }
-    const auto stimulus = value.is_string() ? key_of.find(value.get<std::string>()) : key_of.end();
+    std::string label;
+    const json name = read_answer(value, here, label, faults);
+    const auto stimulus = name.is_string() ? key_of.find(name.get<std::string>()) : key_of.end();
     if (stimulus == key_of.end()) {
-      faults.add(here, "expected the name of a stimulus" + found(value));
+      if (!value.is_object()) {
+        faults.add(here, "expected the name of a stimulus, or an object of 'stimulus' and 'label'" +
+                             found(value));
+      } else if (value.contains("stimulus")) {
+        faults.add(child_pointer(here, "stimulus"),
+                   "expected the name of a stimulus" + found(name));
+      }
       continue;
     }
     if (stimulus->second) {
@@ -132,7 +176,9 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
     }
     stimulus->second = key;
     protocol.response.keys[key] = stimulus->first;
+    if (!label.empty()) protocol.response.labels[stimulus->first] = label;
   }
+  check_labels(protocol, place, faults);
   for (const auto& [name, key] : key_of) {
     if (!key && !name.empty()) faults.add(place, "no key for the stimulus '" + name + "'");
   }
@@ -171,6 +217,11 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
     section.text("practice", protocol.texts.practice);
     section.text("break", protocol.texts.break_text);
     section.text("end", protocol.texts.end);
+    section.text("move_away", protocol.texts.move_away);
+    section.text("ready", protocol.texts.ready);
+    section.text("go", protocol.texts.go);
+    section.text("wait", protocol.texts.wait);
+    section.text("other_key", protocol.texts.other_key);
   });
 }
 

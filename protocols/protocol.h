@@ -67,8 +67,9 @@ struct Protocol {
     double min_seconds = 0;
   } breaks;
   struct Response {
-    std::map<std::string, std::string> keys;  ///< key -> stimulus name
-    double time_out = 60;                     ///< s
+    std::map<std::string, std::string> keys;    ///< key -> stimulus name
+    std::map<std::string, std::string> labels;  ///< stimulus name -> what is read instead of it
+    double time_out = 60;                       ///< s
     bool feedback = false;
   } response;
   struct Stylus {
@@ -89,6 +90,12 @@ struct Protocol {
   } home;
   struct Texts {
     std::string instructions, practice, break_text, end;
+    // Of every trial, and so in every session.
+    std::string move_away = "Take the stylus away from the middle.";
+    std::string ready = "Ready: hold it still.";
+    std::string go = "Go";
+    std::string wait = "Please wait.";
+    std::string other_key = "This key does nothing now.";
   } texts;
   std::optional<MaskingNoise> masking_noise;
   bool samples = false;
@@ -97,5 +104,8 @@ struct Protocol {
   std::string source_text;  ///< the file as it was read, byte for byte
   std::string sha256;       ///< of source_text, lower-case hexadecimal
 };
+
+/// What the participant reads for a stimulus: its label, else its name. Answers are stored by name.
+const std::string& answer_label(const Protocol& protocol, const std::string& stimulus);
 
 }  // namespace palpate

@@ -14,6 +14,13 @@ constexpr std::int64_t kNap_ns = 5'000'000;
 constexpr std::int64_t kFrame_ns = 33'000'000;  // of the console
 constexpr std::size_t kMostMessages = 200;
 
+double largest_reach(const LiveSession::Parts& parts) {
+  double reach = 0;
+  for (std::size_t i = 0; i < parts.protocol.stimuli.size(); ++i)
+    reach = std::max(reach, parts.library.reach(static_cast<int>(i)));
+  return reach;
+}
+
 const char* word(Session::State state) {
   switch (state) {
     case Session::State::instruction:
@@ -39,13 +46,15 @@ LiveSession::LiveSession(const Parts& parts, const ClockStamp& stamp, const Sess
     : parts_(parts),
       respondent_(parts.protocol, parts.screen, *this, parts.clock, parts.answer_by),
       session_({parts.protocol, parts.library, parts.servo, parts.clock, respondent_, parts.record,
-                this},
+                this, largest_reach(parts)},
                plan, stamp),
       forces_(parts.servo, parts.guard, parts.clock),
       started_ns_(parts.clock.now_ns()) {
   state_.study = parts.protocol.name;
   state_.participant = marker_.participant = parts.record.participant().code;
   state_.session = marker_.session = parts.record.session();
+  for (const StimulusSpec& stimulus : parts.protocol.stimuli)
+    state_.scores.push_back({stimulus.name, 0, 0});
 }
 
 LiveSession::Outcome LiveSession::run() {
@@ -115,6 +124,7 @@ void LiveSession::between_trials() {
   const double elapsed = static_cast<double>(parts_.clock.now_ns() - started_ns_) / kSecond_ns;
   if (longest && elapsed > *longest * 60)
     throw EndOfSession(RunEnd::paused, "the session has lasted as long as the protocol allows");
+  respondent_.set_progress(session_.plan().done(), session_.plan().size());
   if (now != Session::State::trial) stop_noise();  // a page to read, and perhaps to talk about
   do {
     wait_while_held();
@@ -132,8 +142,11 @@ void LiveSession::stop_if_due() {
 void LiveSession::wait_while_held() {
   if (hold_ == Hold::none) return;
   stop_noise();
-  respondent_.show_message(parts_.protocol.texts.break_text);
+  const auto& texts = parts_.protocol.texts;
+  const bool by_fault = hold_ != Hold::pause || texts.break_text.empty();
+  respondent_.show_message(by_fault ? texts.wait : texts.break_text);
   while (hold_ != Hold::none) {
+    respondent_.tend();
     state_.state = hold_ == Hold::pause ? "paused" : held_state_;
     state_.held_by = held_reason_ + (held_reason_.empty() ? "" : "; ") + ways_on();
     attend();
@@ -185,8 +198,10 @@ void LiveSession::obey(const ConsoleCommand& command) {
       break;
     case Kind::emergency_zero:
       forces_.off();
-      note(command.time_ns, "emergency zero");
-      say("EMERGENCY: forces are off until the fault is cleared");
+      zero_asked_by_ = " by " + command.text;
+      state_.fault = trip_reason(servo_fault::kEmergency, DeviceTrouble::none) + zero_asked_by_;
+      note(command.time_ns, "emergency zero: " + command.text);
+      say("EMERGENCY" + zero_asked_by_ + ": forces are off until the fault is cleared");
       if (!in_trial_)
         hold(trip_reason(servo_fault::kEmergency, DeviceTrouble::none), false, DeviceTrouble::none);
       break;
@@ -206,7 +221,9 @@ void LiveSession::pause() { hold_ = std::max(hold_, Hold::pause); }
 void LiveSession::hold(const std::string& reason, bool passed, DeviceTrouble trouble) {
   hold_ = passed ? Hold::passed : Hold::fault;
   held_state_ = trouble == DeviceTrouble::guard_late ? "paused" : "fault";
-  held_reason_ = reason;
+  const bool asked = reason == trip_reason(servo_fault::kEmergency, DeviceTrouble::none);
+  held_reason_ = reason + (asked ? zero_asked_by_ : "");
+  state_.fault = held_reason_;
 }
 
 std::string LiveSession::ways_on() const {
@@ -223,7 +240,10 @@ bool LiveSession::allow_forces() {
   const std::string trouble = forces_.allow([this] { return parts_.end_requested() != 0; });
   state_.sample = forces_.newest();
   end_with_the_guard();
-  if (trouble.empty()) return true;
+  if (trouble.empty()) {
+    state_.fault.clear();
+    return true;
+  }
   hold(trouble, false, state_.sample.trouble);
   say("not cleared, forces stay off: " + trouble + "; after that " + ways_on());
   return false;
@@ -320,6 +340,7 @@ void LiveSession::say(const std::string& message) {
 void LiveSession::show_console() {
   shown_ns_ = parts_.clock.now_ns();
   const SessionPlan& plan = session_.plan();
+  state_.seconds_left = respondent_.seconds_left();
   state_.elapsed = static_cast<double>(shown_ns_ - started_ns_) / kSecond_ns;
   state_.trials = static_cast<int>(plan.size());
   state_.blocks = plan.blocks();
@@ -346,6 +367,7 @@ void LiveSession::began(const Trial& trial) {
                  trial.orientation * object.pose.orientation};
   state_.objects = std::make_shared<const std::vector<ObjectSpec>>(1, std::move(object));
   state_.shape = stimulus.name;
+  state_.practice = trial.practice;
   state_.renderer = to_string(trial.renderer);
   state_.block = marker_.block = trial.block;
   state_.trial = marker_.trial = trial.trial;
@@ -358,6 +380,7 @@ void LiveSession::began(const Trial& trial) {
 
 void LiveSession::onset(const TrialRecord& so_far) {
   feeling_ = true;
+  if (parts_.noise != nullptr) parts_.noise->tone();
   marker_.kind = Marker::Kind::trial_start;
   marker_.attempt = so_far.attempt;
   marker_.time_ns = so_far.onset_ns;
@@ -386,7 +409,19 @@ void LiveSession::cut_off(const std::string& reason) {
   say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
 }
 
+void LiveSession::count(const TrialRecord& record) {
+  if (record.practice) return;
+  for (ShapeScore& score : state_.scores) {
+    if (score.shape != record.shape) continue;
+    ++score.shown;
+    score.right += record.correct ? 1 : 0;
+  }
+}
+
 void LiveSession::recorded(const TrialRecord& record) {
+  state_.answer = record.timed_out ? "none in time"
+                                   : record.response + (record.correct ? ", right" : ", wrong");
+  count(record);
   state_.times.push_back(record.response_time);
   const double took = static_cast<double>(parts_.clock.now_ns() - began_ns_) / kSecond_ns;
   ++timed_trials_;

@@ -56,6 +56,8 @@ class LiveSession final : public Attendant, private SessionEvents {
   /// For the session's own thread. \throws EndOfSession, TrialCutOff
   void attend() override;
   void say(const std::string& message);
+  /// A trial that is on record, for the accuracy so far.
+  void count(const TrialRecord& record);
 
  private:
   Outcome go_through();
@@ -106,6 +108,7 @@ class LiveSession final : public Attendant, private SessionEvents {
     fault,   ///< forces are off: the fault must be cleared first
   } hold_ = Hold::none;
   std::string held_state_, held_reason_;  ///< of Hold::passed and fault
+  std::string zero_asked_by_;             ///< " by the key F12"
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

@@ -20,15 +20,33 @@ std::string newtons(double force) {
 
 }  // namespace
 
-void Preflight::finish(const std::string& finding) {
+bool Preflight::asked_for(Step step) const {
+  switch (step) {
+    case Step::homing:
+      return true;
+    case Step::limits:
+      return needs_.push != nullptr;
+    case Step::range:
+      return needs_.reach > 0;
+    case Step::buttons:
+      return needs_.buttons > 0;
+    case Step::done:
+      break;
+  }
+  return false;
+}
+
+void Preflight::finish(const std::string& finding, bool left_out) {
   findings_.push_back(finding);
-  step_ = static_cast<Step>(static_cast<int>(step_) + 1);
-  if (step_ == Step::limits && needs_.push == nullptr) step_ = Step::range;
-  if (step_ == Step::range && needs_.reach <= 0) step_ = Step::buttons;
-  if (step_ == Step::buttons && needs_.buttons == 0) step_ = Step::done;
+  if (left_out) left_out_.push_back(step_);
+  do {
+    step_ = static_cast<Step>(static_cast<int>(step_) + 1);
+  } while (step_ != Step::done && !asked_for(step_));
 }
 
 void Preflight::add(const Sample& sample) {
+  // Forces that were asked off, or that the guard took off, leave the device where it is.
+  if (sample.trouble == DeviceTrouble::guarded && step_ != Step::homing) return;
   const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
   trouble_ = sample.trouble;
   if (lost) {  // also later: a device that was lost has to be homed again
@@ -111,9 +129,9 @@ void Preflight::skip() {
     }
     return;
   }
-  if (step_ == Step::range) finish("range NOT checked: not reached: " + missing_sides());
+  if (step_ == Step::range) finish("range NOT checked: not reached: " + missing_sides(), true);
   if (step_ == Step::buttons)
-    finish("button " + std::to_string(missing_button()) + " and those after it NOT checked");
+    finish("button " + std::to_string(missing_button()) + " and those after it NOT checked", true);
 }
 
 std::string Preflight::instruction() const {
@@ -124,22 +142,46 @@ std::string Preflight::instruction() const {
         return advice(trouble_);
       return "home the device: pull the grip fully out, then push it straight in";
     case Step::limits:
-      if (push_ == Push::given)
-        return "was a feeble push to the right felt? (go: yes; repeat: once more; quit: no)";
+      if (push_ == Push::given) return "was a feeble push to the right felt?";
       return (push_fault_.empty() ? "limits: " + limits_in_words()
                                   : "the push was not as it should be: " + push_fault_) +
              "; hold the grip: a push of " + newtons(needs_.push->force()) +
-             " to the right comes for a second (go: push)";
+             " to the right comes for a second";
     case Step::range:
       return "move the stylus " + millimetres(needs_.reach) +
-             " from the centre; still to come: " + missing_sides() + " (go: leave it unchecked)";
+             " from the centre; still to come: " + missing_sides();
     case Step::buttons:
-      return "press button " + std::to_string(missing_button()) +
-             " of the device (go: leave it unchecked)";
+      return "press button " + std::to_string(missing_button()) + " of the device";
     case Step::done:
       break;
   }
   return "";
+}
+
+Checklist Preflight::checklist() const {
+  using State = Checklist::Step::State;
+  using Kind = ConsoleCommand::Kind;
+  Checklist list;
+  for (const auto& [step, words] : {std::pair(Step::homing, "Home the device"),
+                                    std::pair(Step::limits, "Feel a feeble push to the right"),
+                                    std::pair(Step::range, "Move to every side"),
+                                    std::pair(Step::buttons, "Press the buttons")}) {
+    if (!asked_for(step)) continue;
+    const bool left_out = std::count(left_out_.begin(), left_out_.end(), step) > 0;
+    list.steps.push_back({words, step_ == step  ? State::now
+                                 : step_ < step ? State::to_do
+                                 : left_out     ? State::left_out
+                                                : State::done});
+  }
+  list.instruction = instruction();
+  if (step_ == Step::limits && push_ == Push::given) {
+    list.choices = {{Kind::go_on, "yes"}, {Kind::repeat_trial, "once more"}, {Kind::quit, "no"}};
+  } else if (step_ == Step::limits) {
+    list.choices = {{Kind::go_on, "push"}};
+  } else if (step_ == Step::range || step_ == Step::buttons) {
+    list.choices = {{Kind::go_on, "leave it unchecked"}};
+  }
+  return list;
 }
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "runner/display/display.h"
 #include "runner/feeble_push.h"
 #include "runner/participants/keyboard.h"
 #include "runner/sample.h"
@@ -37,13 +38,16 @@ class Preflight {
   bool push_due() const { return push_ == Push::due; }
   /// \param fault  what was wrong; empty: nothing
   void pushed(const std::string& fault);
-  /// What the experimenter is asked to do, and what is missing.
-  std::string instruction() const;
+  /// What there is to do, what of it is done, and what is due: what is missing and what the
+  /// experimenter may say to it.
+  Checklist checklist() const;
   /// For the record: what was checked and what was left out.
   const std::vector<std::string>& findings() const { return findings_; }
 
  private:
-  void finish(const std::string& finding);
+  void finish(const std::string& finding, bool left_out = false);
+  bool asked_for(Step step) const;
+  std::string instruction() const;
   void add_range(const Vec3& tip);
   std::string missing_sides() const;
   int missing_button() const;
@@ -58,6 +62,7 @@ class Preflight {
   Vec3 least_, most_;
   unsigned pressed_ = 0, released_ = 0;  ///< buttons seen down, and up
   std::vector<std::string> findings_;
+  std::vector<Step> left_out_;
 };
 
 }  // namespace palpate

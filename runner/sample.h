@@ -16,6 +16,13 @@ enum class Phase : std::uint8_t {
   feeling,  ///< forces on
 };
 
+/// Why forces are not on yet, in homing.
+enum class Waiting : std::uint8_t {
+  nothing,
+  for_distance,  ///< the stylus is not in the home zone
+  for_rest,      ///< it is, and has not rested there long enough
+};
+
 /// What happened in one tick.
 struct Sample {
   std::int64_t time_ns = 0;      ///< session clock, at the start of the tick
@@ -25,6 +32,7 @@ struct Sample {
   std::int64_t compute_ns = 0;   ///< from the device's reading to the command for it, by the clock
   std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
   Phase phase = Phase::idle;
+  Waiting waiting = Waiting::nothing;
   LineProbe probe;        ///< virtual probe, m
   Rendering rendering;    ///< as rendered
   Vec3 device1, device2;  ///< N, as commanded after the limits

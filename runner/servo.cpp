@@ -68,8 +68,10 @@ bool Servo::at_home(const LineProbe& probe) noexcept {
   }
   if (!(distance_of_segment(probe) >= home.radius)) {
     rested_ = 0;
+    sample_.waiting = Waiting::for_distance;
     return false;
   }
+  sample_.waiting = Waiting::for_rest;
   return ++rested_ >= home.rest / period_;
 }
 
@@ -150,6 +152,7 @@ const Sample& Servo::tick() noexcept {
   check(reading);
   if (sample_.phase == Phase::homing && !reading.lost && at_home(sample_.probe)) {
     sample_.phase = Phase::feeling;
+    sample_.waiting = Waiting::nothing;
     sample_.tick = 0;
   } else if (sample_.phase == Phase::feeling) {
     ++sample_.tick;
@@ -175,6 +178,7 @@ ServoQuality Servo::stop() noexcept {
   limiter_.release();
   device_.write(Vec3(0), Vec3(0));
   sample_.phase = Phase::idle;
+  sample_.waiting = Waiting::nothing;
   sample_.device1 = sample_.device2 = Vec3(0);
   sample_.rendering = {};
   stage_ = nullptr;

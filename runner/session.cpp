@@ -1,5 +1,6 @@
 #include "runner/session.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -130,8 +131,9 @@ bool Session::run_trial() {
   record_ = planned_record(trial);
   record_.attempt = parts_.log.begin(record_, parts_.clock.now_ns());
   if (parts_.events != nullptr) parts_.events->began(trial);
-  const HomeZone home{parts_.library.reach(trial.stimulus) + protocol.home.margin,
-                      protocol.home.rest};
+  const HomeZone home{
+      std::max(parts_.library.reach(trial.stimulus), parts_.least_reach) + protocol.home.margin,
+      protocol.home.rest};
   std::optional<Answer> answer;
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;

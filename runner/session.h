@@ -66,6 +66,9 @@ class Session {
     Respondent& participant;
     TrialLog& log;
     SessionEvents* events = nullptr;  ///< may be none
+    /// m; the home zone leaves at least so much room, whichever the stimulus. A person whom the
+    /// screen tells to move away must not learn a shape from where that ends.
+    double least_reach = 0;
   };
 
   /// \param plan  already fed with what is on record

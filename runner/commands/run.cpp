@@ -50,7 +50,7 @@ int run_command(const std::vector<std::string>& args) {
       "--no-window\n";
   RunSettings settings;
   int number = 0, session = 0;
-  double latency = 0;
+  double latency = 0, scale = 0;
   line.options.add_options()  //
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
        "database; created, or gone on with")  //
@@ -83,12 +83,15 @@ int run_command(const std::vector<std::string>& args) {
       ("marker-codes", po::bool_switch(&settings.marker_codes),
        "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
        "in "
-       "clear; without it participant_id is null there")                                   //
-      ("no-window", po::bool_switch(&settings.no_window), "text only")                     //
-      ("full-screen", po::bool_switch(&settings.full_screen), "the participant's window")  //
+       "clear; without it participant_id is null there")                //
+      ("no-window", po::bool_switch(&settings.no_window), "text only")  //
+      ("full-screen", po::bool_switch(&settings.full_screen),
+       "the participant's window, on a monitor of its own")  //
       ("participant-monitor", po::value(&settings.participant_monitor)->value_name("N"),
        "from 1")                                                                            //
       ("console-monitor", po::value(&settings.console_monitor)->value_name("N"), "from 1")  //
+      ("ui-scale", po::value(&scale)->value_name("FACTOR"),
+       "of letters and buttons, 0.5 to 4; default: from each window's monitor")  //
       ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
        "which device; falcon2: twice, tip first")  //
       ("firmware", po::value(&settings.firmware)->value_name("FILE"),
@@ -108,6 +111,10 @@ int run_command(const std::vector<std::string>& args) {
   if (values->count("number") > 0) settings.number = number;
   if (values->count("session") > 0) settings.session = session;
   if (values->count("response-latency") > 0) settings.response_latency = latency;
+  if (values->count("ui-scale") > 0) {
+    if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: 0.5 to 4 was expected");
+    settings.ui_scale = scale;
+  }
   check(settings);
   std::signal(SIGPIPE, SIG_IGN);  // a reader that goes away does not end a session
   return run_station(settings);

@@ -24,6 +24,7 @@ struct RunSettings {
   std::vector<std::string> serials, markers;
   std::optional<double> response_latency;
   int participant_monitor = 0, console_monitor = 0;
+  double ui_scale = 0;  ///< 0: from the monitors
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
        without_noise = false, new_participant = false, after_withdrawal = false,
        marker_codes = false;

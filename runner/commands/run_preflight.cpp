@@ -24,8 +24,14 @@ void take_note(RunRecord& record, const ConsoleCommand& note, std::vector<std::s
 
 /// What is obeyed at any step. \throws EndOfSession
 void obey(const RunParts& at, RunRecord& record, const ConsoleCommand& command,
-          std::vector<std::string>& messages) {
+          ConsoleState& state) {
+  std::vector<std::string>& messages = state.messages;
   if (command.kind == Kind::quit) throw end_by_experimenter(command.text);
+  if (command.kind == Kind::emergency_zero) {
+    state.fault = "zero force was asked for by " + command.text;
+    messages.push_back("EMERGENCY by " + command.text +
+                       ": forces are off until the fault is cleared");
+  }
   if (command.kind == Kind::note) take_note(record, command, messages);
   if (command.kind == Kind::pause || command.kind == Kind::stop_after_trial ||
       command.kind == Kind::stop_after_block)
@@ -34,6 +40,7 @@ void obey(const RunParts& at, RunRecord& record, const ConsoleCommand& command,
   const std::string trouble = LiveForces(at.servo, at.guard, at.clock).allow([&at] {
     return at.signals.end_requested() != 0;
   });
+  if (trouble.empty()) state.fault.clear();
   messages.push_back(trouble.empty() ? "the device is well" : "not cleared: " + trouble);
 }
 
@@ -76,21 +83,26 @@ PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
   std::string told;
   std::int64_t told_ns = at.clock.now_ns() - 500'000'000;  // what is well need not be said
   std::int64_t pushed_ns = 0;
+  std::vector<std::string> emergencies;
   std::vector<ConsoleCommand> while_pushed;  // not obeyed yet
-  while (preflight.step() != Preflight::Step::done) {
+  while (preflight.step() != Preflight::Step::done || !state.fault.empty()) {
     at.clock.wait_until(at.clock.now_ns() + 5'000'000);
     if (at.servo.latest(state.sample)) preflight.add(state.sample);
+    at.display.participant().keys();  // none answers yet
     std::vector<ConsoleCommand> commands = std::exchange(while_pushed, {});
     for (ConsoleCommand& more : at.display.console().commands()) commands.push_back(more);
     for (const ConsoleCommand& command : commands) {
-      obey(at, record, command, state.messages);
+      obey(at, record, command, state);
+      if (command.kind == Kind::emergency_zero)
+        emergencies.push_back("EMERGENCY by " + command.text);
       // What was pressed while it pushed does not tell that it was felt.
-      if (command.kind == ConsoleCommand::Kind::go_on && command.time_ns >= pushed_ns)
+      const bool free = state.fault.empty();
+      if (free && command.kind == ConsoleCommand::Kind::go_on && command.time_ns >= pushed_ns)
         preflight.skip();
-      if (command.kind == ConsoleCommand::Kind::repeat_trial) preflight.repeat();
+      if (free && command.kind == ConsoleCommand::Kind::repeat_trial) preflight.repeat();
     }
     end_if_due(at, state.sample);
-    if (preflight.push_due()) {
+    if (preflight.push_due() && state.fault.empty()) {
       at.servo.clear_fault();  // before homing there were no readings
       preflight.pushed(at.push.give(at.servo, [&] {
         bool quit = at.signals.end_requested() != 0;
@@ -102,19 +114,26 @@ PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
       }));
       pushed_ns = at.clock.now_ns();
     }
-    const std::string instruction = preflight.instruction() + way_on(at, state.sample.trouble);
+    Checklist list = preflight.checklist();
+    list.instruction += way_on(at, state.sample.trouble);
     const std::int64_t now = at.clock.now_ns();
     // What is missing changes while the stylus moves: no more often than one can read.
-    if (instruction != told && now - told_ns > 1'000'000'000) {
-      told = instruction;
+    if (list.instruction != told && now - told_ns > 1'000'000'000) {
+      told = list.instruction;
       told_ns = now;
-      state.messages.push_back(instruction);
+      Page page;
+      page.kind = Page::Kind::checklist;
+      page.checklist = list;
+      at.display.participant().show(page);
+      state.checklist = std::move(list);
     }
     at.display.console().show(state);
   }
   at.servo.clear_fault();  // before homing there were no readings
   at.display.console().show(state);
-  return {preflight.findings(), state.messages};
+  std::vector<std::string> findings = preflight.findings();
+  findings.insert(findings.end(), emergencies.begin(), emergencies.end());
+  return {findings, state.messages};
 }
 
 }  // namespace palpate

@@ -127,7 +127,8 @@ LiveSession::Outcome run_session(const RunParts& at) {
   RunRecord record(at.store, at.admission.enrolled, at.participant,
                    describe(at.settings, at.device, at.session, stamp),
                    other_texts ? std::optional(shown) : std::nullopt);
-  const SessionPlan plan = plan_of(at, at.store.progress(at.participant, at.session));
+  const SessionProgress before = at.store.progress(at.participant, at.session);
+  const SessionPlan plan = plan_of(at, before);
   PreflightRecord preflight;
   try {
     preflight = go_through_preflight(at, record, news(at, plan));
@@ -142,6 +143,7 @@ LiveSession::Outcome run_session(const RunParts& at) {
        at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
        [&at] { return at.signals.end_requested(); }, at.noise},
       stamp, plan);
+  for (const TrialRecord& trial : before.completed) session.count(trial);
   for (const std::string& warning : at.admission.warnings) session.say(warning);
   for (const std::string& note : at.admission.notes) record.note(stamp.monotonic_ns, note);
   for (const std::string& message : preflight.messages) session.say(message);  // it shows on

@@ -103,11 +103,15 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
     WindowSettings window;
     window.title = protocol.name + ", " + settings.participant;
     window.full_screen = settings.full_screen;
+    window.ui_scale = settings.ui_scale;
     window.participant_monitor = settings.participant_monitor;
     window.console_monitor = settings.console_monitor;
     const auto& texts = protocol.texts;
-    window.texts = {texts.instructions, texts.practice, texts.break_text, texts.end};
-    for (const auto& [key, name] : protocol.response.keys) window.texts.push_back(name);
+    window.texts = {texts.instructions, texts.practice,  texts.break_text,
+                    texts.end,          texts.move_away, texts.ready,
+                    texts.go,           texts.wait,      texts.other_key};
+    for (const auto& [key, name] : protocol.response.keys)
+      window.texts.push_back(answer_label(protocol, name));
     window.emergency = emergency;
     window.mouse = dynamic_cast<MouseStylus*>(&device);
     window.workspace = {protocol.workspace.centre, protocol.workspace.scale};
@@ -116,6 +120,8 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
       auto windows = make_windows(window);
       const std::string missing = missing_letters(window.texts);
       if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
+      const std::string warning = windows->warning();
+      if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
       return windows;
     } catch (const DisplayError& error) {
       if (window.mouse != nullptr) throw;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "runner/sample.h"
 
@@ -46,40 +47,20 @@ bool wide_button(const char* words, float width, bool lit = false) {
   return pressed;
 }
 
-/// A frame with a name; where to draw in it.
-struct Plot {
-  ImVec2 from, to;
-  ImDrawList* list;
-};
-
-Plot plot_frame(const char* name, float width, float height, double top, const char* unit) {
-  const ImVec2 at = ImGui::GetCursorScreenPos();
-  const float size = ImGui::GetFontSize();
-  ImDrawList* const list = ImGui::GetWindowDrawList();
-  list->AddRectFilled(at, {at.x + width, at.y + height}, ImGui::GetColorU32(ImGuiCol_FrameBg), 6);
-  list->AddText({at.x + 10, at.y + 6}, ImGui::GetColorU32(kQuiet), name);
-  const Plot plot{{at.x + 3.6F * size, at.y + 2.0F * size},
-                  {at.x + width - 0.8F * size, at.y + height - 0.8F * size},
-                  list};
-  for (int i = 0; i <= 2; ++i) {
-    const float y = plot.to.y + (plot.from.y - plot.to.y) * static_cast<float>(i) / 2;
-    list->AddLine({plot.from.x, y}, {plot.to.x, y}, IM_COL32(255, 255, 255, 26));
-    const std::string label = number(top * i / 2, top < 4 ? 1 : 0) + (i == 2 ? unit : "");
-    const float wide = ImGui::CalcTextSize(label.c_str()).x;
-    list->AddText({plot.from.x - wide - 6, y - size / 2}, ImGui::GetColorU32(kQuiet),
-                  label.c_str());
-  }
-  ImGui::Dummy({width, height});
-  return plot;
+/// What goes with the state's word.
+std::string beside_state(const ConsoleState& state) {
+  if (!state.stop_plan.empty()) return state.stop_plan;
+  if (state.seconds_left > 0) return in_words(state.seconds_left) + " left";
+  if (state.state != "homing") return {};
+  if (state.sample.waiting == Waiting::for_distance) return "stylus too near: move it away";
+  if (state.sample.waiting == Waiting::for_rest) return "stylus must rest: hold it still";
+  return {};
 }
 
-/// 1, 2 or 5 times a power of ten, not below.
-double round_up(double value) {
-  const double power = std::pow(10, std::floor(std::log10(std::max(value, 1e-3))));
-  for (const double step : {1.0, 2.0, 5.0}) {
-    if (value <= step * power) return step * power;
-  }
-  return 10 * power;
+const char* word(ConsoleCommand::Kind kind) {
+  return kind == ConsoleCommand::Kind::go_on          ? "Go on"
+         : kind == ConsoleCommand::Kind::repeat_trial ? "Repeat"
+                                                      : "End";
 }
 
 }  // namespace
@@ -111,20 +92,16 @@ void style_console(float scale) {
   style.ScaleAllSizes(scale);
 }
 
-void draw_status(const ConsoleState& state) {
+void draw_status(const ConsoleState& state, bool hidden) {
   text(kQuiet,
        state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session));
   ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
   text(kBright, state.state.empty() ? "waiting" : state.state);
   ImGui::PopFont();
-  if (!state.stop_plan.empty()) {
+  const std::string beside = beside_state(state);
+  if (!beside.empty()) {
     ImGui::SameLine();
-    text(kBad, state.stop_plan);
-  }
-  if (!state.held_by.empty()) {
-    ImGui::PushTextWrapPos(0);
-    text(kBad, state.held_by);
-    ImGui::PopTextWrapPos();
+    text(state.stop_plan.empty() ? kBright : kBad, beside);
   }
   const float done = state.trials > 0 ? static_cast<float>(std::max(state.trial - 1, 0)) /
                                             static_cast<float>(state.trials)
@@ -133,20 +110,54 @@ void draw_status(const ConsoleState& state) {
   if (!ImGui::BeginTable("status", 2)) return;
   ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 7.5F * ImGui::GetFontSize());
   ImGui::TableSetupColumn("value");
-  row("Trial", std::to_string(state.trial) + " of " + std::to_string(state.trials));
+  const bool practice = state.practice && (state.state == "trial" || state.state == "homing");
+  row("Trial",
+      std::to_string(state.trial) + " of " + std::to_string(state.trials) +
+          (practice ? "  PRACTICE" : ""),
+      practice ? kGood : kBright);
   row("Block", std::to_string(state.block) + " of " + std::to_string(state.blocks));
-  row("Shape", state.shape.empty() ? "-" : state.shape);
+  row("Shape", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
   row("Renderer", state.renderer.empty() ? "-" : state.renderer);
+  row("Last answer", state.answer.empty() ? "-" : hidden ? "hidden" : state.answer);
   row("Elapsed", in_words(state.elapsed));
   row("Remaining", state.remaining > 0 ? "about " + in_words(state.remaining) : "not known yet");
   ImGui::EndTable();
 }
 
-void draw_buttons(const ConsoleState& state, TypedText& reason,
-                  std::vector<ConsoleCommand>& asked) {
-  using Kind = ConsoleCommand::Kind;
+namespace {
+
+using Kind = ConsoleCommand::Kind;
+
+void draw_ending(Ending& ending, float half, std::vector<ConsoleCommand>& asked) {
+  if (!std::exchange(ending.seen, true)) ImGui::SetScrollHereY(0);  // in a small window
+  ImGui::PushTextWrapPos(0);
+  text(kBright,
+       "End the session now? The trial under way is cut off. All answers are on record; "
+       "the session can be resumed, unless the participant withdraws.");
+  ImGui::PopTextWrapPos();
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputTextWithHint("##why", "Why, for the record", ending.reason.data(),
+                           ending.reason.size());
+  const auto end = [&](const char* words, const std::string& why) {
+    if (!wide_button(words, half)) return;
+    asked.push_back({Kind::quit, why, 0});
+    ending = {};
+  };
+  end("End the session", ending.reason.data());
+  ImGui::SameLine();
+  if (wide_button("Back", half)) ending = {};
+  end("Participant withdraws", "withdrawn");
+}
+
+}  // namespace
+
+void draw_buttons(const ConsoleState& state, Ending& ending, std::vector<ConsoleCommand>& asked) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
+  if (ending.asked) {
+    draw_ending(ending, half, asked);
+    return;
+  }
   const auto button = [&](const char* words, Kind kind, bool lit = false) {
     if (wide_button(words, half, lit)) asked.push_back({kind, {}, 0});
   };
@@ -158,54 +169,144 @@ void draw_buttons(const ConsoleState& state, TypedText& reason,
   button("Stop after block", Kind::stop_after_block, state.stop_plan == "after this block");
   button("Repeat trial", Kind::repeat_trial);
   ImGui::SameLine();
-  if (wide_button("End now...", half)) ImGui::OpenPopup("End the session now?");
-  ImGui::SetNextWindowPos(ImGui::GetMainViewport()->GetCenter(), ImGuiCond_Appearing, {0.5F, 0.5F});
-  if (ImGui::BeginPopupModal("End the session now?", nullptr,
-                             ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove)) {
-    text(kBright,
-         "The trial under way is cut off. All answers are on record;\n"
-         "the session can be resumed, unless the participant withdraws.");
-    ImGui::SetNextItemWidth(-1);
-    ImGui::InputTextWithHint("##why", "Why, for the record", reason.data(), reason.size());
-    const auto end = [&](const char* words, const std::string& why) {
-      if (!wide_button(words, 1.2F * half)) return;
-      asked.push_back({Kind::quit, why, 0});
-      reason.fill(0);
-      ImGui::CloseCurrentPopup();
-    };
-    end("End the session", reason.data());
-    ImGui::SameLine();
-    end("The participant withdraws", "withdrawn");
-    ImGui::SameLine();
-    if (wide_button("Back", half / 2)) ImGui::CloseCurrentPopup();
-    ImGui::EndPopup();
-  }
+  if (wide_button("End now...", half)) ending.asked = true;
 }
 
-void draw_emergency(const ConsoleState& state, std::vector<ConsoleCommand>& asked) {
+float draw_emergency(bool lit) {
+  const float font = ImGui::GetFontSize();
+  const ImGuiViewport& all = *ImGui::GetMainViewport();
+  const float room = all.WorkSize.x, gap = std::min(8.0F, 0.02F * room);
+  const float height = std::min(3.4F * font, all.WorkSize.y);
+  const ImVec2 from{all.WorkPos.x + gap, all.WorkPos.y + gap};
+  const ImVec2 to{all.WorkPos.x + room - gap, all.WorkPos.y + height};
+  ImDrawList& list = *ImGui::GetForegroundDrawList();
+  list.AddRectFilled(all.WorkPos, {all.WorkPos.x + room, to.y + gap},
+                     ImGui::GetColorU32(ImGuiCol_WindowBg));
+  list.AddRectFilled(from, to, ImGui::GetColorU32(lit ? kRedLit : kRed), 6);
+  const auto wide = [](const char* words) { return ImGui::CalcTextSize(words).x; };
+  const char* words = "EMERGENCY: ZERO FORCE   (F12 or Esc)";
+  if (wide(words) > to.x - from.x) words = "EMERGENCY";
+  const float fits = std::min(
+      {1.4F, 0.96F * (to.x - from.x) / std::max(wide(words), 1.0F), (to.y - from.y) / font});
+  const float size = fits * font;
+  list.AddText(ImGui::GetFont(), size,
+               {(from.x + to.x - fits * wide(words)) / 2, (from.y + to.y - size) / 2},
+               ImGui::GetColorU32(kBright), words);
+  return to.y + gap;
+}
+
+void draw_forces_off(const ConsoleState& state, double silence,
+                     std::vector<ConsoleCommand>& asked) {
   const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
-  const float width = ImGui::GetContentRegionAvail().x;
-  ImGui::PushStyleColor(ImGuiCol_Button, kRed);
-  ImGui::PushStyleColor(ImGuiCol_ButtonHovered, kRedLit);
-  ImGui::PushStyleColor(ImGuiCol_ButtonActive, kRedLit);
-  if (ImGui::Button("EMERGENCY: ZERO FORCE   (F12 or Esc)", {width, 3.4F * ImGui::GetFontSize()})) {
-    asked.push_back({ConsoleCommand::Kind::emergency_zero, {}, 0});
-  }
-  ImGui::PopStyleColor(3);
   // Always there, so that no other button moves under the hand when forces go off.
   const float clear = 8 * ImGui::GetFontSize();
-  ImGui::BeginChild("forces", {width - clear - ImGui::GetStyle().ItemSpacing.x,
-                               2 * ImGui::GetTextLineHeightWithSpacing()});
+  ImGui::BeginChild("forces",
+                    {ImGui::GetContentRegionAvail().x - clear - ImGui::GetStyle().ItemSpacing.x,
+                     4.25F * ImGui::GetFontSize()});
   ImGui::PushTextWrapPos(0);
-  text(off ? kBad : kQuiet,
-       off ? "Forces are off: " + fault_words(state.sample.faults) : "No fault");
+  if (silence > 0) {
+    text(kBad, "No news from the session for " + in_words(silence));
+  } else if (!state.held_by.empty()) {
+    text(off ? kBad : kBright, (off ? "Forces are off: " : "") + state.held_by);
+  } else {
+    text(off ? kBad : kQuiet, off ? "Forces are off: " + forces_off_reason(state) : "No fault");
+  }
   ImGui::PopTextWrapPos();
   ImGui::EndChild();
   ImGui::SameLine();
   ImGui::BeginDisabled(!off);
-  if (wide_button("Clear the fault", clear))
-    asked.push_back({ConsoleCommand::Kind::clear_fault, {}, 0});
+  if (wide_button("Clear the fault", clear)) asked.push_back({Kind::clear_fault, {}, 0});
   ImGui::EndDisabled();
+}
+
+namespace {
+
+/// Broken at spaces only: Dear ImGui would tear "0.5" apart.
+void wrapped_text(const ImVec4& colour, const std::string& words) {
+  const float room = ImGui::GetContentRegionAvail().x;
+  std::string line;
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    const std::string longer = line + (line.empty() ? "" : " ") + words.substr(at, end - at);
+    if (!line.empty() && ImGui::CalcTextSize(longer.c_str()).x > room) {
+      text(colour, line);
+      line = words.substr(at, end - at);
+    } else {
+      line = longer;
+    }
+    at = end + 1;
+  }
+  text(colour, line);
+}
+
+const char* word(Checklist::Step::State state) {
+  switch (state) {
+    case Checklist::Step::State::to_do:
+      return "to do";
+    case Checklist::Step::State::now:
+      return "now";
+    case Checklist::Step::State::done:
+      return "done";
+    case Checklist::Step::State::left_out:
+      return "left out";
+  }
+  return "";
+}
+
+void draw_choices(const Checklist& list, Ending& ending, std::vector<ConsoleCommand>& asked) {
+  const float font = ImGui::GetFontSize(), gap = ImGui::GetStyle().ItemSpacing.x;
+  const float room = ImGui::GetContentRegionAvail().x;
+  float right = 0;
+  for (const auto& [kind, meaning] : list.choices) {
+    const std::string words = std::string(word(kind)) + ": " + meaning;
+    const float width = std::max(10 * font, ImGui::CalcTextSize(words.c_str()).x + 2 * font);
+    if (right > 0 && right + gap + width < room) {
+      ImGui::SameLine();
+      right += gap + width;
+    } else {
+      right = width;
+    }
+    if (!ImGui::Button(words.c_str(), {width, 2.4F * font})) continue;
+    if (kind == Kind::quit) {
+      ending.asked = true;
+    } else {
+      asked.push_back({kind, {}, 0});
+    }
+  }
+}
+
+}  // namespace
+
+void draw_checklist(const Checklist& list, Ending& ending, std::vector<ConsoleCommand>& asked) {
+  using State = Checklist::Step::State;
+  const float font = ImGui::GetFontSize();
+  std::size_t due = 0;
+  while (due < list.steps.size() && list.steps[due].state != State::now) ++due;
+  text(kQuiet, "Before the first trial: step " +
+                   std::to_string(std::min(due + 1, list.steps.size())) + " of " +
+                   std::to_string(list.steps.size()));
+  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
+  std::string instruction = list.instruction;
+  if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
+  wrapped_text(kBright, instruction);
+  ImGui::PopFont();
+  draw_choices(list, ending, asked);
+  ImGui::Dummy({0, 0.4F * font});
+  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
+  if (ImGui::BeginTable("steps", 2)) {
+    ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 8 * font);
+    ImGui::TableSetupColumn("step");
+    for (const Checklist::Step& step : list.steps) {
+      const bool now = step.state == State::now;
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      text(step.state == State::done ? kGood : now ? kBright : kQuiet, word(step.state));
+      ImGui::TableNextColumn();
+      text(now ? kBright : kQuiet, step.words);
+    }
+    ImGui::EndTable();
+  }
+  ImGui::PopFont();
 }
 
 void draw_health(const ConsoleState& state) {
@@ -227,41 +328,6 @@ void draw_health(const ConsoleState& state) {
                      ? "none"
                      : number(sample.rendering.deepest.depth * 1e3, 2) + " mm deep");
   ImGui::EndTable();
-}
-
-void draw_forces(const std::deque<ForcePoint>& forces, float width, float height) {
-  double most = 1;
-  for (const ForcePoint& point : forces) most = std::max(most, point.force);
-  const double top = round_up(most);
-  const Plot plot = plot_frame("Force on the hand, last 10 s", width, height, top, " N");
-  if (forces.size() < 2) return;
-  std::vector<ImVec2> line;
-  line.reserve(forces.size());
-  for (const ForcePoint& point : forces) {
-    const auto ago = static_cast<float>((forces.back().time - point.time) / 10);
-    const auto high = static_cast<float>(point.force / top);
-    line.emplace_back(plot.to.x - ago * (plot.to.x - plot.from.x),
-                      plot.to.y - high * (plot.to.y - plot.from.y));
-  }
-  plot.list->AddPolyline(line.data(), static_cast<int>(line.size()), IM_COL32(247, 199, 66, 255), 0,
-                         1.8F);
-}
-
-void draw_times(const std::vector<double>& times, float width, float height) {
-  double most = 1;
-  for (const double time : times) most = std::max(most, std::isfinite(time) ? time : 0);
-  const double top = round_up(most);
-  const Plot plot = plot_frame("Identification times so far", width, height, top, " s");
-  const auto count = static_cast<float>(std::max<std::size_t>(times.size(), 20));
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    if (!std::isfinite(times[i])) continue;
-    const float x =
-        plot.from.x + (static_cast<float>(i) + 0.5F) / count * (plot.to.x - plot.from.x);
-    const float y =
-        plot.to.y - static_cast<float>(std::max(times[i], 0.0) / top) * (plot.to.y - plot.from.y);
-    plot.list->AddCircleFilled({x, y}, times.size() > 200 ? 2.0F : 3.5F,
-                               IM_COL32(116, 170, 217, 255));
-  }
 }
 
 }  // namespace palpate

@@ -17,7 +17,9 @@ constexpr double kSilence = 1;     // s without news before the console says so
 
 }  // namespace
 
-ConsoleView::ConsoleView(const WindowSettings& settings) {
+// Whoever holds the mouse has to see where.
+ConsoleView::ConsoleView(const WindowSettings& settings, bool shared)
+    : shared_(shared && settings.mouse == nullptr), hidden_(shared_) {
   if (settings.mouse != nullptr) hand_.emplace(*settings.mouse, settings.workspace);
 }
 
@@ -28,6 +30,7 @@ void ConsoleView::take(ConsoleState state, double now) {
   const double time = static_cast<double>(state_.sample.time_ns) * 1e-9;
   const double force = glm::length(state_.sample.device1 + state_.sample.device2);
   if (!forces_.empty() && time < forces_.back().time) forces_.clear();
+  if (!forces_.empty() && time == forces_.back().time) forces_.pop_back();
   forces_.push_back({time, std::isfinite(force) ? force : 0});
   while (forces_.front().time < time - kForceSpan) forces_.pop_front();
 }
@@ -35,25 +38,26 @@ void ConsoleView::take(ConsoleState state, double now) {
 std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modifiers) {
   std::vector<ConsoleCommand> asked;
   const ImGuiViewport* const all = ImGui::GetMainViewport();
-  ImGui::SetNextWindowPos(all->WorkPos);
-  ImGui::SetNextWindowSize(all->WorkSize);
+  emergency_to_ = draw_emergency(emergency_lit_);
+  ImGui::SetNextWindowPos({all->WorkPos.x, all->WorkPos.y + emergency_to_});
+  ImGui::SetNextWindowSize({all->WorkSize.x, std::max(all->WorkSize.y - emergency_to_, 1.0F)});
   ImGui::Begin("console", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
   const float font = ImGui::GetFontSize();
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const ImVec2 room = ImGui::GetContentRegionAvail();
+  const bool narrow = room.x < 44 * font;
   const float side = std::clamp(0.36F * room.x, 22 * font, 30 * font);
-  const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
-
-  ImGui::BeginChild("picture", {room.x - side - gap, 0}, false, ImGuiWindowFlags_NoScrollbar);
-  draw_view(modifiers);
-  const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
-  draw_forces(forces_, half, plots);
-  ImGui::SameLine();
-  draw_times(state_.times, half, plots);
+  const bool checks = !state_.checklist.steps.empty();
+  const float high = checks    ? 0.55F * room.y
+                     : hidden_ ? 7 * font
+                               : std::clamp(0.3F * room.y, 8 * font, 16 * font);
+  ImGui::BeginChild("picture", narrow ? ImVec2{0, high} : ImVec2{room.x - side - gap, 0}, false,
+                    ImGuiWindowFlags_NoScrollbar);
+  draw_picture(modifiers, !narrow, asked);
   ImGui::EndChild();
-  ImGui::SameLine();
+  if (!narrow) ImGui::SameLine();
   ImGui::BeginChild("side", {0, 0});
   draw_side(now, asked);
   ImGui::EndChild();
@@ -61,12 +65,50 @@ std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modif
   return asked;
 }
 
-void ConsoleView::draw_view(const Modifiers& modifiers) {
+void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
+                               std::vector<ConsoleCommand>& asked) {
   const float font = ImGui::GetFontSize();
+  const ImVec2 spacing = ImGui::GetStyle().ItemSpacing;
   const ImVec2 room = ImGui::GetContentRegionAvail();
-  const float plots = std::clamp(0.22F * room.y, 6 * font, 12 * font);
+  const float plots = with_plots ? std::clamp(0.22F * room.y, 6 * font, 12 * font) : 0;
   const float width = std::max(room.x, 40.0F);
-  const float height = std::max(room.y - plots - ImGui::GetStyle().ItemSpacing.y, 40.0F);
+  const float height = std::max(room.y - (with_plots ? plots + spacing.y : 0), 40.0F);
+  if (!state_.checklist.steps.empty()) {
+    ImGui::BeginChild("checklist", {width, height});
+    draw_checklist(state_.checklist, ending_, asked);
+    ImGui::EndChild();
+  } else if (hidden_) {
+    draw_hidden(width, height);
+  } else {
+    draw_view(modifiers, width, height);
+  }
+  if (!with_plots) return;
+  const float part = (room.x - spacing.x * (hidden_ ? 1 : 2)) / (hidden_ ? 2 : 3);
+  draw_forces(forces_, part, plots);
+  ImGui::SameLine();
+  draw_times(state_.times, part, plots);
+  if (hidden_) return;
+  ImGui::SameLine();
+  draw_scores(state_.scores, part, plots);
+}
+
+void ConsoleView::draw_hidden(float width, float height) {
+  const float font = ImGui::GetFontSize();
+  ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
+  ImGui::BeginChild("hidden", {width, height}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
+  ImGui::Dummy({0, std::max(0.0F, height / 2 - 6 * font)});
+  ImGui::PushTextWrapPos(0);
+  ImGui::TextUnformatted(
+      "One monitor: shape, scene and whether answers are right are hidden here, because the "
+      "participant may see this window.");
+  ImGui::PopTextWrapPos();
+  if (ImGui::Button("Show them", {10 * font, 2 * font})) hidden_ = false;
+  ImGui::EndChild();
+  ImGui::PopStyleColor();
+}
+
+void ConsoleView::draw_view(const Modifiers& modifiers, float width, float height) {
+  const float font = ImGui::GetFontSize();
   camera_.resize(width, height);
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
@@ -80,6 +122,7 @@ void ConsoleView::draw_view(const Modifiers& modifiers) {
                                               {1, 0}, IM_COL32_WHITE, 6);
   ImGui::InvisibleButton("view", {width, height},
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+  ImGui::SetItemAllowOverlap();  // the button to hide it
   const ImGuiIO& io = ImGui::GetIO();
   PointerMotion pointer;
   pointer.over = ImGui::IsItemHovered() || ImGui::IsItemActive();
@@ -92,7 +135,11 @@ void ConsoleView::draw_view(const Modifiers& modifiers) {
       modifiers.ctrl || (ImGui::IsItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left));
   pointer.reach = modifiers.shift;
   if (pointer.orbit) camera_.orbit(-0.008F * pointer.moved.x, 0.008F * pointer.moved.y);
-  if (hand_) hand_->step(pointer, camera_);
+  if (hand_) {
+    hand_->step(pointer, camera_, [this](const glm::vec3& from, const glm::vec3& along) {
+      return scene_.hit(from, along);
+    });
+  }
 
   const auto label = [&](float line, const std::string& words, ImU32 colour) {
     ImGui::GetWindowDrawList()->AddText({at.x + 0.8F * font, at.y + (0.6F + 1.4F * line) * font},
@@ -102,21 +149,22 @@ void ConsoleView::draw_view(const Modifiers& modifiers) {
   const float last = (height / font - 2.1F) / 1.4F;
   const ImU32 quiet = IM_COL32(150, 158, 168, 255);
   if (hand_) {
-    label(last - 1, "pointer: the tip     wheel or Shift: to and fro", quiet);
+    label(last - 1, "pointer: the tip, on what is under it     wheel or Shift: press harder",
+          quiet);
     label(last, "Ctrl or left button: turn     right button: look around", quiet);
   } else {
     label(last, "drag: look around", quiet);
   }
+  if (!shared_) return;
+  ImGui::SetCursorScreenPos({at.x + width - 7 * font, at.y + 0.6F * font});
+  if (ImGui::Button("Hide", {6.4F * font, 2 * font})) hidden_ = true;
+  ImGui::SetCursorScreenPos({at.x, at.y + height + ImGui::GetStyle().ItemSpacing.y});
 }
 
 void ConsoleView::draw_side(double now, std::vector<ConsoleCommand>& asked) {
-  draw_emergency(state_, asked);
-  draw_status(state_);
-  if (any_ && now - came_ > kSilence) {
-    ImGui::TextColored({0.97F, 0.46F, 0.40F, 1}, "No news from the session for %.0f s",
-                       now - came_);
-  }
-  draw_buttons(state_, reason_, asked);
+  draw_forces_off(state_, any_ && now - came_ > kSilence ? now - came_ : 0, asked);
+  draw_status(state_, hidden_);
+  draw_buttons(state_, ending_, asked);
   ImGui::Dummy({0, 2});
   draw_health(state_);
   ImGui::Dummy({0, 2});

@@ -22,6 +22,12 @@ struct ForcePoint {
 /// Of a field, ended by a zero.
 using TypedText = std::array<char, 1000>;
 
+/// The end of a session that is being asked for.
+struct Ending {
+  bool asked = false, seen = false;
+  TypedText reason{};  ///< typed so far
+};
+
 /// Held down, whichever window has the keyboard.
 struct Modifiers {
   bool ctrl = false, shift = false;
@@ -29,16 +35,22 @@ struct Modifiers {
 
 class ConsoleView {
  public:
-  /// Needs a current OpenGL context.
-  explicit ConsoleView(const WindowSettings& settings);
+  /// Needs a current OpenGL context. \param shared  the participant may see it as well
+  ConsoleView(const WindowSettings& settings, bool shared);
 
   /// \param now  s, when it came
   void take(ConsoleState state, double now);
   /// One frame; what was asked for in it, without times. \param now  s
   std::vector<ConsoleCommand> draw(double now, const Modifiers& modifiers);
+  /// Whether the pointer is on the emergency button: as drawn last, or where it will be.
+  bool on_emergency(float y) const { return y >= 0 && y < emergency_to_; }
+  void light_emergency(bool on) { emergency_lit_ = on; }
 
  private:
-  void draw_view(const Modifiers& modifiers);
+  void draw_picture(const Modifiers& modifiers, bool with_plots,
+                    std::vector<ConsoleCommand>& asked);
+  void draw_hidden(float width, float height);
+  void draw_view(const Modifiers& modifiers, float width, float height);
   void draw_side(double now, std::vector<ConsoleCommand>& asked);
   void draw_notes(std::vector<ConsoleCommand>& asked);
 
@@ -46,10 +58,14 @@ class ConsoleView {
   Camera camera_;
   std::optional<PointerHand> hand_;
   ConsoleState state_;
-  double came_ = 0;  ///< s
+  bool shared_, hidden_;  ///< hidden: shape, scene and whether answers are right
+  double came_ = 0;       ///< s
   bool any_ = false;
   std::deque<ForcePoint> forces_;
-  TypedText note_{}, reason_{};
+  TypedText note_{};
+  Ending ending_;
+  float emergency_to_ = 40;  ///< px, its lower edge; it is as wide as the window
+  bool emergency_lit_ = false;
   std::size_t messages_seen_ = 0;
 };
 

@@ -43,17 +43,16 @@ void load_fonts(const std::vector<std::string>& texts, float scale) {
 
 }  // namespace
 
-ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Place& place,
+ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Places& places,
                              ParticipantWindow& participant)
     : settings_(settings),
       participant_(participant),
-      window_(make_window(settings.title + " - console", place)) {
-  glfwSetWindowSizeLimits(window_, 700, 480, GLFW_DONT_CARE, GLFW_DONT_CARE);
+      window_(make_window(settings.title + " - console", places.console)) {
+  glfwSetWindowSizeLimits(window_, std::min(700, places.console.width),
+                          std::min(480, places.console.height), GLFW_DONT_CARE, GLFW_DONT_CARE);
   context_ = ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // writes no file
-  float scale = 1, ignored = 1;
-  glfwGetWindowContentScale(window_, &scale, &ignored);
-  scale = std::clamp(scale, 1.0F, 4.0F);
+  const auto scale = static_cast<float>(places.console_scale);
   load_fonts(settings.texts, scale);
   style_console(scale);
   glfwSetWindowUserPointer(window_, this);
@@ -61,11 +60,12 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Place& place,
   glfwSetCharCallback(window_, &ConsoleWindow::on_letter);
   glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
   glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
+  glfwSetCursorPosCallback(window_, &ConsoleWindow::on_pointer);
   glfwSetMouseButtonCallback(window_, &ConsoleWindow::on_button);
   glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
   ImGui_ImplGlfw_InitForOpenGL(window_, false);
   ImGui_ImplOpenGL3_Init("#version 330 core");
-  view_ = std::make_unique<ConsoleView>(settings);
+  view_ = std::make_unique<ConsoleView>(settings, places.shared);
 }
 
 ConsoleWindow::~ConsoleWindow() {
@@ -104,7 +104,7 @@ void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action
   self.swallow_letter_ = answer;
   if (action == GLFW_PRESS) {
     if (key == GLFW_KEY_F12 || key == GLFW_KEY_ESCAPE) {
-      self.ask(ConsoleCommand::Kind::emergency_zero);
+      self.ask(ConsoleCommand::Kind::emergency_zero, emergency_key(key));
     } else if (answer || !typing) {
       self.participant_.press(key, scancode);
     }
@@ -126,7 +126,20 @@ void ConsoleWindow::on_letter(GLFWwindow* window, unsigned letter) {
   if (!self.swallow_letter_) ImGui_ImplGlfw_CharCallback(window, letter);
 }
 
+void ConsoleWindow::on_pointer(GLFWwindow* window, double, double y) {
+  auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  self.pointer_y_ = y;
+  self.view_->light_emergency(self.view_->on_emergency(static_cast<float>(y)));
+}
+
 void ConsoleWindow::on_button(GLFWwindow* window, int button, int action, int mods) {
+  auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  // Here, as the event comes, not in a frame of Dear ImGui, where a dialog, a drag or a field that
+  // is being written could have the pointer, and a slow frame would keep it waiting.
+  if (action == GLFW_PRESS && self.view_->on_emergency(static_cast<float>(self.pointer_y_))) {
+    self.ask(ConsoleCommand::Kind::emergency_zero, "the EMERGENCY button");
+    return;
+  }
   // For displays without a window manager, which leave the keyboard where it is.
   if (action == GLFW_PRESS && glfwGetWindowAttrib(window, GLFW_FOCUSED) == GLFW_FALSE) {
     glfwFocusWindow(window);

@@ -48,6 +48,12 @@ const char* button_words(ConsoleCommand::Kind kind) {
   return "";
 }
 
+std::string forces_off_reason(const ConsoleState& state) {
+  if (!state.fault.empty()) return state.fault;
+  const std::string words = fault_words(state.sample.faults & ~servo_fault::kTripped);
+  return words.empty() ? "they have not been cleared since the last fault" : words;
+}
+
 std::string in_words(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "-";
   const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };

@@ -45,6 +45,10 @@ char on_us_keyboard(int key) {
 
 }  // namespace
 
+const char* emergency_key(int key) {
+  return key == GLFW_KEY_F12 ? "the key F12" : "the key Escape";
+}
+
 bool on_keypad(int key) { return key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_EQUAL; }
 
 std::vector<std::string> key_names(int key, int scancode) {

@@ -16,6 +16,9 @@ std::vector<std::string> key_names(int key, int scancode);
 std::string meant(const std::vector<std::string>& names,
                   const std::vector<std::pair<std::string, std::string>>& keys);
 
+/// Which of the emergency keys it is, in words.
+const char* emergency_key(int key);
+
 /// On the numeric pad, which belongs to the participant.
 bool on_keypad(int key);
 

@@ -25,6 +25,30 @@ GLFWmonitor* monitor(int number, int otherwise) {
   return all[otherwise <= count ? otherwise - 1 : 0];
 }
 
+/// What the desktop asks for; where it asks for nothing, letters on a screen of many lines are
+/// enlarged, or 3840 x 2160 would show them at half their size.
+double scale_for(GLFWmonitor* on, double wanted) {
+  constexpr double kMost = 4, kUsualHeight = 1080;  // px
+  if (wanted > 0) return wanted;
+  if (on == nullptr) return 1;
+  float scale = 1, ignored = 1;
+  glfwGetMonitorContentScale(on, &scale, &ignored);
+  if (scale > 1) return std::min<double>(scale, kMost);
+  int left = 0, top = 0, width = 0, height = 0;
+  glfwGetMonitorWorkarea(on, &left, &top, &width, &height);
+  return std::clamp(std::min(height / kUsualHeight, width / (kUsualHeight * 16 / 9)), 1.0, kMost);
+}
+
+/// One and the same, or two that show the same part of the desktop.
+bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
+  if (a == b) return true;
+  int left[2], top[2], width[2], height[2];
+  glfwGetMonitorWorkarea(a, &left[0], &top[0], &width[0], &height[0]);
+  glfwGetMonitorWorkarea(b, &left[1], &top[1], &width[1], &height[1]);
+  return left[0] < left[1] + width[1] && left[1] < left[0] + width[0] &&
+         top[0] < top[1] + height[1] && top[1] < top[0] + height[0];
+}
+
 /// Centred in a part of the monitor. \param from, to  shares of its width
 Place place(GLFWmonitor* on, double from, double to, int width, int height) {
   int left = 0, top = 0, room_width = 1280, room_height = 800;
@@ -48,10 +72,18 @@ std::string glfw_reason() {
 Places place_windows(const WindowSettings& settings) {
   GLFWmonitor* const participant = monitor(settings.participant_monitor, 2);
   GLFWmonitor* const console = monitor(settings.console_monitor, 1);
-  const bool share = participant == console && !settings.full_screen;
-  Places places{place(participant, 0, share ? kParticipantsShare : 1, 1280, 800),
-                place(console, share ? kParticipantsShare : 0, 1, 1480, 920)};
-  if (settings.full_screen && participant != nullptr) {
+  Places places;
+  places.shared = participant == nullptr || overlap(participant, console);
+  places.participant_scale = scale_for(participant, settings.ui_scale);
+  places.console_scale = scale_for(console, settings.ui_scale);
+  const double share = places.shared ? kParticipantsShare : 0;
+  const auto scaled = [](int size, double scale) { return static_cast<int>(size * scale); };
+  places.participant =
+      place(participant, 0, places.shared ? share : 1, scaled(1280, places.participant_scale),
+            scaled(800, places.participant_scale));
+  places.console = place(places.shared ? participant : console, share, 1,
+                         scaled(1480, places.console_scale), scaled(920, places.console_scale));
+  if (settings.full_screen && !places.shared) {
     const GLFWvidmode* const mode = glfwGetVideoMode(participant);
     places.participant = {participant, 0, 0, mode->width, mode->height};
   }

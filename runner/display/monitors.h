@@ -17,9 +17,12 @@ struct Place {
 
 struct Places {
   Place participant, console;
+  bool shared = false;  ///< both windows can be seen from the participant's chair
+  double participant_scale = 1, console_scale = 1;  ///< of letters and buttons
 };
 
-/// Each on its monitor; on one and the same, side by side.
+/// Each on its monitor; on one and the same, side by side, never one over the other: without a
+/// window manager nobody could move them apart.
 /// \throws DisplayError for a monitor that is asked for and not connected
 Places place_windows(const WindowSettings& settings);
 

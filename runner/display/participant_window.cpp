@@ -10,8 +10,9 @@
 
 namespace palpate {
 
-ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place& place)
-    : settings_(settings), window_(make_window(settings.title, place)) {
+ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place& place,
+                                     double ui_scale)
+    : settings_(settings), window_(make_window(settings.title, place)), ui_scale_(ui_scale) {
   glfwSetInputMode(window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);
@@ -43,12 +44,26 @@ bool ParticipantWindow::press(int key, int scancode) {
   const std::int64_t now = settings_.clock->now_ns();
   const std::string name = meant(key_names(key, scancode), page_.keys);
   if (name.empty()) return false;
+  if (turn(name)) return true;
   keys_.add({name, now});
+  return true;
+}
+
+bool ParticipantWindow::turn(const std::string& key) {
+  if (page_.kind != Page::Kind::text) return false;
+  int to = screen_;
+  if (key == "space" || key == "enter" || key == "right") ++to;
+  if (key == "left" || key == "backspace") --to;
+  if (to == screen_ || to < 0 || to >= screens_) return false;
+  screen_ = to;
+  image_ = {};
+  stale_ = true;
   return true;
 }
 
 void ParticipantWindow::draw() {
   if (auto page = pages_.take()) {
+    if (page->kind != page_.kind || page->text != page_.text) screen_ = 0;
     page_ = std::move(*page);
     stale_ = true;
     image_ = {};
@@ -57,7 +72,9 @@ void ParticipantWindow::draw() {
   glfwGetFramebufferSize(window_, &width, &height);
   if (width <= 0 || height <= 0) return;
   if (image_.width != width || image_.height != height) {
-    image_ = draw_page(page_, width, height);
+    screens_ = screens_of(page_, width, height, ui_scale_);
+    screen_ = std::min(screen_, screens_ - 1);
+    image_ = draw_page(page_, width, height, {ui_scale_, screen_});
     stale_ = true;
   }
   if (stale_) paint(width, height);

@@ -15,7 +15,7 @@ namespace palpate {
 class ParticipantWindow final : public ParticipantScreen {
  public:
   /// \throws DisplayError
-  ParticipantWindow(const WindowSettings& settings, const Place& place);
+  ParticipantWindow(const WindowSettings& settings, const Place& place, double ui_scale);
   ParticipantWindow(const ParticipantWindow&) = delete;
   ParticipantWindow& operator=(const ParticipantWindow&) = delete;
   ~ParticipantWindow() override;
@@ -42,11 +42,15 @@ class ParticipantWindow final : public ParticipantScreen {
 
  private:
   void paint(int width, int height);
+  /// Within a text that takes several screens. False: there is nothing to turn to.
+  bool turn(const std::string& key);
 
   const WindowSettings& settings_;
   GLFWwindow* window_ = nullptr;
   unsigned texture_ = 0, frame_ = 0;
+  const double ui_scale_;
   Page page_;
+  int screen_ = 0, screens_ = 1;  ///< of a text
   Image image_;
   bool stale_ = true;  ///< what is on the screen is not what should be
   Mailbox<Page> pages_;

@@ -221,6 +221,38 @@ void SceneView::draw_stylus(const Sample& sample) const {
   draw_arrow(seen.tail, sample.device2, kForce);
 }
 
+/// What of the stylus is inside of the object or behind it, faintly: where the tip is that a trial
+/// waits for must be seen.
+void SceneView::draw_through(const Sample& sample) const {
+  glDepthFunc(GL_GREATER);
+  glDepthMask(GL_FALSE);
+  glEnable(GL_BLEND);
+  glBlendColor(0, 0, 0, 0.45F);
+  glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
+  draw_stylus(sample);
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_LESS);
+}
+
+// Moeller & Trumbore 1997, for the triangles that face the line.
+std::optional<glm::vec3> SceneView::hit(const glm::vec3& from, const glm::vec3& along) const {
+  std::optional<float> nearest;
+  for (std::size_t i = 0; i + 2 < mesh_.size(); i += 3) {
+    const glm::vec3 corner = mesh_[i].position;
+    const glm::vec3 a = mesh_[i + 1].position - corner, b = mesh_[i + 2].position - corner;
+    const glm::vec3 p = glm::cross(along, b);
+    const float size = glm::dot(a, p);
+    if (!(size > 0)) continue;
+    const glm::vec3 off = from - corner, q = glm::cross(off, a);
+    const float u = glm::dot(off, p), v = glm::dot(along, q), t = glm::dot(b, q) / size;
+    if (u < 0 || v < 0 || u + v > size || t <= 0) continue;
+    if (!nearest || t < *nearest) nearest = t;
+  }
+  if (!nearest) return std::nullopt;
+  return from + *nearest * along;
+}
+
 unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Camera& camera,
                          int width, int height) {
   resize(std::max(width, 1), std::max(height, 1));
@@ -228,8 +260,10 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
     discard(objects_);
     trouble_.clear();
     shown_ = objects;
+    mesh_.clear();
     try {
-      if (objects != nullptr) objects_ = upload(drawn(*objects));
+      if (objects != nullptr) mesh_ = drawn(*objects);
+      if (!mesh_.empty()) objects_ = upload(mesh_);
     } catch (const std::exception& fault) {
       trouble_ = fault.what();
     }
@@ -249,7 +283,10 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
     draw_rod({at, kGridHeight, -kGridEdge}, {at, kGridHeight, kGridEdge}, 0.0004, kGrid);
     draw_rod({-kGridEdge, kGridHeight, at}, {kGridEdge, kGridHeight, at}, 0.0004, kGrid);
   }
-  if (objects_.corners > 0) draw_shape(objects_, glm::mat4(1), kObject);
+  if (objects_.corners > 0) {
+    draw_shape(objects_, glm::mat4(1), kObject);
+    draw_through(sample);
+  }
   draw_stylus(sample);
   glBindVertexArray(0);
   glUseProgram(0);

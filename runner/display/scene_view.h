@@ -5,6 +5,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ class SceneView {
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
   unsigned draw(const Objects& objects, const Sample& sample, const Camera& camera, int width,
                 int height);
+  /// Where a line first meets the objects that were drawn last, from outside.
+  std::optional<glm::vec3> hit(const glm::vec3& from, const glm::vec3& along) const;
   /// Why the objects could not be drawn; empty: they were.
   const std::string& trouble() const { return trouble_; }
 
@@ -41,12 +44,14 @@ class SceneView {
   void draw_rod(const Vec3& from, const Vec3& to, double radius, const glm::vec4& colour) const;
   void draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4& colour) const;
   void draw_stylus(const Sample& sample) const;
+  void draw_through(const Sample& sample) const;
 
   const int samples_;  ///< of each pixel
   unsigned program_ = 0;
   int matrix_at_ = 0, place_at_ = 0, colour_at_ = 0, eye_at_ = 0;
   Shape objects_, cylinder_, cone_, ball_;
   Objects shown_;
+  DrawnMesh mesh_;  ///< of these
   std::string trouble_;
   int width_ = 0, height_ = 0;
   unsigned samples_frame_ = 0, samples_colour_ = 0, samples_depth_ = 0, frame_ = 0, texture_ = 0;

@@ -2,6 +2,7 @@
 
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -12,6 +13,7 @@
 #include <chrono>
 #include <deque>
 #include <string_view>
+#include <utility>
 
 #include "runner/display/mailbox.h"
 #include "runner/display/text_input.h"
@@ -75,19 +77,48 @@ class Bell {
   int file_;
 };
 
+/// Breaks lines between words, where they are too long for the terminal.
+/// \param columns  of it; few or none: it does not say
+std::string wrapped(const std::string& text, std::size_t columns) {
+  if (columns < 20) return text;
+  std::string out = text;
+  std::size_t start = 0, space = 0, column = 0;  // of the line; the last space; letters so far
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if ((static_cast<unsigned char>(out[i]) & 0xC0U) == 0x80U) continue;  // within a letter
+    if (out[i] == '\n') {
+      start = i + 1;
+      column = 0;
+      continue;
+    }
+    if (out[i] == ' ') space = i;
+    if (++column <= columns || space <= start) continue;
+    out[space] = '\n';
+    start = space + 1;
+    column = 0;
+    i = space;
+  }
+  return out;
+}
+
+/// Of the terminal that it is; 0: it is none, or does not say.
+std::size_t columns_of(int file) {
+  winsize size{};
+  return ioctl(file, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
 class TextScreen final : public ParticipantScreen {
  public:
   TextScreen(Inbox<Words>& out, Bell& bell) : out_(out), bell_(bell) {}
 
   void show(const Page& page) override {
-    std::string text = printable_lines(page.text);
-    if (page.kind == Page::Kind::text) text += "\n[space bar: go on]";
-    for (const auto& [key, answer] : page.keys) {
-      text += text.empty() ? "" : "   ";
-      text += printable(key);
-      text += ' ';
-      text += printable(answer);
+    const Page before = std::exchange(last_, page);
+    std::string text;
+    if (page.kind != before.kind || page.text != before.text || page.go != before.go ||
+        (page.keys.empty() && page.seconds_left > before.seconds_left) || page.kind == kRead) {
+      text = words_of(page);
     }
+    if (page.reply != before.reply && !page.reply.empty())
+      text += (text.empty() ? "" : "\n") + printable(page.reply);
     if (text.empty()) return;
     out_.add({STDOUT_FILENO, text + "\n"});
     bell_.ring();
@@ -99,6 +130,26 @@ class TextScreen final : public ParticipantScreen {
   void close() { open_ = false; }
 
  private:
+  static constexpr Page::Kind kRead = Page::Kind::text;
+
+  static std::string words_of(const Page& page) {
+    std::string text = printable_lines(page.text);
+    if (page.kind == Page::Kind::neutral && !page.go) return text;
+    if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
+    if (page.done > 0 && page.kind != Page::Kind::feedback)
+      text += "\n[" + std::to_string(page.done) + " of " + std::to_string(page.trials) + "]";
+    if (page.kind == kRead) text += "\n[space bar: go on]";
+    if (page.kind != Page::Kind::neutral) return text;
+    for (const auto& [key, answer] : page.keys) {
+      text += text.empty() ? "" : "   ";
+      text += printable(key);
+      text += ' ';
+      text += printable(answer);
+    }
+    return text;
+  }
+
+  Page last_;  ///< the session's thread's own
   Inbox<Words>& out_;
   Bell& bell_;
   Inbox<KeyPress> keys_;
@@ -118,7 +169,12 @@ class TextConsole final : public ExperimenterConsole {
       text += printable_lines(state.messages[heard_ - state.older_messages]);
       text += '\n';
     }
-    if (state.state != state_ || state.trial != trial_ || state.held_by != held_by_) {
+    if (state.checklist.instruction != instruction_) {
+      instruction_ = state.checklist.instruction;
+      if (!instruction_.empty()) text += step_due(state.checklist);
+    }
+    if (!state.state.empty() &&
+        (state.state != state_ || state.trial != trial_ || state.held_by != held_by_)) {
       state_ = state.state;
       held_by_ = state.held_by;
       trial_ = state.trial;
@@ -136,8 +192,23 @@ class TextConsole final : public ExperimenterConsole {
   void ask(const ConsoleCommand& command) { commands_.add(command); }
 
  private:
+  static std::string step_due(const Checklist& list) {
+    std::size_t due = 0;
+    while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
+    std::string text = "* step " + std::to_string(due + 1) + " of " +
+                       std::to_string(list.steps.size()) + ": " + printable(list.instruction);
+    std::string choices;
+    for (const auto& [kind, meaning] : list.choices) {
+      choices += choices.empty() ? " (" : "; ";
+      choices += text_command(kind);
+      choices += ": " + meaning;
+    }
+    return text + choices + (choices.empty() ? "\n" : ")\n");
+  }
+
   static std::string status(const ConsoleState& state) {
     std::string text = "[" + state.state;
+    if (state.practice && (state.state == "trial" || state.state == "homing")) text += ", practice";
     if (state.trial > 0) {
       text += ", block " + std::to_string(state.block) + " of " + std::to_string(state.blocks) +
               ", trial " + std::to_string(state.trial) + " of " + std::to_string(state.trials);
@@ -154,7 +225,7 @@ class TextConsole final : public ExperimenterConsole {
   Inbox<ConsoleCommand> commands_;
   // Of what was shown last; the session's thread's own:
   std::size_t heard_ = 0;
-  std::string state_, held_by_;
+  std::string state_, held_by_, instruction_;
   int trial_ = 0;
 };
 
@@ -183,7 +254,15 @@ class TextDisplay final : public DisplayLoop {
   void say(const std::string& text) { out_.add({STDERR_FILENO, text}); }
 
   void collect() {
-    for (Words& words : out_.take()) pending_.push_back(std::move(words));
+    for (Words& words : out_.take()) {
+      if (words.text.front() != '\r') {
+        words.text = wrapped(words.text, columns_of(words.file));
+        // A command that is being typed stays in one piece, below what came in between.
+        if (terminal_.on() && !input_.line().empty())
+          words.text = "\r\x1b[K" + words.text + printable(input_.line());
+      }
+      pending_.push_back(std::move(words));
+    }
   }
 
   /// Waits for a key, for something to be said, or for room to say it.

@@ -76,7 +76,8 @@ ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
   line = trimmed(line);
   const std::string said = lower(line);
   for (const Word& word : kWords) {
-    if (said == word.line) return {word.kind, "", time_ns};
+    if (said != word.line) continue;
+    return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};
   }
   for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
                                    std::pair(std::string_view("quit "), Kind::quit)}) {
@@ -125,7 +126,9 @@ void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vecto
 /// \return how many bytes of `rest`, which begins with Escape, it took
 std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
                               std::vector<Event>& out) {
-  const ConsoleCommand emergency{Kind::emergency_zero, "", time_ns};
+  const auto emergency = [time_ns](const std::string& key) {
+    return ConsoleCommand{Kind::emergency_zero, "the key " + key, time_ns};
+  };
   if (rest.size() >= 3 && rest[1] == 'O') {  // keypad in its application mode
     if (rest[2] >= 'p' && rest[2] <= 'y')
       out.emplace_back(KeyPress{std::string(1, static_cast<char>('0' + rest[2] - 'p')), time_ns});
@@ -135,11 +138,19 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
   if (rest.size() >= 3 && rest[1] == '[') {
     std::size_t end = 2;
     while (end < rest.size() && (rest[end] < '@' || rest[end] > '~')) ++end;
-    if (rest.substr(2, end - 2) == "24" && end < rest.size() && rest[end] == '~')  // F12
-      out.emplace_back(emergency);
+    if (rest.substr(2, end - 2) == "24" && end < rest.size() && rest[end] == '~')
+      out.emplace_back(emergency("F12"));
     return std::min(end + 1, rest.size());
   }
-  out.emplace_back(emergency);
+  // A terminal writes Alt and a key as Escape and that key, in one piece. Nothing else tells them
+  // from Escape alone, and waiting for what may follow would cost time: zero force in any case.
+  const std::string_view key = rest.substr(1);
+  if (!key.empty() && static_cast<unsigned char>(key[0]) > ' ' && key[0] != kDelete &&
+      sequence_length(key[0]) == key.size()) {
+    out.emplace_back(emergency("Alt+" + std::string(key)));
+    return rest.size();  // it is no answer
+  }
+  out.emplace_back(emergency("Escape"));
   return 1;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 // What is typed into a terminal or a pipe, as answers and commands: single keys answer, a line that
-// begins with ':' is a command, Escape or F12 is the emergency key.
+// begins with ':' is a command, Escape or F12 is the emergency key, and so is Alt with any other.
 
 #include <cstdint>
 #include <string>

@@ -49,8 +49,8 @@ class Windows final : public DisplayLoop {
   explicit Windows(const WindowSettings& settings)
       : settings_(settings),
         places_(place_windows(settings_)),
-        participant_(settings_, places_.participant),
-        console_(settings_, places_.console, participant_) {
+        participant_(settings_, places_.participant, places_.participant_scale),
+        console_(settings_, places_, participant_) {
     GLFWwindow* const window = participant_.handle();
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, &Windows::on_participant_key);
@@ -66,6 +66,17 @@ class Windows final : public DisplayLoop {
 
   ParticipantScreen& participant() override { return participant_; }
   ExperimenterConsole& console() override { return console_; }
+
+  std::string warning() const override {
+    if (!places_.shared) return {};
+    std::string text = settings_.mouse != nullptr
+                           ? "one monitor: whoever holds the mouse sees the shape, as they must"
+                           : "one monitor: the console hides shape and scene until it is asked to "
+                             "show them; a second monitor keeps it out of the participant's sight";
+    if (settings_.full_screen)
+      text += "; --full-screen needs a second monitor: the windows stand side by side";
+    return text;
+  }
 
   void run() override {
     try {
@@ -111,7 +122,7 @@ class Windows final : public DisplayLoop {
     if (action != GLFW_PRESS) return;
     const bool answer = self.participant_.answers(key, scancode);
     if (key == GLFW_KEY_F12 || (key == GLFW_KEY_ESCAPE && !answer)) {
-      self.console_.ask(ConsoleCommand::Kind::emergency_zero);
+      self.console_.ask(ConsoleCommand::Kind::emergency_zero, emergency_key(key));
     }
     self.participant_.press(key, scancode);
   }

@@ -19,7 +19,8 @@ class DisplayError : public std::runtime_error {
 
 struct WindowSettings {
   std::string title;               ///< UTF-8, of the window frames: study and participant
-  bool full_screen = false;        ///< the participant's window, on its monitor
+  bool full_screen = false;        ///< the participant's window, on a monitor of its own
+  double ui_scale = 0;             ///< of letters and buttons; 0: each window's from its monitor
   int participant_monitor = 0;     ///< from 1; 0: the second if there is one, else the first
   int console_monitor = 0;         ///< from 1; 0: the first
   std::vector<std::string> texts;  ///< UTF-8, of the protocol: the console loads letters for them
@@ -38,6 +39,8 @@ class DisplayLoop {
   virtual ~DisplayLoop() = default;
   virtual ParticipantScreen& participant() = 0;
   virtual ExperimenterConsole& console() = 0;
+  /// What the experimenter should know of the monitors: a sentence; empty: nothing.
+  virtual std::string warning() const { return {}; }
   /// Shows both until end() or until the display dies. On the main thread, that made the windows.
   virtual void run() = 0;
   virtual void end() noexcept = 0;

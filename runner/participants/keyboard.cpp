@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace palpate {
 namespace {
 
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kPause_ns = 5'000'000;
 constexpr std::int64_t kFeedback_ns = 1'000'000'000;
+constexpr std::int64_t kReply_ns = 2'000'000'000;
+constexpr std::int64_t kSteady_ns = 150'000'000;  // at the zone's edge the page must not flicker
 
 }  // namespace
 
@@ -20,16 +24,56 @@ KeyboardRespondent::KeyboardRespondent(const Protocol& protocol, ParticipantScre
                      [&wanted = name](const StimulusSpec& s) { return s.name == wanted; });
     stimuli_.push_back(static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
     keys_.emplace_back(by == AnswerBy::keys ? key : "button " + std::to_string(keys_.size() + 1),
-                       name);
+                       answer_label(protocol, name));
   }
 }
 
+void KeyboardRespondent::set_progress(std::size_t done, std::size_t trials) {
+  done_ = static_cast<int>(done);
+  trials_ = static_cast<int>(trials);
+}
+
+void KeyboardRespondent::show(Page page) {
+  page_ = std::move(page);
+  reply_until_ns_ = 0;
+  screen_.show(page_);
+}
+
+void KeyboardRespondent::reply() {
+  reply_until_ns_ = clock_.now_ns() + kReply_ns;
+  if (page_.reply == protocol_.texts.other_key) return;
+  page_.reply = protocol_.texts.other_key;
+  screen_.show(page_);
+}
+
+void KeyboardRespondent::end_reply() {
+  if (reply_until_ns_ == 0 || clock_.now_ns() < reply_until_ns_) return;
+  reply_until_ns_ = 0;
+  page_.reply.clear();
+  screen_.show(page_);
+}
+
+void KeyboardRespondent::tend() {
+  if (!screen_.keys().empty()) reply();
+  end_reply();
+}
+
+Page KeyboardRespondent::between_trials(Page::Kind kind, const std::string& text) const {
+  Page page;
+  page.kind = kind;
+  page.text = text;
+  page.done = done_;
+  page.trials = trials_;
+  return page;
+}
+
 void KeyboardRespondent::show_message(const std::string& text) {
-  screen_.show({Page::Kind::message, text, {}});
+  show(between_trials(Page::Kind::message, text));
 }
 
 void KeyboardRespondent::wait_until(std::int64_t when_ns) {
   while (clock_.now_ns() < when_ns) {
+    tend();
     attendant_.attend();
     clock_.wait_until(std::min(when_ns, clock_.now_ns() + kPause_ns));
   }
@@ -38,8 +82,11 @@ void KeyboardRespondent::wait_until(std::int64_t when_ns) {
 void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
   while (true) {
     for (const KeyPress& press : screen_.keys()) {
-      if (press.time_ns >= since_ns && (press.key == "space" || press.key == "enter")) return;
+      if (press.time_ns < since_ns) continue;
+      if (press.key == "space" || press.key == "enter") return;
+      reply();
     }
+    end_reply();
     attendant_.attend();
     clock_.wait_until(clock_.now_ns() + kPause_ns);
   }
@@ -49,29 +96,60 @@ void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
   // Before it shows: whoever is quick answers before this thread goes on.
   const std::int64_t before_ns = clock_.now_ns();
-  screen_.show({Page::Kind::text, text, {}});
+  show(between_trials(Page::Kind::text, text));
   wait_for_space(before_ns);
 }
 
 void KeyboardRespondent::rest(const std::string& text, std::int64_t until_ns) {
-  if (clock_.now_ns() < until_ns) {
-    show_message(text);
-    wait_until(until_ns);
+  page_.reply.clear();
+  reply_until_ns_ = 0;
+  for (std::int64_t now = clock_.now_ns(); now < until_ns; now = clock_.now_ns()) {
+    Page page = between_trials(Page::Kind::message, text);
+    page.seconds_left = static_cast<int>((until_ns - now + kSecond_ns - 1) / kSecond_ns);
+    page.reply = page_.reply;
+    std::swap(page, page_);
+    screen_.show(page_);
+    wait_until(until_ns - (page_.seconds_left - 1) * kSecond_ns);
   }
+  page_.seconds_left = 0;
   read(text);
 }
 
 void KeyboardRespondent::feedback(bool correct) {
-  screen_.show({Page::Kind::feedback, correct ? "\u2713" : "\u2717", {}});
+  Page page;
+  page.kind = Page::Kind::feedback;
+  page.text = correct ? "\u2713" : "\u2717";
+  show(std::move(page));
+  screen_.keys();
   wait_until(clock_.now_ns() + kFeedback_ns);
 }
 
 void KeyboardRespondent::begin_trial(const Trial&) {
-  screen_.show({Page::Kind::neutral, "", keys_});
+  Page page;
+  page.kind = Page::Kind::neutral;
+  page.keys = keys_;
+  show(std::move(page));
   screen_.keys();
+  cue_ = Cue::none;
+  cue_since_ns_ = 0;
   onset_ns_ = 0;
   buttons_ = 0xFF;  // a button that is held down from before does not answer
   pending_.reset();
+}
+
+void KeyboardRespondent::show_cue(const Sample& sample) {
+  const auto& texts = protocol_.texts;
+  Cue cue = cue_;
+  if (sample.phase == Phase::feeling) cue = Cue::go;
+  if (sample.waiting == Waiting::for_rest) cue = Cue::ready;
+  if (sample.waiting == Waiting::for_distance) cue = Cue::move_away;
+  if (cue == cue_ || (cue != Cue::go && sample.time_ns - cue_since_ns_ < kSteady_ns)) return;
+  cue_ = cue;
+  cue_since_ns_ = sample.time_ns;
+  page_.kind = cue == Cue::move_away ? Page::Kind::message : Page::Kind::neutral;
+  page_.go = cue == Cue::go;
+  page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
+  screen_.show(page_);
 }
 
 std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
@@ -85,9 +163,14 @@ std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
 void KeyboardRespondent::listen(const Sample& sample) {
   for (const KeyPress& press : screen_.keys()) {
     const std::optional<int> stimulus = meaning(press.key);
-    if (!pending_ && stimulus && onset_ns_ > 0 && press.time_ns >= onset_ns_)
+    if (pending_) continue;
+    if (stimulus && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
       pending_ = Answer{*stimulus, press.time_ns};
+    } else {
+      reply();
+    }
   }
+  end_reply();
   const unsigned pressed = sample.buttons & ~static_cast<unsigned>(buttons_);
   buttons_ = sample.buttons;
   if (by_ != AnswerBy::buttons || pending_ || onset_ns_ == 0) return;
@@ -101,6 +184,7 @@ void KeyboardRespondent::listen(const Sample& sample) {
 
 std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
   if (sample.phase == Phase::feeling && onset_ns_ == 0) onset_ns_ = sample.time_ns;
+  show_cue(sample);
   listen(sample);
   if (pending_ && sample.time_ns >= pending_->time_ns) return pending_;
   attendant_.attend();

@@ -41,8 +41,20 @@ class KeyboardRespondent final : public Respondent {
 
   /// A page with nothing to press.
   void show_message(const std::string& text);
+  /// To be called again and again while such a page is shown: keys get their reply.
+  void tend();
+  /// Of this session, for the pages between trials.
+  void set_progress(std::size_t done, std::size_t trials);
+  /// s, of the break under way; 0: none is
+  int seconds_left() const { return page_.seconds_left; }
 
  private:
+  enum class Cue { none, move_away, ready, go };
+  Page between_trials(Page::Kind kind, const std::string& text) const;
+  void show(Page page);
+  void show_cue(const Sample& sample);
+  void reply();
+  void end_reply();
   void wait_until(std::int64_t when_ns);
   void wait_for_space(std::int64_t since_ns);
   void listen(const Sample& sample);
@@ -55,8 +67,13 @@ class KeyboardRespondent final : public Respondent {
   AnswerBy by_;
   std::vector<std::pair<std::string, std::string>> keys_;  ///< as shown
   std::vector<int> stimuli_;                               ///< of keys_, in order
-  std::int64_t onset_ns_ = 0;                              ///< 0: not yet
-  std::uint8_t buttons_ = 0xFF;                            ///< down at the last tick
+  Page page_;                                              ///< on show
+  int done_ = 0, trials_ = 0;
+  std::int64_t reply_until_ns_ = 0;  ///< 0: there is none
+  Cue cue_ = Cue::none;
+  std::int64_t cue_since_ns_ = 0;
+  std::int64_t onset_ns_ = 0;      ///< 0: not yet
+  std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
   std::optional<Answer> pending_;  ///< given until the servo's samples have come as far
 };
 

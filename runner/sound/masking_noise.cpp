@@ -1,5 +1,6 @@
 #include "runner/sound/masking_noise.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -14,6 +15,28 @@ constexpr double kPiece = 0.02;  // s, written at a time
 // An output without a clock of its own (a file) takes everything at once: it gets no more than a
 // little ahead. A sound card's clock, which may differ by much less, keeps its own pace.
 constexpr double kAhead = 0.9;
+
+/// Adds a tone to what is played, from the moment at which it is asked for.
+class Tone {
+ public:
+  Tone(double level_db, double rate)
+      : amplitude_(std::sqrt(2) * std::pow(10, level_db / 20)), rate_(rate), at_(kLength) {}
+  void begin() { at_ = 0; }
+  void add(std::vector<double>& samples) {
+    for (double& sample : samples) {
+      if (at_ >= kLength) return;
+      const double edge = std::min({1.0, at_ / kEdge, (kLength - at_) / kEdge});
+      sample += amplitude_ * edge * std::sin(2 * M_PI * kPitch * at_);
+      at_ += 1 / rate_;
+    }
+  }
+
+ private:
+  static constexpr double kPitch = 880;                 // Hz
+  static constexpr double kLength = 0.1, kEdge = 0.01;  // s
+
+  double amplitude_, rate_, at_;
+};
 
 }  // namespace
 
@@ -57,6 +80,7 @@ void NoisePlayer::play() noexcept {
   using Clock = std::chrono::steady_clock;
   const double rate = output_->rate();
   NoiseSignal signal(noise_, rate, seed_);
+  Tone tone(noise_.level_db, rate);
   std::vector<double> samples(static_cast<std::size_t>(kPiece * rate));
   std::vector<std::int16_t> frames(2 * samples.size());
   const auto pace =
@@ -67,9 +91,14 @@ void NoisePlayer::play() noexcept {
       signal.sound(asked_);
       const bool heard = !signal.silent();
       signal.fill(samples);
+      if (const unsigned asked = tones_; asked != tones_begun_) {
+        tones_begun_ = asked;
+        tone.begin();
+      }
+      tone.add(samples);
       for (std::size_t i = 0; i < samples.size(); ++i) {
         frames[2 * i] = frames[2 * i + 1] =
-            static_cast<std::int16_t>(std::lround(32767 * samples[i]));
+            static_cast<std::int16_t>(std::lround(32767 * std::clamp(samples[i], -1.0, 1.0)));
       }
       const int ran_dry = output_->write(frames);
       if (heard) {

@@ -39,6 +39,8 @@ class NoisePlayer {
   void turn_on();
   /// Fades out; returns at once.
   void turn_off();
+  /// "Go": a short tone as loud as the noise, heard latency() later; returns at once.
+  void tone() { tones_.fetch_add(1); }
   bool on() const { return asked_.load(); }
   /// The output has failed since it was turned on.
   bool failed() const { return failed_.load(); }
@@ -61,8 +63,10 @@ class NoisePlayer {
   std::string trouble_;                  ///< written before failed_
   std::atomic<bool> asked_{false}, failed_{false}, quit_{false};
   std::atomic<std::uint64_t> frames_{0};  ///< of noise
+  std::atomic<unsigned> tones_{0};        ///< asked for
   std::atomic<int> underruns_{0};         ///< while it sounded
   std::atomic<double> latency_{0};
+  unsigned tones_begun_ = 0;  ///< the thread's
   std::uint64_t frames_before_ = 0;
   int underruns_before_ = 0;
   std::jthread thread_;

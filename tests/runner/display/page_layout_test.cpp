@@ -32,10 +32,11 @@ int inked_rows(const Image& image) {
   return rows;
 }
 
-/// Where key map and space bar are.
-std::vector<std::uint32_t> lower_part(const Image& image) {
-  const std::ptrdiff_t rows = image.height * 2 / 3;
-  return {image.pixels.begin() + rows * image.width, image.pixels.end()};
+/// Where key map and space bar are. \param to  share of the height; the bar begins at 0.86
+std::vector<std::uint32_t> lower_part(const Image& image, double to = 1) {
+  const std::ptrdiff_t from = image.height * 2 / 3;
+  const auto end = static_cast<std::ptrdiff_t>(to * image.height);
+  return {image.pixels.begin() + from * image.width, image.pixels.begin() + end * image.width};
 }
 
 bool border_is_clear(const Image& image) {
@@ -69,13 +70,56 @@ TEST(PageLayout, TheSamePageGivesTheSamePixels) {
   EXPECT_GT(inked_rows(a), 30);
 }
 
-TEST(PageLayout, ATrialShowsNothingButTheKeyMapWhateverTextComesWithIt) {
+TEST(PageLayout, ATrialShowsItsWordAndTheKeyMap) {
   Page page = trial_page();
   const Image without = draw_page(page, 1280, 800);
-  page.text = "cube";
-  EXPECT_EQ(draw_page(page, 1280, 800).pixels, without.pixels);
+  page.text = "Go";
+  page.go = true;
+  const Image go = draw_page(page, 1280, 800);
+  keep(go, "go");
+  EXPECT_NE(go.pixels, without.pixels);
+  EXPECT_EQ(lower_part(go), lower_part(without));
+  page.text.clear();
   page.keys.clear();
   EXPECT_EQ(inked_rows(draw_page(page, 1280, 800)), 0);
+}
+
+TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
+  Page page;
+  page.kind = Page::Kind::text;
+  for (int i = 0; i < 300; ++i) page.text += "Halten Sie den Griffel wie einen Stift. ";
+  for (const auto& [width, height] : {std::pair{400, 728}, {1024, 768}, {3840, 2160}}) {
+    const int screens = screens_of(page, width, height);
+    ASSERT_GT(screens, 1);
+    std::vector<std::vector<std::uint32_t>> seen;
+    for (int i = 0; i < screens; ++i) {
+      const Image image = draw_page(page, width, height, {1, i});
+      keep(image, "long" + std::to_string(width) + "-" + std::to_string(i));
+      EXPECT_TRUE(border_is_clear(image));
+      EXPECT_EQ(std::count(seen.begin(), seen.end(), image.pixels), 0);
+      seen.push_back(image.pixels);
+    }
+    EXPECT_EQ(draw_page(page, width, height, {1, screens}).pixels, seen.back());
+  }
+  page.text = "short";
+  EXPECT_EQ(screens_of(page, 1024, 768), 1);
+  page.text = std::string(5000, '\n');
+  EXPECT_EQ(screens_of(page, 1024, 768), 1) << "empty screens are left out";
+}
+
+TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
+  Page page;
+  page.text = "Rest your hand.";
+  const Image plain = draw_page(page, 1280, 800);
+  page.seconds_left = 25;
+  const Image counted = draw_page(page, 1280, 800);
+  page.seconds_left = 24;
+  EXPECT_NE(draw_page(page, 1280, 800).pixels, counted.pixels);
+  page.done = 12;
+  page.trials = 24;
+  const Image far = draw_page(page, 1280, 800);
+  keep(far, "break");
+  EXPECT_EQ(inked_rows(plain) < inked_rows(counted) && inked_rows(counted) < inked_rows(far), true);
 }
 
 TEST(PageLayout, EveryScriptFindsItsPlace) {
@@ -115,7 +159,8 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
   page.kind = Page::Kind::text;
   page.keys = trial_page().keys;
   page.text = "short";
-  const auto keys_and_bar = lower_part(draw_page(page, 1280, 800));
+  const Image short_text = draw_page(page, 1280, 800);
+  const auto keys_and_bar = lower_part(short_text), keys = lower_part(short_text, 0.86);
   std::string endless;
   for (int i = 0; i < 3000; ++i) endless += "feel ";
   for (const std::string& text :
@@ -124,7 +169,10 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
     page.text = text;
     const Image image = draw_page(page, 1280, 800);
     keep(image, "hostile" + std::to_string(text.size()));
-    EXPECT_EQ(lower_part(image), keys_and_bar) << text.substr(0, 20);
+    // Beside the bar of a text with several screens stands the number of the one on show.
+    const bool several = screens_of(page, 1280, 800) > 1;
+    EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? keys : keys_and_bar)
+        << text.substr(0, 20);
     EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);
   }
   for (int i = 0; i < 40; ++i) page.keys.emplace_back("k", "a shape with quite a long name indeed");

@@ -63,7 +63,7 @@ class SessionTest(unittest.TestCase):
         if self.program:
             self.program.wait()
 
-    def start(self, device="mouse"):
+    def start(self, device="mouse", to_the_first_trial=True):
         """Starts a session, or goes on with it, up to its first trial."""
         with open(self.folder / "messages.txt", "a") as messages:
             self.program = subprocess.Popen(
@@ -80,6 +80,8 @@ class SessionTest(unittest.TestCase):
         instructions = self.screen.settled_picture(self.participant)
         before = len(self.attempts())
         self.screen.focus(self.participant)
+        if not to_the_first_trial:
+            return
         self.press_until("space", lambda: len(self.attempts()) > before)
         self.screen.settled_picture(self.participant, differs_from=instructions)
 
@@ -103,8 +105,8 @@ class SessionTest(unittest.TestCase):
 
     def clear_and_go_on(self):
         width, _ = self.screen.size(self.console)
-        self.screen.click(self.console, width - 60, 90)
-        self.screen.click(self.console, width - 100, 348)
+        self.screen.click(self.console, width - 60, 90)  # clear the fault
+        self.screen.click(self.console, width - 100, 388)  # go on
 
     def messages(self):
         return (self.folder / "messages.txt").read_text()
@@ -134,6 +136,7 @@ class SessionTest(unittest.TestCase):
     def wait_for_trial(self):
         """A trial is under way, and its page is on the screen."""
         wait_for("a trial", lambda: self.attempts() and self.attempts()[-1][3] == "running")
+        time.sleep(1)  # "ready" is over
         return self.screen.settled_picture(self.participant)
 
     def finish(self):
@@ -177,12 +180,10 @@ class SessionTest(unittest.TestCase):
         self.wait_for_trial()
         width, height = self.screen.size(self.console)
         middle = int(0.3 * width), int(0.39 * height)
-        # Pushes the tip through the middle of the view, where the object stands.
+        # Onto the middle of the view, where the object stands: nothing else is needed.
+        self.screen.point(self.console, 40, height - 300)
         self.screen.point(self.console, *middle)
-        for _ in range(19):
-            self.screen.do("click", 4)  # the wheel: away from the viewer
-            time.sleep(0.2)
-        self.screen.settled_picture(self.participant)
+        time.sleep(2)
         self.screen.keep(self.console, "session_touch")
         self.answer()
         contacts = self.rows("SELECT first_contact_time, max_force FROM attempts "
@@ -304,8 +305,71 @@ class SessionTest(unittest.TestCase):
         self.finish()
         self.check_whole(cut_off=1)
         notes = [text for (text,) in self.rows("SELECT text FROM notes ORDER BY id")]
-        self.assertIn("emergency zero", notes)
+        self.assertIn("emergency zero: the key F12", notes)
         self.assertIn("fault cleared", notes)
+
+    def forces_are_on(self):
+        """A trial is felt: only then has it a time zero, and servo ticks missed or not."""
+        if self.halted():
+            self.clear_and_go_on()
+        running = self.rows("SELECT count(*) FROM attempts WHERE state = 'running'")
+        return running and running[0][0] == 1 and self.screen.settled_picture(self.participant)
+
+    def write_a_note(self):
+        width, height = self.screen.size(self.console)
+        self.screen.click(self.console, width - 200, height - 28)
+        self.screen.do("type", "--delay", 100, "x")
+
+    def emergencies(self):
+        return sum(text == "emergency zero: the EMERGENCY button"
+                   for (text,) in self.rows("SELECT text FROM notes"))
+
+    def click_emergency(self):
+        before = self.emergencies()
+        self.screen.click(self.console, 100, 25)
+        wait_for("the emergency", lambda: self.emergencies() > before)
+
+    def click_button(self, row, column):
+        """Of the six: rows from 0, columns from 0."""
+        width, _ = self.screen.size(self.console)
+        self.screen.click(self.console, width - (250 if column == 0 else 60), 388 + 40 * row)
+
+    def test_the_emergency_button_works_in_every_state_and_over_every_dialog(self):
+        self.write_protocol(material={"stiffness_n_per_m": 100}, practice={"repetitions": 1},
+                            breaks={"every_trials": 2, "min_seconds": 3},
+                            texts={"instructions": "Feel.", "practice": "Try.", "break": "Rest.",
+                                   "end": "Thanks."}, home={"rest_s": 1, "margin_m": 0.01})
+        self.start(device="simulated", to_the_first_trial=False)
+        for page in ["instructions", "practice"]:
+            self.click_emergency()
+            self.screen.keep(self.console, f"emergency_{page}")
+            self.clear_and_go_on()
+            self.press_until("space", lambda: page == "instructions" or self.attempts())
+        homing = self.attempts()[-1]
+        self.click_emergency()  # while the stylus is waited for, or just after
+        wait_for("the cut-off", lambda: self.attempts()[homing[0] - 1][3] != "running")
+        self.click_emergency()  # and once more in the fault
+        self.clear_and_go_on()
+        def write_a_reason():
+            self.click_button(2, 1)
+            self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 443)
+            self.screen.do("type", "--delay", 100, "why 1")
+
+        dialogs = {"none": lambda: None, "end": lambda: self.click_button(2, 1),
+                   "reason": write_a_reason, "note": self.write_a_note}
+        for name, open_dialog in dialogs.items():
+            wait_for("a trial", lambda: self.forces_are_on())
+            open_dialog()
+            before = len(self.attempts())
+            self.click_emergency()
+            self.screen.keep(self.console, f"emergency_{name}")
+            wait_for("the cut-off", lambda: self.attempts()[before - 1][3] == "cut_off")
+            self.assertEqual(self.rows("SELECT cut_off_reason FROM attempts WHERE cut_off_reason "
+                                       "IS NOT NULL ORDER BY id DESC LIMIT 1"),
+                             [("zero force was asked for",)], name)
+            if name in ("end", "reason"):
+                self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 481)  # back
+            self.clear_and_go_on()
 
 
 class NoDisplay(unittest.TestCase):

@@ -101,6 +101,13 @@ class VirtualScreen:
             "getwindowgeometry", "--shell", window).split())
         return int(words["WIDTH"]), int(words["HEIGHT"])
 
+    def box(self, window):
+        """Left, top, right and lower edge on the screen."""
+        words = dict(line.split("=") for line in self.do(
+            "getwindowgeometry", "--shell", window).split())
+        left, top = int(words["X"]), int(words["Y"])
+        return left, top, left + int(words["WIDTH"]), top + int(words["HEIGHT"])
+
     def point(self, window, x, y):
         self.do("mousemove", "--window", window, x, y)
 
@@ -115,6 +122,11 @@ class VirtualScreen:
         """Its pixels as bytes."""
         return subprocess.run(["import", "-silent", "-window", window, "-depth", "8", "rgb:-"],
                               env=self.environment, check=True, stdout=subprocess.PIPE).stdout
+
+    def pixel(self, window, x, y):
+        return tuple(subprocess.run(
+            ["import", "-silent", "-window", window, "-crop", f"1x1+{x}+{y}", "-depth", "8", "rgb:-"],
+            env=self.environment, check=True, stdout=subprocess.PIPE).stdout)
 
     def keep(self, window, name):
         """For looking at: PALPATE_PICTURES names a folder."""

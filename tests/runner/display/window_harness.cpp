@@ -1,7 +1,8 @@
 // Windows without a session, for windows_test.py. Standard input says what to show, a line each;
 // standard output says what was pressed.
-//   page KIND TEXT      text, neutral, feedback or message; the keys are those of the paper
-//   state SHAPE FAULTS  a console in a trial
+//   page KIND TEXT      text, neutral, go, feedback, message, break or checklist; the keys are
+//                       those of the paper
+//   state SHAPE FAULTS [WORD]  a console in a trial, or in the state that the word says
 //   where               answers "tip x y z axis x y z" of the mouse's stylus
 //   ping                answers "pong"
 //   end
@@ -13,8 +14,10 @@
 #include <glm/geometric.hpp>
 #include <iostream>
 #include <mutex>
+#include <optional>
 #include <sstream>
 #include <thread>
+#include <vector>
 
 #include "runner/display/window.h"
 
@@ -31,6 +34,19 @@ class SteadyClock final : public Clock {
   }
 };
 
+Checklist some_checklist() {
+  using State = Checklist::Step::State;
+  return {{{"Home the device", State::done},
+           {"Feel a feeble push to the right", State::now},
+           {"Move to every side", State::left_out},
+           {"Press the buttons", State::to_do}},
+          "limits: forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of "
+          "change a tick; hold the grip: a push of 1.0 N to the right comes for a second",
+          {{ConsoleCommand::Kind::go_on, "push"},
+           {ConsoleCommand::Kind::repeat_trial, "once more"},
+           {ConsoleCommand::Kind::quit, "no"}}};
+}
+
 Page page_of(std::istringstream& words) {
   Page page;
   std::string kind;
@@ -39,6 +55,27 @@ Page page_of(std::istringstream& words) {
   if (kind == "text") page.kind = Page::Kind::text;
   if (kind == "neutral") page.kind = Page::Kind::neutral;
   if (kind == "feedback") page.kind = Page::Kind::feedback;
+  if (kind == "go") {
+    page.kind = Page::Kind::neutral;
+    page.go = true;
+  }
+  if (kind == "checklist") {
+    page.kind = Page::Kind::checklist;
+    page.checklist = some_checklist();
+    return page;
+  }
+  if (kind == "break") page.seconds_left = 25;
+  if (kind == "break" || kind == "text" || kind == "message") {
+    page.done = 12;
+    page.trials = 24;
+  }
+  if (kind == "reply") {
+    page.kind = Page::Kind::neutral;
+    page.reply = page.text;
+    page.text = "Go";
+    page.go = true;
+  }
+  if (page.kind != Page::Kind::neutral) return page;
   page.keys = {{"1", "sphere"}, {"2", "cone"}, {"3", "cylinder"}, {"4", "cube"}};
   return page;
 }
@@ -54,6 +91,14 @@ ConsoleState state_of(std::istringstream& words, const LineProbe& stylus) {
   state.blocks = 8;
   state.trials = 608;
   state.times = {12.5, 9.25, 14, 8.5};
+  std::string word;
+  if (words >> word) state.state = word;
+  state.practice = true;
+  state.answer = "cylinder, wrong";
+  state.scores = {{"sphere", 5, 6}, {"cone", 3, 6}, {"cylinder", 0, 5}, {"cube", 0, 0}};
+  if (word == "rest") state.seconds_left = 25;
+  if (word == "homing") state.sample.waiting = Waiting::for_distance;
+  if (word == "pre-flight") state.checklist = some_checklist();
   state.messages = {"10:02:11  session 1 began", "10:04:40  " + state.shape};
   ObjectSpec object;
   object.shape = state.shape == "cone"       ? ShapeKind::cone
@@ -80,6 +125,8 @@ class Talk {
     for (const ConsoleCommand& command : windows_.console().commands()) {
       say("command " + std::to_string(static_cast<int>(command.kind)) + " " + command.text);
     }
+    if (const std::lock_guard lock(state_mutex_); state_)
+      windows_.console().show(*state_);  // as a session does, time and again
     if (!windows_.participant().open() && !closed_) {
       closed_ = true;
       say("closed");
@@ -91,7 +138,10 @@ class Talk {
     words >> verb;
     for (int i = 0; i < 1000; ++i) stylus_ = mouse_.read().stylus;
     if (verb == "page") windows_.participant().show(page_of(words));
-    if (verb == "state") windows_.console().show(state_of(words, stylus_));
+    if (verb == "state") {
+      const std::lock_guard lock(state_mutex_);
+      state_ = state_of(words, stylus_);
+    }
     if (verb == "ping") say("pong");
     if (verb == "where") {
       const Vec3 axis = glm::normalize(stylus_.tail - stylus_.tip);
@@ -107,19 +157,27 @@ class Talk {
   MouseStylus& mouse_;
   std::mutex mutex_;
   LineProbe stylus_;
+  std::mutex state_mutex_;
+  std::optional<ConsoleState> state_;
   bool closed_ = false;
 };
 
-int show() {
+int show(const std::vector<std::string>& args) {
+  const auto asked = [&](const char* what) {
+    return std::count(args.begin(), args.end(), what) > 0;
+  };
   SteadyClock clock;
   MouseStylus mouse(0.12, 1000);
   WindowSettings settings;
   settings.title = "harness";
   settings.clock = &clock;
-  settings.mouse = &mouse;
+  if (!asked("--no-mouse")) settings.mouse = &mouse;
+  settings.full_screen = asked("--full-screen");
+  if (asked("--ui-scale")) settings.ui_scale = 1.5;
   settings.texts = {"Kugel", "球"};
   settings.emergency = [] { std::cout << "emergency" << std::endl; };  // at once
   const std::unique_ptr<DisplayLoop> windows = make_windows(settings);
+  if (!windows->warning().empty()) std::cout << "warning " << windows->warning() << std::endl;
   Talk talk(*windows, mouse);
   std::atomic<bool> over{false};
   bool slowly = false;
@@ -152,9 +210,9 @@ int show() {
 }  // namespace
 }  // namespace palpate
 
-int main() {
+int main(int count, char** args) {
   try {
-    return palpate::show();
+    return palpate::show({args + 1, args + count});
   } catch (const palpate::DisplayError& fault) {
     std::cout << fault.what() << std::endl;  // with what was said before
     return 3;

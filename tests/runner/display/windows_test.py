@@ -3,11 +3,13 @@
 Usage: windows_test.py HARNESS
 """
 
+import math
 import os
 import queue
 import subprocess
 import sys
 import threading
+import time
 import unittest
 
 from virtual_screen import PATIENCE, VirtualScreen, skip_without_screen, wait_for
@@ -17,16 +19,21 @@ HARNESS = sys.argv.pop() if len(sys.argv) > 1 else None
 EMERGENCY, PAUSE, NOTE, QUIT = 5, 0, 7, 8
 
 
+def END_NOW(width):
+    """The button that asks whether to end, px."""
+    return width - 60, 468
+
+
 class Windows:
     """The harness, with what it says in order."""
 
-    def __init__(self, screen):
-        self.program = subprocess.Popen([HARNESS], env=screen.environment, text=True,
+    def __init__(self, screen, *options):
+        self.program = subprocess.Popen([HARNESS, *options], env=screen.environment, text=True,
                                         stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self.lines = queue.Queue()
         self.listener = threading.Thread(target=self._listen, daemon=True)
         self.listener.start()
-        self.expect("ready")
+        self.before = self.expect("ready")[0]
         self.participant = screen.window("harness")
         self.console = screen.window("harness - console")
 
@@ -86,7 +93,7 @@ class WindowsTest(unittest.TestCase):
         blank = self.screen.settled_picture(self.windows.participant)
         console = self.screen.settled_picture(self.windows.console)
         for shape in ["cone", "cylinder", "cube"]:
-            self.windows.say(f"page neutral {shape}")
+            self.windows.say("page neutral")
             self.windows.say(f"state {shape} 0")
             console = self.screen.settled_picture(self.windows.console, differs_from=console)
             self.screen.keep(self.windows.console, f"console_{shape}")
@@ -95,6 +102,29 @@ class WindowsTest(unittest.TestCase):
         self.windows.say("page text Fühlen Sie die Form. 触って形を当ててください。")
         self.screen.settled_picture(self.windows.participant, differs_from=blank)
         self.screen.keep(self.windows.participant, "participant_text")
+
+    def test_a_long_text_takes_several_screens(self):
+        self.screen.focus(self.windows.participant)
+        blank = self.screen.settled_picture(self.windows.participant)
+        self.windows.say("page text " + " ".join(f"word{i}" for i in range(400)))
+        first = self.screen.settled_picture(self.windows.participant, differs_from=blank)
+        self.screen.keep(self.windows.participant, "participant_long_text")
+        self.press("a")  # no way to turn
+        self.assertEqual(self.expect("key")[1], "key a")
+        self.press("space")
+        second = self.screen.settled_picture(self.windows.participant, differs_from=first)
+        self.press("Left")
+        self.assertTrue(first == self.screen.settled_picture(self.windows.participant,
+                                                             differs_from=second))
+        for _ in range(20):
+            before = self.screen.settled_picture(self.windows.participant)
+            self.press("space")
+            time.sleep(0.5)
+            if self.screen.settled_picture(self.windows.participant) == before:
+                break
+        self.assertEqual(self.expect("key")[1], "key space", "of the last screen only")
+        self.windows.say("ping")
+        self.assertEqual(self.expect("pong")[0], [])
 
     def test_keys_in_order_keypad_as_digits(self):
         self.windows.say("page neutral")
@@ -140,10 +170,62 @@ class WindowsTest(unittest.TestCase):
                 self.expect("emergency")
                 self.expect(f"command {EMERGENCY}")
         self.screen.keep(self.windows.console, "console_fault")
+        self.click_emergency()
+
+    def click_emergency(self, x=0.5, y=25):
+        """Forces off at once, then the command that says what did it."""
         width, _ = self.screen.size(self.windows.console)
-        self.screen.click(self.windows.console, width - 200, 40)
+        self.screen.click(self.windows.console, int(x * width), y)
         self.expect("emergency")
-        self.expect(f"command {EMERGENCY}")
+        self.assertEqual(self.expect(f"command {EMERGENCY}")[1],
+                         f"command {EMERGENCY} the EMERGENCY button")
+
+    def is_red(self, x, y):
+        red, green, blue = self.screen.pixel(self.windows.console, x, y)
+        return red > 2 * green and red > 2 * blue
+
+    def test_nothing_covers_the_emergency_button(self):
+        self.windows.say("page neutral")
+        self.windows.say("state cube 0")
+        console = self.windows.console
+        self.screen.settled_picture(console)
+        width, height = self.screen.size(console)
+        for state in ["pre-flight", "instructions", "homing", "rest", "paused", "fault", "end"]:
+            self.windows.say(f"state cube 0 {state}")
+            self.click_emergency(x=0.98)
+        self.windows.say("state cube 0")
+        self.click_emergency(x=0.01)
+        # Over the question whether to end, and while its reason is written
+        asked = self.screen.settled_picture(console)
+        self.screen.click(console, *END_NOW(width))
+        self.screen.settled_picture(console, differs_from=asked)
+        self.screen.keep(console, "console_end_now")
+        self.click_emergency()
+        self.screen.click(console, width - 200, END_NOW(width)[1] - 23)
+        self.screen.do("type", "--delay", 120, "why 1")
+        self.screen.keep(console, "console_end_why")
+        self.click_emergency(x=0.98)
+        # While a note is written, and while something is dragged over it
+        self.screen.click(console, width - 200, height - 28)
+        self.screen.do("type", "--delay", 120, "x")
+        self.click_emergency()
+        self.screen.point(console, 300, 300)
+        self.screen.do("mousedown", 3)
+        self.screen.point(console, 300, 25)
+        self.click_emergency()
+        self.screen.do("mouseup", 3)
+
+    def test_the_emergency_button_is_whole_in_a_small_window(self):
+        self.windows.say("page neutral")
+        self.windows.say("state cube 384")
+        console = self.windows.console
+        for width, height in [(700, 480), (320, 200), (120, 60)]:
+            self.screen.do("windowsize", console, width, height)
+            wait_for("the size", lambda: self.screen.size(console) == (width, height))
+            wait_for("the button", lambda: all(
+                self.is_red(int(share * width), 13) for share in (0.1, 0.5, 0.9)))
+            self.screen.keep(console, f"console_small_{width}")
+            self.click_emergency()
 
     def test_the_pointer_moves_and_turns_the_stylus(self):
         self.windows.say("state cube 0")
@@ -166,6 +248,27 @@ class WindowsTest(unittest.TestCase):
         after = self.windows.where()[0]
         for a, b in zip(after, there):
             self.assertAlmostEqual(a, b, delta=1e-6)
+
+    def test_the_tip_follows_the_surface_under_the_pointer_and_the_wheel_presses(self):
+        self.windows.say("state sphere 0")
+        self.screen.settled_picture(self.windows.console)
+
+        def distance_at(x, y):
+            """Of the tip from the centre, once it has come to rest."""
+            self.screen.point(self.windows.console, x, y)
+            time.sleep(1)
+            return math.dist(self.windows.where()[0], (0, 0, 0))
+
+        middle = (289, 395)  # of the view, and of the sphere
+        self.assertGreater(distance_at(40, 120), 0.075, "beside the object it floats off")
+        for place in [middle, (310, 380), (270, 410)]:
+            self.assertAlmostEqual(distance_at(*place), 0.03 - 0.0015, delta=0.0008)
+        for _ in range(5):
+            self.screen.do("click", 4)  # the wheel, away from the viewer
+            time.sleep(0.2)
+        self.assertAlmostEqual(distance_at(*middle), 0.03 - 0.0065, delta=0.0008)
+        self.assertGreater(distance_at(540, 120), 0.075)
+        self.assertAlmostEqual(distance_at(*middle), 0.03 - 0.0015, delta=0.0008)
 
     def test_a_stalled_display_keeps_nobody_waiting(self):
         self.windows.say("page neutral")
@@ -216,6 +319,51 @@ class WindowsTest(unittest.TestCase):
     def test_ends_when_asked(self):
         self.windows.say("end")
         self.assertEqual(self.windows.program.wait(PATIENCE), 0)
+
+
+class OneMonitor(unittest.TestCase):
+    def open(self, *options, size="1600x1000"):
+        skip_without_screen()
+        self.screen = VirtualScreen(size)
+        self.addCleanup(self.screen.close)
+        windows = Windows(self.screen, *options)
+        self.addCleanup(windows.close)
+        return windows
+
+    def test_the_shape_is_hidden_until_it_is_asked_for(self):
+        windows = self.open("--no-mouse")
+        self.assertIn("hides shape and scene", windows.before[0])
+        windows.say("state cone 0")
+        wait_for("the console", lambda: self.screen.pixel(windows.console, 30, 13)[0] > 150)
+        hidden = self.screen.settled_picture(windows.console)
+        self.screen.keep(windows.console, "console_hidden")
+        windows.say("state cube 0")
+        time.sleep(1)
+        # Only a message says it, which is the test's own.
+        self.assertTrue(self.top(self.screen.settled_picture(windows.console), windows) ==
+                        self.top(hidden, windows))
+        width, height = self.screen.size(windows.console)
+        self.screen.click(windows.console, 100, 374)
+        shown = self.screen.settled_picture(windows.console, differs_from=hidden)
+        self.screen.keep(windows.console, "console_shown")
+        windows.say("state cone 0")
+        again = self.screen.settled_picture(windows.console, differs_from=shown)
+        self.assertTrue(self.top(again, windows) != self.top(shown, windows))
+
+    def top(self, picture, windows):
+        """Without the messages."""
+        width, _ = self.screen.size(windows.console)
+        return picture[:3 * width * 640]
+
+    def test_full_screen_leaves_the_participants_page_uncovered(self):
+        for size in ["1024x768", "1920x1080"]:
+            windows = self.open("--no-mouse", "--full-screen", size=size)
+            self.assertIn("--full-screen needs a second monitor", windows.before[0])
+            a, b = (self.screen.box(window) for window in (windows.participant, windows.console))
+            self.assertTrue(a[2] <= b[0] or b[2] <= a[0], f"{a} and {b} overlap at {size}")
+            for box in (a, b):
+                self.assertGreaterEqual(box[0], 0)
+                self.assertLessEqual(box[2], int(size.split("x")[0]))
 
 
 class NoDisplay(unittest.TestCase):

@@ -32,12 +32,16 @@ class Preflight(FalconSession):
         self.assertAlmostEqual(farthest, 0.0025, delta=0.0015)
         terminal.type(":go\n")
         terminal.wait_for("move the stylus 26 mm from the centre")
+        terminal.type("\x1b")
+        terminal.wait_for("EMERGENCY by the key Escape: forces are off until the fault is cleared")
+        terminal.type(":go\n")  # it is not obeyed before the fault is cleared
         for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
             self.hand(*place)
             self.control.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
                 self.state()["position_m"], (place[0], place[1], 0.125 + place[2]))))
             time.sleep(0.1)  # some ticks
         terminal.wait_for("press button 1 of the device")
+        terminal.type(":clear\n")
         self.hand(*AWAY)
         self.press(1)
         self.press(2)
@@ -53,7 +57,8 @@ class Preflight(FalconSession):
         self.assertEqual(terminal.finish(), 0, terminal.text)
         found = next(note for note in self.notes() if note.startswith("pre-flight: "))
         for part in ("device homed", "a push of 1.0 N to the right was felt; limits: forces of up to",
-                     "range of 26 mm to each side", "buttons 1 to 2 work", "calibration stored"):
+                     "range of 26 mm to each side", "buttons 1 to 2 work", "EMERGENCY by the key Escape",
+                     "calibration stored"):
             self.assertIn(part, found)
         with contextlib.closing(sqlite3.connect(self.database)) as db:
             (calibration,) = db.execute("SELECT device_calibration FROM runs").fetchone()

@@ -36,8 +36,11 @@ class Screen final : public ParticipantScreen {
     shown_ns_ = clock_.now_ns();
     texts.push_back(page.text);
     if (kind == Page::Kind::feedback && on_feedback) on_feedback();
+    pages.push_back(page);
+    if (shown) shown(page);
   }
   std::vector<KeyPress> keys() override {
+    if (!wrong_key.empty()) return {{std::exchange(wrong_key, {}), clock_.now_ns()}};
     if (clock_.now_ns() < shown_ns_ + takes_ns) return {};
     if (kind == Page::Kind::text) return {{"space", clock_.now_ns()}};
     if (kind == Page::Kind::neutral && answers) return {{"1", clock_.now_ns()}};
@@ -46,6 +49,9 @@ class Screen final : public ParticipantScreen {
   bool open() const override { return is_open; }
   Page::Kind kind = Page::Kind::message;
   std::vector<std::string> texts;
+  std::vector<Page> pages;
+  std::function<void(const Page&)> shown;
+  std::string wrong_key;  ///< pressed once
   std::atomic<bool> answers{true};
   std::int64_t takes_ns = 0;  ///< to read or to answer
   std::function<void()> on_feedback;
@@ -218,6 +224,73 @@ TEST_F(LiveSessions, FirstContactIsMarkedAndAnAnswerBeforeItHasNone) {
   EXPECT_EQ(kinds, "trial_start first_contact response trial_start response ");
   EXPECT_EQ(markers_[1].time_ns - markers_[0].time_ns,
             std::llround(*both[0].first_contact_time * 1e9));
+}
+
+TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
+  protocol_.home.rest = 0.4;
+  std::atomic<bool> far{false};
+  std::vector<std::set<std::string>> seen;  // what the page has said, in each trial
+  screen_.answers = false;
+  screen_.shown = [&](const Page& page) {
+    if (page.kind == Page::Kind::neutral && page.text.empty()) {
+      far = screen_.answers = false;
+      seen.emplace_back();
+    }
+    if (page.text == protocol_.texts.move_away) far = true;
+    if (page.go) screen_.answers = true;
+    if (!seen.empty() && !page.text.empty()) seen.back().insert(page.text);
+  };
+  // 30 mm off, the ball alone would let its trial begin.
+  FakeDevice device([&](int) { return at(far ? 0.1 : 0.03); });
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  ASSERT_EQ(seen.size(), 2u);
+  const auto& texts = protocol_.texts;
+  for (const auto& said : seen)
+    EXPECT_EQ(said, (std::set<std::string>{texts.move_away, texts.ready, texts.go}));
+}
+
+TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
+  std::atomic<bool> plugged{true};
+  FakeDevice device([&](int) { return at(0.1, !plugged); });
+  screen_.answers = false;
+  screen_.shown = [&](const Page& page) {
+    if (page.go && page.reply.empty() && plugged && !screen_.answers) screen_.wrong_key = "x";
+    if (page.go && !page.reply.empty() && !screen_.answers) plugged = false;
+  };
+  console_.repair = [&] { plugged = screen_.answers = true; };
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  const auto has = [&](const auto& what) {
+    return std::any_of(screen_.pages.begin(), screen_.pages.end(), what);
+  };
+  EXPECT_TRUE(has([&](const Page& p) { return p.go && p.reply == protocol_.texts.other_key; }));
+  EXPECT_TRUE(has([&](const Page& p) {
+    return p.kind == Page::Kind::message && p.text == protocol_.texts.wait;
+  }));
+}
+
+TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleKnowsWhatWasAnswered) {
+  protocol_.breaks.every_trials = 1;
+  protocol_.breaks.min_seconds = 2;
+  protocol_.response.labels["ball"] = "Kugel";
+  FakeDevice device([](int) { return at(0.1); });
+  EXPECT_EQ(run(device).end, RunEnd::done);
+  std::vector<int> counted;
+  for (const Page& page : screen_.pages) {
+    if (page.seconds_left == 0) continue;
+    counted.push_back(page.seconds_left);
+    EXPECT_EQ(page.done, 1);
+    EXPECT_EQ(page.trials, 2);
+  }
+  EXPECT_EQ(counted, (std::vector<int>{2, 1}));
+  const auto trial = std::find_if(screen_.pages.begin(), screen_.pages.end(),
+                                  [](const Page& page) { return !page.keys.empty(); });
+  ASSERT_NE(trial, screen_.pages.end());
+  EXPECT_EQ(trial->keys[0], std::pair(std::string("1"), std::string("Kugel")));
+  for (const TrialRecord& record : records()) EXPECT_EQ(record.response, "ball");
+  EXPECT_EQ(console_.last.answer.substr(0, 6), "ball, ");
+  ASSERT_EQ(console_.last.scores.size(), 2u);
+  EXPECT_EQ(console_.last.scores[0].right + console_.last.scores[1].right, 1);
+  EXPECT_EQ(console_.last.scores[0].shown + console_.last.scores[1].shown, 2);
 }
 
 TEST_F(LiveSessions, ButtonsAnswerAtTheirTickAndOneHeldFromBeforeDoesNot) {

@@ -29,10 +29,10 @@ TEST(Preflight, NothingNeededIsDoneOnceHomed) {
   EXPECT_EQ(preflight.step(), Step::homing);
   preflight.skip();
   EXPECT_EQ(preflight.step(), Step::homing) << "it cannot be left out";
-  EXPECT_NE(preflight.instruction().find("home the device"), std::string::npos);
+  EXPECT_NE(preflight.checklist().instruction.find("home the device"), std::string::npos);
   home(preflight);
   EXPECT_EQ(preflight.step(), Step::done);
-  EXPECT_EQ(preflight.instruction(), "");
+  EXPECT_EQ(preflight.checklist().instruction, "");
 }
 
 TEST(Preflight, EverySideMustBeReached) {
@@ -43,12 +43,25 @@ TEST(Preflight, EverySideMustBeReached) {
     preflight.add(sample(side));
     EXPECT_EQ(preflight.step(), Step::range);
   }
-  EXPECT_NE(preflight.instruction().find("30 mm from the centre; still to come: towards you "),
-            std::string::npos);
+  EXPECT_NE(
+      preflight.checklist().instruction.find("30 mm from the centre; still to come: towards you"),
+      std::string::npos);
   preflight.add(sample({0, 0, 0.0299}));
   EXPECT_EQ(preflight.step(), Step::range);
   preflight.add(sample({0, 0, 0.03}));
   EXPECT_EQ(preflight.step(), Step::done);
+}
+
+TEST(Preflight, AnEmergencyDoesNotUndoWhatIsDone) {
+  Preflight preflight({0.03, 0});
+  home(preflight);
+  Sample off = sample({0, 0, 0}, 0, true);
+  off.trouble = DeviceTrouble::guarded;
+  preflight.add(off);
+  EXPECT_EQ(preflight.step(), Step::range);
+  off.trouble = DeviceTrouble::unplugged;
+  preflight.add(off);
+  EXPECT_EQ(preflight.step(), Step::homing);
 }
 
 TEST(Preflight, ButtonsMustBeUpAndThenDown) {
@@ -56,7 +69,7 @@ TEST(Preflight, ButtonsMustBeUpAndThenDown) {
   home(preflight);
   for (const unsigned buttons : {1u, 1u, 3u, 1u}) preflight.add(sample({0, 0, 0}, buttons));
   EXPECT_EQ(preflight.step(), Step::buttons) << "button 1 is stuck";
-  EXPECT_EQ(preflight.instruction().substr(0, 14), "press button 1");
+  EXPECT_EQ(preflight.checklist().instruction.substr(0, 14), "press button 1");
   preflight.add(sample({0, 0, 0}, 0));
   preflight.add(sample({0, 0, 0}, 1));
   EXPECT_EQ(preflight.step(), Step::done);
@@ -68,6 +81,10 @@ TEST(Preflight, WhatIsLeftOutIsOnRecord) {
   preflight.skip();
   preflight.skip();
   EXPECT_EQ(preflight.step(), Step::done);
+  std::string states;
+  for (const Checklist::Step& step : preflight.checklist().steps)
+    states += step.words + std::to_string(static_cast<int>(step.state)) + " ";
+  EXPECT_EQ(states, "Home the device2 Move to every side3 Press the buttons3 ");
   ASSERT_EQ(preflight.findings().size(), 3u);
   EXPECT_NE(preflight.findings()[1].find("range NOT checked"), std::string::npos);
   EXPECT_NE(preflight.findings()[2].find("NOT checked"), std::string::npos);
@@ -85,21 +102,21 @@ TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
   EXPECT_EQ(preflight.step(), Step::limits);
   EXPECT_FALSE(preflight.push_due()) << "not before somebody holds the grip";
   EXPECT_NE(
-      preflight.instruction().find(
+      preflight.checklist().instruction.find(
           "forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of change "
           "a tick; hold the grip: a push of 1.0 N to the right"),
       std::string::npos)
-      << preflight.instruction();
+      << preflight.checklist().instruction;
   preflight.skip();
   EXPECT_TRUE(preflight.push_due());
   preflight.pushed("7 N were commanded");
   EXPECT_FALSE(preflight.push_due());
-  EXPECT_NE(preflight.instruction().find("7 N were commanded"), std::string::npos);
+  EXPECT_NE(preflight.checklist().instruction.find("7 N were commanded"), std::string::npos);
   preflight.skip();
   EXPECT_TRUE(preflight.push_due()) << "it cannot be left out";
   preflight.pushed("");
   EXPECT_EQ(preflight.step(), Step::limits);
-  EXPECT_NE(preflight.instruction().find("felt?"), std::string::npos);
+  EXPECT_NE(preflight.checklist().instruction.find("felt?"), std::string::npos);
   preflight.repeat();
   EXPECT_TRUE(preflight.push_due());
   preflight.pushed("");

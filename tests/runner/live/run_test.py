@@ -11,6 +11,7 @@ import math
 import os
 import pathlib
 import pty
+import re
 import signal
 import socket
 import sqlite3
@@ -51,11 +52,11 @@ class Live(unittest.TestCase):
         path.write_text(json.dumps(PROTOCOL | changes))
         return path
 
-    def run_session(self, *options, db=None, code="P01", sure=True, **changes):
+    def run_session(self, *options, db=None, code="P01", sure=True, columns=0, **changes):
         """`sure`: the code is meant, nobody asks."""
         new = ["--new-participant"] if sure and code not in self.codes(db or self.db) else []
         return Terminal([PALPATE, "run", self.protocol(**changes), "--db", db or self.db, "--participant", code,
-                         "--device", "simulated", "--no-window", *new, *options])
+                         "--device", "simulated", "--no-window", *new, *options], columns=columns)
 
     def run_piped(self, *options, code="P01", typed=b"", **changes):
         """As a script would: no terminal."""
@@ -182,6 +183,30 @@ class Whole(Live):
         self.assertEqual([row["practice"] for row in rows], list("111100"))
         self.assertEqual(terminal.text.count("\u2713"), 2)
         self.assertEqual(terminal.text.count("\u2717"), 2)
+
+    def test_lines_break_between_words_and_no_status_is_empty(self):
+        terminal = self.begin(columns=40)
+        terminal.type(":note " + "abcdefgh " * 12 + "\n")
+        terminal.wait_for("* note:")
+        terminal.type("1")
+        self.finish(terminal)
+        said = terminal.text[terminal.text.index("* note:"):]
+        note = re.split(r"\n[*\[]", said)[0]
+        self.assertLessEqual(max(map(len, note.splitlines())), 40)
+        self.assertEqual(note.replace("\n", " ").split(), ["*", "note:"] + ["abcdefgh"] * 12)
+        self.assertNotIn("[]", terminal.text)
+
+    def test_a_page_says_in_the_protocols_words_when_to_go_and_what_a_key_stands_for(self):
+        texts = {"ready": "Bereit", "go": "Los", "other_key": "Diese Taste gilt nicht"}
+        terminal = self.begin(texts=texts, response={"keys": {
+            "1": {"stimulus": "ball", "label": "Kugel"}, "2": {"stimulus": "box", "label": "W\u00fcrfel"}}})
+        self.assertIn("1 Kugel   2 W\u00fcrfel", terminal.text)
+        self.assertLess(terminal.text.index("Bereit"), terminal.text.index("Los   1 Kugel"))
+        terminal.type("7")
+        terminal.wait_for("Diese Taste gilt nicht")
+        terminal.type("1")
+        self.finish(terminal)
+        self.assertEqual({row["response"] for row in self.export()}, {"ball"})
 
     def test_time_out(self):
         terminal = self.begin(response={"keys": {"1": "ball", "2": "box"}, "time_out_s": 1}, repetitions=1,
@@ -320,7 +345,15 @@ class Commands(Live):
         terminal.type(":go\n")
         self.finish(terminal)
         self.assertEqual(self.attempts()[:2], [(1, 1, "cut_off"), (1, 2, "completed")])
-        self.assertEqual(self.notes(), ["emergency zero", "fault cleared"])
+        self.assertEqual(self.notes(), ["emergency zero: the key Escape", "fault cleared"])
+
+    def test_alt_with_a_key_is_an_emergency_that_says_so_and_answers_nothing(self):
+        terminal = self.begin()
+        terminal.type("\x1b1")
+        terminal.wait_for("EMERGENCY by the key Alt+1: forces are off")
+        self.finish(terminal)
+        self.assertEqual(self.attempts()[:2], [(1, 1, "cut_off"), (1, 2, "completed")])
+        self.assertEqual(self.notes()[0], "emergency zero: the key Alt+1")
 
     def test_a_wrong_command_gets_the_list(self):
         terminal = self.begin()

@@ -1,21 +1,26 @@
 """A program on a pseudo-terminal, and somebody who reads it and types."""
 
+import fcntl
 import os
 import pty
 import select
 import signal
+import struct
 import subprocess
+import termios
 import time
 
 
 class Terminal:
     """Starts `command` with a terminal of its own. Everything it says gathers in `text`."""
 
-    def __init__(self, command, patience=60):
+    def __init__(self, command, patience=60, columns=0):
         self.patience = patience
         self.text = ""
         self.read_to = 0  # of text, by wait_for
         self.master, slave = pty.openpty()
+        if columns:
+            fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
         self.process = subprocess.Popen(list(map(str, command)), stdin=slave, stdout=slave, stderr=slave,
                                         start_new_session=True)
         os.close(slave)

@@ -44,10 +44,18 @@ TEST(TextInput, KeypadAnswersAsDigits) {
 }
 
 TEST(TextInput, EscapeAndF12AreTheEmergencyAlsoInACommand) {
-  EXPECT_EQ(heard("\x1b"), command(Kind::emergency_zero));
-  EXPECT_EQ(heard("\x1b[24~"), command(Kind::emergency_zero));
-  EXPECT_EQ(heard(":no\x1b"), command(Kind::emergency_zero));
+  EXPECT_EQ(heard("\x1b"), command(Kind::emergency_zero, "the key Escape"));
+  EXPECT_EQ(heard("\x1b[24~"), command(Kind::emergency_zero, "the key F12"));
+  EXPECT_EQ(heard(":no\x1b"), command(Kind::emergency_zero, "the key Escape"));
   EXPECT_EQ(heard("\x1b[A\x1b[5~"), "") << "cursor keys are none";
+}
+
+TEST(TextInput, AltWithAKeyIsTheEmergencyAndNoAnswer) {
+  EXPECT_EQ(heard("\x1b\x31"), command(Kind::emergency_zero, "the key Alt+1"));
+  EXPECT_EQ(heard("\x1b\xC3\xA4"), command(Kind::emergency_zero, "the key Alt+\xC3\xA4"));
+  EXPECT_EQ(heard("\x1b["), command(Kind::emergency_zero, "the key Alt+["));
+  EXPECT_EQ(heard("\x1b:clear\n"),
+            command(Kind::emergency_zero, "the key Escape") + command(Kind::clear_fault));
 }
 
 TEST(TextInput, LinesAreCommands) {
@@ -55,7 +63,7 @@ TEST(TextInput, LinesAreCommands) {
             command(Kind::pause) + command(Kind::go_on) + command(Kind::repeat_trial));
   EXPECT_EQ(heard(":stop\n: stop block \n:zero\n:clear\n"),
             command(Kind::stop_after_trial) + command(Kind::stop_after_block) +
-                command(Kind::emergency_zero) + command(Kind::clear_fault));
+                command(Kind::emergency_zero, ":zero") + command(Kind::clear_fault));
   EXPECT_EQ(
       heard(":note  1: \xC3\xA4 \n:quit withdrawn\n:quit\n"),
       command(Kind::note, "1: \xC3\xA4") + command(Kind::quit, "withdrawn") + command(Kind::quit));

@@ -86,6 +86,22 @@ TEST_F(Players, PlaySilenceUntilTheyAreTurnedOn) {
   EXPECT_EQ(noise->report().underruns, 0);
 }
 
+TEST_F(Players, GiveAToneWhenTheyAreAskedForOneAndThenSilence) {
+  const auto noise = player();
+  for (int i = 0; i < 2; ++i) {
+    const std::size_t before = ear_.count();
+    noise->tone();
+    const auto heard = [&] {
+      const std::lock_guard lock(ear_.mutex);
+      return std::count_if(ear_.heard.begin() + static_cast<std::ptrdiff_t>(before),
+                           ear_.heard.end(), [](std::int16_t x) { return x != 0; });
+    };
+    wait_for([&] { return heard() > 1000 && !ear_.sounds(); });
+    EXPECT_NEAR(static_cast<double>(heard()), 2 * 0.1 * 8000, 20);
+  }
+  EXPECT_FALSE(noise->on());
+}
+
 TEST_F(Players, GiveBothEarsTheSame) {
   const auto noise = player();
   noise->turn_on();
