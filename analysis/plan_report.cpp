@@ -97,8 +97,8 @@ void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
                     " for each participant)");
   std::vector<std::size_t> shapes(plan.model.shapes.size());
   std::iota(shapes.begin(), shapes.end(), std::size_t{0});
-  std::ranges::stable_partition(shapes,
-                                [&](std::size_t s) { return plan.model.log_ratios[s] != 0; });
+  std::stable_partition(shapes.begin(), shapes.end(),
+                        [&](std::size_t s) { return plan.model.log_ratios[s] != 0; });
   for (std::size_t first = 0, last = 0; first < shapes.size(); first = last) {
     std::size_t used = 0;
     for (; last < shapes.size(); ++last) {
