@@ -54,8 +54,9 @@ TEST(Censored, AgreesWithSurvreg) {
       ASSERT_EQ(found.undefined, "");
       EXPECT_EQ(found.n_observed, expected["n_observed"].get<std::size_t>());
       EXPECT_EQ(found.n_censored, expected["n_censored"].get<std::size_t>());
-      const auto near = [&](const std::optional<double>& value, const char* key, double relative) {
-        const auto wanted = expected[key].get<double>();
+      const auto near = [&answer = expected](const std::optional<double>& value, const char* key,
+                                             double relative) {
+        const auto wanted = answer[key].get<double>();
         EXPECT_NEAR(value.value(), wanted, relative * std::max(1e-2, std::fabs(wanted))) << key;
       };
       near(found.log_ratio, "log_ratio", 1e-6);
