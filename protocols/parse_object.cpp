@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -85,6 +86,7 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
 
   std::optional<ShapeKind> shape;
   std::vector<std::pair<const char*, std::optional<ShapeKind>>> shapes;
+  shapes.reserve(std::size(kShapes));
   for (const ShapeKind kind : kShapes) shapes.emplace_back(needs_of(kind).name, kind);
   reader.choice<std::optional<ShapeKind>>("shape", shape, shapes, Need::required);
   if (!shape) {

@@ -27,7 +27,7 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   for (const std::uint32_t bit :
        {kEmergency, kStalled, kDeviceLost, kMissedTicks, render_fault::kNonFinite}) {
     if ((faults & bit) == 0) continue;
-    const std::string why = bit == kDeviceLost ? advice(trouble) : "";
+    std::string why = bit == kDeviceLost ? advice(trouble) : "";
     if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
       if (!why.empty()) return why;
     }

@@ -1,5 +1,6 @@
 #include <atomic>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -66,6 +67,7 @@ ProtocolFacts facts_of(const ProtocolInfo& info) {
 
 std::vector<FaultMeaning> fault_bits() {
   std::vector<FaultMeaning> all;
+  all.reserve(std::size(kFaultBits));
   for (const FaultBit& fault : kFaultBits) {
     all.push_back({fault.bit, std::string(fault.name) + ": " + fault.meaning});
   }

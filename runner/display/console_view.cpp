@@ -83,7 +83,8 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
     draw_view(modifiers, width, height);
   }
   if (!with_plots) return;
-  const float part = (room.x - spacing.x * (hidden_ ? 1 : 2)) / (hidden_ ? 2 : 3);
+  const float plots_beside = hidden_ ? 2 : 3;
+  const float part = (room.x - spacing.x * (plots_beside - 1)) / plots_beside;
   draw_forces(forces_, part, plots);
   ImGui::SameLine();
   draw_times(state_.times, part, plots);
