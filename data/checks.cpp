@@ -46,6 +46,11 @@ void Checks::present(const char* field, std::string_view value) {
   expect(!value.empty(), std::string(field) + " must not be empty");
 }
 
+void Checks::amount(const char* field, double value) {
+  finite(field, value);
+  expect(!(value < 0), std::string(field) + " must not be below zero");
+}
+
 void Checks::finite(const char* field, double value) {
   expect(std::isfinite(value), std::string(field) + " must be a finite number");
 }
@@ -105,13 +110,13 @@ void check_plan(Checks& checks, const TrialRecord& record, int session) {
 void check_outcome(Checks& checks, const TrialRecord& record) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   checks.text("response", record.response);
-  checks.finite("response_time", record.response_time);
-  if (record.first_contact_time) checks.finite("first_contact_time", *record.first_contact_time);
+  checks.amount("response_time", record.response_time);
+  if (record.first_contact_time) checks.amount("first_contact_time", *record.first_contact_time);
   for (int i = 0; i < 3; ++i) {
     checks.finite("start_tip", record.start_tip[i]);
     checks.finite("start_tail", record.start_tail[i]);
   }
-  checks.finite("max_force", record.max_force);
+  checks.amount("max_force", record.max_force);
   checks.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
   checks.expect(!record.timed_out || (record.response.empty() && !record.correct),
                 "a time-out has no response and is not correct");

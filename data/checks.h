@@ -17,6 +17,7 @@ class Checks {
   void text(const char* field, std::string_view value);
   void present(const char* field, std::string_view value);  ///< text, and not empty
   void finite(const char* field, double value);
+  void amount(const char* field, double value);  ///< finite, and not below zero
   void positive(const char* field, int value);
   void expect(bool holds, const std::string& expectation);
   /// \throws StoreRefused with all faults. \param what "PATH: trial 3"

@@ -61,8 +61,8 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
 
 std::string LiveForces::allow(const std::function<bool()>& stop) {
   const std::int64_t asked_ns = clock_.now_ns();
-  servo_
-      .clear_fault();  // zero force that is asked for from now on is kept, however long this takes
+  // Zero force that is asked for from now on is kept, however long this takes.
+  servo_.clear_fault();
   await(is_settled, kPatience, stop);
   const bool away =
       sample_.trouble == DeviceTrouble::unplugged || sample_.trouble == DeviceTrouble::silent;

@@ -197,6 +197,8 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
        "not a finite number"},
       {"an infinite time", "UPDATE attempts SET response_time = -9e999 WHERE id = 1",
        "not a finite number"},
+      {"a time below zero", "UPDATE attempts SET response_time = -0.5 WHERE id = 1",
+       "is below zero"},
       {"a shape that is no text",
        "UPDATE attempts SET shape = CAST(x'FF2E2E2F' AS TEXT) WHERE id = 1", "not UTF-8"},
       {"a shape with NUL", "UPDATE attempts SET shape = CAST(x'610062' AS TEXT) WHERE id = 1",

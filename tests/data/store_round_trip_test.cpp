@@ -250,6 +250,13 @@ TEST(StoreRoundTrip, WhatNoDatabaseKeepsIsRefusedFieldByField) {
                             "max_force", "orientation", "ticks", "s.db", "trial 1"}) {
     EXPECT_TRUE(contains(error, field)) << field << " in: " << error;
   }
+  record = a_record(1);
+  record.response_time = record.max_force = -1e-300;
+  record.first_contact_time = -0.5;
+  const std::string below = error_of([&] { store.finish_attempt(run, record); });
+  for (const char* field : {"response_time", "first_contact_time", "max_force"}) {
+    EXPECT_TRUE(contains(below, std::string(field) + " must not be below zero")) << below;
+  }
   for (const std::string& text :
        {std::string("\0", 1), std::string("\xFF"), std::string("\xC0\x80"),
         std::string("\xED\xA0\x80"), std::string("\xF4\x90\x80\x80"), std::string("\xE2\x82")}) {

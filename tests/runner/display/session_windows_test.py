@@ -324,10 +324,18 @@ class SessionTest(unittest.TestCase):
         return sum(text == "emergency zero: the EMERGENCY button"
                    for (text,) in self.rows("SELECT text FROM notes"))
 
+    def forces_are_shown_off(self):
+        """The word beside "Servo" on the console is red."""
+        width, _ = self.screen.size(self.console)
+        return any(red > 180 and green < 140
+                   for red, green, _ in self.screen.pixels(self.console, width - 234, 505, 120, 16))
+
     def click_emergency(self):
+        """What is on record of it waits in memory until the first trial has begun."""
         before = self.emergencies()
         self.screen.click(self.console, 100, 25)
-        wait_for("the emergency", lambda: self.emergencies() > before)
+        wait_for("the emergency", lambda: self.emergencies() > before if self.attempts()
+                 else self.forces_are_shown_off())
 
     def click_button(self, row, column):
         """Of the six: rows from 0, columns from 0."""
@@ -336,7 +344,7 @@ class SessionTest(unittest.TestCase):
 
     def test_the_emergency_button_works_in_every_state_and_over_every_dialog(self):
         self.write_protocol(material={"stiffness_n_per_m": 100}, practice={"repetitions": 1},
-                            breaks={"every_trials": 2, "min_seconds": 3},
+                            breaks={"min_seconds": 3},
                             texts={"instructions": "Feel.", "practice": "Try.", "break": "Rest.",
                                    "end": "Thanks."}, home={"rest_s": 1, "margin_m": 0.01})
         self.start(device="simulated", to_the_first_trial=False)
@@ -370,6 +378,19 @@ class SessionTest(unittest.TestCase):
             if name in ("end", "reason"):
                 self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 481)  # back
             self.clear_and_go_on()
+        wait_for("a practice trial", lambda: self.forces_are_on())
+        self.answer()
+        self.click_emergency()  # the feedback, or what comes right after it
+        self.screen.keep(self.console, "emergency_feedback")
+        self.clear_and_go_on()
+        self.answer(4 - 1)  # the rest of the practice: a break follows
+        self.click_emergency()
+        self.screen.keep(self.console, "emergency_break")
+        self.screen.keep(self.participant, "emergency_break_page")
+        self.assertEqual(self.attempts()[-1][3], "completed", "no trial begins in a break")
+        self.clear_and_go_on()
+        before = len(self.attempts())
+        self.press_until("space", lambda: len(self.attempts()) > before)
 
 
 class NoDisplay(unittest.TestCase):

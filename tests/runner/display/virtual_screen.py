@@ -123,10 +123,12 @@ class VirtualScreen:
         return subprocess.run(["import", "-silent", "-window", window, "-depth", "8", "rgb:-"],
                               env=self.environment, check=True, stdout=subprocess.PIPE).stdout
 
-    def pixel(self, window, x, y):
-        return tuple(subprocess.run(
-            ["import", "-silent", "-window", window, "-crop", f"1x1+{x}+{y}", "-depth", "8", "rgb:-"],
-            env=self.environment, check=True, stdout=subprocess.PIPE).stdout)
+    def pixels(self, window, x, y, width=1, height=1):
+        """Red, green and blue of each."""
+        seen = subprocess.run(
+            ["import", "-silent", "-window", window, "-crop", f"{width}x{height}+{x}+{y}",
+             "-depth", "8", "rgb:-"], env=self.environment, check=True, stdout=subprocess.PIPE).stdout
+        return list(zip(seen[0::3], seen[1::3], seen[2::3]))
 
     def keep(self, window, name):
         """For looking at: PALPATE_PICTURES names a folder."""

@@ -181,7 +181,7 @@ class WindowsTest(unittest.TestCase):
                          f"command {EMERGENCY} the EMERGENCY button")
 
     def is_red(self, x, y):
-        red, green, blue = self.screen.pixel(self.windows.console, x, y)
+        red, green, blue = self.screen.pixels(self.windows.console, x, y)[0]
         return red > 2 * green and red > 2 * blue
 
     def test_nothing_covers_the_emergency_button(self):
@@ -334,7 +334,7 @@ class OneMonitor(unittest.TestCase):
         windows = self.open("--no-mouse")
         self.assertIn("hides shape and scene", windows.before[0])
         windows.say("state cone 0")
-        wait_for("the console", lambda: self.screen.pixel(windows.console, 30, 13)[0] > 150)
+        wait_for("the console", lambda: self.screen.pixels(windows.console, 30, 13)[0][0] > 150)
         hidden = self.screen.settled_picture(windows.console)
         self.screen.keep(windows.console, "console_hidden")
         windows.say("state cube 0")
