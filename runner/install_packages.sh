@@ -7,7 +7,7 @@ build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3
   fonts-noto-core libasound2-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev libstb-dev libx11-dev)
 tests=(imagemagick libbenchmark-dev libbullet-dev libfcl-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
   libumockdev-dev libxml2-utils python3 python3-jsonschema umockdev xdotool xvfb)
-quality=(chromium clang clang-format clang-tidy rt-tests valgrind)
+quality=(chromium clang clang-format clang-tidy devscripts rt-tests valgrind)
 
 case "${1:-}" in
   build) wanted=("${build[@]}") ;;

@@ -32,6 +32,10 @@ const Sample& LiveForces::newest() noexcept {
   return sample_;
 }
 
+bool LiveForces::device_is_gone() noexcept {
+  return !is_well(newest()) && is_settled(sample_) && sample_.trouble != DeviceTrouble::guard_lost;
+}
+
 /// Whether a sample of a tick from now on was as wished. The newest one stays.
 template <class Wished>
 bool LiveForces::await(Wished wished, double seconds, const std::function<bool()>& stop) {

@@ -27,6 +27,8 @@ class LiveForces {
 
   /// The servo's newest sample.
   const Sample& newest() noexcept;
+  /// It gives no readings, not only in passing.
+  bool device_is_gone() noexcept;
 
  private:
   template <class Wished>

@@ -167,6 +167,7 @@ void LiveSession::attend() {
     obey(command);
   }
   watch_noise();
+  watch_device();
   if (!parts_.screen.open())
     throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
   if (parts_.clock.now_ns() - shown_ns_ >= kFrame_ns) show_console();
@@ -176,6 +177,15 @@ void LiveSession::attend() {
 void LiveSession::end_with_the_guard() const {
   if (state_.sample.trouble == DeviceTrouble::guard_lost)
     throw EndOfSession(RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
+}
+
+/// In a break no trial would tell of a device that is gone.
+void LiveSession::watch_device() {
+  if (in_trial_ || hold_ >= Hold::passed || !forces_.device_is_gone()) return;
+  const DeviceTrouble trouble = forces_.newest().trouble;
+  const std::string reason = trip_reason(servo_fault::kDeviceLost, trouble);
+  hold(reason, false, trouble);
+  say(reason + "; " + ways_on());
 }
 
 void LiveSession::obey(const ConsoleCommand& command) {

@@ -78,6 +78,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   bool start_noise();               ///< false: it cannot be had, and the session is paused
   void stop_noise();
   void watch_noise();
+  void watch_device();
   void note(std::int64_t at_ns, const std::string& text);
   void show_console();
 

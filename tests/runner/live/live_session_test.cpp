@@ -66,7 +66,10 @@ class Screen final : public ParticipantScreen {
 class Console final : public ExperimenterConsole {
  public:
   explicit Console(Clock& clock) : clock_(clock) {}
-  void show(const ConsoleState& state) override { last = state; }
+  void show(const ConsoleState& state) override {
+    last = state;
+    if (shown) shown(state);
+  }
   std::vector<ConsoleCommand> commands() override {
     std::vector<ConsoleCommand> out = std::exchange(next, {});
     if (in_state && in_state->first == last.state)
@@ -93,6 +96,7 @@ class Console final : public ExperimenterConsole {
     return kind == ConsoleCommand::Kind::go_on ? "'on'" : "'other'";
   }
   ConsoleState last;
+  std::function<void(const ConsoleState&)> shown;
   std::vector<ConsoleCommand> next;
   std::function<void()> repair;
   bool goes_on = false;                    ///< after a pause
@@ -409,6 +413,32 @@ TEST_F(LiveSessions, AClearedFaultIsCleared) {
   EXPECT_EQ(cleared, tries - 2) << "also where a busy machine has made it more";
   EXPECT_EQ(refused, 2);
   EXPECT_TRUE(has_note("fault cleared"));
+}
+
+TEST_F(LiveSessions, ADeviceThatIsUnpluggedInABreakIsToldOfThere) {
+  protocol_.breaks.every_trials = 1;
+  protocol_.texts.break_text = "Rest.";
+  std::atomic<bool> plugged{true};
+  FakeDevice device([&](int) { return at(0.1, !plugged); });
+  screen_.takes_ns = 150'000'000;
+  std::string state, fault;
+  screen_.shown = [&](const Page& page) {
+    if (page.text == "Rest." && fault.empty()) plugged = false;
+  };
+  console_.shown = [&](const ConsoleState& now) {
+    if (!fault.empty() || now.fault.empty()) return;
+    state = now.state;
+    fault = now.fault;
+    plugged = true;
+    console_.next = {{ConsoleCommand::Kind::clear_fault, "", 0},
+                     {ConsoleCommand::Kind::go_on, "", 0}};
+  };
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.recorded, 2u);
+  EXPECT_EQ(state, "rest");
+  EXPECT_NE(fault.find("the device is unplugged"), std::string::npos) << fault;
+  EXPECT_TRUE(cut_off_reasons().empty()) << "no trial was begun without a device";
 }
 
 TEST_F(LiveSessions, AFaultSaysWhatItIsAndWhatGoesOn) {

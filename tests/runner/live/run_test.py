@@ -690,6 +690,32 @@ class Broken(Live):
         done = subprocess.run([*replay, self.dir / "ticks.csv"], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
 
+    def test_a_mesh_is_kept_with_the_data_and_replayed_and_exported_from_there(self):
+        solid = "v 0 0 0\nv .04 0 0\nv 0 .04 0\nv 0 0 .04\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+        (self.dir / "solid.obj").write_text(solid)
+        stimuli = [{"name": "ball", "shape": "mesh", "file": "solid.obj"}, PROTOCOL["stimuli"][1]]
+        session = self.begin(stimuli=stimuli, repetitions=1, blocks_per_renderer=1, samples=True)
+        time.sleep(0.5)
+        session.type("1")
+        self.finish(session)
+        (trial,) = [t["trial"] for t in self.export() if t["shape"] == "ball"]
+
+        # Half the size, and then gone: the record knows better.
+        mesh = self.dir / "solid.obj"
+        mesh.write_text(solid.replace(".04", ".02"))
+        replay = [PALPATE, "replay", "--db", self.db, "--trial", f"P01/1/{trial}"]
+        for _ in range(2):
+            done = subprocess.run(replay, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            self.assertIn("equal the record, bit by bit", done.stdout)
+            mesh.unlink(missing_ok=True)
+        for form, place in [("bids", "stimuli"), ("psych-ds", "materials")]:
+            out = self.dir / form
+            subprocess.run([PALPATE, "export", "--db", self.db, "--format", form, "--out", out], check=True,
+                           capture_output=True)
+            (kept,) = (out / place).rglob("solid.obj")
+            self.assertEqual(kept.read_text(), solid)
+
     def test_signals_end_it_with_everything_on_record(self):
         for which, word in ((signal.SIGINT, "Interrupt"), (signal.SIGTERM, "Terminated")):
             terminal = self.begin(code=f"P{int(which)}")
