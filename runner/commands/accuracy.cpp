@@ -163,7 +163,7 @@ int accuracy_command(const std::vector<std::string>& args) {
       "[--json FILE]";
   line.summary =
       "How far the rendered forces are from the exact ones, and at what cost: every method over\n"
-      "every tessellation of the four shapes, and which tessellation a lab should choose.\n"
+      "every tessellation of every analytic shape, and which tessellation a lab should choose.\n"
       "Takes two minutes, with --quick ten seconds. Status 1 when a tick of\nthe search is wrong "
       "or an extreme case does not hold.";
   line.example =

@@ -66,10 +66,14 @@ void draw_legend(Svg& svg, const AccuracyReport& report, double x, double y) {
 }  // namespace
 
 std::string accuracy_figure(const AccuracyReport& report) {
-  constexpr double kWidth = 1176, kPanel = 230, kHeight = 230, kLeft = 62, kGap = 58, kTop = 112;
+  constexpr double kPanel = 230, kHeight = 230, kLeft = 62, kGap = 58, kTop = 112, kRight = 20;
   constexpr double kBetween = 84;
+  const std::vector<std::string> shapes = measured_shapes(report);
+  // The legend needs the width of four panels.
+  const auto columns = static_cast<double>(std::max<std::size_t>(shapes.size(), 4));
+  const double width = kLeft + columns * (kPanel + kGap) - kGap + kRight;
   Svg svg;
-  svg.rect(0, 0, kWidth, kTop + 2 * kHeight + kBetween + 52, "#ffffff");
+  svg.rect(0, 0, width, kTop + 2 * kHeight + kBetween + 52, "#ffffff");
   svg.text(16, 30, "Tessellation decides the error, the method decides the time",
            {18, kInk, Svg::Anchor::start, true, 0});
   svg.text(16, 52,
@@ -93,14 +97,15 @@ std::string accuracy_figure(const AccuracyReport& report) {
   shape_errors.y_high = std::max(shape_errors.y_high, kHand.position);
   shape_errors.round_ends();
   exact_errors.round_ends();
-  for (std::size_t i = 0; i < std::size(kAccuracyShapes); ++i) {
+  // Levels are named where no line is in the way: a shape of flats has one tessellation.
+  const auto flat = std::find_if(shapes.begin(), shapes.end(), is_flat_sided);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
     const double left = kLeft + static_cast<double>(i) * (kPanel + kGap);
     shape_errors.left = exact_errors.left = left;
-    const std::string name = kAccuracyShapes[i];
+    const std::string& name = shapes[i];
     draw_panel(svg, shape_errors,
                {name, "ns a tick", i == 0 ? "rms depth error against the shape, m" : ""});
-    // Named where no line is in the way: a cube has one tessellation.
-    const bool named = name == "cube";
+    const bool named = flat != shapes.end() && name == *flat;
     draw_level(svg, shape_errors, kHand.position, named ? "a hand feels 1 mm" : "");
     draw_level(svg, shape_errors, kDevice.position, named ? "a device resolves 0.03 mm" : "");
     draw_methods(svg, shape_errors, report, name, of_shape);
@@ -108,7 +113,7 @@ std::string accuracy_figure(const AccuracyReport& report) {
                {name, "ns a tick", i == 0 ? "worst against the polyhedron, m" : ""});
     draw_methods(svg, exact_errors, report, name, of_polyhedron);
   }
-  return svg.document(kWidth, kTop + 2 * kHeight + kBetween + 52,
+  return svg.document(width, kTop + 2 * kHeight + kBetween + 52,
                       "Error over time for each method of finding contact",
                       "One panel for each shape, both axes logarithmic. Top: error of depth "
                       "against the analytic shape. Bottom: against the exact polyhedron.");

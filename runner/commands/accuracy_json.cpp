@@ -50,7 +50,7 @@ Json accuracy_json(const AccuracyReport& report) {
                              {"version", library.make ? Json(library.version) : Json()}});
   }
   if (!report.rows.empty()) {
-    for (const char* shape : kAccuracyShapes) {
+    for (const std::string& shape : measured_shapes(report)) {
       const int hand = triangles_for(report.rows, shape, kHand);
       const int device = triangles_for(report.rows, shape, kDevice);
       json["recommended"].push_back({{"shape", shape},
@@ -66,7 +66,7 @@ Json accuracy_json(const AccuracyReport& report) {
          {"triangles", row.triangles},
          {"facets", row.facets},
          {"edges", row.edges},
-         {"subdivisions", row.shape == "sphere" ? Json(row.subdivisions) : Json()},
+         {"subdivisions", needs_of_shape(row.shape).subdivisions ? Json(row.subdivisions) : Json()},
          {"segments", row.segments ? Json(row.segments) : Json()},
          {"probe", row.probe},
          {"method", row.method},

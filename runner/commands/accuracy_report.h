@@ -12,6 +12,7 @@
 #include "rendering/extreme_cases.h"
 #include "rendering/paper_first_contact.h"
 #include "rendering/search.h"
+#include "stimuli/shapes.h"
 
 namespace palpate {
 
@@ -41,7 +42,12 @@ struct AccuracyReport {
 constexpr Demand kHand{1e-3, 0.17453292519943295};  ///< 1 mm, 10 degrees
 constexpr Demand kDevice{3e-5, kNoDemand};          ///< 0.03 mm
 
-constexpr const char* kAccuracyShapes[] = {"sphere", "cone", "cylinder", "cube"};
+/// The shapes that were measured, in order.
+std::vector<std::string> measured_shapes(const AccuracyReport& report);
+/// What the shape of this name needs; nothing for a name that is none.
+ShapeNeeds needs_of_shape(const std::string& name);
+/// It is made of flats: its one tessellation is the shape itself.
+bool is_flat_sided(const std::string& shape);
 
 /// Three significant figures, plain where that is short: "0.0345", "1.2e-17".
 std::string significant(double value);

@@ -40,7 +40,8 @@ std::string share(std::size_t part, std::size_t all) {
 }
 
 std::string setting_of(const AccuracyRow& row) {
-  if (row.shape == "sphere") return "subdivisions " + std::to_string(row.subdivisions);
+  if (needs_of_shape(row.shape).subdivisions)
+    return "subdivisions " + std::to_string(row.subdivisions);
   if (row.segments > 0) return "segments " + std::to_string(row.segments);
   return "";
 }
@@ -211,11 +212,12 @@ Table search_table(const SearchCounts& c, std::uint64_t seed) {
 std::string recommendation(const AccuracyReport& report, const std::string& shape) {
   const int hand = triangles_for(report.rows, shape, kHand);
   const int device = triangles_for(report.rows, shape, kDevice);
-  if (shape == "cube") {
-    return "cube: its " + choice(report, shape, 12) +
+  if (is_flat_sided(shape)) {
+    const int only = std::ranges::find(report.rows, shape, &AccuracyRow::shape)->triangles;
+    return shape + ": its " + choice(report, shape, only) +
            " are the shape itself: there is nothing to choose (errors below " +
-           significant(1e3 * worse(report, shape, 12, depth_of)) + " mm and " +
-           significant(worse(report, shape, 12, normal_of) / kDegree) + " degrees).";
+           significant(1e3 * worse(report, shape, only, depth_of)) + " mm and " +
+           significant(worse(report, shape, only, normal_of) / kDegree) + " degrees).";
   }
   const auto within = [&](int triangles) {
     return significant(worse(report, shape, triangles, normal_of) / kDegree) + " degrees and " +
@@ -230,20 +232,41 @@ std::string recommendation(const AccuracyReport& report, const std::string& shap
          " to be finer than the device resolves (within " + within(device) + ").";
 }
 
+ShapeNeeds needs_of_shape(const std::string& name) {
+  for (const ShapeKind shape : kShapes) {
+    if (name == needs_of(shape).name) return needs_of(shape);
+  }
+  return {};
+}
+
+bool is_flat_sided(const std::string& shape) {
+  const ShapeNeeds needs = needs_of_shape(shape);
+  return !needs.subdivisions && !needs.segments;
+}
+
+std::vector<std::string> measured_shapes(const AccuracyReport& report) {
+  std::vector<std::string> all;
+  for (const AccuracyRow& row : report.rows) {
+    if (std::find(all.begin(), all.end(), row.shape) == all.end()) all.push_back(row.shape);
+  }
+  return all;
+}
+
 std::vector<std::string> recommendations(const AccuracyReport& report) {
   std::vector<std::string> all;
-  for (const char* shape : kAccuracyShapes) all.push_back(recommendation(report, shape));
+  for (const std::string& shape : measured_shapes(report)) {
+    all.push_back(recommendation(report, shape));
+  }
   return all;
 }
 
 std::vector<Table> accuracy_tables(const AccuracyReport& report) {
   std::vector<Table> tables;
-  if (!report.rows.empty()) {
-    for (const char* shape : kAccuracyShapes) tables.push_back(tessellation_table(report, shape));
-    for (const char* shape : kAccuracyShapes) {
-      for (const int triangles : tessellations_shown(report, shape)) {
-        tables.push_back(method_table(report, shape, triangles));
-      }
+  const std::vector<std::string> shapes = measured_shapes(report);
+  for (const std::string& shape : shapes) tables.push_back(tessellation_table(report, shape));
+  for (const std::string& shape : shapes) {
+    for (const int triangles : tessellations_shown(report, shape)) {
+      tables.push_back(method_table(report, shape, triangles));
     }
   }
   if (!report.first_contacts.empty()) tables.push_back(first_contact_table(report));
