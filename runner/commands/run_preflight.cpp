@@ -116,6 +116,11 @@ PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
     }
     Checklist list = preflight.checklist();
     list.instruction += way_on(at, state.sample.trouble);
+    if (!state.fault.empty()) {  // nothing else is obeyed before
+      list.instruction = "forces are off: " + state.fault +
+                         "; next: " + at.display.console().name_of(Kind::clear_fault);
+      list.choices.clear();
+    }
     const std::int64_t now = at.clock.now_ns();
     // What is missing changes while the stylus moves: no more often than one can read.
     if (list.instruction != told && now - told_ns > 1'000'000'000) {

@@ -52,6 +52,8 @@ std::vector<std::string> news(const RunParts& at, const SessionPlan& plan) {
   std::vector<std::string> out;
   const std::string resumed = resumption(at.store, at.participant, at.session, plan);
   if (!resumed.empty()) out.push_back(resumed);
+  const std::string unreadable = at.display.unreadable();
+  if (!unreadable.empty()) out.push_back("WARNING: " + unreadable);
   return out;
 }
 

@@ -118,7 +118,7 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
     window.clock = &clock;
     try {
       auto windows = make_windows(window);
-      const std::string missing = missing_letters(window.texts);
+      const std::string missing = windows->unreadable();
       if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
       const std::string warning = windows->warning();
       if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());

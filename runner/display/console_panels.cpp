@@ -17,6 +17,7 @@ const ImVec4 kBright{0.95F, 0.94F, 0.91F, 1};
 const ImVec4 kGood{0.47F, 0.78F, 0.55F, 1};
 const ImVec4 kBad{0.97F, 0.46F, 0.40F, 1};
 const ImVec4 kButton{0.20F, 0.24F, 0.28F, 1};
+const ImVec4 kDue{0.16F, 0.42F, 0.27F, 1};
 const ImVec4 kRed{0.74F, 0.16F, 0.15F, 1};
 const ImVec4 kRedLit{0.86F, 0.23F, 0.21F, 1};
 
@@ -27,8 +28,7 @@ void text(const ImVec4& colour, const std::string& words) {
 }
 
 void row(const char* name, const std::string& value, const ImVec4& colour = kBright) {
-  ImGui::TableNextRow();
-  ImGui::TableNextColumn();
+  ImGui::TableNextColumn();  // a new row where the last one is full
   text(kQuiet, name);
   ImGui::TableNextColumn();
   text(colour, value);
@@ -40,22 +40,20 @@ std::string number(double value, int digits) {
   return out.data();
 }
 
-bool wide_button(const char* words, float width, bool lit = false) {
-  if (lit) ImGui::PushStyleColor(ImGuiCol_Button, ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+enum class Look { plain, lit, due };  ///< due: what to press next
+
+bool wide_button(const char* words, float width, Look look = Look::plain) {
+  if (look != Look::plain) {
+    ImGui::PushStyleColor(ImGuiCol_Button, look == Look::due
+                                               ? kDue
+                                               : ImGui::GetStyleColorVec4(ImGuiCol_ButtonActive));
+  }
   const bool pressed = ImGui::Button(words, ImVec2(width, 2.0F * ImGui::GetFontSize()));
-  if (lit) ImGui::PopStyleColor();
+  if (look != Look::plain) ImGui::PopStyleColor();
   return pressed;
 }
 
-/// What goes with the state's word.
-std::string beside_state(const ConsoleState& state) {
-  if (!state.stop_plan.empty()) return state.stop_plan;
-  if (state.seconds_left > 0) return in_words(state.seconds_left) + " left";
-  if (state.state != "homing") return {};
-  if (state.sample.waiting == Waiting::for_distance) return "stylus too near: move it away";
-  if (state.sample.waiting == Waiting::for_rest) return "stylus must rest: hold it still";
-  return {};
-}
+bool off(const ConsoleState& state) { return (state.sample.faults & servo_fault::kTripped) != 0; }
 
 const char* word(ConsoleCommand::Kind kind) {
   return kind == ConsoleCommand::Kind::go_on          ? "Go on"
@@ -88,34 +86,53 @@ void style_console(float scale) {
   colour(ImGuiCol_ButtonActive, {0.31F, 0.43F, 0.55F, 1});
   colour(ImGuiCol_PlotHistogram, {0.38F, 0.58F, 0.76F, 1});
   colour(ImGuiCol_Text, kBright);
+  colour(ImGuiCol_TextDisabled, kQuiet);
   colour(ImGuiCol_ModalWindowDimBg, {0, 0, 0, 0.5F});
   style.ScaleAllSizes(scale);
 }
 
-void draw_status(const ConsoleState& state, bool hidden) {
-  text(kQuiet,
-       state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session));
-  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
-  text(kBright, state.state.empty() ? "waiting" : state.state);
-  ImGui::PopFont();
-  const std::string beside = beside_state(state);
-  if (!beside.empty()) {
-    ImGui::SameLine();
-    text(state.stop_plan.empty() ? kBright : kBad, beside);
-  }
+namespace {
+
+void progress(const ConsoleState& state) {
   const float done = state.trials > 0 ? static_cast<float>(std::max(state.trial - 1, 0)) /
                                             static_cast<float>(state.trials)
                                       : 0.0F;
   ImGui::ProgressBar(std::min(done, 1.0F), {-1, 6}, "");
-  if (!ImGui::BeginTable("status", 2)) return;
-  ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 7.5F * ImGui::GetFontSize());
-  ImGui::TableSetupColumn("value");
+}
+
+void title(const ConsoleState& state) {
+  const float font = ImGui::GetFontSize();
+  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
+  text(state.state == "fault" ? kBad : kBright, state_title(state));
+  ImGui::PopFont();
+  const ImVec2 corner = ImGui::GetItemRectMax();
+  ImGui::GetWindowDrawList()->AddText(
+      {corner.x + ImGui::GetStyle().ItemSpacing.x, corner.y - 1.35F * font},
+      ImGui::GetColorU32(state.stop_plan.empty() ? kBright : kBad), beside_state(state).c_str());
+}
+
+std::string of(int number, int all) {
+  return all > 0 ? std::to_string(number) + " of " + std::to_string(all) : "-";
+}
+
+}  // namespace
+
+void draw_status(const ConsoleState& state, bool hidden, bool beside) {
+  text(kQuiet,
+       state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session));
+  title(state);
+  if (beside && !state.checklist.steps.empty()) return;  // no trial yet: the room is needed
+  progress(state);
+  if (!ImGui::BeginTable("status", beside ? 4 : 2)) return;
+  for (int i = 0; i < (beside ? 2 : 1); ++i) {
+    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed,
+                            (beside ? 6.0F : 7.5F) * ImGui::GetFontSize());
+    ImGui::TableSetupColumn("value");
+  }
   const bool practice = state.practice && (state.state == "trial" || state.state == "homing");
-  row("Trial",
-      std::to_string(state.trial) + " of " + std::to_string(state.trials) +
-          (practice ? "  PRACTICE" : ""),
+  row("Trial", of(state.trial, state.trials) + (practice ? "  PRACTICE" : ""),
       practice ? kGood : kBright);
-  row("Block", std::to_string(state.block) + " of " + std::to_string(state.blocks));
+  row("Block", of(state.block, state.blocks));
   row("Shape", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
   row("Renderer", state.renderer.empty() ? "-" : state.renderer);
   row("Last answer", state.answer.empty() ? "-" : hidden ? "hidden" : state.answer);
@@ -151,19 +168,25 @@ void draw_ending(Ending& ending, float half, std::vector<ConsoleCommand>& asked)
 
 }  // namespace
 
-void draw_buttons(const ConsoleState& state, Ending& ending, std::vector<ConsoleCommand>& asked) {
+void draw_buttons(const ConsoleState& state, bool beside, Ending& ending,
+                  std::vector<ConsoleCommand>& asked) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
   if (ending.asked) {
     draw_ending(ending, half, asked);
     return;
   }
-  const auto button = [&](const char* words, Kind kind, bool lit = false) {
-    if (wide_button(words, half, lit)) asked.push_back({kind, {}, 0});
+  if (beside && !state.checklist.steps.empty()) {
+    if (wide_button("End now...", half)) ending.asked = true;
+    return;
+  }
+  const auto button = [&](const char* words, Kind kind, bool lit = false, bool due = false) {
+    const Look look = due ? Look::due : lit ? Look::lit : Look::plain;
+    if (wide_button(words, half, look)) asked.push_back({kind, {}, 0});
   };
   button("Pause", Kind::pause, state.state == "paused");
   ImGui::SameLine();
-  button("Go on", Kind::go_on);
+  button("Go on", Kind::go_on, false, !state.held_by.empty() && !off(state));
   button("Stop after trial", Kind::stop_after_trial, state.stop_plan == "after this trial");
   ImGui::SameLine();
   button("Stop after block", Kind::stop_after_block, state.stop_plan == "after this block");
@@ -197,25 +220,25 @@ float draw_emergency(bool lit) {
 
 void draw_forces_off(const ConsoleState& state, double silence,
                      std::vector<ConsoleCommand>& asked) {
-  const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
   // Always there, so that no other button moves under the hand when forces go off.
-  const float clear = 8 * ImGui::GetFontSize();
-  ImGui::BeginChild("forces",
-                    {ImGui::GetContentRegionAvail().x - clear - ImGui::GetStyle().ItemSpacing.x,
-                     4.25F * ImGui::GetFontSize()});
+  const float font = ImGui::GetFontSize(), room = ImGui::GetContentRegionAvail().x;
+  const float clear = 8 * font, gap = ImGui::GetStyle().ItemSpacing.x;
+  const float wide = (room - clear) / font;
+  const float lines = wide < 18 ? 6.25F : wide < 24 ? 4.25F : 3.25F;
+  ImGui::BeginChild("forces", {room - clear - gap, lines * font});
   ImGui::PushTextWrapPos(0);
   if (silence > 0) {
     text(kBad, "No news from the session for " + in_words(silence));
-  } else if (!state.held_by.empty()) {
-    text(off ? kBad : kBright, (off ? "Forces are off: " : "") + state.held_by);
   } else {
-    text(off ? kBad : kQuiet, off ? "Forces are off: " + forces_off_reason(state) : "No fault");
+    const bool alarm = off(state) && !not_on_yet(state);
+    text(alarm ? kBad : state.held_by.empty() ? kQuiet : kBright, words_of_forces(state));
   }
   ImGui::PopTextWrapPos();
   ImGui::EndChild();
   ImGui::SameLine();
-  ImGui::BeginDisabled(!off);
-  if (wide_button("Clear the fault", clear)) asked.push_back({Kind::clear_fault, {}, 0});
+  ImGui::BeginDisabled(!off(state));
+  const Look look = off(state) && !not_on_yet(state) ? Look::due : Look::plain;
+  if (wide_button("Clear the fault", clear, look)) asked.push_back({Kind::clear_fault, {}, 0});
   ImGui::EndDisabled();
 }
 
@@ -292,7 +315,9 @@ void draw_checklist(const Checklist& list, Ending& ending, std::vector<ConsoleCo
   ImGui::PopFont();
   draw_choices(list, ending, asked);
   ImGui::Dummy({0, 0.4F * font});
-  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
+  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
+  const bool small = ImGui::GetContentRegionAvail().y < 9 * font;
+  ImGui::PushFont(small ? fonts.front() : fonts.back());
   if (ImGui::BeginTable("steps", 2)) {
     ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 8 * font);
     ImGui::TableSetupColumn("step");
@@ -309,13 +334,20 @@ void draw_checklist(const Checklist& list, Ending& ending, std::vector<ConsoleCo
   ImGui::PopFont();
 }
 
-void draw_health(const ConsoleState& state) {
+void draw_health(const ConsoleState& state, bool brief) {
   const Sample& sample = state.sample;
   if (!ImGui::BeginTable("health", 2)) return;
   ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 7.5F * ImGui::GetFontSize());
   ImGui::TableSetupColumn("value");
   const std::string faults = fault_words(sample.faults);
-  row("Servo", faults.empty() ? "sound" : faults, faults.empty() ? kGood : kBad);
+  row("Servo", faults.empty() ? "sound" : faults,
+      faults.empty()      ? kGood
+      : not_on_yet(state) ? kQuiet
+                          : kBad);
+  if (brief) {
+    ImGui::EndTable();
+    return;
+  }
   row("Period", number(static_cast<double>(sample.period_ns) * 1e-6, 3) + " ms, longest " +
                     number(static_cast<double>(state.longest_period_ns) * 1e-6, 2) + " ms");
   row("Computing", number(static_cast<double>(sample.compute_ns) * 1e-3, 1) + " µs");

@@ -50,16 +50,16 @@ std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modif
   const bool narrow = room.x < 44 * font;
   const float side = std::clamp(0.36F * room.x, 22 * font, 30 * font);
   const bool checks = !state_.checklist.steps.empty();
-  const float high = checks    ? 0.55F * room.y
-                     : hidden_ ? 7 * font
-                               : std::clamp(0.3F * room.y, 8 * font, 16 * font);
+  const float least = (checks || !hidden_ ? 7.5F : 6.5F) * font;
+  const float high = std::clamp(room.y - controls_ - least_notes() - gap, least,
+                                std::max(least, (checks ? 0.6F : 0.45F) * room.y));
   ImGui::BeginChild("picture", narrow ? ImVec2{0, high} : ImVec2{room.x - side - gap, 0}, false,
                     ImGuiWindowFlags_NoScrollbar);
   draw_picture(modifiers, !narrow, asked);
   ImGui::EndChild();
   if (!narrow) ImGui::SameLine();
-  ImGui::BeginChild("side", {0, 0});
-  draw_side(now, asked);
+  ImGui::BeginChild("side", {0, 0}, false, ImGuiWindowFlags_NoScrollbar);
+  draw_side(now, narrow, asked);
   ImGui::EndChild();
   ImGui::End();
   return asked;
@@ -162,29 +162,51 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   ImGui::SetCursorScreenPos({at.x, at.y + height + ImGui::GetStyle().ItemSpacing.y});
 }
 
-void ConsoleView::draw_side(double now, std::vector<ConsoleCommand>& asked) {
+float ConsoleView::least_notes() {
+  return 5.5F * ImGui::GetFontSize() + ImGui::GetFrameHeightWithSpacing() +
+         ImGui::GetStyle().ItemSpacing.y;
+}
+
+// In a small window the controls scroll, the newest message never does.
+void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>& asked) {
+  const float room = ImGui::GetContentRegionAvail().y;
+  const float notes = std::max(least_notes(), room - controls_);
+  ImGui::BeginChild("controls", {0, std::max(room - notes, 1.0F)});
   draw_forces_off(state_, any_ && now - came_ > kSilence ? now - came_ : 0, asked);
-  draw_status(state_, hidden_);
-  draw_buttons(state_, ending_, asked);
+  draw_status(state_, hidden_, narrow);
+  draw_buttons(state_, narrow, ending_, asked);
   ImGui::Dummy({0, 2});
-  draw_health(state_);
+  draw_health(state_, narrow || room < 46 * ImGui::GetFontSize());
   ImGui::Dummy({0, 2});
+  controls_ = ImGui::GetCursorPosY();
+  ImGui::EndChild();
   draw_notes(asked);
 }
 
 void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
   const float field = ImGui::GetFrameHeightWithSpacing();
-  const float room = std::max(ImGui::GetContentRegionAvail().y - field, 5 * ImGui::GetFontSize());
+  const float room = std::max(ImGui::GetContentRegionAvail().y - field, ImGui::GetFontSize());
   ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
-  ImGui::BeginChild("messages", {0, room}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
+  ImGui::BeginChild(
+      "messages", {0, room}, false,
+      ImGuiWindowFlags_AlwaysUseWindowPadding | ImGuiWindowFlags_AlwaysVerticalScrollbar);
   ImGui::PushTextWrapPos(0);
   for (const std::string& message : state_.messages) {
+    const bool newest = &message == &state_.messages.back();
+    ImGui::PushStyleColor(ImGuiCol_Text,
+                          ImGui::GetStyleColorVec4(newest ? ImGuiCol_Text : ImGuiCol_TextDisabled));
     ImGui::TextUnformatted(message.c_str(), message.c_str() + message.size());
+    ImGui::PopStyleColor();
   }
   ImGui::PopTextWrapPos();
+  // How far down it goes is known a frame after it was drawn first.
   const std::size_t count = state_.older_messages + state_.messages.size();
-  if (count != messages_seen_) ImGui::SetScrollHereY(1);
+  if (count != messages_seen_) frames_to_scroll_ = 3;
   messages_seen_ = count;
+  if (frames_to_scroll_ > 0) {
+    ImGui::SetScrollY(ImGui::GetScrollMaxY());
+    --frames_to_scroll_;
+  }
   ImGui::EndChild();
   ImGui::PopStyleColor();
   ImGui::SetNextItemWidth(-1);

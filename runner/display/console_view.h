@@ -51,8 +51,9 @@ class ConsoleView {
                     std::vector<ConsoleCommand>& asked);
   void draw_hidden(float width, float height);
   void draw_view(const Modifiers& modifiers, float width, float height);
-  void draw_side(double now, std::vector<ConsoleCommand>& asked);
+  void draw_side(double now, bool narrow, std::vector<ConsoleCommand>& asked);
   void draw_notes(std::vector<ConsoleCommand>& asked);
+  static float least_notes();  ///< px, of the newest messages and the field for a note
 
   SceneView scene_;
   Camera camera_;
@@ -66,7 +67,9 @@ class ConsoleView {
   Ending ending_;
   float emergency_to_ = 40;  ///< px, its lower edge; it is as wide as the window
   bool emergency_lit_ = false;
+  float controls_ = 1;  ///< px, height of all between picture and messages, as drawn last
   std::size_t messages_seen_ = 0;
+  int frames_to_scroll_ = 0;  ///< to the newest message
 };
 
 }  // namespace palpate

@@ -54,6 +54,40 @@ std::string forces_off_reason(const ConsoleState& state) {
   return words.empty() ? "they have not been cleared since the last fault" : words;
 }
 
+std::string state_title(const ConsoleState& state) {
+  if (state.state.empty()) return "waiting";
+  return state.seconds_left > 0 || state.state == "rest" ? "break" : state.state;
+}
+
+std::string beside_state(const ConsoleState& state) {
+  if (!state.stop_plan.empty()) return "stops " + state.stop_plan;
+  if (!state.held_by.empty()) return {};
+  if (state.seconds_left > 0) return in_words(state.seconds_left) + " left";
+  for (const char* const page : {"instructions", "practice begins", "block begins", "rest"}) {
+    if (state.state == page) return "space bar goes on";
+  }
+  if (state.state == "end") return "space bar ends it";
+  if (state.state != "homing") return {};
+  if (state.sample.waiting == Waiting::for_distance) return "stylus too near: move it away";
+  if (state.sample.waiting == Waiting::for_rest) return "stylus must rest: hold it still";
+  return {};
+}
+
+bool not_on_yet(const ConsoleState& state) {
+  const DeviceTrouble trouble = state.sample.trouble;
+  return !state.checklist.steps.empty() && state.fault.empty() &&
+         trouble != DeviceTrouble::unplugged && trouble != DeviceTrouble::silent;
+}
+
+std::string words_of_forces(const ConsoleState& state) {
+  const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
+  if (!off) return state.held_by.empty() ? "No fault" : state.held_by;
+  if (not_on_yet(state)) return "Forces are off: none is needed yet";
+  if (!state.held_by.empty()) return "Forces are off: " + state.held_by;
+  return "Forces are off: " + forces_off_reason(state) + "; next: '" +
+         button_words(ConsoleCommand::Kind::clear_fault) + "'";
+}
+
 std::string in_words(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "-";
   const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };

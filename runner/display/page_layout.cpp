@@ -8,7 +8,7 @@
 namespace palpate {
 namespace {
 
-constexpr double kSmallestUnit = 13;  // px, at scale 1
+constexpr double kSmallestUnit = 14;  // px, at scale 1
 constexpr std::size_t kMostScreens = 200;
 constexpr double kSmallest = 0.45;  // of the normal size; below it text is cut off instead
 
@@ -62,7 +62,8 @@ class PageFrame {
     const bool goes_on = page.kind == Page::Kind::text;
     go_on_top_ = height - margin - 1.9 * unit_;
     keys_top_ = (goes_on ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
-    reply_top_ = (page.keys.empty() ? (goes_on ? go_on_top_ : height) : keys_top_) - 2.4 * unit_;
+    reply_top_ =
+        (page.keys.empty() ? (goes_on ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
     top_ = margin + 0.6 * unit_;
     count_top_ = reply_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);
     room_ = count_top_ - margin / 2 - top_;
@@ -86,7 +87,8 @@ class PageFrame {
       draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
     } else {
       const bool large = page_.kind != Page::Kind::message;
-      draw_text(canvas_, page_.text, (large ? 2.6 : 1.8) * unit_, kSmallest * unit_, width_,
+      const double letters = page_.kind == Page::Kind::feedback ? 8 : large ? 2.6 : 1.8;
+      draw_text(canvas_, page_.text, letters * unit_, kSmallest * unit_, width_,
                 text_width(width_, unit_), top_, room_, page_.go ? kGo : kText, large);
     }
   }

@@ -127,12 +127,12 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
   if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
   const double instructions = std::max(room - 4 * unit - steps - unit, 3 * unit);
   Words how(canvas, instruction, kLetters * unit, line_width);
-  for (double size = kLetters * unit; how.size().height > instructions && size > 0.6 * unit;) {
+  for (double size = kLetters * unit; how.size().height > instructions && size > unit;) {
     size *= 0.94;
     how.set_size(size);
   }
   how.draw(canvas, left, y, kText);
-  y += std::min(how.size().height, instructions) + 2 * unit;
+  y += how.size().height + 2 * unit;  // where not all fits, the last steps are cut off, not this
   for (const Checklist::Step& step : list.steps) {
     const bool now = step.state == State::now;
     const char* const mark = step.state == State::done       ? "\u2713"

@@ -92,8 +92,8 @@ std::string missing_letters(const std::vector<std::string>& texts) {
     }
   }
   if (missing.empty()) return {};
-  return std::to_string(missing.size()) +
-         " letters of the protocol's texts are in no installed font (" + shown +
+  return "the participant sees boxes instead of " + std::to_string(missing.size()) +
+         " letters of the protocol's texts, which are in no installed font (" + shown +
          (missing.size() > 10 ? "...)" : ")") +
          ": install one that has them, for example the package fonts-noto-core or fonts-noto-cjk";
 }

@@ -78,6 +78,8 @@ class Windows final : public DisplayLoop {
     return text;
   }
 
+  std::string unreadable() const override { return missing_letters(settings_.texts); }
+
   void run() override {
     try {
       while (!ended_.load() && !window_gone_) {

@@ -41,6 +41,8 @@ class DisplayLoop {
   virtual ExperimenterConsole& console() = 0;
   /// What the experimenter should know of the monitors: a sentence; empty: nothing.
   virtual std::string warning() const { return {}; }
+  /// What of the protocol's texts it cannot show: a sentence; empty: nothing.
+  virtual std::string unreadable() const { return {}; }
   /// Shows both until end() or until the display dies. On the main thread, that made the windows.
   virtual void run() = 0;
   virtual void end() noexcept = 0;

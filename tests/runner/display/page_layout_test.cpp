@@ -122,6 +122,33 @@ TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
   EXPECT_EQ(inked_rows(plain) < inked_rows(counted) && inked_rows(counted) < inked_rows(far), true);
 }
 
+TEST(PageLayout, AReplyInABreakStandsOffTheEdge) {
+  Page page;
+  page.text = "Rest your hand.";
+  page.seconds_left = 25;
+  page.reply = "This key does nothing now.";
+  for (const auto& [width, height] : {std::pair{389, 728}, {1280, 800}}) {
+    const Image image = draw_page(page, width, height);
+    keep(image, "reply" + std::to_string(width));
+    const std::ptrdiff_t edge = static_cast<std::ptrdiff_t>(height / 34) * width;
+    EXPECT_TRUE(std::all_of(image.pixels.end() - edge, image.pixels.end(),
+                            [](auto p) { return p == ground_colour(); }));
+  }
+}
+
+TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
+  Page page;
+  page.kind = Page::Kind::checklist;
+  page.checklist.steps = {{"Home the device", Checklist::Step::State::done},
+                          {"Feel a feeble push to the right", Checklist::Step::State::now}};
+  for (int i = 0; i < 20; ++i) page.checklist.instruction += "Hold the grip and wait. ";
+  const Image image = draw_page(page, 389, 728);
+  keep(image, "checklist389");
+  EXPECT_TRUE(border_is_clear(image));
+  page.checklist.instruction += page.checklist.instruction;
+  EXPECT_GT(inked_rows(draw_page(page, 389, 728)), inked_rows(image)) << "more text, more lines";
+}
+
 TEST(PageLayout, EveryScriptFindsItsPlace) {
   Page page;
   page.kind = Page::Kind::text;
@@ -185,8 +212,12 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
 TEST(PageLayout, OtherKindsOfPages) {
   Page page;
   page.kind = Page::Kind::feedback;
-  page.text = "Right";
-  keep(draw_page(page, 1280, 800), "feedback");
+  page.text = "\u2713";
+  for (const auto& [width, height] : {std::pair{389, 728}, {1280, 800}, {1516, 1600}}) {
+    const Image feedback = draw_page(page, width, height);
+    keep(feedback, "feedback" + std::to_string(width));
+    EXPECT_GT(inked_rows(feedback), height / 14) << "seen at a glance";
+  }
   page.kind = Page::Kind::message;
   page.text = "A short break. The experimenter will go on with you.";
   const Image message = draw_page(page, 1280, 800);

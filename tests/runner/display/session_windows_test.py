@@ -106,7 +106,7 @@ class SessionTest(unittest.TestCase):
     def clear_and_go_on(self):
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - 60, 90)  # clear the fault
-        self.screen.click(self.console, width - 100, 388)  # go on
+        self.screen.click(self.console, width - 100, 420)  # go on
 
     def messages(self):
         return (self.folder / "messages.txt").read_text()
@@ -328,7 +328,7 @@ class SessionTest(unittest.TestCase):
         """The word beside "Servo" on the console is red."""
         width, _ = self.screen.size(self.console)
         return any(red > 180 and green < 140
-                   for red, green, _ in self.screen.pixels(self.console, width - 234, 505, 120, 16))
+                   for red, green, _ in self.screen.pixels(self.console, width - 234, 537, 120, 16))
 
     def click_emergency(self):
         """What is on record of it waits in memory until the first trial has begun."""
@@ -340,7 +340,7 @@ class SessionTest(unittest.TestCase):
     def click_button(self, row, column):
         """Of the six: rows from 0, columns from 0."""
         width, _ = self.screen.size(self.console)
-        self.screen.click(self.console, width - (250 if column == 0 else 60), 388 + 40 * row)
+        self.screen.click(self.console, width - (250 if column == 0 else 60), 420 + 40 * row)
 
     def test_the_emergency_button_works_in_every_state_and_over_every_dialog(self):
         self.write_protocol(material={"stiffness_n_per_m": 100}, practice={"repetitions": 1},
@@ -360,7 +360,7 @@ class SessionTest(unittest.TestCase):
         self.clear_and_go_on()
         def write_a_reason():
             self.click_button(2, 1)
-            self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 443)
+            self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 475)
             self.screen.do("type", "--delay", 100, "why 1")
 
         dialogs = {"none": lambda: None, "end": lambda: self.click_button(2, 1),
@@ -376,7 +376,7 @@ class SessionTest(unittest.TestCase):
                                        "IS NOT NULL ORDER BY id DESC LIMIT 1"),
                              [("zero force was asked for",)], name)
             if name in ("end", "reason"):
-                self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 481)  # back
+                self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 513)  # back
             self.clear_and_go_on()
         wait_for("a practice trial", lambda: self.forces_are_on())
         self.answer()

@@ -21,7 +21,7 @@ EMERGENCY, PAUSE, NOTE, QUIT = 5, 0, 7, 8
 
 def END_NOW(width):
     """The button that asks whether to end, px."""
-    return width - 60, 468
+    return width - 60, 500
 
 
 class Windows:
@@ -335,6 +335,7 @@ class OneMonitor(unittest.TestCase):
         self.assertIn("hides shape and scene", windows.before[0])
         windows.say("state cone 0")
         wait_for("the console", lambda: self.screen.pixels(windows.console, 30, 13)[0][0] > 150)
+        time.sleep(1)  # the red button comes before the state
         hidden = self.screen.settled_picture(windows.console)
         self.screen.keep(windows.console, "console_hidden")
         windows.say("state cube 0")
@@ -354,6 +355,29 @@ class OneMonitor(unittest.TestCase):
         """Without the messages."""
         width, _ = self.screen.size(windows.console)
         return picture[:3 * width * 640]
+
+    def test_the_newest_message_is_in_sight_in_a_small_window(self):
+        windows = self.open("--no-mouse", size="1024x768")
+        width, height = self.screen.size(windows.console)
+
+        def newest():
+            return self.screen.pixels(windows.console, 10, height - 115, width - 40, 65)
+
+        def check(word):
+            seen = []
+            for shape in ["cone", "cylinder"]:  # which the newest message names
+                windows.say(f"state {shape} {384 if word == 'fault' else 0} {word}")
+                time.sleep(1)
+                self.screen.settled_picture(windows.console)
+                seen.append(newest())
+            self.screen.keep(windows.console, f"console_1024_{word}")
+            self.assertTrue(seen[0] != seen[1], word)
+
+        for word in ["pre-flight", "instructions", "homing", "trial", "rest", "paused", "fault"]:
+            check(word)
+        self.screen.click(windows.console, 100, 150)  # show them
+        check("trial")
+        self.screen.keep(windows.console, "console_1024_shown")
 
     def test_full_screen_leaves_the_participants_page_uncovered(self):
         for size in ["1024x768", "1920x1080"]:

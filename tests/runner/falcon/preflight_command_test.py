@@ -34,14 +34,15 @@ class Preflight(FalconSession):
         terminal.wait_for("move the stylus 26 mm from the centre")
         terminal.type("\x1b")
         terminal.wait_for("EMERGENCY by the key Escape: forces are off until the fault is cleared")
+        terminal.wait_for("orces are off: zero force was asked for by the key Escape; next: ':clear'")
         terminal.type(":go\n")  # it is not obeyed before the fault is cleared
         for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
             self.hand(*place)
             self.control.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
                 self.state()["position_m"], (place[0], place[1], 0.125 + place[2]))))
             time.sleep(0.1)  # some ticks
-        terminal.wait_for("press button 1 of the device")
         terminal.type(":clear\n")
+        terminal.wait_for("press button 1 of the device")
         self.hand(*AWAY)
         self.press(1)
         self.press(2)

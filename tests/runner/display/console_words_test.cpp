@@ -1,0 +1,63 @@
+#include <gtest/gtest.h>
+
+#include "runner/display/console_panels.h"
+#include "runner/servo_fault.h"
+
+namespace palpate {
+namespace {
+
+ConsoleState in(const char* word) {
+  ConsoleState state;
+  state.state = word;
+  return state;
+}
+
+TEST(ConsoleWords, ABreakIsCalledABreakAndSaysHowLong) {
+  ConsoleState state = in("block begins");
+  state.seconds_left = 90;
+  EXPECT_EQ(state_title(state), "break");
+  EXPECT_EQ(beside_state(state), "1 min 30 s left");
+  state.seconds_left = 0;
+  EXPECT_EQ(state_title(state), "block begins");
+  EXPECT_EQ(state_title(in("rest")), "break");
+}
+
+TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
+  for (const char* const word : {"instructions", "practice begins", "block begins", "rest"})
+    EXPECT_EQ(beside_state(in(word)), "space bar goes on") << word;
+  EXPECT_EQ(beside_state(in("end")), "space bar ends it");
+  EXPECT_EQ(beside_state(in("trial")), "");
+  ConsoleState held = in("rest");
+  held.held_by = "'Go on' goes on";
+  EXPECT_EQ(beside_state(held), "") << "the space bar does not";
+}
+
+TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
+  ConsoleState state = in("rest");
+  EXPECT_EQ(words_of_forces(state), "No fault");
+  state.sample.faults = servo_fault::kTripped | servo_fault::kEmergency;
+  state.fault = "zero force was asked for by the key F12";
+  EXPECT_EQ(words_of_forces(state),
+            "Forces are off: zero force was asked for by the key F12; next: 'Clear the fault'");
+  state.held_by = "the device is unplugged; 'Clear the fault', then 'Go on', goes on";
+  EXPECT_EQ(words_of_forces(state), "Forces are off: " + state.held_by);
+  state.sample.faults = 0;
+  EXPECT_EQ(words_of_forces(state), state.held_by);
+}
+
+TEST(ConsoleWords, BeforeTheFirstTrialForcesThatAreOffAreNoAlarm) {
+  ConsoleState state = in("pre-flight");
+  state.checklist.steps = {{"Home the device", Checklist::Step::State::now}};
+  state.sample.faults = servo_fault::kTripped | servo_fault::kDeviceLost;
+  EXPECT_TRUE(not_on_yet(state));
+  EXPECT_EQ(words_of_forces(state), "Forces are off: none is needed yet");
+  state.sample.trouble = DeviceTrouble::unplugged;
+  EXPECT_FALSE(not_on_yet(state)) << "to clear it opens the device again";
+  state.sample.trouble = DeviceTrouble::none;
+  state.fault = "zero force was asked for by the key F12";
+  EXPECT_FALSE(not_on_yet(state));
+  EXPECT_NE(words_of_forces(state).find("F12; next: 'Clear the fault'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate
