@@ -94,10 +94,7 @@ void style_console(float scale) {
 namespace {
 
 void progress(const ConsoleState& state) {
-  const float done = state.trials > 0 ? static_cast<float>(std::max(state.trial - 1, 0)) /
-                                            static_cast<float>(state.trials)
-                                      : 0.0F;
-  ImGui::ProgressBar(std::min(done, 1.0F), {-1, 6}, "");
+  ImGui::ProgressBar(static_cast<float>(share_done(state)), {-1, 6}, "");
 }
 
 void title(const ConsoleState& state) {

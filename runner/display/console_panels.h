@@ -42,6 +42,8 @@ std::string forces_off_reason(const ConsoleState& state);
 /// What is going on, in a word or two, and what goes with it: what it waits for.
 std::string state_title(const ConsoleState& state);
 std::string beside_state(const ConsoleState& state);
+/// Of the session's trials, 0 to 1: the one that is said to be under way counts once it is over.
+double share_done(const ConsoleState& state);
 /// Forces are off as they have not been needed yet: nothing is wrong.
 bool not_on_yet(const ConsoleState& state);
 /// Whether forces are off, why, and what to press next.

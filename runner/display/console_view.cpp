@@ -175,8 +175,9 @@ void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>
   draw_forces_off(state_, any_ && now - came_ > kSilence ? now - came_ : 0, asked);
   draw_status(state_, hidden_, narrow);
   draw_buttons(state_, narrow, ending_, asked);
-  ImGui::Dummy({0, 2});
-  draw_health(state_, narrow || room < 46 * ImGui::GetFontSize());
+  const bool brief = narrow || room < 46 * ImGui::GetFontSize();
+  if (!brief) ImGui::Dummy({0, 2});
+  if (!(narrow && ending_.asked)) draw_health(state_, brief);
   ImGui::Dummy({0, 2});
   controls_ = ImGui::GetCursorPosY();
   ImGui::EndChild();

@@ -73,6 +73,13 @@ std::string beside_state(const ConsoleState& state) {
   return {};
 }
 
+double share_done(const ConsoleState& state) {
+  if (state.trials <= 0) return 0;
+  const bool over = state.seconds_left > 0 || state.state == "rest" ||
+                    state.state == "block begins" || state.state == "end";
+  return std::clamp((state.trial - (over ? 0.0 : 1.0)) / state.trials, 0.0, 1.0);
+}
+
 bool not_on_yet(const ConsoleState& state) {
   const DeviceTrouble trouble = state.sample.trouble;
   return !state.checklist.steps.empty() && state.fault.empty() &&

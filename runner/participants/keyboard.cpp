@@ -96,7 +96,10 @@ void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
   // Before it shows: whoever is quick answers before this thread goes on.
   const std::int64_t before_ns = clock_.now_ns();
-  show(between_trials(Page::Kind::text, text));
+  Page page = between_trials(Page::Kind::text, text);
+  // Asked for before anybody could tell that the last trial is on record.
+  if (&text == &protocol_.texts.end) page.done = page.trials;
+  show(std::move(page));
   wait_for_space(before_ns);
 }
 

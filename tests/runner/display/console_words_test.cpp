@@ -32,6 +32,21 @@ TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
   EXPECT_EQ(beside_state(held), "") << "the space bar does not";
 }
 
+TEST(ConsoleWords, TheBarCountsTheTrialThatIsOver) {
+  ConsoleState state = in("trial");
+  EXPECT_EQ(share_done(state), 0);
+  state.trial = 4;
+  state.trials = 8;
+  EXPECT_EQ(share_done(state), 3 / 8.0);
+  for (const char* const word : {"rest", "block begins"}) {
+    state.state = word;
+    EXPECT_EQ(share_done(state), 4 / 8.0) << word;
+  }
+  state.trial = 8;
+  state.state = "end";
+  EXPECT_EQ(share_done(state), 1);
+}
+
 TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
   ConsoleState state = in("rest");
   EXPECT_EQ(words_of_forces(state), "No fault");

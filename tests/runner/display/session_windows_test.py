@@ -172,6 +172,14 @@ class SessionTest(unittest.TestCase):
         self.assertEqual(sorted(seen), sorted(SHAPES))
         self.assertEqual(len(set.union(*seen.values())), 1)
         self.assertGreater(len(set(picture)), 20, "the key map")
+        width, _ = self.screen.size(self.participant)
+
+        def far_along_the_bar():
+            red, green, _ = self.screen.pixels(self.participant, int(0.8 * width), 18)[0]
+            return green > 1.4 * red
+
+        wait_for("the bar on the last page, full", far_along_the_bar)
+        self.screen.keep(self.participant, "session_end")
         self.finish()
         self.check_whole(cut_off=0)
 
