@@ -10,6 +10,7 @@
 #include "stimuli/convexity.h"
 #include "stimuli/coplanar.h"
 #include "stimuli/facet_outlines.h"
+#include "stimuli/grid_hull.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/polygon.h"
 
@@ -18,14 +19,27 @@ namespace {
 
 using Index = std::uint32_t;
 
+// How far a corner may be behind the hull of all, in errors: as far as it may be in front of a
+// facet (convexity.cpp).
+constexpr double kDeepest = 16 * kCoplanar;
+
+struct Bulk {
+  double volume = 0, area = 0;  // m^3, negative where it is inside out; m^2
+};
+
+Bulk bulk_of(const HalfEdges& mesh, const std::vector<FaceShape>& shapes) {
+  Bulk bulk;
+  for (const FaceShape& shape : shapes) {
+    bulk.volume += glm::dot(shape.middle - mesh.points[0], shape.normal) * shape.area / 3;
+    bulk.area += shape.area;
+  }
+  return bulk;
+}
+
 // Folds, thickness and orientation, face by face, before anything is merged.
 void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, MeshFaults& faults) {
   check_flatness(mesh, shapes, faults);
-  double volume = 0, area = 0;
-  for (const FaceShape& shape : shapes) {
-    volume += glm::dot(shape.middle - mesh.points[0], shape.normal) * shape.area / 3;
-    area += shape.area;
-  }
+  const auto [volume, area] = bulk_of(mesh, shapes);
   const bool closed =
       std::find(mesh.twin.begin(), mesh.twin.end(), HalfEdges::kNone) == mesh.twin.end();
   if (closed && !(std::abs(volume) > 2 * mesh.error * area)) {
@@ -115,6 +129,12 @@ class ConvexMesh::Builder {
   /// \return false where a region is no polygon
   static bool fill(ConvexMesh& out, const HalfEdges& mesh, const std::vector<Index>& region_of,
                    Index count, MeshFaults& faults);
+
+  /// Where corners crowd together their error hides the folds between some faces and not between
+  /// others, and what is merged then may be no polygon; the faces as they came have dents too fine
+  /// to be seen. The hull of their corners is a solid; it is taken if they are all but on it.
+  static bool fill_crowded(ConvexMesh& out, const HalfEdges& mesh,
+                           const std::vector<FaceShape>& shapes);
 
   void build() {
     clear();
@@ -251,6 +271,25 @@ bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
   return true;
 }
 
+bool ConvexMesh::Builder::fill_crowded(ConvexMesh& out, const HalfEdges& mesh,
+                                       const std::vector<FaceShape>& shapes) {
+  const GridHull hull = grid_hull(mesh.points, mesh.error);
+  if (hull.soup.faces.empty() || hull.depth > kDeepest * mesh.error) return false;
+  MeshFaults hull_faults;
+  const HalfEdges hull_mesh = link_half_edges(hull.soup, hull_faults);
+  if (!hull_faults.empty()) return false;
+  const std::vector<FaceShape> hull_shapes = shapes_of(hull_mesh);
+  // What winds round twice, say, has corners like its hull and folds that are convex.
+  const Bulk is = bulk_of(mesh, shapes), could_be = bulk_of(hull_mesh, hull_shapes);
+  if (std::abs(could_be.volume - is.volume) > kDeepest * mesh.error * is.area) return false;
+  Index count = 0;
+  const std::vector<Index> merged = coplanar_regions(hull_mesh, hull_shapes, count);
+  if (fill(out, hull_mesh, merged, count, hull_faults) && hull_faults.empty()) return true;
+  MeshFaults last_faults;
+  const std::vector<Index> triangles = single_regions(hull_mesh, hull_shapes, count);
+  return fill(out, hull_mesh, triangles, count, last_faults) && last_faults.empty();
+}
+
 ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   MeshFaults faults;
   const HalfEdges mesh = link_half_edges(soup, faults);
@@ -259,20 +298,13 @@ ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   faults.throw_if_any();
   Index count = 0;
   const std::vector<Index> merged = coplanar_regions(mesh, shapes, count);
-  if (count == 0) {
-    faults.add("flat", [] { return "expected a solid, found lines only"; });
-    faults.throw_if_any();
-  }
-  if (Builder::fill(*this, mesh, merged, count, faults)) {
-    faults.throw_if_any();
+  if (count == 0) faults.add("flat", [] { return "expected a solid, found lines only"; });
+  faults.throw_if_any();
+  if (!Builder::fill(*this, mesh, merged, count, faults) &&
+      Builder::fill_crowded(*this, mesh, shapes)) {
     return;
   }
-  // Where corners crowd together their error hides the folds between some faces and not between
-  // others, and what is merged then may be no polygon. The faces as they came may be a solid still.
-  MeshFaults single_faults;
-  const std::vector<Index> single = single_regions(mesh, shapes, count);
-  Builder::fill(*this, mesh, single, count, single_faults);
-  if (!single_faults.empty()) faults.throw_if_any();
+  faults.throw_if_any();
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -248,6 +249,40 @@ TEST(ConvexMesh, HullsOfCrowdedPointsAreNotRefused) {
               << "spread " << spread << " seed " << seed;
         }
       }
+    }
+  }
+}
+
+// Digits of a file round the corners of a crowd: some faces are dents then, too fine to be told
+// from flats, and the hull of the corners is what is meant.
+TEST(ConvexMesh, HullsOfCrowdedAndRoundedPointsAreNotRefused) {
+  for (const double spread : {0.1, 0.03, 0.01, 3e-3, 1e-3}) {
+    for (std::uint64_t seed = 1; seed < 6; ++seed) {
+      Random random(seed, {78});
+      const Vec3 crowd = uniform_rotation(random) * Vec3(0, 0, 1);
+      std::vector<Vec3> points;
+      for (int i = 0; i < 1500; ++i) {
+        const Vec3 anywhere = uniform_rotation(random) * Vec3(0, 0, 1);
+        const double away = spread * random.unit();
+        points.push_back(0.03 * (i % 10 == 0 ? anywhere : glm::normalize(crowd + away * anywhere)));
+      }
+      PolygonSoup soup = testing::hull_of(points);
+      // The corners' distances shrink with the spread, and the folds with their square.
+      const double step = 3e-6 * spread * spread;
+      for (Vec3& vertex : soup.vertices) vertex = step * glm::round(vertex / step);
+      soup.coordinate_error = step / 2;
+      const ConvexMesh mesh(soup);
+      double above = 0, below = 0;
+      for (const Vec3& vertex : soup.vertices) {
+        double highest = -1;
+        for (const Facet& facet : mesh.facets()) {
+          highest = std::max(highest, glm::dot(facet.normal, vertex) - facet.offset);
+        }
+        above = std::max(above, highest);
+        below = std::max(below, -highest);
+      }
+      EXPECT_LE(above, 64 * step) << "spread " << spread << " seed " << seed;
+      EXPECT_LE(below, 64 * step) << "spread " << spread << " seed " << seed;
     }
   }
 }
