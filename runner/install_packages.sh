@@ -1,20 +1,22 @@
 #!/usr/bin/env bash
-# Installs the Debian packages that are missing. Usage: install_packages.sh build|tests|quality
+# Installs the Debian packages that are missing. Usage: install_packages.sh build|package|tests|quality
 set -euo pipefail
 
 build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libjs-vega libsqlite3-dev
   libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config zlib1g-dev
   fonts-noto-core libasound2-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev libstb-dev libx11-dev)
+package=(dpkg-dev file help2man)  # `cmake --install` and cpack
 tests=(imagemagick libbenchmark-dev libbullet-dev libfcl-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
-  libumockdev-dev libxml2-utils python3 python3-jsonschema umockdev xdotool xvfb)
-quality=(chromium clang clang-format clang-tidy devscripts rt-tests valgrind)
+  libumockdev-dev libxml2-utils man-db python3 python3-jsonschema umockdev xdotool xvfb)
+quality=(chromium clang clang-format clang-tidy devscripts lintian rt-tests valgrind)
 
 case "${1:-}" in
   build) wanted=("${build[@]}") ;;
-  tests) wanted=("${build[@]}" "${tests[@]}") ;;
-  quality) wanted=("${build[@]}" "${tests[@]}" "${quality[@]}") ;;
+  package) wanted=("${build[@]}" "${package[@]}") ;;
+  tests) wanted=("${build[@]}" "${package[@]}" "${tests[@]}") ;;
+  quality) wanted=("${build[@]}" "${package[@]}" "${tests[@]}" "${quality[@]}") ;;
   *)
-    echo "usage: $0 build|tests|quality" >&2
+    echo "usage: $0 build|package|tests|quality" >&2
     exit 2
     ;;
 esac

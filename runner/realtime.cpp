@@ -81,7 +81,8 @@ RealtimeRights request_realtime(const RealtimeWish& wish) {
       add(rights.missing,
           std::string("No real-time priority (") + std::strerror(error) +
               "): other programs can make ticks late; grant CAP_SYS_NICE or a limit 'rtprio' of " +
-              std::to_string(wish.priority) + ".");
+              std::to_string(wish.priority) +
+              " (members of the package's group 'palpate' have it).");
     }
   }
   if (wish.lock_memory) {
@@ -90,7 +91,7 @@ RealtimeRights request_realtime(const RealtimeWish& wish) {
       add(rights.missing,
           std::string("Memory is not locked (") + std::strerror(errno) +
               "): a page fetched from disk can make a tick late; grant CAP_IPC_LOCK or raise the "
-              "limit 'memlock'.");
+              "limit 'memlock' (members of the package's group 'palpate' have it).");
     }
   }
   if (wish.core >= 0) {
