@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -66,7 +67,8 @@ void check_numbers(const PolygonSoup& soup) {
 }
 
 // Corners that no face uses are left out: they must not make the object seem larger than it is.
-void take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& point_of) {
+// \return how many are taken for another one that is near, not at the same place.
+std::size_t take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& point_of) {
   std::vector<char> used(soup.vertices.size(), 0);
   for (const auto& face : soup.faces) {
     for (const Index v : face) used[v] = 1;
@@ -91,6 +93,7 @@ void take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& p
                 8 * std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
   const std::vector<Index> kept = weld(points, 4 * mesh.error);
   point_of.assign(soup.vertices.size(), HalfEdges::kNone);
+  std::size_t moved = 0;
   for (Index i = 0; i < kept.size(); ++i) {
     if (kept[i] == i) {
       point_of[soup_vertex[i]] = static_cast<Index>(mesh.points.size());
@@ -98,8 +101,10 @@ void take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& p
       mesh.soup_vertex.push_back(soup_vertex[i]);
     } else {
       point_of[soup_vertex[i]] = point_of[soup_vertex[kept[i]]];
+      if (points[i] != points[kept[i]]) ++moved;
     }
   }
+  return moved;
 }
 
 void take_faces(const PolygonSoup& soup, const std::vector<Index>& point_of, HalfEdges& mesh,
@@ -224,9 +229,18 @@ HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults) {
   check_numbers(soup);
   HalfEdges mesh;
   std::vector<Index> point_of;
-  take_points(soup, mesh, point_of);
+  const std::size_t moved = take_points(soup, mesh, point_of);
   take_faces(soup, point_of, mesh, faults);
   link_twins(mesh, faults);
+  if (moved > 0 && !faults.empty()) {
+    faults.add("crowded", [&] {
+      char error[32];
+      std::snprintf(error, sizeof error, "%.1g", mesh.error);
+      return std::to_string(moved) + " vertices cannot be told from others near them, with " +
+             "coordinates known to " + error +
+             " m; the faults above may come of that: expected more digits or fewer vertices";
+    });
+  }
   if (faults.empty()) check_fans(mesh, faults);
   return mesh;
 }

@@ -136,6 +136,19 @@ TEST(ConvexMeshFaults, NamesBodiesThatTouchInACorner) {
   EXPECT_FAULT(soup, "separate pieces");
 }
 
+TEST(ConvexMeshFaults, SaysThatVerticesAreTooNearToBeToldApart) {
+  // An octahedron of which two opposite corners are 1 mm apart.
+  PolygonSoup soup{
+      {{5e-4, 0, 0}, {0, 0.03, 0}, {-5e-4, 0, 0}, {0, -0.03, 0}, {0, 0, 0.03}, {0, 0, -0.03}},
+      {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
+  EXPECT_EQ(faults_of(soup), std::vector<std::string>());
+  soup.coordinate_error = 5e-4;
+  EXPECT_TRUE(mentions(faults_of(soup), "shared edge"));
+  EXPECT_TRUE(mentions(faults_of(soup),
+                       "1 vertices cannot be told from others near them, with coordinates known to "
+                       "0.0005 m"));
+}
+
 TEST(ConvexMeshFaults, NamesAnEdgeOfFourFaces) {
   PolygonSoup soup = cube(1);
   append(soup, placed(cube(1), Quat(1, 0, 0, 0), 1, Vec3(1, 1, 0)));
