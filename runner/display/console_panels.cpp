@@ -115,10 +115,10 @@ std::string of(int number, int all) {
 }  // namespace
 
 void draw_status(const ConsoleState& state, bool hidden, bool beside) {
+  if (beside && !state.checklist.steps.empty()) return;  // no trial yet: the room is needed
   text(kQuiet,
        state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session));
   title(state);
-  if (beside && !state.checklist.steps.empty()) return;  // no trial yet: the room is needed
   progress(state);
   if (!ImGui::BeginTable("status", beside ? 4 : 2)) return;
   for (int i = 0; i < (beside ? 2 : 1); ++i) {

@@ -177,7 +177,8 @@ void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>
   draw_buttons(state_, narrow, ending_, asked);
   const bool brief = narrow || room < 46 * ImGui::GetFontSize();
   if (!brief) ImGui::Dummy({0, 2});
-  if (!(narrow && ending_.asked)) draw_health(state_, brief);
+  const bool crowded = narrow && (ending_.asked || !state_.checklist.steps.empty());
+  if (!crowded) draw_health(state_, brief);
   ImGui::Dummy({0, 2});
   controls_ = ImGui::GetCursorPosY();
   ImGui::EndChild();
