@@ -235,7 +235,7 @@ int run_station(const RunSettings& named) {
                        servo,       clock,    store,     *display,    markers,    signals,
                        participant, session,  admission, noise.get(), limited,    push};
   LiveSession::Outcome outcome;
-  std::exception_ptr failure;
+  std::exception_ptr failure, display_failure;
   std::jthread session_thread([&] {
     try {
       outcome = run_session(parts);
@@ -247,10 +247,16 @@ int run_station(const RunSettings& named) {
     }
     display->end();
   });
-  display->run();
+  try {
+    display->run();
+  } catch (...) {  // the session ends by itself: its participant sees nothing
+    emergency();
+    display_failure = std::current_exception();
+  }
   session_thread.join();
   report_servo(parts, started_ns);
   if (failure) std::rethrow_exception(failure);
+  if (display_failure) std::rethrow_exception(display_failure);
   return report(parts, outcome);
 }
 

@@ -12,6 +12,7 @@
 #include "runner/display/console_panels.h"
 #include "runner/display/fonts.h"
 #include "runner/display/key_names.h"
+#include "runner/display/lost_display.h"
 
 namespace palpate {
 namespace {
@@ -152,7 +153,7 @@ void ConsoleWindow::draw() {
   if (auto state = states_.take()) view_->take(std::move(*state), now);
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
-  if (width <= 0 || height <= 0) return;
+  if (width <= 0 || height <= 0 || is_gone(window_)) return;
   glfwMakeContextCurrent(window_);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();

@@ -54,6 +54,14 @@ void watch_window(GLFWwindow* window, bool& gone) {
   XSaveContext(display, glfwGetX11Window(window), our_windows(), reinterpret_cast<XPointer>(&gone));
 }
 
+bool is_gone(GLFWwindow* window) {
+  Display* const display = glfwGetX11Display();
+  XPointer gone = nullptr;
+  return display != nullptr &&
+         XFindContext(display, glfwGetX11Window(window), our_windows(), &gone) == 0 &&
+         *reinterpret_cast<bool*>(gone);
+}
+
 bool display_lost() {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return false;

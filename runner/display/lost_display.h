@@ -16,6 +16,10 @@ void survive_lost_display();
 /// outlive the connection.
 void watch_window(GLFWwindow* window, bool& gone);
 
+/// Whether it is, of a window that is watched. After its size was asked for: GLFW does not look
+/// whether there was an answer, and gives what lay about in memory.
+bool is_gone(GLFWwindow* window);
+
 /// Asks for nothing and waits for nothing: whether the connection is known to be broken.
 bool display_lost();
 

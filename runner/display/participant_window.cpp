@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "runner/display/key_names.h"
+#include "runner/display/lost_display.h"
 
 namespace palpate {
 
@@ -70,7 +71,7 @@ void ParticipantWindow::draw() {
   }
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
-  if (width <= 0 || height <= 0) return;
+  if (width <= 0 || height <= 0 || is_gone(window_)) return;
   if (image_.width != width || image_.height != height) {
     screens_ = screens_of(page_, width, height, ui_scale_);
     screen_ = std::min(screen_, screens_ - 1);

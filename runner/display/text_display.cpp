@@ -239,7 +239,12 @@ class TextDisplay final : public DisplayLoop {
   ExperimenterConsole& console() override { return console_; }
 
   void run() override {
-    while (!ended_.load()) step(-1);
+    try {
+      while (!ended_.load()) step(-1);
+    } catch (...) {
+      screen_.close();
+      throw;
+    }
     const auto give_up = steady_clock::now() + kFarewell;
     collect();
     while (!pending_.empty() && steady_clock::now() < give_up) step(20);

@@ -95,6 +95,9 @@ class Windows final : public DisplayLoop {
       participant_.abandon();
       console_.abandon();
       library_.abandon();
+    } catch (...) {
+      participant_.close();
+      throw;
     }
   }
 

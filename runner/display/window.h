@@ -44,6 +44,7 @@ class DisplayLoop {
   /// What of the protocol's texts it cannot show: a sentence; empty: nothing.
   virtual std::string unreadable() const { return {}; }
   /// Shows both until end() or until the display dies. On the main thread, that made the windows.
+  /// Where it leaves before end(), by an exception as well, the participant's screen is not open.
   virtual void run() = 0;
   virtual void end() noexcept = 0;
 };
