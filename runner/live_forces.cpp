@@ -57,7 +57,7 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
     while (guard_->reopening() && newest().trouble != DeviceTrouble::guard_lost && !stop())
       clock_.wait_until(clock_.now_ns() + kNap_ns);
     if (guard_->reopening()) return advice(sample_.trouble);
-    const std::string trouble = guard_->reopen_trouble();
+    std::string trouble = guard_->reopen_trouble();
     if (trouble.empty() || clock_.now_ns() >= end_ns || stop()) return trouble;
     clock_.wait_until(clock_.now_ns() + 20 * kNap_ns);
   }
@@ -71,7 +71,7 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   const bool away =
       sample_.trouble == DeviceTrouble::unplugged || sample_.trouble == DeviceTrouble::silent;
   if (guard_ != nullptr && away) {
-    const std::string trouble = open_again(stop);
+    std::string trouble = open_again(stop);
     if (!trouble.empty()) return trouble;
     await(is_well, kPatience, stop);
   }

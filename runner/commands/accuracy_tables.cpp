@@ -263,6 +263,7 @@ std::vector<std::string> recommendations(const AccuracyReport& report) {
 std::vector<Table> accuracy_tables(const AccuracyReport& report) {
   std::vector<Table> tables;
   const std::vector<std::string> shapes = measured_shapes(report);
+  tables.reserve(shapes.size());
   for (const std::string& shape : shapes) tables.push_back(tessellation_table(report, shape));
   for (const std::string& shape : shapes) {
     for (const int triangles : tessellations_shown(report, shape)) {
