@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "data/store.h"
+#include "data/store/store.h"
 #include "protocols/parse.h"
-#include "runner/commands/command.h"
+#include "runner/commands/shared/command.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/printable.h"
 

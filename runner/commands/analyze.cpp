@@ -4,17 +4,17 @@
 #include <string>
 #include <vector>
 
-#include "analysis/analysis.h"
-#include "analysis/figures.h"
-#include "analysis/figures_svg.h"
-#include "analysis/report_html.h"
-#include "analysis/report_json.h"
-#include "analysis/report_record.h"
-#include "analysis/report_text.h"
-#include "analysis/trials.h"
-#include "data/store.h"
-#include "runner/commands/command.h"
-#include "runner/commands/outputs.h"
+#include "analysis/figures/figures.h"
+#include "analysis/figures/figures_svg.h"
+#include "analysis/input/study_record.h"
+#include "analysis/input/trials.h"
+#include "analysis/report/report_html.h"
+#include "analysis/report/report_json.h"
+#include "analysis/report/report_text.h"
+#include "analysis/statistics/analysis.h"
+#include "data/store/store.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
 
 namespace palpate {
 

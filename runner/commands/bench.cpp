@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "runner/commands/command.h"
-#include "runner/commands/outputs.h"
-#include "runner/tick_cost.h"
+#include "runner/bench/tick_cost.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
 
 namespace palpate {
 namespace {

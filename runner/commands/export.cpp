@@ -5,15 +5,15 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/export_bids.h"
-#include "data/export_csv.h"
-#include "data/export_psychds.h"
-#include "data/store.h"
+#include "data/export/export_bids.h"
+#include "data/export/export_csv.h"
+#include "data/export/export_psychds.h"
+#include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "runner/commands/command.h"
-#include "runner/commands/progress_line.h"
-#include "runner/commands/stop_signal.h"
-#include "runner/servo_fault.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/stop_signal.h"
+#include "runner/servo/servo_fault.h"
 #include "stimuli/printable.h"
 
 namespace palpate {

@@ -4,10 +4,10 @@
 #include <iostream>
 #include <string>
 
-#include "data/store.h"
-#include "data/utc.h"
-#include "runner/commands/ask.h"
-#include "runner/commands/command.h"
+#include "data/files/utc.h"
+#include "data/store/store.h"
+#include "runner/commands/shared/ask.h"
+#include "runner/commands/shared/command.h"
 #include "stimuli/printable.h"
 
 namespace palpate {

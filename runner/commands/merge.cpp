@@ -1,4 +1,4 @@
-#include "data/merge.h"
+#include "data/merge/merge.h"
 
 #include <atomic>
 #include <filesystem>
@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "runner/commands/command.h"
-#include "runner/commands/progress_line.h"
-#include "runner/commands/stop_signal.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/stop_signal.h"
 #include "stimuli/printable.h"
 
 namespace palpate {

@@ -1,4 +1,4 @@
-#include "runner/replay.h"
+#include "runner/session/replay.h"
 
 #include <algorithm>
 #include <charconv>
@@ -10,11 +10,11 @@
 #include <optional>
 #include <sstream>
 
-#include "data/store.h"
+#include "data/store/store.h"
 #include "protocols/parse.h"
-#include "runner/commands/command.h"
-#include "runner/commands/outputs.h"
-#include "runner/device_check.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/session/device_check.h"
 #include "stimuli/printable.h"
 
 namespace palpate {

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocols/parse.h"
-#include "runner/commands/command.h"
+#include "runner/commands/shared/command.h"
 
 namespace palpate {
 namespace {

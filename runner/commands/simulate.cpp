@@ -5,12 +5,12 @@
 #include <thread>
 
 #include "protocols/parse.h"
-#include "runner/commands/command.h"
-#include "runner/commands/progress_line.h"
-#include "runner/commands/stop_signal.h"
-#include "runner/device_check.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/stop_signal.h"
 #include "runner/devices/simulated.h"
-#include "runner/simulated_study.h"
+#include "runner/session/device_check.h"
+#include "runner/session/simulated_study.h"
 #include "stimuli/printable.h"
 
 namespace palpate {

@@ -2,8 +2,8 @@
 // A stylus for anyone without hardware: pointer, wheel and modifiers move and turn it in the
 // console's view, and contact is seen, not felt. Five degrees of freedom.
 
-#include "runner/device.h"
-#include "runner/triple_buffer.h"
+#include "runner/servo/device.h"
+#include "runner/servo/triple_buffer.h"
 
 namespace palpate {
 

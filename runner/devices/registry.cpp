@@ -3,8 +3,8 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "runner/devices/falcon_open.h"
-#include "runner/devices/falcon_parameters.h"
+#include "runner/devices/falcon/open.h"
+#include "runner/devices/falcon/parameters.h"
 #include "runner/devices/mouse.h"
 #include "runner/devices/stroking.h"
 

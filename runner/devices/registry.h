@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "runner/device.h"
+#include "runner/servo/device.h"
 
 namespace palpate {
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "data/record.h"
-#include "runner/device.h"
+#include "runner/servo/device.h"
 
 namespace palpate {
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "runner/device.h"
+#include "runner/servo/device.h"
 
 namespace palpate {
 

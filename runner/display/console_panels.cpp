@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "runner/sample.h"
+#include "runner/servo/sample.h"
 
 namespace palpate {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "runner/servo.h"
+#include "runner/servo/servo.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate {

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "runner/display/console_panels.h"
-#include "runner/servo_fault.h"
+#include "runner/servo/servo_fault.h"
 
 namespace palpate {
 

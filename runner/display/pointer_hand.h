@@ -5,7 +5,7 @@
 
 #include "runner/devices/mouse.h"
 #include "runner/display/camera.h"
-#include "runner/servo.h"
+#include "runner/servo/servo.h"
 
 namespace palpate {
 

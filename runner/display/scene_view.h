@@ -11,7 +11,7 @@
 
 #include "runner/display/camera.h"
 #include "runner/display/scene_mesh.h"
-#include "runner/sample.h"
+#include "runner/servo/sample.h"
 
 namespace palpate {
 

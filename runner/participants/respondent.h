@@ -6,7 +6,7 @@
 #include <string>
 
 #include "protocols/schedule.h"
-#include "runner/servo.h"
+#include "runner/servo/servo.h"
 
 namespace palpate {
 

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "runner/passivity.h"
 #include "runner/scene_builder.h"
+#include "runner/servo/passivity.h"
 #include "stimuli/primitives.h"
 
 namespace palpate {

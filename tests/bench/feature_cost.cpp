@@ -14,7 +14,7 @@
 #include "rendering/point_probe.h"
 #include "rendering/render.h"
 #include "rendering/segment_probe.h"
-#include "rendering/stroking_hand.h"
+#include "rendering/verification/stroking_hand.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
 #include "tests/bench/measured_tick.h"

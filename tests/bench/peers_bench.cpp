@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy_methods.h"
-#include "rendering/reference.h"
+#include "rendering/accuracy/methods.h"
+#include "rendering/accuracy/ways_out.h"
 #include "rendering/renderer.h"
-#include "rendering/stroking_hand.h"
-#include "rendering/ways_out.h"
-#include "runner/tick_clock.h"
+#include "rendering/verification/reference.h"
+#include "rendering/verification/stroking_hand.h"
+#include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::bench {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "rendering/stroking_hand.h"
-#include "runner/session.h"
+#include "rendering/verification/stroking_hand.h"
+#include "runner/session/session.h"
 #include "tests/bench/unlogged_trial.h"
 
 namespace palpate::bench {

@@ -1,6 +1,6 @@
 #include "tests/bench/unlogged_trial.h"
 
-#include "data/utc.h"
+#include "data/files/utc.h"
 
 namespace palpate::bench {
 namespace {

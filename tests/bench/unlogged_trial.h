@@ -2,7 +2,7 @@
 
 #include "data/record.h"
 #include "runner/participants/respondent.h"
-#include "runner/tick_source.h"
+#include "runner/servo/tick_source.h"
 
 namespace palpate::bench {
 

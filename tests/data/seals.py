@@ -1,4 +1,4 @@
-"""The seals of a session's rows, made by what data/seals.h says and by nothing of palpate's."""
+"""The seals of a session's rows, made by what data/store/seals.h says and by nothing of palpate's."""
 
 import hashlib
 import struct

@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/checksum.h"
-#include "data/store.h"
+#include "data/files/checksum.h"
+#include "data/store/store.h"
 
 namespace palpate::testing {
 

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "analysis/trials.h"
+#include "analysis/input/trials.h"
 #include "tests/fuzz/input_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

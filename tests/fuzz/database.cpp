@@ -7,8 +7,8 @@
 #include <iterator>
 #include <string>
 
-#include "data/checksum.h"
-#include "data/store.h"
+#include "data/files/checksum.h"
+#include "data/store/store.h"
 #include "tests/fuzz/input_file.h"
 
 namespace {

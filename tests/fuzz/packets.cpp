@@ -1,6 +1,8 @@
 // Whatever comes over the wire: packets are found, and say the same when they are written again.
 // Whatever a firmware file holds: it is refused with the reason, or its structure is right.
 
+#include "runner/devices/falcon/packets.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -10,11 +12,10 @@
 #include <utility>
 
 #include "protocols/parse.h"
-#include "runner/devices/falcon_arm.h"
-#include "runner/devices/falcon_image.h"
-#include "runner/devices/falcon_packets.h"
-#include "runner/devices/falcon_parameters.h"
-#include "runner/devices/falcon_serial.h"
+#include "runner/devices/falcon/arm.h"
+#include "runner/devices/falcon/image.h"
+#include "runner/devices/falcon/parameters.h"
+#include "runner/devices/falcon/serial.h"
 
 namespace {
 

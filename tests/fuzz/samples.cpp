@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "data/samples_codec.h"
-#include "data/store.h"
+#include "data/store/samples_codec.h"
+#include "data/store/store.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate;

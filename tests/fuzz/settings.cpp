@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "protocols/parse.h"
-#include "runner/devices/falcon_calibration.h"
+#include "runner/devices/falcon/calibration.h"
 #include "runner/participants/simulated_settings.h"
 #include "tests/fuzz/input_file.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runner/allocation_count.h"
+#include "runner/bench/allocation_count.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "runner/device.h"
+#include "runner/servo/device.h"
 
 namespace palpate::testing {
 

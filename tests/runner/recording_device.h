@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "runner/device.h"
-#include "runner/realtime.h"
+#include "runner/servo/device.h"
+#include "runner/servo/realtime.h"
 
 namespace palpate::testing {
 

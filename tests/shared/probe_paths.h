@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "rendering/probe.h"
-#include "rendering/reference.h"
+#include "rendering/verification/reference.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"

@@ -10,9 +10,9 @@
 #include <string>
 #include <utility>
 
-#include "rendering/reference.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
+#include "rendering/verification/reference.h"
 #include "tests/shared/probe_paths.h"
 
 namespace palpate::testing {

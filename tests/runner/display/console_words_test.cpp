@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "runner/display/console_panels.h"
-#include "runner/servo_fault.h"
+#include "runner/servo/servo_fault.h"
 
 namespace palpate {
 namespace {

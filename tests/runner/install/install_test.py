@@ -139,7 +139,7 @@ class ManPages(unittest.TestCase):
 class Rights(unittest.TestCase):
     def test_the_rule_is_for_the_falcon_and_not_for_everybody(self):
         rules = (INSTALL / "60-palpate.rules").read_text()
-        parameters = (SOURCES / "runner/devices/falcon_parameters.h").read_text()
+        parameters = (SOURCES / "runner/devices/falcon/parameters.h").read_text()
         vendor, product = re.search(r"kVendor = 0x(\w+), kProduct = 0x(\w+);", parameters).groups()
         self.assertIn(f'ATTR{{idVendor}}=="{vendor.lower()}", ATTR{{idProduct}}=="{product.lower()}"', rules)
         self.assertIn('TAG+="uaccess"', rules)

@@ -1,0 +1,297 @@
+// What was answered: confusion, accuracy beside speed, and what is lost on the way to the times.
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/svg.h"
+#include "analysis/text.h"
+
+namespace palpate {
+
+namespace {
+
+constexpr double kMuchLost = 10;       // percent of the trials
+constexpr double kWidestChange = 150;  // percent of the time; what is longer leaves the axis
+
+std::string percent_text(std::size_t part, std::size_t of) {
+  const double percent = of ? 100 * static_cast<double>(part) / static_cast<double>(of) : 0;
+  return fixed(percent, percent > 0 && percent < 9.95 ? 1 : 0) + " %";
+}
+
+Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_t shapes) {
+  const auto& table = analysis.table;
+  std::vector<std::string> answers(
+      table.answers.begin(), table.answers.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                         table.answers.size(), kShownShapes)));
+  answers.emplace_back("none");
+  Panel panel;
+  const std::string name = short_name(table.renderers[renderer]);
+  panel.title = name;
+  panel.x = names_axis(answers, answers.size(), "answered");
+  panel.y = names_axis(table.shapes, shapes, "shown");
+  for (Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;  // the first on top
+  panel.width = std::max(340.0, 62.0 * static_cast<double>(answers.size()));
+  panel.height = 56.0 * static_cast<double>(shapes);
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const auto& row = analysis.description.confusion[renderer][s];
+    const std::size_t total = std::accumulate(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t a = 0; a < answers.size(); ++a) {
+      const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
+      const double share = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
+      const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
+      const std::string text = name + ": " + printable(table.shapes[s], 40) + " answered as " +
+                               printable(answers[a], 40) + " " + counted(n, "time", "times") +
+                               " of " + std::to_string(total) + " (" + percent_text(n, total) + ")";
+      panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
+                                      n ? 0.08 + 0.9 * share : 0.03, text));
+      if (n == 0) continue;
+      // On the dark cells of a light page, and the light ones of a dark page, the page's colour.
+      Mark mark = text_mark(share > 0.5 ? Role::page : Role::ink, x + 0.5, y + 0.5,
+                            percent_text(n, total), 12);
+      mark.bold = analysis.table.answers.size() > a && answers[a] == table.shapes[s];
+      mark.dy = 4;
+      panel.marks.push_back(std::move(mark));
+    }
+  }
+  return panel;
+}
+
+struct Label {
+  double x, y;
+  std::string text;
+};
+
+struct Box {
+  double left, right, top, bottom;  ///< px
+
+  bool meets(const Box& other) const {
+    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
+  }
+};
+
+/// Names beside their points: right or left, above or below, wherever they hide no other. In a
+/// panel that has others at its sides they stay inside.
+void put_labels(Panel& panel, const std::vector<Label>& labels) {
+  constexpr double kSize = 13, kPoint = 7;  // px
+  const auto px = [&](double x) {
+    return (x - panel.x.low) / (panel.x.high - panel.x.low) * panel.width;
+  };
+  const auto py = [&](double y) {
+    return (panel.y.high - y) / (panel.y.high - panel.y.low) * panel.height;
+  };
+  std::vector<Box> taken;  // points, bars, the lines at 0, then labels
+  taken.reserve(2 * labels.size() + panel.marks.size());
+  for (const Mark& mark : panel.marks) {
+    if (mark.kind != Mark::Kind::line && mark.kind != Mark::Kind::interval) continue;
+    const auto [left, right] = std::ranges::minmax(mark.x);
+    const auto [low, high] = std::ranges::minmax(mark.y);
+    taken.push_back({px(left) - 2, px(right) + 2, py(high) - 2, py(low) + 2});
+  }
+  for (const Label& label : labels) {
+    const double x = px(label.x), y = py(label.y);
+    taken.push_back({x - kPoint, x + kPoint, y - kPoint, y + kPoint});
+  }
+  for (const Label& label : labels) {
+    const double wide = text_width(label.text, kSize, true);
+    Mark best;
+    Box place{};
+    std::ptrdiff_t fewest = std::ssize(taken) + 1;
+    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
+      for (const int anchor : {-1, 1}) {
+        Mark mark = text_mark(Role::ink, label.x, label.y, label.text, kSize);
+        mark.anchor = anchor;
+        mark.bold = true;
+        mark.dx = -11 * anchor;
+        mark.dy = dy;
+        const double left = px(label.x) + mark.dx - (anchor > 0 ? wide : 0);
+        const double base = py(label.y) + dy;
+        const Box box{left, left + wide, base - kSize, base + 3};
+        const bool outside = panel.width < kWide && (box.left < 0 || box.right > panel.width);
+        const auto hits =
+            std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); }) +
+            (outside ? 3 : 0);
+        if (hits >= fewest) continue;
+        fewest = hits;
+        best = std::move(mark);
+        place = box;
+      }
+    }
+    taken.push_back(place);
+    panel.marks.push_back(std::move(best));
+  }
+}
+
+/// Of the time in percent, negative where it is less.
+std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio) {
+  if (!log_ratio) return std::nullopt;
+  const Interval reduction = percent_reduction(*log_ratio);
+  return Interval{-reduction.high, -reduction.low};
+}
+
+/// One comparison's shapes. \return false where none can be shown
+bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
+                 std::size_t shapes, std::string& description) {
+  panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
+                                  "faster and less accurate: a trade-off"));
+  panel.marks.push_back(rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1,
+                                  "slower and more accurate: a trade-off"));
+  panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
+  panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
+  std::vector<Label> labels;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const SpeedAccuracy& both = comparison.speed_accuracy[s];
+    if (!both.percent_change_time || !both.accuracy_change) continue;
+    const std::string name = printable(names[s], 40);
+    const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
+    std::string text =
+        (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " + fixed(x, 1) + " %";
+    const auto time = percent_change(comparison.shapes[s].t_test.log_ratio_ci95);
+    if (time)
+      text += " (95 % interval " + fixed(time->low, 1) + " to " + fixed(time->high, 1) + ")";
+    text += ", accuracy " + fixed(y, 1) + " points";
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      text += " (" + fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1) + ")";
+    }
+    if (!both.reading.empty()) text += ", " + both.reading;
+    if (time) add_interval_across(panel, Role::ink, y, time->low, time->high, text);
+    if (const auto& ends = both.test.log_ratio_ci95) {
+      add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
+    }
+    panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
+    labels.push_back({x, y, name});
+    description += text + ". ";
+  }
+  put_labels(panel, labels);
+  return !labels.empty();
+}
+
+}  // namespace
+
+Figure confusion_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "confusion", "What was shown and what was answered");
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t renderers = shown_renderers(analysis, figure);
+  for (std::size_t r = 0; r < renderers; ++r) {
+    figure.panels.push_back(confusion_panel(analysis, r, shapes));
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const AccuracyCell& cell = analysis.description.accuracy[r][s];
+      figure.description += short_name(analysis.table.renderers[r]) + ", " +
+                            printable(analysis.table.shapes[s], 40) + ": " +
+                            percent_text(cell.n_correct, cell.n_trials) + " correct. ";
+    }
+  }
+  figure.notes.insert(
+      figure.notes.begin(),
+      "Share of the trials of a row; bold: the right answer. None: no answer in time.");
+  return figure;
+}
+
+Figure speed_accuracy_of(const Analysis& analysis) {
+  Figure figure =
+      new_figure(analysis, "speed-accuracy", "Change of time beside change of accuracy");
+  const std::size_t shapes = shown_shapes(analysis, figure);
+  const std::size_t comparisons = shown_comparisons(analysis, figure);
+  double widest = 5, highest = 3;
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    for (std::size_t s = 0; s < shapes; ++s) {
+      const SpeedAccuracy& both = analysis.comparisons[c].speed_accuracy[s];
+      if (!both.percent_change_time || !both.accuracy_change) continue;
+      widest = std::max(widest, std::fabs(*both.percent_change_time));
+      highest = std::max(highest, 100 * std::fabs(*both.accuracy_change));
+      if (const auto time =
+              percent_change(analysis.comparisons[c].shapes[s].t_test.log_ratio_ci95)) {
+        for (const double end : {time->low, time->high}) {
+          widest = std::max(widest, std::min(kWidestChange, std::fabs(end)));
+        }
+      }
+      if (const auto& ends = both.test.log_ratio_ci95) {
+        highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->low)));
+        highest = std::max(highest, std::min(100.0, 100 * std::fabs(ends->high)));
+      }
+    }
+  }
+  for (std::size_t c = 0; c < comparisons; ++c) {
+    const Comparison& comparison = analysis.comparisons[c];
+    Panel panel = comparison_panel(analysis, comparison.pair, 0, 0);
+    panel.x = linear_axis(-1.15 * widest, 1.15 * widest,
+                          gain_title(analysis, "change of time", "against"));
+    panel.y = linear_axis(-1.05 * highest, 1.05 * highest, "change of accuracy (points)");
+    panel.height = 340;
+    if (add_changes(panel, comparison, analysis.table.shapes, shapes, figure.description)) {
+      figure.panels.push_back(std::move(panel));
+    }
+  }
+  if (figure.panels.empty()) return figure;
+  const bool paper =
+      analysis.comparisons.size() == 1 && analysis.comparisons.front().pair.is_ray_minus_point();
+  figure.notes.insert(figure.notes.begin(),
+                      std::string(paper ? "Ray minus point" : "Renderer minus reference") +
+                          ", means over participants; bars: 95 % intervals of the change of time "
+                          "and of accuracy, not adjusted. Shaded: speed may have been bought with "
+                          "errors, or accuracy "
+                          "with time.");
+  return figure;
+}
+
+Figure exclusions_of(const Analysis& analysis) {
+  Figure figure = new_figure(analysis, "exclusions", "From trials to times");
+  const std::size_t n = shown_renderers(analysis, figure);
+  if (n == 0) return figure;
+  double highest = 10;
+  for (const Exclusions& lost : analysis.exclusions) {
+    highest = std::max(highest, 100 * lost.share_excluded());
+  }
+  struct Reason {
+    const char* name;
+    std::size_t Exclusions::*count;
+  };
+  constexpr Reason kReasons[] = {{"wrong", &Exclusions::n_wrong},
+                                 {"no response", &Exclusions::n_timeouts},
+                                 {"too fast", &Exclusions::n_too_fast},
+                                 {"all", nullptr}};
+  constexpr std::size_t kGroups = std::size(kReasons);
+  std::vector<std::string> names;
+  for (const Reason& reason : kReasons) names.emplace_back(reason.name);
+  Panel panel;
+  panel.x = names_axis(names, kGroups, "");
+  panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
+  panel.width = kWide;
+  panel.height = 260;
+  panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {kMuchLost, kMuchLost}, 1.4));
+  const double group = n < 4 ? 0.6 : 0.88, width = group / static_cast<double>(n);
+  for (std::size_t r = 0; r < n; ++r) {
+    const Exclusions& lost = analysis.exclusions[r];
+    const std::string renderer = short_name(analysis.table.renderers[r]);
+    const Role role = look_of(analysis, analysis.table.renderers[r]).role;
+    figure.legend.push_back({printable(analysis.table.renderers[r], 200), role, Shape::square});
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      const std::size_t count =
+          kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;
+      const double percent =
+          lost.n_trials ? 100 * static_cast<double>(count) / static_cast<double>(lost.n_trials) : 0;
+      const double x = static_cast<double>(g) + (1 - group) / 2 + static_cast<double>(r) * width;
+      const std::string text = renderer + ", " + kReasons[g].name + ": " +
+                               counted(count, "trial", "trials") + " of " +
+                               std::to_string(lost.n_trials) + " (" + fixed(percent, 1) + " %)";
+      panel.marks.push_back(rect_mark(role, x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
+      const double px = (panel.y.high - panel.y.low) / panel.height;
+      const bool crossed = percent < kMuchLost && percent + 18 * px > kMuchLost;
+      Mark mark = text_mark(Role::soft, x + width / 2, crossed ? kMuchLost : percent,
+                            fixed(percent, 1), 12);
+      mark.dy = -5;
+      panel.marks.push_back(std::move(mark));
+      figure.description += text + ". ";
+    }
+  }
+  figure.panels.push_back(std::move(panel));
+  figure.notes.push_back(
+      "Amber line: 10 %; beyond it, or where renderers differ, the times are to be read with "
+      "care.");
+  return figure;
+}
+
+}  // namespace palpate

@@ -1,0 +1,76 @@
+#include "analysis/input/study_record.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "data/store/store.h"
+
+namespace palpate {
+
+namespace {
+
+void remember(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::ranges::find(known, value) == known.end()) known.push_back(value);
+}
+
+ProtocolText protocol_text(const ProtocolInfo& info) {
+  ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
+  const auto json = nlohmann::json::parse(info.text, nullptr, false);
+  if (!json.is_object()) return protocol;
+  if (json.contains("title") && json["title"].is_string()) {
+    protocol.title = json["title"].get<std::string>();
+  }
+  if (json.contains("seed") && json["seed"].is_number_integer()) {
+    protocol.seed = json["seed"].dump();
+  }
+  return protocol;
+}
+
+void add_trial(const TrialRecord& record, ServoQuality& servo) {
+  ++servo.n_trials;
+  servo.n_with_missed += record.missed_ticks > 0 ? 1 : 0;
+  servo.n_with_faults += record.faults != 0 ? 1 : 0;
+  servo.n_started_inside += record.started_inside ? 1 : 0;
+  servo.ticks += record.ticks;
+  servo.missed_ticks += record.missed_ticks;
+  servo.max_force = std::max(servo.max_force, record.max_force);
+  const double period = 1e-9 * static_cast<double>(record.longest_period_ns);
+  if (!(period > 0)) return;
+  servo.longest_period = std::max(servo.longest_period, period);
+  const double bin = ServoQuality::kBinsPerDecade * std::log10(period / ServoQuality::kLowest);
+  ++servo.longest_periods[static_cast<std::size_t>(
+      std::clamp(bin + 1e-9, 0.0, ServoQuality::kBins - 1.0))];
+}
+
+}  // namespace
+
+ReportRecord read_report_record(const std::string& database) {
+  Store store = Store::open(database, Store::Mode::read_only);
+  ReportRecord record;
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    record.protocols.push_back(protocol_text(protocol));
+    for (const Participant& person : store.participants(protocol.sha256)) {
+      if (person.seed) record.seeds.push_back(person.code + ": " + std::to_string(*person.seed));
+    }
+  }
+  for (const StoredRun& run : store.runs()) {
+    remember(run.info.device, record.devices);
+    remember(run.info.build, record.builds);
+    remember(run.info.response_device, record.response_devices);
+  }
+  store.for_each_trial([&](const StoredTrial& trial) {
+    if (trial.record.practice) return;
+    auto servo = std::ranges::find(record.servo, trial.record.renderer, &ServoQuality::renderer);
+    if (servo == record.servo.end()) {
+      record.servo.emplace_back().renderer = trial.record.renderer;
+      servo = std::prev(record.servo.end());
+    }
+    add_trial(trial.record, *servo);
+  });
+  std::ranges::sort(record.servo, {}, &ServoQuality::renderer);
+  record.n_cut_off = static_cast<std::size_t>(store.counts().cut_off);
+  return record;
+}
+
+}  // namespace palpate

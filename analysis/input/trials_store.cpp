@@ -1,0 +1,89 @@
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
+#include "analysis/text.h"
+#include "data/store/store.h"
+#include "protocols/parse.h"
+
+namespace palpate {
+
+namespace {
+
+/// Names of the stimuli in a stored protocol's order. Read leniently: the text was checked when it
+/// was stored, and a mesh file that it names may be gone since.
+std::vector<std::string> stimuli_of(const std::string& protocol_text) {
+  std::vector<std::string> names;
+  const auto json = nlohmann::json::parse(protocol_text, nullptr, false);
+  if (!json.is_object() || !json.contains("stimuli") || !json["stimuli"].is_array()) return names;
+  for (const auto& stimulus : json["stimuli"]) {
+    if (stimulus.is_object() && stimulus.contains("name") && stimulus["name"].is_string()) {
+      names.push_back(stimulus["name"].get<std::string>());
+    }
+  }
+  return names;
+}
+
+void note(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end()) {
+    known.push_back(value);
+  }
+}
+
+}  // namespace
+
+TrialTable read_trials_store(const std::string& path) {
+  Store store = Store::open(path, Store::Mode::read_only);
+  Provenance provenance;
+  provenance.source = path;
+  std::vector<std::string> listed, protocol_names, observers;
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
+  }
+  TrialTableBuilder builder;
+  store.for_each_trial([&](const StoredTrial& trial) {
+    const TrialRecord& record = trial.record;
+    if (record.renderer != "point" && record.renderer != "ray") {
+      throw InputError({{path, "participant " + trial.participant.code,
+                         "expected the renderer 'point' or 'ray'; found '" +
+                             printable(record.renderer, 40) + "'"}});
+    }
+    RawTrial raw;
+    raw.participant = trial.participant.code;
+    raw.renderer = record.renderer;
+    raw.shape = record.shape;
+    raw.response = record.response;
+    raw.session = record.session;
+    raw.block = record.block;
+    raw.trial = record.trial;
+    raw.correct = record.correct;
+    raw.practice = record.practice;
+    raw.timed_out = record.timed_out;
+    raw.simulated = trial.participant.simulated;
+    raw.response_time = record.response_time;
+    builder.add(raw);
+    note(trial.protocol_name, protocol_names);
+    note(trial.protocol_sha256, provenance.protocol_sha256);
+    note(trial.run.program_version, provenance.program_versions);
+    note(trial.run.observer_sha256, observers);
+  });
+  const auto join = [](const std::vector<std::string>& parts) {
+    std::string all;
+    for (const auto& part : parts) all += (all.empty() ? "" : ", ") + part;
+    return all;
+  };
+  provenance.protocol_name = join(protocol_names);
+  provenance.observer_sha256 = join(observers);
+  try {
+    return builder.finish(std::move(provenance), listed);
+  } catch (const std::runtime_error& error) {
+    throw InputError({{path, "trials", error.what()}});
+  }
+}
+
+}  // namespace palpate

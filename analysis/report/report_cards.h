@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "analysis/statistics/analysis.h"
+
+namespace palpate {
+
+/// The reductions at the top of a page: a card for each shape, a row of cards for each comparison.
+void put_cards(std::string& out, const Analysis& analysis);
+
+}  // namespace palpate

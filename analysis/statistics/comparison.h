@@ -1,0 +1,29 @@
+#pragma once
+// A renderer against the reference, shape by shape.
+
+#include <cstdint>
+#include <vector>
+
+#include "analysis/input/renderers.h"
+#include "analysis/input/trials.h"
+#include "analysis/statistics/censored.h"
+#include "analysis/statistics/describe.h"
+#include "analysis/statistics/paired.h"
+#include "analysis/statistics/speed_accuracy.h"
+#include "analysis/statistics/time_outs.h"
+
+namespace palpate {
+
+struct Comparison {
+  RendererPair pair;
+  std::vector<PairedShape> shapes;            ///< one for each of table.shapes
+  std::vector<SpeedAccuracy> speed_accuracy;  ///< likewise
+  std::vector<CensoredEstimate> censored;     ///< likewise, or none: nobody timed out
+};
+
+/// One for each of renderer_pairs(). Holm's adjustment is over all shapes of all comparisons.
+/// \param seed of the bootstrap
+std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
+                                          const TimeOuts& time_outs, std::uint64_t seed);
+
+}  // namespace palpate

@@ -1,0 +1,274 @@
+#include "analysis/statistics/mixed_model.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <utility>
+
+#include "analysis/statistics/reml.h"
+#include "analysis/statistics/reml_data.h"
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t kMaxModelRenderers = 8;
+
+/// Of one evaluation of the criterion's derivatives: a product of matrices as large as there are
+/// cells for each parameter of the participants' covariance.
+double model_work(std::size_t renderers, Index cells) {
+  const auto q = static_cast<double>(renderers), n = static_cast<double>(cells);
+  return q * (q + 1) / 2 * n * n * n;
+}
+
+/// Treatment coding: its columns in R's order, each as values at the non-empty cells.
+struct Columns {
+  std::vector<std::string> names, left_out;
+  MatrixXd values;  ///< cells x columns, square
+};
+
+Columns treatment_columns(const ModelCells& cells, const std::vector<std::string>& renderers,
+                          const std::vector<std::string>& shapes) {
+  Columns out;
+  out.values.resize(cells.n, cells.n);
+  MatrixXd basis(cells.n, cells.n);
+  Index rank = 0;
+  const auto add = [&](const std::string& name, std::size_t renderer, std::size_t shape) {
+    VectorXd column = VectorXd::Zero(cells.n);
+    for (std::size_t r = 0; r < cells.renderers.size(); ++r) {
+      for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
+        if (cells.column[r][s] >= 0 && (renderer == 0 || r == renderer) &&
+            (shape == 0 || s == shape)) {
+          column(cells.column[r][s]) = 1;
+        }
+      }
+    }
+    // As R does: a column that follows from those before it is left out.
+    VectorXd rest = column;
+    for (int again = 0; again < 2; ++again) {
+      const VectorXd known = basis.leftCols(rank).transpose() * rest;
+      rest.noalias() -= basis.leftCols(rank) * known;
+    }
+    if (rest.norm() <= 1e-7 * column.norm()) {
+      out.left_out.push_back(name);
+      return;
+    }
+    out.names.push_back(name);
+    out.values.col(rank) = column;
+    basis.col(rank++) = rest.normalized();
+  };
+  const auto renderer_name = [&](std::size_t r) {
+    return "renderer" + renderers[cells.renderers[r]];
+  };
+  const auto shape_name = [&](std::size_t s) { return "shape" + shapes[cells.shapes[s]]; };
+  add("(Intercept)", 0, 0);
+  for (std::size_t r = 1; r < cells.renderers.size(); ++r) add(renderer_name(r), r, 0);
+  for (std::size_t s = 1; s < cells.shapes.size(); ++s) add(shape_name(s), 0, s);
+  for (std::size_t s = 1; s < cells.shapes.size(); ++s) {
+    for (std::size_t r = 1; r < cells.renderers.size(); ++r) {
+      add(renderer_name(r) + ":" + shape_name(s), r, s);
+    }
+  }
+  return out;
+}
+
+/// Inverse of the full Hessian, without the directions in which the criterion is flat.
+MatrixXd inverse_of_curved(const MatrixXd& hessian) {
+  const VectorXd scale =
+      hessian.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * hessian *
+                                                      scale.asDiagonal());
+  const VectorXd inverse =
+      eigen.eigenvalues().unaryExpr([](double e) { return e > 1e-10 ? 1 / e : 0.0; });
+  return scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
+         eigen.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+/// Estimates and tests linear functions of the cells' means.
+class Tester {
+ public:
+  Tester(const ModelData& data, const RemlPoint& point)
+      : data_(data),
+        point_(point),
+        means_(data.cell_means(point.beta)),
+        spread_(2 * inverse_of_curved(point.full_hessian)) {}
+
+  /// Satterthwaite (1946) as in lmerTest (Kuznetsova et al. 2017): the variance's own variance by
+  /// the delta method from the curvature of the likelihood in (theta, sigma).
+  ModelEstimate operator()(const VectorXd& weights) const {
+    ModelEstimate out;
+    out.estimate = weights.dot(means_);
+    const ModelData::Loading load = data_.load(weights);
+    const VectorXd loaded = point_.inverse_xx * load.inside;
+    const double variance = point_.sigma_squared * (load.inside.dot(loaded) + load.outside);
+    out.se = std::sqrt(variance);
+    const auto n_theta = static_cast<Index>(point_.information_loss.size());
+    VectorXd slope(n_theta + 1);
+    for (Index k = 0; k < n_theta; ++k) {
+      slope(k) = point_.sigma_squared *
+                 loaded.dot(point_.information_loss[static_cast<std::size_t>(k)] * loaded);
+    }
+    slope(n_theta) = 2 * variance / std::sqrt(point_.sigma_squared);
+    const double df = 2 * variance * variance / slope.dot(spread_ * slope);
+    namespace bm = boost::math;
+    using Gentle = bm::policies::policy<bm::policies::overflow_error<bm::policies::ignore_error>>;
+    if (!(df > 0) || !std::isfinite(df)) {
+      out.undefined = "Satterthwaite's degrees of freedom cannot be computed";
+      return out;
+    }
+    out.df_satterthwaite = df;
+    const bm::students_t_distribution<double, Gentle> distribution(df);
+    const double half = *out.se * quantile(distribution, 0.975);
+    if (!std::isfinite(half)) {
+      out.undefined = "too few degrees of freedom";
+      return out;
+    }
+    out.t = *out.estimate / *out.se;
+    out.p = std::min(1.0, 2 * cdf(complement(distribution, std::fabs(*out.t))));
+    out.ci95 = Interval{*out.estimate - half, *out.estimate + half};
+    return out;
+  }
+
+ private:
+  const ModelData& data_;
+  const RemlPoint& point_;
+  VectorXd means_;
+  MatrixXd spread_;
+};
+
+void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& renderers,
+                   MixedModel& out) {
+  constexpr double kZero = 1e-4;  // relative to the residual sd, as lme4's isSingular()
+  const double sigma = std::sqrt(optimum.point.sigma_squared);
+  out.residual_sd = sigma;
+  const auto q = static_cast<Index>(renderers.size());
+  const MatrixXd lambda = lower_triangle(optimum.theta, q);
+  const MatrixXd psi = lambda * lambda.transpose();
+  bool zero_sd = false, zero_diagonal = false;
+  std::string reason;
+  const auto add = [&](const std::string& what) { reason += (reason.empty() ? "" : "; ") + what; };
+  for (Index i = 0; i < q; ++i) {
+    const double sd = std::sqrt(psi(i, i));
+    out.random_sds.push_back(sigma * sd);
+    zero_diagonal = zero_diagonal || lambda(i, i) < kZero;
+    if (sd < kZero) {
+      zero_sd = true;
+      add(i == 0 ? "participants' intercepts do not vary"
+                 : "participants' slopes for " + renderers[static_cast<std::size_t>(i)] +
+                       " do not vary");
+    }
+    for (Index k = 0; k < i; ++k) {
+      const double both = std::sqrt(psi(i, i) * psi(k, k));
+      if (sd < kZero || psi(k, k) < kZero * kZero) {
+        out.random_correlations.emplace_back();
+        continue;
+      }
+      const double correlation = std::clamp(psi(i, k) / both, -1.0, 1.0);
+      out.random_correlations.emplace_back(correlation);
+      if (std::fabs(correlation) > 1 - 1e-9) {
+        add(correlation > 0 ? "a correlation of +1 between participants' effects"
+                            : "a correlation of -1 between participants' effects");
+      }
+    }
+  }
+  if (zero_diagonal || zero_sd) {
+    if (reason.empty()) add("participants' effects lie in fewer dimensions than there are");
+    out.singular = reason;
+  }
+}
+
+std::string why_no_fit(const People& people, const ModelCells& cells) {
+  if (people.size() < 2) return "only one renderer in the data";
+  if (cells.n == 0) return "no trial can be used for times";
+  if (cells.renderers.size() < people.size())
+    return "no trial with one of the renderers can be used for times";
+  if (people.size() > kMaxModelRenderers ||
+      model_work(people.size(), cells.n) > model_work(2, 400)) {
+    return "too many renderers and shapes for this model";
+  }
+  return {};
+}
+
+}  // namespace
+
+MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
+                       const std::vector<std::string>& shapes) {
+  MixedModel out;
+  const ModelCells cells = model_cells(people);
+  for (const auto& renderer : people) {
+    for (const auto& shape : renderer) {
+      for (const ParticipantCell& cell : shape) out.n_observations += cell.n_used;
+    }
+  }
+  ModelEstimate nothing;
+  const auto refuse = [&](const std::string& reason) {
+    out.undefined = nothing.undefined = reason;
+    out.contrasts.assign(std::max<std::size_t>(people.size(), 2) - 1,
+                         std::vector<ModelEstimate>(shapes.size(), nothing));
+    return out;
+  };
+  if (const std::string reason = why_no_fit(people, cells); !reason.empty()) return refuse(reason);
+  const ModelData prepared(people, cells);
+  out.n_participants = prepared.data.groups.size();
+  if (out.n_participants < 2) return refuse("one participant cannot tell chance from effect");
+  if (!prepared.shared) {
+    return refuse(people.size() == 2
+                      ? "no participant has times for both renderers"
+                      : "two of the renderers have no participant with times for both");
+  }
+  if (prepared.freedom < 1) {
+    return refuse("too few trials: none is left to tell the residual variance");
+  }
+  if (std::sqrt(prepared.least_square / prepared.freedom) <=
+      1e-10 * std::max(1.0, prepared.scale)) {
+    return refuse("no residual variance: participants and shapes explain every time");
+  }
+
+  const auto q = static_cast<Index>(people.size());
+  MatrixXd coding = MatrixXd::Identity(q, q);
+  coding.col(0).setOnes();
+  const RemlOptimum optimum = reml_optimum(prepared.data, coding);
+  if (!optimum.converged) return refuse("the fit did not converge");
+
+  const Columns columns = treatment_columns(cells, renderers, shapes);
+  // Incidences of a graph and unit vectors: the determinant is 1 or -1, and nothing of it is in the
+  // likelihood.
+  const MatrixXd from_cells = columns.values.inverse();
+  out.log_likelihood_reml = -(optimum.point.deviance + prepared.log_determinant()) / 2;
+  out.left_out = columns.left_out;
+  put_variances(optimum, renderers, out);
+
+  const Tester tested(prepared, optimum.point);
+  for (Index i = 0; i < cells.n; ++i) {
+    out.fixed_effects.push_back(
+        {columns.names[static_cast<std::size_t>(i)], tested(from_cells.row(i).transpose())});
+  }
+  nothing.undefined = "no trial of one of the renderers can be used for times";
+  std::vector<std::optional<double>> p;
+  for (std::size_t r = 1; r < people.size(); ++r) {
+    std::vector<ModelEstimate> contrasts(shapes.size(), nothing);
+    for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
+      const Index first = cells.column[0][s], other = cells.column[r][s];
+      if (first < 0 || other < 0) continue;
+      VectorXd weights = VectorXd::Zero(cells.n);
+      weights(other) = 1;
+      weights(first) = -1;
+      contrasts[cells.shapes[s]] = tested(weights);
+    }
+    for (const ModelEstimate& contrast : contrasts) p.push_back(contrast.p);
+    out.contrasts.push_back(std::move(contrasts));
+  }
+  const auto adjusted = holm(p);
+  std::size_t test = 0;
+  for (auto& contrasts : out.contrasts) {
+    for (ModelEstimate& contrast : contrasts) contrast.p_holm = adjusted[test++];
+  }
+  return out;
+}
+
+}  // namespace palpate

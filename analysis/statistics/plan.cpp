@@ -1,0 +1,67 @@
+#include "analysis/statistics/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+constexpr std::size_t kGridPoints = 12;
+
+/// About evenly on a log scale, both ends included.
+std::vector<std::size_t> grid(std::size_t least, std::size_t most) {
+  std::vector<std::size_t> out;
+  const double low = std::log(static_cast<double>(least)),
+               high = std::log(static_cast<double>(most));
+  for (std::size_t i = 0; i < kGridPoints; ++i) {
+    const double share = static_cast<double>(i) / static_cast<double>(kGridPoints - 1);
+    out.push_back(static_cast<std::size_t>(std::lround(std::exp(low + share * (high - low)))));
+  }
+  out.erase(std::unique(out.begin(), out.end()), out.end());
+  return out;
+}
+
+}  // namespace
+
+double goal_power(const Plan& plan, const Power& power) {
+  return power.share(plan.settings.goal == Goal::all ? power.all : power.any);
+}
+
+Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string> notes,
+               const std::function<void(std::size_t, std::size_t)>& progress) {
+  Plan plan{std::move(model), std::move(settings), std::move(notes), {}, {}};
+  for (const std::size_t trials : plan.settings.trials) {
+    PlanCurve curve;
+    curve.trials = trials;
+    const auto reaches = [&](std::size_t participants) {
+      if (progress) progress(plan.curves.size() + 1, curve.points.size() + 1);
+      PlanPoint point{{participants, trials}, {}};
+      point.power = simulate_power(plan.model, point.design, plan.settings.simulation);
+      const bool enough = goal_power(plan, point.power) >= plan.settings.power;
+      curve.points.push_back(std::move(point));
+      return enough;
+    };
+    std::optional<std::size_t> enough, short_of;
+    for (const std::size_t participants : grid(plan.settings.least, plan.settings.most)) {
+      const bool here = reaches(participants);
+      if (here && !enough) enough = participants;
+      if (!here && !enough) short_of = participants;
+    }
+    while (enough && short_of && *enough - *short_of > 1) {
+      const std::size_t middle = (*enough + *short_of) / 2;
+      (reaches(middle) ? enough : short_of) = middle;
+    }
+    std::ranges::sort(curve.points, {},
+                      [](const PlanPoint& point) { return point.design.participants; });
+    if (enough) {
+      curve.smallest = *std::ranges::find(
+          curve.points, *enough, [](const PlanPoint& point) { return point.design.participants; });
+    }
+    plan.curves.push_back(std::move(curve));
+  }
+  return plan;
+}
+
+}  // namespace palpate

@@ -1,0 +1,23 @@
+#include "data/export/attempts_file.h"
+
+#include "data/export/table_fields.h"
+
+namespace palpate {
+
+std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
+                            ExportedPeople& people, ProgressCounter& counter) {
+  std::int64_t rows = 0;
+  TableRow row(TableStyle::csv);
+  row << attempt_columns(clock.times());
+  out.write(row.end());
+  store.for_each_cut_off([&](const StoredTrial& attempt) {
+    put_attempt(row, attempt, clock);
+    out.write(row.end());
+    people.add(attempt.participant);
+    ++rows;
+    counter.next();
+  });
+  return rows;
+}
+
+}  // namespace palpate

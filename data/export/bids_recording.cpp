@@ -1,0 +1,138 @@
+#include "data/export/bids_recording.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/export/sample_slots.h"
+#include "data/export/table_fields.h"
+#include "data/files/utc.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kLongestGap = 60;  // s
+
+const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the tick is of", "1"};
+
+const std::string& empty_row() {
+  static const std::string row = [] {
+    TableRow all(TableStyle::tsv);
+    all << "";
+    for (std::size_t k = 0; k < sample_columns().size(); ++k) all << "";
+    return all.end();
+  }();
+  return row;
+}
+
+/// Files stand elsewhere in a dataset than beside the protocol.
+void rename_files(nlohmann::ordered_json& object, const StudyLabel& study) {
+  if (const auto file = object.find("file"); file != object.end() && file->is_string()) {
+    const auto found = study.files.find(file->get<std::string>());
+    if (found != study.files.end()) {
+      *file = "bids::stimuli/" + study.label + "/" + found->second;
+    }
+  }
+  if (const auto parts = object.find("parts"); parts != object.end() && parts->is_array()) {
+    for (auto& part : *parts) {
+      if (part.is_object()) rename_files(part, study);
+    }
+  }
+}
+
+nlohmann::ordered_json objects_of(const StudyLabel& study) {
+  nlohmann::ordered_json objects = nlohmann::ordered_json::object();
+  for (const StimulusFacts& stimulus : study.facts.stimuli) {
+    auto& object = objects[in_table(stimulus.name)] =
+        nlohmann::ordered_json::parse(stimulus.object);
+    rename_files(object, study);
+  }
+  return objects;
+}
+
+}  // namespace
+
+BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study)
+    : study_(study),
+      run_(first.run),
+      simulated_(first.participant.simulated),
+      begin_ns_(to_unix_ns(first.run.clock, first.record.onset_ns)) {}
+
+std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
+  if (unix_ns < begin_ns_) return std::nullopt;
+  constexpr double kMostSlots = 1e12;  // years: damaged times
+  const auto since = static_cast<std::uint64_t>(unix_ns) - static_cast<std::uint64_t>(begin_ns_);
+  const double slot = std::round(static_cast<double>(since) / 1e9 * study_.facts.servo_rate);
+  if (slot > kMostSlots) return std::nullopt;
+  return static_cast<std::int64_t>(slot);
+}
+
+bool BidsRecording::goes_on_with(const StoredTrial& trial) const {
+  const ClockStamp &a = run_.clock, &b = trial.run.clock;
+  if (a.utc_ns != b.utc_ns || a.monotonic_ns != b.monotonic_ns) return false;
+  const auto slot = slot_of(to_unix_ns(b, trial.record.onset_ns));
+  if (!slot || *slot < free_) return false;
+  return static_cast<double>(*slot - free_) <= kLongestGap * study_.facts.servo_rate;
+}
+
+void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
+  const TrialRecord& record = trial.record;
+  const std::int64_t onset = slot_of(to_unix_ns(trial.run.clock, record.onset_ns)).value_or(free_);
+  const double length = std::ceil(record.response_time * study_.facts.servo_rate);
+  free_ = onset + static_cast<std::int64_t>(std::clamp(length, 0.0, 1e9));
+  if (record.samples.empty()) return;
+  SampleSlots slots(trial, study_.facts.servo_rate);
+  TableRow row(TableStyle::tsv);
+  std::int64_t first = 0;
+  for (const SampleRecord& sample : record.samples) {
+    const std::int64_t slot = onset + slots.next();
+    if (!file_) {
+      file_.emplace(path);
+      first_row_ = next_row_ = slot;
+    }
+    if (&sample == &record.samples.front()) first = slot;
+    for (; next_row_ < slot; ++next_row_) file_->gzip.write(empty_row());
+    row << record.trial;
+    put_sample(row, sample);
+    file_->gzip.write(row.end());
+    ++next_row_;
+  }
+  free_ = std::max(free_, next_row_);
+  trials_.push_back({{"trial", record.trial},
+                     {"onset", static_cast<double>(onset) / study_.facts.servo_rate},
+                     {"first_row", first - first_row_},
+                     {"rows", next_row_ - first},
+                     {"renderer", in_table(record.renderer)},
+                     {"shape", in_table(record.shape)},
+                     {"orientation_wxyz", record.orientation_wxyz}});
+}
+
+std::optional<nlohmann::ordered_json> BidsRecording::finish(
+    const std::vector<FaultMeaning>& fault_bits) {
+  if (!file_) return std::nullopt;
+  file_->gzip.finish();
+  file_->sink.close(false);
+  nlohmann::ordered_json json{
+      {"SamplingFrequency", study_.facts.servo_rate},
+      {"StartTime", static_cast<double>(first_row_) / study_.facts.servo_rate},
+      {"StartTimeReference",
+       "onset 0 in the beh.tsv of the same run: the first tick with forces on of its first trial"},
+      {"Simulated", simulated_},
+      {"Device", run_.device}};
+  json["Columns"].push_back(kTrialOfSample.name);
+  for (const Column& column : sample_columns()) json["Columns"].push_back(column.name);
+  json[kTrialOfSample.name] = describe(kTrialOfSample, {}, fault_bits);
+  for (const Column& column : sample_columns()) {
+    json[column.name] = describe(column, {}, fault_bits);
+  }
+  json["TrialsDescription"] =
+      "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "
+      "of that name in Objects, turned by the quaternion about the origin of the world frame";
+  json["Trials"] = trials_;
+  json["ObjectsDescription"] =
+      "The protocol's stimuli: position_m, where it is there, and orientation_wxyz place the "
+      "object before it is turned; lengths in m";
+  json["Objects"] = objects_of(study_);
+  return json;
+}
+
+}  // namespace palpate

@@ -1,0 +1,49 @@
+#pragma once
+// Internal to data/: the servo samples of a BIDS run as one recording.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "data/export/dataset.h"
+#include "data/files/text_sink.h"
+#include "data/store/store.h"
+
+namespace palpate {
+
+/// Gzipped rows without a header, one a servo period from the first sample to the last: recordings
+/// of BIDS have no gaps, so periods between trials, and those whose tick was missed, are rows of
+/// n/a. Time is counted from the onset of the run's first trial.
+class BidsRecording {
+ public:
+  /// Begins with this trial, which need not have samples. \param study of the protocol
+  BidsRecording(const StoredTrial& first, const StudyLabel& study);
+
+  /// Whether a trial can stand in the same recording: shown by the same process, after all that is
+  /// there, and at most a minute later (longer gaps would be more n/a than data).
+  bool goes_on_with(const StoredTrial& trial) const;
+  /// \param path of the file, which is made when the first samples come
+  /// \throws StoreRefused: the samples are damaged.
+  void add(const StoredTrial& trial, const std::string& path);
+  /// The sidecar, once all is there; none where no trial had samples.
+  std::optional<nlohmann::ordered_json> finish(const std::vector<FaultMeaning>& fault_bits);
+
+ private:
+  struct File {
+    explicit File(const std::string& path) : sink(path), gzip(sink) {}
+    FileSink sink;
+    GzipSink gzip;
+  };
+  std::optional<std::int64_t> slot_of(std::int64_t unix_ns) const;
+
+  const StudyLabel& study_;
+  const RunInfo run_;
+  const bool simulated_;
+  const std::int64_t begin_ns_;                // since 1970
+  std::int64_t free_ = 0;                      // the first slot after all trials so far
+  std::int64_t first_row_ = 0, next_row_ = 0;  // slots
+  std::optional<File> file_;
+  nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();
+};
+
+}  // namespace palpate

@@ -1,0 +1,42 @@
+#include "data/export/codebook.h"
+
+#include <span>
+
+#include "data/export/table_row.h"
+#include "data/files/spreadsheet_text.h"
+
+namespace palpate {
+namespace {
+
+void describe_table(const char* table, std::span<const Column> columns, const ProtocolFacts& facts,
+                    const ExportSettings& settings, TextSink& out) {
+  TableRow row(TableStyle::csv);
+  for (const Column& column : columns) {
+    row << table << column.name << column.unit << "" << column.description;
+    out.write(row.end());
+    for (const auto& values : {levels_of(column, facts), bits_of(column, settings.fault_bits)}) {
+      for (const auto& [value, meaning] : values.items()) {
+        // A name of a stimulus is guarded already; a guard of its own would be one too many.
+        row << table << column.name << column.unit << unguarded(value)
+            << meaning.get<std::string>();
+        out.write(row.end());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings) {
+  TableRow row(TableStyle::csv);
+  row << "table"
+      << "column"
+      << "unit"
+      << "value"
+      << "meaning";
+  out.write(row.end());
+  describe_table("trials", trial_columns(settings.times), facts, settings, out);
+  describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
+}
+
+}  // namespace palpate

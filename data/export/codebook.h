@@ -1,0 +1,15 @@
+#pragma once
+// Internal to data/: what the columns of trials.csv and attempts.csv mean, as a table.
+
+#include "data/export/columns.h"
+#include "data/export/dataset.h"
+#include "data/export/export.h"
+#include "data/files/text_sink.h"
+
+namespace palpate {
+
+/// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, then one for
+/// each value or bit that stands for something.
+void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings);
+
+}  // namespace palpate

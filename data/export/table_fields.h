@@ -1,0 +1,20 @@
+#pragma once
+// Internal to data/: a trial as the fields of columns.h, in their order.
+
+#include "data/export/export_clock.h"
+#include "data/export/table_row.h"
+#include "data/store/store.h"
+
+namespace palpate {
+
+/// trial_columns()
+void put_trial(TableRow& row, const StoredTrial& trial, const ExportClock& clock);
+/// The same without the first column, participant_id.
+void put_trial_but_who(TableRow& row, const StoredTrial& trial, const ExportClock& clock);
+/// attempt_columns()
+void put_attempt(TableRow& row, const StoredTrial& attempt, const ExportClock& clock);
+/// sample_columns(): places to 1 nm, forces to 1 uN and torques to 1 uN m, a thousandth of what any
+/// device senses or shows; the database has all digits.
+void put_sample(TableRow& row, const SampleRecord& sample);
+
+}  // namespace palpate

@@ -1,0 +1,160 @@
+#include "data/files/output_check.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <unistd.h>
+
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+
+#include "data/errors.h"
+#include "data/files/draft_file.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kLockEnd = ".palpate-lock";
+
+std::optional<struct stat> look_at(const std::string& path) {
+  struct stat found {};
+  if (::stat(path.c_str(), &found) != 0) return std::nullopt;
+  return found;
+}
+
+std::string place_of(const std::string& path) {
+  std::error_code error;
+  const fs::path place = fs::weakly_canonical(fs::absolute(path, error), error);
+  return error ? path : place.string();
+}
+
+bool same(const std::string& a, const std::string& b) {
+  if (a == b) return true;
+  const auto first = look_at(a), second = look_at(b);
+  return first && second && first->st_dev == second->st_dev && first->st_ino == second->st_ino;
+}
+
+bool is_null_device(const struct stat& found) {
+  return S_ISCHR(found.st_mode) && found.st_rdev == makedev(1, 3);
+}
+
+/// Pipes, terminals and what the shell opened take a text as it comes. \return why not, or "".
+std::string why_not_to_stream(const struct stat& found, std::optional<int> descriptor) {
+  if (S_ISDIR(found.st_mode)) return "expected a file; this is a folder";
+  if (is_null_device(found)) return "";
+  if (S_ISFIFO(found.st_mode)) {
+    const bool ours = descriptor || found.st_uid == ::geteuid() || found.st_uid == 0;
+    return ours ? "" : "is a pipe of another user's; name a file";
+  }
+  if (S_ISSOCK(found.st_mode) && descriptor) return "";
+  const bool terminal =
+      descriptor ? ::isatty(*descriptor) == 1 : found.st_rdev == makedev(5, 0);  // /dev/tty
+  if (S_ISCHR(found.st_mode) && terminal) return "";
+  return "is a device; name a file";
+}
+
+}  // namespace
+
+const std::vector<std::string>& database_companions() {
+  static const std::vector<std::string> ends = {"-wal", "-shm", "-journal"};
+  return ends;
+}
+
+bool may_be_database(const std::string& path) {
+  const auto found = look_at(path);
+  // Not even opened: whoever waits at the other end of a pipe would take it for the reader.
+  if (!found || !S_ISREG(found->st_mode)) return false;
+  const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) return true;
+  std::array<char, 16> begin{};
+  const ssize_t length = ::pread(file, begin.data(), begin.size(), 0);
+  ::close(file);
+  if (length < 0) return true;
+  const std::string_view text(begin.data(), static_cast<std::size_t>(length));
+  using namespace std::string_view_literals;
+  for (const std::string_view magic :
+       {"SQLite format 3\0"sv, "\x37\x7f\x06\x82"sv, "\x37\x7f\x06\x83"sv,
+        "\xd9\xd5\x05\xf9\x20\xa1\x63\xd7"sv}) {
+    if (text.starts_with(magic)) return true;
+  }
+  return false;
+}
+
+bool is_named_as_companion(const std::string& path) {
+  const std::string place = place_of(path);
+  for (std::string_view end : {"-wal", "-shm", "-journal", kLockEnd}) {
+    if (!place.ends_with(end)) continue;
+    const std::string database = place.substr(0, place.size() - end.size());
+    if (may_be_database(database)) return true;
+  }
+  return false;
+}
+
+std::optional<int> descriptor_named(const std::string& path) {
+  if (path == "/dev/stdout") return STDOUT_FILENO;
+  if (path == "/dev/stderr") return STDERR_FILENO;
+  for (const std::string_view begin : {"/dev/fd/", "/proc/self/fd/"}) {
+    if (!path.starts_with(begin)) continue;
+    const std::string_view digits = std::string_view(path).substr(begin.size());
+    int number = 0;
+    const auto [end, error] = std::from_chars(digits.begin(), digits.end(), number);
+    if (error == std::errc() && end == digits.end() && number >= 0) return number;
+  }
+  return std::nullopt;
+}
+
+void TakenFiles::add(const std::string& path, const std::string& why) {
+  if (path.empty()) return;
+  const std::string place = place_of(path);
+  taken_.push_back({place, why});
+  if (!may_be_database(place)) return;
+  for (const std::string& end : database_companions()) {
+    taken_.push_back({place + end, "SQLite's file beside a database: " + why});
+  }
+}
+
+std::string TakenFiles::why(const std::string& path) const {
+  const auto found = look_at(path);
+  // A terminal or a pipe may be read and written.
+  if (found && !S_ISREG(found->st_mode)) return "";
+  const std::string place = place_of(path);
+  for (const Taken& one : taken_) {
+    if (same(one.place, place)) return one.why;
+  }
+  return "";
+}
+
+std::string why_not_to_write(const std::string& path, bool force, const TakenFiles& taken) {
+  if (path.empty()) return "expected a path";
+  const auto found = look_at(path);
+  const auto descriptor = descriptor_named(path);
+  if (descriptor) {
+    const int mode = ::fcntl(*descriptor, F_GETFL);
+    if (mode < 0 || (mode & O_ACCMODE) == O_RDONLY) return "is not open for writing";
+  }
+  if (found && !S_ISREG(found->st_mode)) return why_not_to_stream(*found, descriptor);
+  std::string why = taken.why(path);
+  if (!why.empty()) return why;
+  const std::string place = place_of(path);
+  const bool logged = found && (look_at(place + "-wal") || look_at(place + "-journal"));
+  if (logged || may_be_database(path) || is_named_as_companion(path)) {
+    return "is a database or what belongs to one, and is never written over; name another file";
+  }
+  if (descriptor) return "";
+  if (place.starts_with("/dev/") && !place.starts_with("/dev/shm/")) {
+    return "is in the folder of devices; name a file elsewhere";
+  }
+  why = follow_own_links(path).fault;
+  if (!why.empty()) return why;
+  struct stat link {};
+  if (!found && ::lstat(path.c_str(), &link) == 0) return "is a link that leads nowhere";
+  if (found && !force) return "is there already; --force replaces it";
+  return "";
+}
+
+}  // namespace palpate

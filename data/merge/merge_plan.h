@@ -1,0 +1,47 @@
+#pragma once
+// Internal to data/: what of the stations goes into one study, and what speaks against it.
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/merge/merge.h"
+#include "data/merge/station.h"
+#include "data/store/tombstones.h"
+
+namespace palpate {
+
+struct PlannedSession {
+  Station* station = nullptr;  ///< that it is copied from
+  std::int64_t id = 0;         ///< there
+};
+
+struct PlannedParticipant {
+  Station* station = nullptr;  ///< where it was found first
+  std::string code;
+  int enrolled_number = 0;  ///< as of Participant
+  bool simulated = false;
+  std::optional<std::string> seed;
+  std::map<int, PlannedSession> sessions;  ///< by number
+};
+
+struct PlannedProtocol {
+  ProtocolInfo info;                               ///< with its files, by name
+  std::map<int, PlannedParticipant> participants;  ///< by number
+};
+
+struct MergePlan {
+  std::vector<PlannedProtocol> protocols;  ///< by name, then checksum
+  Tombstones tombstones;
+  std::vector<LeftOut> left_out;
+  std::vector<Renumbered> renumbered;
+  std::int64_t sessions = 0;
+};
+
+/// \throws StoreRefused with every conflict, a line each.
+MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash);
+
+}  // namespace palpate

@@ -1,0 +1,233 @@
+#include "data/store/samples_codec.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <bit>
+#include <span>
+#include <type_traits>
+
+#include "data/errors.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::size_t bytes_a_sample(int packing) {
+  return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0);
+}
+// What a count may claim, so that memory stays in proportion to the bytes that are there: a trial
+// of an hour at the fastest rate at most; beyond some minutes no fewer bytes a sample than a
+// clock's jitter alone takes (zlib makes 1000 equal bytes into one).
+constexpr std::int64_t kMostSamples = 40'000'000;
+constexpr std::size_t kSamplesWithFewBytes = 400'000;
+constexpr std::size_t kLeastBytesASample = 2;
+constexpr std::size_t kMostShrunk = 1032;             // zlib makes nothing smaller than this part
+constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes that are unpacked at a time
+// A trial of 10 s packs in some 50 ms at this level, and higher ones save little: the low bytes of
+// a measured signal are noise.
+constexpr int kLevel = 3;
+
+// One visit for both directions: `column(get, form)` where get(sample) is a reference to the field,
+// and `form` has the type that it is stored as.
+template <class Visitor>
+void visit_columns(int packing, Visitor&& column) {
+  constexpr std::uint8_t kByte{};
+  constexpr std::uint32_t kWord{};
+  constexpr std::int64_t kTime{};
+  constexpr double kReal{};
+  column(
+      [](auto& s) -> auto& { return s.tick; }, kWord);
+  if (packing > 1)
+    column(
+        [](auto& s) -> auto& { return s.period_ns; }, kTime);
+  if (packing > 2)
+    column(
+        [](auto& s) -> auto& { return s.lateness_ns; }, kTime);
+  if (packing > 2)
+    column(
+        [](auto& s) -> auto& { return s.compute_ns; }, kTime);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.tip[i]; }, kReal);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.tail[i]; }, kReal);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.force[i]; }, kReal);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.torque[i]; }, kReal);
+  for (int i = 0; i < 3 && packing > 2; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.device1[i]; }, kReal);
+  for (int i = 0; i < 3 && packing > 2; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.device2[i]; }, kReal);
+  column(
+      [](auto& s) -> auto& { return s.depth; }, kReal);
+  column(
+      [](auto& s) -> auto& { return s.contacts; }, kByte);
+  column(
+      [](auto& s) -> auto& { return s.contact_type; }, kByte);
+  column(
+      [](auto& s) -> auto& { return s.buttons; }, kByte);
+  if (packing > 2) {
+    column(
+        [](auto& s) -> auto& { return s.faults; }, kWord);
+  } else {
+    column(
+        [](auto& s) -> auto& { return s.faults; }, kByte);
+  }
+}
+
+constexpr std::size_t kCrcSize = 4;
+
+std::uint32_t crc_of(const unsigned char* bytes, std::size_t size) {
+  return static_cast<std::uint32_t>(crc32_z(crc32_z(0, nullptr, 0), bytes, size));
+}
+
+bool bytes_suffice(std::size_t count, std::size_t size) {
+  return count <= kSamplesWithFewBytes || size / kLeastBytesASample >= count;
+}
+
+[[noreturn]] void refuse() { throw StoreError("the samples are damaged"); }
+
+/// The bytes of a zlib stream, unpacked a piece at a time.
+class Planes {
+ public:
+  Planes(const void* data, std::size_t size) : left_(size) {
+    stream_.next_in = const_cast<Bytef*>(static_cast<const Bytef*>(data));
+    if (inflateInit(&stream_) != Z_OK) throw StoreError("the samples: out of memory");
+  }
+  Planes(const Planes&) = delete;
+  Planes& operator=(const Planes&) = delete;
+  ~Planes() { inflateEnd(&stream_); }
+
+  /// Some of the next bytes, one at least and `most` at most. \throws StoreError at the end.
+  std::span<const unsigned char> take(std::size_t most) {
+    if (at_ == end_ && !fill()) refuse();
+    const std::span<const unsigned char> some(piece_.data() + at_, std::min(most, end_ - at_));
+    at_ += some.size();
+    return some;
+  }
+
+  /// \throws StoreError where more bytes follow, packed or unpacked.
+  void expect_end() {
+    if (at_ != end_ || fill() || left_ + stream_.avail_in > 0) refuse();
+  }
+
+  /// Of all that was unpacked.
+  std::uint32_t crc() const { return static_cast<std::uint32_t>(crc_); }
+
+ private:
+  /// False at the end of the stream.
+  bool fill() {
+    at_ = end_ = 0;
+    while (end_ == 0 && !ended_) {
+      if (stream_.avail_in == 0) {  // it counts in 32 bits
+        stream_.avail_in = static_cast<uInt>(std::min<std::size_t>(left_, 1U << 30U));
+        left_ -= stream_.avail_in;
+      }
+      stream_.next_out = piece_.data();
+      stream_.avail_out = static_cast<uInt>(piece_.size());
+      const int status = inflate(&stream_, Z_NO_FLUSH);
+      if (status != Z_OK && status != Z_STREAM_END) refuse();
+      ended_ = status == Z_STREAM_END;
+      end_ = piece_.size() - stream_.avail_out;
+    }
+    crc_ = crc32_z(crc_, piece_.data(), end_);
+    return end_ > 0;
+  }
+
+  z_stream stream_{};
+  std::size_t left_;  // bytes that the stream has not been given
+  std::vector<unsigned char> piece_ = std::vector<unsigned char>(kPiece);
+  std::size_t at_ = 0, end_ = 0;
+  bool ended_ = false;
+  uLong crc_ = crc32_z(0, nullptr, 0);
+};
+
+template <class Field>
+using Bits = std::conditional_t<sizeof(Field) == 8, std::uint64_t, Field>;
+
+std::string compressed(const std::vector<unsigned char>& planes, int level) {
+  uLongf size = compressBound(planes.size());
+  std::string packed(size, '\0');
+  const int status = compress2(reinterpret_cast<Bytef*>(packed.data()), &size, planes.data(),
+                               planes.size(), level);
+  if (status != Z_OK) throw StoreError("the samples could not be compressed: out of memory");
+  packed.resize(size);
+  return packed;
+}
+
+}  // namespace
+
+std::string pack_samples(const std::vector<SampleRecord>& samples) {
+  const std::size_t count = samples.size();
+  std::vector<unsigned char> planes(count * bytes_a_sample(kSamplesPacking));
+  std::size_t offset = 0;
+  visit_columns(kSamplesPacking, [&](auto get, auto form) {
+    using Field = decltype(form);
+    using Pattern = Bits<Field>;
+    Pattern before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto pattern = std::bit_cast<Pattern>(static_cast<Field>(get(samples[i])));
+      const auto stored = sizeof(Field) == 1 ? pattern : static_cast<Pattern>(pattern - before);
+      before = pattern;
+      for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
+        planes[offset + byte * count + i] =
+            static_cast<unsigned char>(stored >> (8 * (sizeof(Field) - 1 - byte)));
+      }
+    }
+    offset += sizeof(Field) * count;
+  });
+  std::string packed = compressed(planes, kLevel);
+  // Samples that hardly differ: stored as they are, or they could not be told from a false count.
+  if (!bytes_suffice(count, packed.size())) packed = compressed(planes, Z_NO_COMPRESSION);
+  const std::uint32_t crc = crc_of(planes.data(), planes.size());
+  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+  return packed;
+}
+
+std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count,
+                                         int packing) {
+  if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
+  const auto rows = static_cast<std::size_t>(count);
+  const std::size_t expected = rows * bytes_a_sample(packing);
+  if (expected / kMostShrunk > size || (packing > 2 && size < kCrcSize)) refuse();
+  if (!bytes_suffice(rows, size)) refuse();
+  if (packing > 2) size -= kCrcSize;
+  Planes planes(data, size);
+  std::vector<SampleRecord> samples(rows);
+  std::vector<std::uint64_t> column(rows);
+  visit_columns(packing, [&](auto get, auto form) {
+    using Field = decltype(form);
+    using Pattern = Bits<Field>;
+    for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
+      for (std::size_t i = 0; i < rows;) {
+        for (const unsigned char stored : planes.take(rows - i)) {
+          column[i] = (byte == 0 ? 0 : column[i] << 8) | stored;
+          ++i;
+        }
+      }
+    }
+    Pattern before = 0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const auto pattern =
+          static_cast<Pattern>(sizeof(Field) == 1 ? column[i] : column[i] + before);
+      before = pattern;
+      get(samples[i]) = std::bit_cast<Field>(pattern);
+    }
+  });
+  planes.expect_end();
+  if (packing > 2) {
+    std::uint32_t crc = 0;
+    for (std::size_t i = 0; i < kCrcSize; ++i)
+      crc = crc << 8 | static_cast<const unsigned char*>(data)[size + i];
+    if (crc != planes.crc()) refuse();
+  }
+  return samples;
+}
+
+}  // namespace palpate

@@ -1,0 +1,126 @@
+#include "data/store/schema.h"
+
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include "data/errors.h"
+#include "data/files/draft_file.h"
+#include "data/files/draft_folder.h"
+#include "data/store/seal_writer.h"
+#include "data/store/sqlite_errors.h"
+
+namespace palpate {
+namespace {
+
+void set_version(SQLite::Database& db, int version) {
+  db.exec("PRAGMA user_version = " + std::to_string(version));
+}
+
+/// In a folder of our own, where nobody else can put anything beside it.
+void make_private_file(const std::string& file) {
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (descriptor < 0) {
+    throw StoreError(file + ": cannot be created: " + std::generic_category().message(errno) +
+                     "; check that the folder exists and that you may write there");
+  }
+  ::close(descriptor);
+}
+
+}  // namespace
+
+std::span<const Migration> migrations() {
+  static const std::array<Migration, 2> steps = {
+      {{1, withdrawal_sql()},
+       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).all_as_found(); }}}};
+  return steps;
+}
+
+void create_database(const std::string& path) {
+  const DraftFolder folder(path);
+  const std::string draft = folder / "new.db";
+  make_private_file(draft);
+  guarded(path, [&] {
+    SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+    db.exec("PRAGMA page_size = " + std::to_string(kPageSize));
+    db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+    SQLite::Transaction transaction(db);
+    db.exec(schema_sql());
+    for (const Migration& step : migrations()) db.exec(step.sql);
+    db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
+    set_version(db, kSchemaVersion);
+    transaction.commit();
+  });
+  if (!name_new_file(draft, path)) {
+    throw StoreRefused(path + ": has come there while it was to be created; start again");
+  }
+}
+
+void require_application_id(SQLite::Database& db, const std::string& path) {
+  if (db.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return;
+  throw StoreRefused(path + ": is not a palpate database but another program's; name another file");
+}
+
+int checked_version(SQLite::Database& db, const std::string& path, int newest) {
+  return guarded(path, [&] {
+    require_application_id(db, path);
+    const int version = db.execAndGet("PRAGMA user_version").getInt();
+    if (version > newest || version < 1) {
+      throw StoreRefused(path + ": has schema version " + std::to_string(version) +
+                         ", this palpate knows 1 to " + std::to_string(newest) +
+                         "; use the palpate that wrote it or a newer one");
+    }
+    return version;
+  });
+}
+
+std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
+                    std::span<const Migration> steps) {
+  const std::string stem = path + ".v" + std::to_string(from);
+  const DraftFolder folder(stem);
+  const std::string draft = folder / "backup.db";
+  make_private_file(draft);
+  std::string copy = stem + ".backup";
+  guarded(copy, [&] {
+    SQLite::Database target(draft, SQLite::OPEN_READWRITE);
+    if (SQLite::Backup(target, db).executeStep() != 101 /* SQLITE_DONE */) {
+      throw StoreError(path + ": cannot be copied to " + copy +
+                       " before it is migrated: another program keeps it locked");
+    }
+  });
+  for (int i = 2; !name_new_file(draft, copy); ++i) {
+    copy = stem + "-" + std::to_string(i) + ".backup";
+  }
+  guarded(path, [&] {
+    // A step may rebuild tables that others refer to: references are checked once, at the end.
+    db.exec("PRAGMA foreign_keys = OFF");
+    SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
+    int version = from;
+    for (const auto& step : steps) {
+      if (step.from != version || version >= to) continue;
+      db.exec(step.sql);
+      if (step.fill != nullptr) step.fill(db);
+      ++version;
+    }
+    if (version != to) {
+      throw StoreError(path + ": no way from schema version " + std::to_string(version) + " to " +
+                       std::to_string(to));
+    }
+    if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
+      throw StoreError(path +
+                       ": rows would be left without what they refer to; it stays at version " +
+                       std::to_string(from) + ", see the copy " + copy);
+    }
+    set_version(db, version);
+    transaction.commit();
+  });
+  return copy;
+}
+
+}  // namespace palpate

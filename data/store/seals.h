@@ -1,0 +1,147 @@
+#pragma once
+// Internal to data/: the chain of seals over the rows of a session.
+//
+// A seal is SHA-256(seal before, values of the row). It shows accidents and quiet edits: who
+// changes a value in the file changes what the seal was made of, and a row that is taken out is
+// missing in the chain. It is no proof against somebody who means to deceive: the program that made
+// the seals can make them again. Whoever wants that writes the last seal down elsewhere.
+//
+// Values, one after the other: a letter for the type (n null, i integer, r real, t text, b blob),
+// then 8 bytes, least significant first: the integer (booleans 0 or 1), the bits of the real, or
+// the length of the text or blob, whose bytes follow. The first value is a text, the kind of the
+// row:
+//
+//   session  protocol's sha256 and name, participant's code, enrolled number, simulated and seed,
+//            session's number, observer_sha256: link 0, which is not stored
+//   run      the columns of runs from started_utc_ns to hand, sha256 of its own protocol or null,
+//            files_sha256
+//   note     link of its run, at_ns, text
+//   attempt  link of its run, the columns of attempts from trial to samples_sha256
+//   end      link of its run, end_reason, ended_ns
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "data/files/checksum.h"
+#include "data/record.h"
+
+namespace palpate {
+
+/// The values of a row, as they are sealed.
+class SealedValues {
+ public:
+  /// A row of this kind begins; what was there is gone.
+  SealedValues& begin(std::string_view kind) {
+    size_ = 0;
+    return text('t', kind);
+  }
+  SealedValues& operator<<(const std::string& value) { return text('t', value); }
+  SealedValues& operator<<(const Checksum& value) {
+    return text('b', {reinterpret_cast<const char*>(value.data()), value.size()});
+  }
+  SealedValues& operator<<(double value) { return put('r', std::bit_cast<std::uint64_t>(value)); }
+  SealedValues& operator<<(std::int64_t value) {
+    return put('i', static_cast<std::uint64_t>(value));
+  }
+  SealedValues& operator<<(std::uint64_t value) { return put('i', value); }
+  SealedValues& operator<<(int value) { return *this << std::int64_t{value}; }
+  SealedValues& operator<<(std::uint32_t value) { return put('i', value); }
+  SealedValues& operator<<(bool value) { return put('i', value ? 1 : 0); }
+  template <class T>
+  SealedValues& operator<<(const std::optional<T>& value) {
+    if (value) return *this << *value;
+    *room(1) = 'n';
+    return *this;
+  }
+
+  Checksum seal(const Checksum& before) const;  ///< of this row
+
+ private:
+  SealedValues& put(char type, std::uint64_t value) {
+    unsigned char* at = room(9);
+    *at++ = static_cast<unsigned char>(type);
+    for (int shift = 0; shift < 64; shift += 8) *at++ = static_cast<unsigned char>(value >> shift);
+    return *this;
+  }
+  SealedValues& text(char type, std::string_view value) {
+    put(type, value.size());
+    if (!value.empty()) std::memcpy(room(value.size()), value.data(), value.size());
+    return *this;
+  }
+  unsigned char* room(std::size_t more) {
+    size_ += more;
+    if (size_ > bytes_.size()) bytes_.resize(2 * size_);
+    return bytes_.data() + size_ - more;
+  }
+  std::vector<unsigned char> bytes_;
+  std::size_t size_ = 0;
+};
+
+struct SessionHead;
+
+/// What is sealed of an attempt beside its record.
+struct AttemptSealed {
+  std::int64_t run_link = 0, began_ns = 0;
+  std::optional<std::string> cut_off_reason;  ///< none: it was completed
+  std::optional<Checksum> samples;
+};
+
+void put_session(SealedValues& out, const SessionHead& session);
+void put_run(SealedValues& out, const RunInfo& info);
+void put_note(SealedValues& out, std::int64_t run_link, std::int64_t at_ns,
+              const std::string& text);
+void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRecord& record);
+void put_end(SealedValues& out, std::int64_t run_link, const std::string& reason,
+             std::optional<std::int64_t> ended_ns);
+/// Little-endian packing (4 bytes) and count (8), then the data.
+Checksum checksum_of_samples(int packing, std::int64_t count, const void* data, std::size_t size);
+
+/// A place in a session's chain.
+struct Link {
+  std::int64_t place = 0;  ///< 1, 2, ...; 0: what stands for the session itself
+  Checksum seal{};
+};
+
+/// Which row, for messages.
+struct RowName {
+  const char* kind;  ///< "trial", "note of run", ...
+  std::int64_t number = 0;
+  int attempt = 0;  ///< 0: it has none
+};
+
+/// Holds the rows of one session against their seals, in whatever order they come.
+class ChainCheck {
+ public:
+  /// \param session "study.db: participant P01, session 1", for messages
+  ChainCheck(std::string session, const Checksum& first) : session_(std::move(session)) {
+    last_ = first;
+  }
+
+  /// \param link  none: the row has no seal. \throws StoreRefused: it has none, or was changed
+  /// since it was sealed.
+  void add(const std::optional<Link>& link, const SealedValues& values, const RowName& name);
+  /// All rows have come. \throws StoreRefused: some are gone.
+  void finish() const;
+
+ private:
+  struct Waiting {
+    Checksum seal;
+    SealedValues values;
+    RowName name;
+  };
+  void take(const Checksum& seal, const SealedValues& values, const RowName& name);
+  [[noreturn]] void fail(const RowName& name, const char* what) const;
+  std::string session_;
+  Checksum last_;
+  std::int64_t links_ = 0;
+  std::map<std::int64_t, Waiting> waiting_;
+};
+
+}  // namespace palpate

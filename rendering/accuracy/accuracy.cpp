@@ -1,0 +1,78 @@
+#include "rendering/accuracy/accuracy.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+ErrorSpread spread(std::vector<double> errors) {
+  ErrorSpread s;
+  s.count = errors.size();
+  if (errors.empty()) return s;
+  double squares = 0;
+  for (const double e : errors) squares += e * e;
+  const auto n = static_cast<double>(errors.size());
+  s.rms = std::sqrt(squares / n);
+  std::sort(errors.begin(), errors.end());
+  s.p999 = errors[static_cast<std::size_t>(std::ceil(0.999 * n)) - 1];
+  s.worst = errors.back();
+  return s;
+}
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+}  // namespace
+
+void ErrorTally::add(const LineProbe& probe, const std::vector<WayOut>& truth,
+                     const Answer& answer) {
+  ++counts_.ticks;
+  const bool gave_up = std::isnan(answer.depth);
+  const bool touching = answer.touching && !gave_up;
+  if (truth.empty()) {
+    if (!touching) return;
+    ++counts_.phantom;
+    depth_.push_back(answer.depth);
+    force_.push_back(kStiffness * answer.depth);
+    return;
+  }
+  if (!touching) {
+    ++counts_.lost;
+    counts_.gave_up += gave_up ? 1 : 0;
+    depth_.push_back(truth.front().depth);
+    force_.push_back(kStiffness * truth.front().depth);
+    return;
+  }
+  const WayOut& held =
+      *std::max_element(truth.begin(), truth.end(), [&](const WayOut& a, const WayOut& b) {
+        return glm::dot(a.normal, answer.normal) < glm::dot(b.normal, answer.normal);
+      });
+  // Equal to rounding is the least as well: an edge's two faces, a way that two facets share.
+  counts_.deeper += held.depth > truth.front().depth + 1e-12 ? 1 : 0;
+  const Vec3 exact_force = kStiffness * held.depth * held.normal;
+  const Vec3 force = kStiffness * answer.depth * answer.normal;
+  depth_.push_back(std::abs(answer.depth - held.depth));
+  normal_.push_back(angle_between(answer.normal, held.normal));
+  force_.push_back(glm::length(force - exact_force));
+  if (held.flat_angle < kFlat || std::isnan(answer.point.x)) return;
+  const Vec3 exact_point =
+      probe.tip + held.place * (probe.tail - probe.tip) + held.depth * held.normal;
+  point_.push_back(glm::length(answer.point - exact_point));
+  torque_.push_back(glm::length(glm::cross(answer.point - probe.tip, force) -
+                                glm::cross(exact_point - probe.tip, exact_force)));
+}
+
+ErrorSummary ErrorTally::summary() const {
+  ErrorSummary s = counts_;
+  s.depth = spread(depth_);
+  s.normal = spread(normal_);
+  s.point = spread(point_);
+  s.force = spread(force_);
+  s.torque = spread(torque_);
+  return s;
+}
+
+}  // namespace palpate

@@ -1,0 +1,108 @@
+#include "rendering/accuracy/hand_path.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "rendering/accuracy/ways_out.h"
+#include "stimuli/orientation.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kTick = 1e-3;      // s
+constexpr double kStroked = 0.03;   // m from the middle: where the speed is meant
+constexpr double kTurnSd = 0.02;    // rad a tick
+constexpr double kOutside = 0.3;    // m; farther out than any touch
+constexpr double kApproach = 3e-3;  // m
+constexpr double kPlaced = 1e-9;    // m; how exactly the depth is kept
+
+class Hand {
+ public:
+  Hand(const ObjectSpec& shape, const HandPathSettings& settings)
+      : shape_(shape), settings_(settings), random_(settings.seed) {
+    const Quat turn = uniform_rotation(random_);
+    out_ = turn * Vec3(0, 0, 1);
+    heading_ = level_ = turn * Vec3(1, 0, 0);
+    for (double& phase : phase_) phase = 2 * std::numbers::pi * random_.unit();
+  }
+
+  void move() {
+    const double turn = kTurnSd * random_.normal();
+    heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(out_, heading_);
+    out_ = glm::normalize(out_ + settings_.speed * kTick / kStroked * heading_);
+    heading_ = glm::normalize(heading_ - glm::dot(heading_, out_) * out_);
+    level_ = glm::normalize(level_ - glm::dot(level_, out_) * out_);
+    time_ += kTick;
+  }
+
+  /// The stylus with the stroked place at this distance from the middle.
+  LineProbe at(double distance) const {
+    if (settings_.length == 0) return {distance * out_, distance * out_};
+    const double spin = wave(0, 2.9), tilt = 0.8 * std::sin(wave(1, 3.1));
+    const double stroked = std::min(settings_.length, 0.02 + 0.02 * std::sin(wave(2, 1.9)));
+    const Vec3 level = std::cos(spin) * level_ + std::sin(spin) * glm::cross(out_, level_);
+    const Vec3 axis = std::cos(tilt) * level + std::sin(tilt) * out_;
+    const Vec3 tip = distance * out_ - stroked * axis;
+    return {tip, tip + settings_.length * axis};
+  }
+
+  double wanted_depth() const {
+    const double middle = (settings_.shallow + settings_.deep) / 2;
+    return middle + (settings_.deep - middle) * std::sin(wave(3, 0.7));
+  }
+
+  /// How far out the stylus is as deep as wanted. From outside in, the depth rises.
+  double distance_for(double depth) const {
+    double in = 0, beyond = kOutside;
+    if (last_ > 0 && deeper(last_ - 1e-3, depth) && !deeper(last_ + 1e-3, depth)) {
+      in = last_ - 1e-3;
+      beyond = last_ + 1e-3;
+    }
+    while (beyond - in > kPlaced) {
+      const double middle = (in + beyond) / 2;
+      (deeper(middle, depth) ? in : beyond) = middle;
+    }
+    last_ = in;
+    return in;
+  }
+
+ private:
+  double wave(int which, double period) const {
+    return phase_[which] + 2 * std::numbers::pi * time_ / period;
+  }
+  bool deeper(double distance, double depth) const {
+    const auto ways = ways_out(shape_, at(distance));
+    return !ways.empty() && ways.front().depth > depth;
+  }
+
+  const ObjectSpec& shape_;
+  const HandPathSettings& settings_;
+  Random random_;
+  Vec3 out_, heading_;
+  Vec3 level_;  // carried along without turning about out_
+  double phase_[4] = {};
+  double time_ = 0;
+  mutable double last_ = 0;  // where the last search ended: the next one begins near it
+};
+
+}  // namespace
+
+HandPath hand_path(const ObjectSpec& primitive, const HandPathSettings& settings) {
+  HandPath path;
+  Hand hand(primitive, settings);
+  const double distance = hand.distance_for(hand.wanted_depth());
+  const double step = settings.speed * kTick;
+  for (double back = settings.deep + kApproach; back > step / 2; back -= step) {
+    path.poses.push_back(hand.at(distance + back));
+  }
+  path.approach = path.poses.size();
+  for (int i = 0; i < settings.contact_ticks; ++i) {
+    path.poses.push_back(hand.at(hand.distance_for(hand.wanted_depth())));
+    hand.move();
+  }
+  return path;
+}
+
+}  // namespace palpate

@@ -1,0 +1,182 @@
+#include "rendering/accuracy/methods.h"
+
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "rendering/accuracy/peers.h"
+#include "rendering/accuracy/plain_walk.h"
+#include "rendering/facet_walk.h"
+#include "rendering/first_contact.h"
+#include "rendering/renderer.h"
+#include "rendering/separation.h"
+#include "rendering/verification/reference.h"
+
+namespace palpate {
+namespace {
+
+using Kind = MinkowskiFacet::Kind;
+
+Answer answer_of(const WalkResult& hit, const LineProbe& probe) {
+  if (hit.facet.kind == Kind::none) return {};
+  return {true, hit.depth, hit.normal,
+          probe.tip + hit.place * (probe.tail - probe.tip) + hit.depth * hit.normal};
+}
+
+/// The product: a whole tick of a renderer, force and torque included.
+class WholeTick final : public Method {
+ public:
+  WholeTick(const ConvexMesh& mesh, bool segment)
+      : renderer_(segment ? ray_renderer() : point_renderer()),
+        scene_({{std::shared_ptr<const ConvexMesh>(&mesh, [](const ConvexMesh*) {}), Pose{},
+                 Material{}, 0, nullptr}},
+               segment),
+        state_(scene_.initial_state()) {}
+
+  Answer tick(const LineProbe& probe) override {
+    const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
+    return {r.contacts > 0, r.deepest.depth, r.deepest.normal, r.deepest.point};
+  }
+
+ private:
+  const Renderer& renderer_;
+  Scene scene_;
+  RenderState state_;
+};
+
+struct ProductWalk {
+  explicit ProductWalk(const ConvexMesh& m) : mesh(m) {}
+  WalkResult walk(MinkowskiFacet start, const Vec3& tip, const Vec3& d) const {
+    return d == Vec3() ? walk_point(mesh, start, tip) : walk_segment(mesh, start, tip, d);
+  }
+  const ConvexMesh& mesh;
+};
+
+/// The walk alone, from the facet of the last tick; entries by first contact.
+template <class Walk>
+class WarmWalk final : public Method {
+ public:
+  WarmWalk(const ConvexMesh& mesh, bool segment)
+      : mesh_(mesh), walk_(mesh), trees_(mesh, segment), tolerance_(1e-12 * mesh.size()) {}
+
+  Answer tick(const LineProbe& probe) override {
+    const Vec3 d = probe.tail - probe.tip;
+    WalkResult hit;
+    if (facet_.kind != Kind::none) {
+      hit = walk_.walk(facet_, probe.tip, d);
+    } else if (has_last_) {
+      const MinkowskiFacet first =
+          d == Vec3() ? first_contact_point(mesh_, trees_, last_.tip, probe.tip, tolerance_).facet
+                      : first_contact_segment(mesh_, trees_, last_, probe, tolerance_).facet;
+      if (first.kind != Kind::none) hit = walk_.walk(first, probe.tip, d);
+      if (hit.facet.kind == Kind::none) {
+        // Lost to rounding, maybe: then there is no plane between them.
+        find_separating_plane(mesh_, probe.tip, probe.tail, tolerance_, plane_, support_);
+        if (!plane_.valid) hit = nearest_facet_segment(mesh_, probe.tip, d);
+      }
+    }
+    facet_ = hit.facet;
+    last_ = probe;
+    has_last_ = true;
+    return answer_of(hit, probe);
+  }
+
+ private:
+  const ConvexMesh& mesh_;
+  Walk walk_;
+  ContactTrees trees_;
+  double tolerance_;
+  MinkowskiFacet facet_;
+  LineProbe last_;
+  bool has_last_ = false;
+  SeparatingPlane plane_;
+  std::uint32_t support_ = 0;
+};
+
+/// The walk from the same facet at every tick.
+class ColdWalk final : public Method {
+ public:
+  ColdWalk(const ConvexMesh& mesh, bool) : walk_(mesh) {}
+  Answer tick(const LineProbe& probe) override {
+    return answer_of(walk_.walk({Kind::face, false, 0}, probe.tip, probe.tail - probe.tip), probe);
+  }
+
+ private:
+  ProductWalk walk_;
+};
+
+class FullScan final : public Method {
+ public:
+  FullScan(const ConvexMesh& mesh, bool) : mesh_(mesh) {}
+  Answer tick(const LineProbe& probe) override {
+    const Vec3 d = probe.tail - probe.tip;
+    return answer_of(d == Vec3() ? nearest_facet_point(mesh_, probe.tip)
+                                 : nearest_facet_segment(mesh_, probe.tip, d),
+                     probe);
+  }
+
+ private:
+  const ConvexMesh& mesh_;
+};
+
+/// Brute force: the yardstick of the tests, timed. It tells no contact point.
+class BruteForce final : public Method {
+ public:
+  BruteForce(const ConvexMesh& mesh, bool) : mesh_(mesh) {}
+  Answer tick(const LineProbe& probe) override {
+    const ReferenceDepth reference = reference_depth(mesh_, probe);
+    if (reference.depth < 0) return {};
+    return {true, reference.depth, reference.normal,
+            Vec3(std::numeric_limits<double>::quiet_NaN())};
+  }
+
+ private:
+  const ConvexMesh& mesh_;
+};
+
+template <std::size_t kIndex>
+class PeerMethod final : public Method {
+ public:
+  PeerMethod(const ConvexMesh& mesh, bool) : peer_(peer_libraries()[kIndex].make(mesh)) {}
+  Answer tick(const LineProbe& probe) override {
+    const PeerContact contact = peer_->contact(probe);
+    return {!(contact.depth < 0), contact.depth, contact.normal, contact.point};
+  }
+
+ private:
+  std::unique_ptr<Peer> peer_;
+};
+
+template <class M>
+std::unique_ptr<Method> make(const ConvexMesh& mesh, bool segment) {
+  return std::make_unique<M>(mesh, segment);
+}
+
+}  // namespace
+
+std::vector<MethodKind> accuracy_methods() {
+  std::vector<MethodKind> methods = {
+      {"tick", "the renderer's whole tick, force and torque included", true, true, make<WholeTick>},
+      {"walk", "its walk alone, from the last tick's facet", true, true,
+       make<WarmWalk<ProductWalk>>},
+      {"walk-float", "the walk written out in single precision", true, true,
+       make<WarmWalk<PlainWalk<float>>>},
+      {"walk-cold", "the walk from facet 0 at every tick", false, false, make<ColdWalk>},
+      {"scan", "the walk's start by looking at every facet, at every tick", false, false,
+       make<FullScan>},
+      {"brute-force", "the reference of the tests", false, false, make<BruteForce>},
+  };
+  constexpr std::unique_ptr<Method> (*kMakePeer[])(const ConvexMesh&, bool) = {make<PeerMethod<0>>,
+                                                                               make<PeerMethod<1>>};
+  const auto libraries = peer_libraries();
+  for (std::size_t i = 0; i < libraries.size(); ++i) {
+    if (!libraries[i].make) continue;
+    methods.push_back(
+        {libraries[i].name,
+         std::string(libraries[i].name) + " " + libraries[i].version + ", " + libraries[i].method,
+         true, false, kMakePeer[i]});
+  }
+  return methods;
+}
+
+}  // namespace palpate

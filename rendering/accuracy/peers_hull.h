@@ -1,0 +1,55 @@
+#pragma once
+// What the adaptors of the libraries share: mesh and probe in the libraries' units. Included by
+// peers_*.cpp alone.
+
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <memory>
+
+#include "rendering/accuracy/peers.h"
+#include "rendering/separation.h"
+#include "rendering/support_map.h"
+
+namespace palpate::peers {
+
+/// Mesh frame to coordinates in which the object has radius 1 about the origin.
+struct Scale {
+  explicit Scale(const ConvexMesh& mesh) : centre(mesh.centre()), radius(mesh.radius()) {}
+  Vec3 to_unit(const Vec3& p) const { return (p - centre) / radius; }
+  Vec3 from_unit(const Vec3& p) const { return centre + radius * p; }
+
+  Vec3 centre;
+  double radius;
+};
+
+/// The mesh as a support function: climbs from the start that a map has for the direction, so that
+/// a direction asked twice gets the same vertex twice, ties included: Bullet asks again for its
+/// witness points.
+class Hull {
+ public:
+  explicit Hull(const ConvexMesh& mesh) : mesh_(mesh), scale_(mesh), map_(mesh, 0, 1) {}
+  const Scale& scale() const { return scale_; }
+  Vec3 support(const Vec3& direction) const {
+    // Libraries may ask for no direction at all.
+    const Vec3 asked = glm::dot(direction, direction) > 0 ? direction : Vec3(1, 0, 0);
+    const std::uint32_t vertex = support_vertex(mesh_, asked, map_.near_support(asked));
+    return scale_.to_unit(mesh_.vertices()[vertex]);
+  }
+
+ private:
+  const ConvexMesh& mesh_;
+  Scale scale_;
+  SupportMap map_;
+};
+
+struct Segment {
+  Vec3 tip, tail;
+  Vec3 support(const Vec3& direction) const {
+    return glm::dot(direction, tail - tip) > 0 ? tail : tip;
+  }
+};
+
+std::unique_ptr<Peer> make_bullet(const ConvexMesh& mesh);
+std::unique_ptr<Peer> make_fcl(const ConvexMesh& mesh);
+
+}  // namespace palpate::peers

@@ -1,0 +1,61 @@
+#pragma once
+// The work-precision study: every method over every tessellation of the four shapes.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "rendering/accuracy/accuracy.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate {
+
+struct AccuracySettings {
+  int paths = 4;             ///< for each shape and probe; seeds 1, 2, ...
+  int contact_ticks = 1000;  ///< of each path
+  double length = 0.12;      ///< m, of the stylus
+  int most_triangles = 327680;
+  /// Facets and edges that may be visited in a look at everything (the exact polyhedron, and the
+  /// methods that scan); where all ticks would take more, every n-th is looked at.
+  double visits = 2e8;
+  int timings = 3;  ///< of which the fastest counts
+};
+
+/// One method on one tessellation with one probe.
+struct AccuracyRow {
+  std::string shape;  ///< "sphere", "cone", "cylinder", "cube"
+  int triangles = 0;
+  std::size_t facets = 0, edges = 0;  ///< after merging coplanar triangles
+  int subdivisions = 0;               ///< sphere
+  int segments = 0;                   ///< cone, cylinder
+  std::string probe;                  ///< "ray", "point"
+  std::string method;
+  double ns_per_tick = 0;
+  ErrorSummary shape_errors;       ///< against the analytic shape
+  ErrorSummary polyhedron_errors;  ///< against the exact polyhedron
+};
+
+/// The tessellations of one shape, coarse to fine; default sizes (30 mm, 60 mm).
+std::vector<ObjectSpec> tessellations(ShapeKind shape, int most_triangles);
+int triangles_of(const ObjectSpec& spec);
+
+/// Runs it all. \param now  a clock, ns \param progress  called with the share done before each row
+std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
+                                        const std::function<double()>& now,
+                                        const std::function<void(double)>& progress);
+
+/// What a lab asks: the coarsest tessellation from which on (the finer ones included) the
+/// renderers' whole ticks, point and ray, keep 99.9 % of their errors below these, with no contact
+/// lost.
+struct Demand {
+  double position;   ///< m, of the surface along the normal
+  double direction;  ///< rad, of the force
+};
+constexpr double kNoDemand = 1e9;
+
+/// The rows ("ray" and "point") of that tessellation by its triangles; 0 when none is fine enough.
+int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
+                  const Demand& demand);
+
+}  // namespace palpate

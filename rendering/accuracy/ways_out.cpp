@@ -1,0 +1,159 @@
+// The ways out of the analytic shapes; sphere and cube.
+
+#include "rendering/accuracy/ways_out.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+#include "rendering/accuracy/ways_out_round.h"
+#include "rendering/accuracy/ways_out_search.h"
+
+namespace palpate {
+namespace ways {
+namespace {
+
+void out_of_sphere(Search& s) {
+  const double radius = s.shape.radius;
+  const auto add_end = [&](bool tail) {
+    const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+    const double from = glm::length(p);
+    s.end(tail, from > 0 ? p / from : Vec3(0, 0, 1), radius - from, kRight);
+  };
+  add_end(false);
+  if (s.is_point()) return;
+  add_end(true);
+  const double place = -glm::dot(s.probe.tip, s.d) / (s.length * s.length);
+  const Vec3 foot = s.probe.tip + place * s.d;
+  const double from = glm::length(foot);
+  // A probe through the centre: any direction across it.
+  const Vec3 normal = from > 1e-12 * radius   ? foot / from
+                      : std::abs(s.u.z) < 0.9 ? glm::normalize(glm::cross(s.u, Vec3(0, 0, 1)))
+                                              : glm::normalize(glm::cross(s.u, Vec3(1, 0, 0)));
+  s.side(normal, radius - from, place, kRight);
+}
+
+void out_of_cube(Search& s) {
+  const double h = s.shape.edge / 2;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      Vec3 normal;
+      normal[axis] = sign;
+      const double flat = angle_to_plane(s.u, normal);
+      for (const bool tail : {false, true}) {
+        const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+        if (std::abs(p[(axis + 1) % 3]) <= h && std::abs(p[(axis + 2) % 3]) <= h)
+          s.end(tail, normal, h - sign * p[axis], flat);
+      }
+      if (s.is_point()) continue;
+      // The edges along this axis: the normal chooses which.
+      Vec3 line;
+      line[axis] = 1;
+      const Vec3 c = sign * glm::cross(line, s.u);
+      const double width = glm::length(c);
+      if (width == 0) continue;
+      const Vec3 n = c / width;
+      const int i = (axis + 1) % 3, k = (axis + 2) % 3;
+      if (n[i] == 0 || n[k] == 0) continue;  // flat on a face
+      Vec3 start;
+      start[axis] = -h;
+      start[i] = std::copysign(h, n[i]);
+      start[k] = std::copysign(h, n[k]);
+      const double before = s.u[i], beside = s.u[k];
+      const double depth = glm::dot(n, start - s.probe.tip);
+      const Vec3 w = s.probe.tip + depth * n - start;
+      const Vec3 across = glm::cross(2 * h * line, s.d);
+      const double c2 = glm::dot(across, across);
+      const double along = glm::dot(glm::cross(w, s.d), across) / c2;
+      if (along < 0 || along > 1) continue;
+      s.side(n, depth, glm::dot(glm::cross(w, 2 * h * line), across) / c2,
+             std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
+    }
+  }
+}
+
+/// At most 0 inside the shape, above 0 outside; convex. Not a distance past rims and edges.
+double outside_by(const ObjectSpec& s, const Vec3& p) {
+  const double out = std::hypot(p.x, p.y);
+  switch (s.shape) {
+    case ShapeKind::sphere:
+      return glm::length(p) - s.radius;
+    case ShapeKind::cube:
+      return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) - s.edge / 2;
+    case ShapeKind::cylinder:
+      return std::max(out - s.radius, std::abs(p.z) - s.height / 2);
+    case ShapeKind::cone: {
+      const Vec3 side = cone_normal(s, Vec3(1, 0, 0));
+      return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
+    }
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
+  }
+  throw std::invalid_argument("ways_out: a mesh or compound is no analytic primitive");
+}
+
+/// Some point of the probe is within the shape: the least of a convex function by thirds.
+bool overlaps(const ObjectSpec& shape, const LineProbe& probe) {
+  const auto at = [&](double t) {
+    return outside_by(shape, probe.tip + t * (probe.tail - probe.tip));
+  };
+  double low = 0, high = 1;
+  for (int i = 0; i < 100 && at(low) > 0 && at(high) > 0; ++i) {
+    const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+    (at(a) <= at(b) ? high : low) = at(a) <= at(b) ? b : a;
+  }
+  return at(low) <= 0 || at(high) <= 0;
+}
+
+}  // namespace
+}  // namespace ways
+
+double support(const ObjectSpec& primitive, const Vec3& n) {
+  const double out = primitive.radius * std::hypot(n.x, n.y), up = primitive.height / 2 * n.z;
+  switch (primitive.shape) {
+    case ShapeKind::sphere:
+      return primitive.radius * glm::length(n);
+    case ShapeKind::cube:
+      return primitive.edge / 2 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
+    case ShapeKind::cylinder:
+      return out + std::abs(up);
+    case ShapeKind::cone:
+      return std::max(up, out - up);
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
+  }
+  throw std::invalid_argument("support: a mesh or compound is no analytic primitive");
+}
+
+double depth_along(const ObjectSpec& primitive, const LineProbe& probe, const Vec3& n) {
+  return support(primitive, n) - std::min(glm::dot(n, probe.tip), glm::dot(n, probe.tail));
+}
+
+std::vector<WayOut> ways_out(const ObjectSpec& primitive, const LineProbe& probe) {
+  support(primitive, Vec3());  // refuses what is no primitive
+  if (!ways::overlaps(primitive, probe)) return {};
+  ways::Search s(primitive, probe);
+  switch (primitive.shape) {
+    case ShapeKind::sphere:
+      ways::out_of_sphere(s);
+      break;
+    case ShapeKind::cube:
+      ways::out_of_cube(s);
+      break;
+    case ShapeKind::cylinder:
+      ways::out_of_cylinder(s);
+      break;
+    case ShapeKind::cone:
+      ways::out_of_cone(s);
+      break;
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;  // refused above
+  }
+  return s.sorted();
+}
+
+}  // namespace palpate

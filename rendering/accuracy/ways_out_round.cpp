@@ -1,0 +1,148 @@
+#include "rendering/accuracy/ways_out_round.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <numbers>
+#include <vector>
+
+namespace palpate::ways {
+namespace {
+
+Vec3 radial(const Vec3& p) {
+  const double out = std::sqrt(p.x * p.x + p.y * p.y);
+  return out > 0 ? Vec3(p.x / out, p.y / out, 0) : Vec3(1, 0, 0);
+}
+
+/// Down the cone's side from the apex to the rim; not normalised.
+Vec3 cone_generator(const ObjectSpec& cone, const Vec3& out) {
+  return {cone.radius * out.x, cone.radius * out.y, -cone.height};
+}
+
+/// The probe, moved out to the plane with this normal through `start`, crosses the straight line
+/// start..start + line of the surface.
+void cross_line(Search& s, const Vec3& normal, const Vec3& start, const Vec3& line) {
+  const double depth = glm::dot(normal, start - s.probe.tip);
+  const Vec3 w = s.probe.tip + depth * normal - start;  // w + place d = along line
+  const Vec3 c = glm::cross(line, s.d);
+  const double c2 = glm::dot(c, c);
+  if (c2 == 0) return;  // parallel: the ends and rims have it
+  const double along = glm::dot(glm::cross(w, s.d), c) / c2;
+  if (along < 0 || along > 1) return;
+  s.side(normal, depth, glm::dot(glm::cross(w, line), c) / c2, angle_to_line(s.u, line));
+}
+
+/// Directions around a circle, off the axes, where a rate may be exactly zero.
+class Turns {
+ public:
+  static constexpr int kParts = 360;
+  static double angle(int i) { return 2 * std::numbers::pi * (i + 0.123) / kParts; }
+  Turns() {
+    for (int i = 0; i <= kParts; ++i) all_.push_back({std::cos(angle(i)), std::sin(angle(i))});
+  }
+  glm::dvec2 at(int i) const { return all_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<glm::dvec2> all_;
+};
+
+/// The probe's side against a rim, the circle of the shape's radius at height z: n at right angles
+/// to the probe, within `belongs` (the normals that the rim has). Along the circle of those n,
+/// phi' = (x - tip).n' with x the rim's point farthest along n: its roots from below, each halved
+/// down to rounding, are the minima.
+template <class Belongs>
+void cross_rim(Search& s, double z, Belongs belongs) {
+  static const Turns turns;
+  const Vec3 across = std::abs(s.u.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
+  const Vec3 e1 = glm::normalize(glm::cross(s.u, across)), e2 = glm::cross(s.u, e1);
+  const auto normal = [&](const glm::dvec2& turn) { return turn.x * e1 + turn.y * e2; };
+  const auto touched = [&](const Vec3& n) { return s.shape.radius * radial(n) + Vec3(0, 0, z); };
+  const auto rate = [&](const glm::dvec2& turn) {  // n' is e2 cos - e1 sin
+    return glm::dot(touched(normal(turn)) - s.probe.tip, turn.x * e2 - turn.y * e1);
+  };
+  double last = rate(turns.at(0));
+  for (int i = 0; i < Turns::kParts; ++i) {
+    const double next = rate(turns.at(i + 1));
+    if (last < 0 && next >= 0) {
+      double low = Turns::angle(i), high = Turns::angle(i + 1);
+      for (double middle = (low + high) / 2; middle > low && middle < high;
+           middle = (low + high) / 2) {
+        (rate({std::cos(middle), std::sin(middle)}) < 0 ? low : high) = middle;
+      }
+      const Vec3 n = normal({std::cos(high), std::sin(high)});
+      if (belongs(n)) {
+        const Vec3 x = touched(n);
+        const double place = glm::dot(x - s.probe.tip, s.d) / (s.length * s.length);
+        const Vec3 line =
+            s.shape.shape == ShapeKind::cone ? cone_generator(s.shape, radial(n)) : Vec3(0, 0, 1);
+        s.side(n, glm::dot(n, x - s.probe.tip), place,
+               std::min(angle_to_plane(s.u, Vec3(0, 0, 1)), angle_to_line(s.u, line)));
+      }
+    }
+    last = next;
+  }
+}
+
+}  // namespace
+
+Vec3 cone_normal(const ObjectSpec& cone, const Vec3& out) {
+  return glm::normalize(Vec3(cone.height * out.x, cone.height * out.y, cone.radius));
+}
+
+void out_of_cylinder(Search& s) {
+  const double radius = s.shape.radius, h = s.shape.height / 2;
+  const Vec3 up(0, 0, 1);
+  for (const bool tail : {false, true}) {
+    const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+    if (tail && s.is_point()) break;
+    for (const double sign : {-1.0, 1.0}) {
+      const Vec3 n(0, 0, sign);
+      // Out past an end: on the disc only where the end of the probe is above it.
+      if (std::hypot(p.x, p.y) <= radius) s.end(tail, n, h - sign * p.z, angle_to_plane(s.u, n));
+    }
+    if (std::abs(p.z) <= h)
+      s.end(tail, radial(p), radius - std::hypot(p.x, p.y), angle_to_line(s.u, up));
+  }
+  if (s.is_point()) return;
+  const Vec3 c = glm::cross(up, s.u);
+  const double width = glm::length(c);
+  for (const double sign : {-1.0, 1.0}) {
+    if (width > 0) {
+      const Vec3 n = sign * c / width;
+      cross_line(s, n, radius * n - h * up, 2 * h * up);
+    }
+    cross_rim(s, sign * h, [&](const Vec3& n) { return n.z * sign > 0; });
+  }
+}
+
+void out_of_cone(Search& s) {
+  const double radius = s.shape.radius, height = s.shape.height;
+  const Vec3 apex(0, 0, height / 2), down(0, 0, -1);
+  for (const bool tail : {false, true}) {
+    const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+    if (tail && s.is_point()) break;
+    if (std::hypot(p.x, p.y) <= radius)
+      s.end(tail, down, p.z + height / 2, angle_to_plane(s.u, down));
+    const Vec3 out = radial(p), n = cone_normal(s.shape, out), line = cone_generator(s.shape, out);
+    const double along = glm::dot(p - apex, line) / glm::dot(line, line);
+    if (along >= 0 && along <= 1) s.end(tail, n, glm::dot(n, apex - p), angle_to_line(s.u, line));
+  }
+  if (s.is_point()) return;
+  // Normals of the side at right angles to the probe: height (u.out) + radius u.z = 0.
+  const double across = std::hypot(s.u.x, s.u.y);
+  const double cosine = across > 0 ? -radius * s.u.z / (height * across) : 2;
+  if (std::abs(cosine) <= 1) {
+    const double about = std::atan2(s.u.y, s.u.x), turn = std::acos(cosine);
+    for (const double angle : {about - turn, about + turn}) {
+      const Vec3 out(std::cos(angle), std::sin(angle), 0);
+      cross_line(s, cone_normal(s.shape, out), apex, cone_generator(s.shape, out));
+    }
+  }
+  cross_rim(s, -height / 2, [&](const Vec3& n) {
+    return radius * std::hypot(n.x, n.y) > height * n.z;  // farther out than the apex
+  });
+}
+
+}  // namespace palpate::ways

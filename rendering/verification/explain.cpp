@@ -1,0 +1,158 @@
+#include "rendering/verification/explain.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <set>
+
+namespace palpate {
+namespace {
+
+std::string counted(std::size_t count, const std::string& one, const std::string& many) {
+  return std::to_string(count) + ' ' + (count == 1 ? one : many);
+}
+
+/// How many of the scene's meshes have what `get` returns of their trees, and the largest count of
+/// primitives among the meshes.
+struct MeshTally {
+  std::size_t meshes = 0, with = 0, most = 0;
+};
+
+template <class Has, class Count>
+MeshTally tally(const Scene& scene, Has has, Count count) {
+  MeshTally result;
+  std::set<const ConvexMesh*> seen;
+  for (const ScenePart& part : scene.parts()) {
+    if (!seen.insert(part.mesh.get()).second) continue;
+    ++result.meshes;
+    if (has(*part.trees)) ++result.with;
+    result.most = std::max(result.most, count(*part.mesh));
+  }
+  return result;
+}
+
+Stage structure(std::string name, const MeshTally& t, const std::string& things,
+                std::size_t limit) {
+  const bool built = t.with > 0;
+  std::string why = built ? "for " + std::to_string(t.with) + " of " +
+                                counted(t.meshes, "mesh", "meshes") + ": more than " +
+                                std::to_string(limit) + ' ' + things
+                          : "not more than " + std::to_string(limit) + ' ' + things +
+                                " (here up to " + std::to_string(t.most) + ")";
+  return {std::move(name), StageTime::once, built, std::move(why)};
+}
+
+void add_structures(const Scene& scene, const Renderer& renderer, std::vector<Stage>& stages) {
+  const auto facets = [](const ConvexMesh& m) { return m.facets().size(); };
+  const auto edges = [](const ConvexMesh& m) { return m.edges().size(); };
+  const auto vertices = [](const ConvexMesh& m) { return m.vertices().size(); };
+  stages.push_back(
+      structure("tree of polygons",
+                tally(
+                    scene, [](const ContactTrees& t) { return t.polygons() != nullptr; }, facets),
+                "facets to scan", ContactTrees::kScan));
+  const MeshTally with_edges = tally(
+      scene, [](const ContactTrees& t) { return t.edges() != nullptr; }, edges);
+  if (with_edges.with == 0 && !renderer.side_contact()) {
+    stages.push_back({"tree of edges", StageTime::once, false, "a point meets no edges"});
+  } else {
+    stages.push_back(structure("tree of edges", with_edges, "edges to scan", ContactTrees::kScan));
+  }
+  stages.push_back(structure(
+      "support map",
+      tally(
+          scene, [](const ContactTrees& t) { return t.support_map() != nullptr; }, vertices),
+      "vertices to climb", SupportMap::kClimbed));
+}
+
+/// Parts that are out of reach of a point anywhere on the first part's bounding sphere.
+std::size_t out_of_reach(const Scene& scene) {
+  const auto& parts = scene.parts();
+  return static_cast<std::size_t>(
+      std::count_if(parts.begin(), parts.end(), [&](const ScenePart& part) {
+        const ScenePart& first = parts.front();
+        const double gap = glm::length(part.sphere_centre - first.sphere_centre) -
+                           first.sphere_radius - part.sphere_radius;
+        return !in_reach(part, gap, 0);
+      }));
+}
+
+bool has_compound(const Scene& scene) {
+  const auto& parts = scene.parts();
+  return std::adjacent_find(parts.begin(), parts.end(), [](const ScenePart& a, const ScenePart& b) {
+           return a.object == b.object;
+         }) != parts.end();
+}
+
+void add_parts(const Scene& scene, std::vector<Stage>& stages) {
+  const std::size_t parts = scene.parts().size();
+  const bool several = scene.needs().several_parts;
+  stages.push_back({"several parts", StageTime::tick, several,
+                    several ? "which of them are in reach, a list of contacts, sums over it"
+                            : "one part is always looked at; it has one contact at most"});
+  const std::size_t far = out_of_reach(scene);
+  stages.push_back({"objects out of reach", StageTime::tick, false,
+                    far == 0 ? "there are none while the first is touched"
+                             : std::to_string(far) + " of " + counted(parts, "part", "parts") +
+                                   " while the first is touched"});
+}
+
+void add_materials(const Needs& needs, std::vector<Stage>& stages) {
+  const auto add = [&](const char* name, bool runs, const char* what) {
+    stages.push_back({name, StageTime::contact, runs, runs ? what : "no material asks for it"});
+  };
+  add("layers", needs.layers, "the sum over the layers that the probe is in");
+  add("damping", needs.damping, "against the normal speed, never pulling");
+  add("friction", needs.friction, "Coulomb's, through the ideal probe's lag along the surface");
+}
+
+}  // namespace
+
+const char* to_string(StageTime time) {
+  switch (time) {
+    case StageTime::once:
+      return "once a scene";
+    case StageTime::tick:
+      return "every tick";
+    case StageTime::free:
+      return "in free space";
+    case StageTime::entry:
+      return "at first contact";
+    case StageTime::contact:
+      return "in contact";
+  }
+  return "";
+}
+
+std::vector<Stage> explain(const Scene& scene, const Renderer& renderer) {
+  const bool sides = renderer.side_contact();
+  std::vector<Stage> stages;
+  add_structures(scene, renderer, stages);
+  stages.push_back({"pose check", StageTime::tick, true,
+                    "no force where a coordinate is not finite or beyond 1000 km"});
+  add_parts(scene, stages);
+  stages.push_back({"frame of the part", StageTime::tick, true, "the pose as the mesh sees it"});
+  stages.push_back({"separating plane", StageTime::free, true,
+                    "while the plane of an earlier tick stands between them, that is all"});
+  stages.push_back({"first contact", StageTime::entry, true,
+                    "the facet by which the path comes in, once that plane is crossed"});
+  stages.push_back({"neighbourhood watch", StageTime::contact, true,
+                    "from the last facet to the one that holds the probe now"});
+  stages.push_back({"side contact", StageTime::contact, sides,
+                    sides ? "the watch crosses silhouette edges too (its cost is counted there); "
+                            "equation (2) places the contact"
+                          : "only the tip is felt"});
+  const bool compound = has_compound(scene);
+  stages.push_back({"parts of one object", StageTime::contact, compound,
+                    compound ? "they share the shortest way out, so that seams are not felt"
+                             : "no object has several"});
+  stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
+  add_materials(scene.needs(), stages);
+  stages.push_back({"torque and second device", StageTime::contact, sides,
+                    sides ? "the moment about the tip; equations (1), (4) and (5)"
+                          : "a force at the tip has no lever"});
+  stages.push_back({"sample log", StageTime::tick, false,
+                    "not the scene's: a protocol asks for it (\"samples\": true)"});
+  return stages;
+}
+
+}  // namespace palpate

@@ -1,0 +1,266 @@
+// Closed paths: what the renderer does to the hand on a way that ends where it began. A wall must
+// give back what was put in, or less; never more.
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "rendering/verification/extreme_watch.h"
+#include "stimuli/orientation.h"
+#include "stimuli/primitives.h"
+
+namespace palpate::extremes {
+namespace {
+
+constexpr double kStylus = 0.12;                   // m
+constexpr double kBlend = std::numbers::pi / 180;  // rad; equation (2)
+constexpr double kExtrapolated = 1e-6;  // of the stored energy, what extrapolation leaves
+constexpr double kDepth = 1e-3;         // m, about which a cycle goes
+
+/// tip = middle + across sin(turn) + along (1 - cos(turn)), and the tail likewise; without end.
+struct Cycle {
+  LineProbe middle, across, along;
+
+  LineProbe at(double turn) const { return sum(middle, std::sin(turn), 1 - std::cos(turn)); }
+  LineProbe rate(double turn) const { return sum({}, std::cos(turn), std::sin(turn)); }
+
+ private:
+  LineProbe sum(const LineProbe& from, double a, double b) const {
+    return {from.tip + a * across.tip + b * along.tip,
+            from.tail + a * across.tail + b * along.tail};
+  }
+};
+
+struct Lap {
+  double work = 0;      ///< J, done on the hand
+  double wound_up = 0;  ///< J, that friction's spring holds more at the end
+  double stored = 0;    ///< J, at the deepest
+  double force = 0;     ///< N, the largest
+  double rocking = 0;   ///< m, way of one end against the other along z while equation (2) blends
+  double jumps = 0;  ///< J, what the sum may be off by where the force jumps, from facet to facet
+  int ticks = 0, in_contact = 0, in_blend = 0;
+  bool one_facet = true;  ///< held by one facet of M all the way
+  bool upwards = true;    ///< within a degree or two of it
+};
+
+/// One object, its material, and the hand that goes round.
+class Track {
+ public:
+  Track(const Renderer& renderer, const std::shared_ptr<const ConvexMesh>& mesh,
+        const Material& material)
+      : renderer_(renderer),
+        stiffness_(material.stiffness),
+        scene_({{mesh, {}, material, 0, nullptr}}, renderer.side_contact()),
+        state_(scene_.initial_state()) {}
+
+  Rendering tick(const LineProbe& probe) { return renderer_.tick(scene_, state_, probe, 1e-3); }
+
+  /// Straight in along `way` (unit) until it is kDepth deep; where it is then. \param probe at the
+  /// object's middle
+  LineProbe press(const LineProbe& probe, const Vec3& way, double from) {
+    constexpr double kStep = 1e-4;
+    LineProbe now = probe;
+    for (double left = from; left > -from; left -= kStep) {
+      now = {probe.tip - left * way, probe.tail - left * way};
+      if (tick(now).deepest.depth > kDepth) break;
+    }
+    return now;
+  }
+
+  /// Once round, going on from the last tick. The sum of force times speed over equal steps nears
+  /// the integral faster than any power of their number where the force is smooth; where the way
+  /// back is not the way there (friction drifts) its ends are weighted as the trapezium rule does.
+  Lap lap(const Cycle& cycle, int ticks) {
+    Lap lap;
+    const double step = 2 * std::numbers::pi / ticks, power_before = power_;
+    const double friction_before = friction_energy();
+    const MinkowskiFacet first = state_.parts[0].facet;
+    lap.one_facet = first.kind != MinkowskiFacet::Kind::none;
+    for (int i = 1; i <= ticks; ++i) {
+      const LineProbe probe = cycle.at(i * step), rate = cycle.rate(i * step);
+      const MinkowskiFacet last = state_.parts[0].facet;
+      const Rendering r = tick(probe);
+      const MinkowskiFacet facet = state_.parts[0].facet;
+      power_ = glm::dot(r.device1, rate.tip) + glm::dot(r.device2, rate.tail);
+      lap.work += power_ * step;
+      const bool blends = r.deepest.type == ContactType::segment_face;
+      if (blends) lap.rocking += std::abs(rate.tail.z - rate.tip.z) * step;
+      if (!(facet == last)) {
+        lap.jumps += glm::length(r.force) * (glm::length(rate.tip) + glm::length(rate.tail)) * step;
+      }
+      lap.one_facet &= facet.kind == first.kind && facet.index == first.index;
+      lap.upwards &= facet.kind != MinkowskiFacet::Kind::none && !(r.deepest.normal.z < 0.99);
+      lap.stored = std::max(lap.stored, stiffness_ * r.deepest.depth * r.deepest.depth / 2);
+      lap.force = std::max(lap.force, glm::length(r.force));
+      ++lap.ticks;
+      lap.in_contact += r.contacts > 0;
+      lap.in_blend += blends;
+    }
+    lap.work += (power_before - power_) * step / 2;
+    lap.wound_up = friction_energy() - friction_before;
+    return lap;
+  }
+
+ private:
+  /// Of the spring that holds a sticking contact, J.
+  double friction_energy() const {
+    const Vec3& lag = state_.parts[0].grip.lag;
+    return stiffness_ * glm::dot(lag, lag) / 2;
+  }
+
+  const Renderer& renderer_;
+  double stiffness_;
+  Scene scene_;
+  RenderState state_;
+  double power_ = 0;  ///< J for each radian of the cycle, at the last tick
+};
+
+Vec3 direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+
+LineProbe small(Random& random, double most) {
+  return {most * random.unit() * direction(random), most * random.unit() * direction(random)};
+}
+
+const std::shared_ptr<const ConvexMesh>& shape(std::uint64_t index) {
+  static const std::array kShapes = {std::make_shared<const ConvexMesh>(icosphere(0.03, 2)),
+                                     std::make_shared<const ConvexMesh>(cone(0.03, 0.06, 32)),
+                                     std::make_shared<const ConvexMesh>(cylinder(0.03, 0.06, 32)),
+                                     std::make_shared<const ConvexMesh>(cube(0.06))};
+  return kShapes[index % kShapes.size()];
+}
+
+/// A stylus in any pose pressed into a shape, and a small way round.
+Cycle cycle_anywhere(Random& random, Track& track) {
+  const Vec3 out = direction(random), d = kStylus * direction(random);
+  const double share = random.unit();
+  Cycle cycle;
+  cycle.middle = track.press({-share * d, (1 - share) * d}, -out, 0.3);
+  cycle.across = small(random, 4e-4);
+  cycle.along = small(random, 2e-4);
+  return cycle;
+}
+
+/// A stylus nearly flat on the top of the cube, that rocks through the blend.
+Cycle cycle_over_a_flat(Random& random, Track& track) {
+  const double turn = 2 * std::numbers::pi * random.unit();
+  // As long as it is, its ends are past the face; a short one's are over it.
+  const double length = random.unit() < 0.5 ? kStylus : 0.3 * kStylus;
+  const Vec3 d = length * Vec3(std::cos(turn), std::sin(turn), 0);
+  const double share = random.unit();
+  const Vec3 place(0.02 * random.unit(), 0.02 * random.unit(), 0);
+  Cycle cycle;
+  cycle.middle = track.press({place - share * d, place + (1 - share) * d}, {0, 0, -1}, 0.1);
+  cycle.across = small(random, 1e-3);
+  cycle.along = small(random, 5e-4);
+  // The rise of one end over the other at 2 degrees, less what the ends move besides.
+  const double rock = 2 * random.unit() * length * std::sin(kBlend);
+  cycle.across.tip.z = -0.5 * rock;
+  cycle.across.tail.z = 0.5 * rock;
+  return cycle;
+}
+
+Material springy() {
+  Material material;
+  material.stiffness = 800;
+  return material;
+}
+
+std::string in_figures(const char* what, std::uint64_t round, const Lap& lap) {
+  std::ostringstream out;
+  out << "cycle " << round << ": " << what << " " << lap.work << " J (friction's spring "
+      << lap.wound_up << " J), stored " << lap.stored << " J at the deepest";
+  return out.str();
+}
+
+void count(ExtremeResult& result, const Lap& lap) {
+  result.ticks += static_cast<std::uint64_t>(lap.ticks);
+  result.in_contact += static_cast<std::uint64_t>(lap.in_contact);
+}
+
+}  // namespace
+
+ExtremeResult closed_paths(const Renderer& renderer) {
+  Several all;
+  for (std::uint64_t round = 0; round < 400; ++round) {
+    Random random(round, {21});
+    Track track(renderer, shape(round), springy());
+    const Cycle cycle = cycle_anywhere(random, track);
+    track.lap(cycle, 400);  // the first begins with a jump
+    const Lap lap = track.lap(cycle, 400);
+    if (!lap.one_facet || (renderer.side_contact() && lap.in_blend > 0)) continue;
+    ExtremeResult result;
+    count(result, lap);
+    result.limit = kShare;
+    result.worst = std::abs(lap.work) / lap.stored;
+    if (!(result.worst <= result.limit)) result.detail = in_figures("work", round, lap);
+    result.passed = result.detail.empty();
+    all.add(result);
+  }
+  return all.result();
+}
+
+namespace {
+
+/// The second lap of a cycle over a material with friction, damping or both.
+Lap lossy_lap(const Renderer& renderer, std::uint64_t round, int ticks) {
+  Random random(round, {22});
+  Material material = springy();
+  if (round % 3 != 0) material.damping = 3 * random.unit();
+  if (round % 3 != 1) {
+    material.friction_static = 0.05 + random.unit();
+    material.friction_dynamic = material.friction_static * random.unit();
+  }
+  Track track(renderer, shape(round / 3), material);
+  const Cycle cycle = cycle_anywhere(random, track);
+  track.lap(cycle, ticks);  // the first begins with a jump, and winds friction's spring up
+  return track.lap(cycle, ticks);
+}
+
+}  // namespace
+
+ExtremeResult closed_paths_lossy(const Renderer& renderer) {
+  constexpr int kTicks = 400;
+  Several all;
+  for (std::uint64_t round = 0; round < 400; ++round) {
+    const Lap coarse = lossy_lap(renderer, round, kTicks);
+    const Lap fine = lossy_lap(renderer, round, 2 * kTicks);
+    if (!fine.one_facet || (renderer.side_contact() && fine.in_blend > 0)) continue;
+    // Steps of half the length, half the error: what is left with steps of none.
+    const double given = 2 * (fine.work + fine.wound_up) - (coarse.work + coarse.wound_up);
+    ExtremeResult result;
+    count(result, fine);
+    result.limit = kExtrapolated;
+    result.worst = std::max(0.0, given / fine.stored);
+    if (!(result.worst <= result.limit)) result.detail = in_figures("gives", round, fine);
+    result.passed = result.detail.empty();
+    all.add(result);
+  }
+  return all.result();
+}
+
+ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
+  Several all;
+  const auto block = shape(3);
+  for (std::uint64_t round = 0; round < 400; ++round) {
+    Random random(round, {23});
+    Track track(renderer, block, springy());
+    const Cycle cycle = cycle_over_a_flat(random, track);
+    track.lap(cycle, 4000);  // the first begins with a jump
+    const Lap lap = track.lap(cycle, 4000);
+    if (!lap.upwards) continue;
+    // Equation (2) applies the spring of the deeper end at a place between the ends, so it does
+    // work by at most the force times what one end moves against the other meanwhile.
+    const double bound = lap.force * lap.rocking + lap.jumps + kShare * lap.stored;
+    ExtremeResult result;
+    count(result, lap);
+    result.worst = std::abs(lap.work);
+    result.limit = bound;
+    if (!(result.worst <= bound)) result.detail = in_figures("work", round, lap);
+    result.passed = result.detail.empty();
+    all.add(result);
+  }
+  return all.result();
+}
+
+}  // namespace palpate::extremes

@@ -1,0 +1,186 @@
+#include "rendering/verification/random_solids.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+#include <utility>
+
+#include "stimuli/orientation.h"
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+using Index = std::uint32_t;
+
+struct Plane {
+  Vec3 normal;
+  double offset;
+};
+
+/// A convex solid that can be cut. planes[i] is that of soup.faces[i].
+struct Block {
+  PolygonSoup soup;
+  std::vector<Plane> planes;
+
+  /// Takes away what is above the plane. Corners on it count as below, so the plane must not go
+  /// through one: random planes do not.
+  void cut(const Plane& plane) {
+    const auto height = [&](Index v) {
+      return glm::dot(plane.normal, soup.vertices[v]) - plane.offset;
+    };
+    std::map<std::pair<Index, Index>, Index> crossings;
+    const auto crossing = [&](Index a, Index b) {
+      const auto [at, is_new] = crossings.try_emplace({std::min(a, b), std::max(a, b)},
+                                                      static_cast<Index>(soup.vertices.size()));
+      if (is_new) {
+        const double share = height(a) / (height(a) - height(b));
+        soup.vertices.push_back(soup.vertices[a] + share * (soup.vertices[b] - soup.vertices[a]));
+      }
+      return at->second;
+    };
+    std::map<Index, Index> rim;  // round the cut, against the way round the faces that are left
+    PolygonSoup left;
+    std::vector<Plane> planes_left;
+    for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+      std::vector<Index> face;
+      Index out = 0, back = 0;
+      const auto& corners = soup.faces[f];
+      for (std::size_t k = 0; k < corners.size(); ++k) {
+        const Index a = corners[k], b = corners[(k + 1) % corners.size()];
+        const bool a_stays = height(a) <= 0, b_stays = height(b) <= 0;
+        if (a_stays) face.push_back(a);
+        if (a_stays != b_stays) {
+          face.push_back(crossing(a, b));
+          (a_stays ? out : back) = face.back();
+        }
+      }
+      if (face.size() < 3) continue;
+      if (out != back) rim[back] = out;
+      left.faces.push_back(face);
+      planes_left.push_back(planes[f]);
+    }
+    if (rim.empty()) return;
+    std::vector<Index> lid;
+    for (Index at = rim.begin()->first; lid.size() < rim.size(); at = rim.at(at)) lid.push_back(at);
+    left.faces.push_back(lid);
+    planes_left.push_back(plane);
+    soup.faces = std::move(left.faces);
+    planes = std::move(planes_left);
+  }
+
+  /// Drops the corners that no face uses.
+  PolygonSoup tidy() const {
+    PolygonSoup out;
+    std::map<Index, Index> number;
+    for (const auto& face : soup.faces) {
+      auto& numbered = out.faces.emplace_back();
+      for (const Index v : face) {
+        const auto [at, is_new] = number.try_emplace(v, static_cast<Index>(out.vertices.size()));
+        if (is_new) out.vertices.push_back(soup.vertices[v]);
+        numbered.push_back(at->second);
+      }
+    }
+    return out;
+  }
+};
+
+Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+
+double between(Random& random, double low, double high) {
+  return low + (high - low) * random.unit();
+}
+
+Block random_block(Random& random, int cuts) {
+  Block block{cube(1), {}};
+  for (const auto& face : block.soup.faces) {
+    Vec3 middle;
+    for (const Index v : face) middle += block.soup.vertices[v];
+    block.planes.push_back({glm::normalize(middle), 0.5});
+  }
+  for (int i = 0; i < cuts; ++i) {
+    block.cut({random_direction(random), between(random, 0.2, 0.8)});
+  }
+  return block;
+}
+
+PolygonSoup some_soup(Random& random) {
+  const auto count = [&](std::uint64_t low, std::uint64_t high) {
+    return static_cast<int>(low + random.below(high - low + 1));
+  };
+  switch (random.below(8)) {
+    case 0:
+    case 1:
+      return cut_cube(random, count(0, 30));
+    case 2:
+    case 3:
+      return polar_of_cut_cube(random, count(0, 30));
+    case 4:
+      return icosphere(0.5, count(0, 2));
+    case 5:
+      return cone(0.5, between(random, 0.1, 2), count(3, 64));
+    case 6:
+      return cylinder(0.5, between(random, 0.1, 2), count(3, 64));
+    default:
+      return cube(1);
+  }
+}
+
+}  // namespace
+
+PolygonSoup cut_cube(Random& random, int cuts) { return random_block(random, cuts).tidy(); }
+
+PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
+  const Block block = random_block(random, cuts);
+  PolygonSoup polar;
+  std::map<Index, std::vector<Index>> faces_at;
+  for (Index f = 0; f < block.planes.size(); ++f) {
+    polar.vertices.push_back(block.planes[f].normal * (0.25 / block.planes[f].offset));
+    for (const Index v : block.soup.faces[f]) faces_at[v].push_back(f);
+  }
+  for (const auto& [corner, faces] : faces_at) {
+    std::vector<Index> triangle = faces;  // three planes meet at every corner
+    const Vec3 &a = polar.vertices[triangle[0]], &b = polar.vertices[triangle[1]],
+               &c = polar.vertices[triangle[2]];
+    if (glm::dot(glm::cross(b - a, c - a), block.soup.vertices[corner]) < 0) {
+      std::swap(triangle[1], triangle[2]);
+    }
+    polar.faces.push_back(std::move(triangle));
+  }
+  return polar;
+}
+
+PolygonSoup stretched(PolygonSoup soup, const Vec3& factors) {
+  for (Vec3& v : soup.vertices) v *= factors;
+  return soup;
+}
+
+PolygonSoup turned_and_moved(PolygonSoup soup, const Quat& turn, double scale, const Vec3& to) {
+  for (Vec3& v : soup.vertices) v = scale * (turn * v) + to;
+  return soup;
+}
+
+ConvexMesh random_solid(Random& random) {
+  for (;;) {
+    PolygonSoup soup = some_soup(random);
+    if (random.below(2) == 0) {
+      Vec3 factors(1, 1, 1);
+      factors[static_cast<int>(random.below(3))] = std::pow(10, -4 * random.unit());
+      factors[static_cast<int>(random.below(3))] = std::pow(10, -4 * random.unit());
+      soup = stretched(std::move(soup), factors);
+    }
+    const double scale = 1e-4 * std::pow(1e6, random.unit());
+    const Quat turn = random.below(4) == 0 ? Quat(1, 0, 0, 0) : uniform_rotation(random);
+    const Vec3 to =
+        static_cast<double>(random.below(2)) * scale * random.unit() * random_direction(random);
+    try {
+      return ConvexMesh(turned_and_moved(std::move(soup), turn, scale, to));
+    } catch (const MeshError&) {
+      // Cut and stretched too finely to be told from a flat one: another.
+    }
+  }
+}
+
+}  // namespace palpate

@@ -1,0 +1,247 @@
+// Stages of the tick in isolation, over recorded ticks: what explain() can put a cost to.
+
+#include <cmath>
+#include <memory>
+
+#include "rendering/point_probe.h"
+#include "rendering/render.h"
+#include "rendering/segment_probe.h"
+#include "rendering/verification/explain.h"
+#include "rendering/verification/stroking_hand.h"
+
+namespace palpate {
+namespace {
+
+using Kind = MinkowskiFacet::Kind;
+
+constexpr int kApproach = 2000;  // ticks until the hand has arrived
+constexpr int kTicks = 1000;     // recorded
+
+/// One tick of one part, with what its stages need.
+struct Moment {
+  LineProbe probe, last;  ///< world
+  LineProbe local;        ///< mesh frame
+  PartState before;       ///< the tick
+  WalkResult hit;
+  LoadedContact loaded;  ///< before materials
+};
+
+/// What happened to the scene's first part.
+struct Recording {
+  std::vector<LineProbe> poses;
+  RenderState start;           ///< before the first pose
+  std::vector<bool> touching;  ///< at each pose, whatever part
+  std::vector<Moment> contact, free, entry;
+};
+
+template <class Probe>
+void note(const Scene& scene, const RenderState& state, const PartState& before,
+          const LineProbe& last, const LineProbe& probe, Recording& out) {
+  const ScenePart& part = scene.parts()[0];
+  const PartState& after = state.parts[0];
+  Moment moment;
+  moment.probe = probe;
+  moment.last = last;
+  moment.local = tick::to_local<Probe>(part, probe, Vec3(0));
+  moment.before = before;
+  if (before.facet.kind == Kind::none) {
+    (after.facet.kind == Kind::none ? out.free : out.entry).push_back(moment);
+    return;
+  }
+  const Vec3 d = moment.local.tail - moment.local.tip;
+  moment.hit = tick::walk<Probe>(*part.mesh, before.facet, moment.local.tip, d);
+  if (moment.hit.facet.kind == Kind::none) return;
+  LoadedContact& c = moment.loaded;
+  Probe::describe(*part.mesh, moment.hit, moment.local.tip, d, glm::length(d), c);
+  c.contact.normal = part.world_vector(moment.hit.normal);
+  c.contact.depth = moment.hit.depth;
+  c.stiffness = part.material.stiffness;
+  c.object = part.object;
+  load(std::span<LoadedContact, 1>(&c, 1));
+  out.contact.push_back(moment);
+}
+
+/// \param lifted  share of the time off the object
+template <class Probe>
+Recording record(const Scene& scene, const Renderer& renderer, double lifted) {
+  const ScenePart& part = scene.parts()[0];
+  StrokeSettings settings;
+  settings.centre = part.sphere_centre;
+  settings.radius = part.sphere_radius;
+  settings.side = Probe::kSegment;
+  settings.lifted = lifted;
+  settings.lift_period = 200;
+  StrokingHand hand(settings);
+  Recording out;
+  RenderState state = scene.initial_state();
+  double depth = 0;
+  for (int i = 0; i < kApproach + kTicks; ++i) {
+    const LineProbe probe = hand.next(depth);
+    const PartState before = state.parts[0];
+    const LineProbe last = state.has_last ? state.last : probe;
+    if (i == kApproach) out.start = state;
+    const Rendering rendering = renderer.tick(scene, state, probe, 1e-3);
+    depth = rendering.contacts > 0 ? rendering.deepest.depth : 0;
+    if (i < kApproach) continue;
+    out.poses.push_back(probe);
+    out.touching.push_back(rendering.contacts > 0);
+    note<Probe>(scene, state, before, last, probe, out);
+  }
+  return out;
+}
+
+double sum(const Vec3& v) { return v.x + v.y + v.z; }
+
+/// The stages of one renderer over a recording.
+template <class Probe>
+class Stages {
+ public:
+  Stages(const Scene& scene, const Renderer& renderer)
+      : scene_(scene),
+        renderer_(renderer),
+        touching_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 0))),
+        lifting_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 0.5))),
+        hovering_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 1))) {}
+
+  std::vector<Rehearsal> all() {
+    add_whole(kTickInContact, touching_, true);
+    add_whole(kTickInFreeSpace, hovering_, false);
+    add("pose check", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
+      return tick::plausible(m.probe.tip) && tick::plausible(m.probe.tail) ? 1.0 : 0.0;
+    });
+    if (scene_.needs().several_parts) add_survey();
+    add("frame of the part", touching_, &Recording::contact,
+        [](const ScenePart& part, const Moment& m) {
+          const LineProbe local = tick::to_local<Probe>(part, m.probe, Vec3(0));
+          return sum(local.tip) + sum(local.tail);
+        });
+    add("separating plane", hovering_, &Recording::free, [](const ScenePart&, const Moment& m) {
+      return m.before.plane.separates(m.local.tip, m.local.tail) ? 1.0 : 0.0;
+    });
+    add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const Moment& m) {
+      PartState state = m.before;
+      return tick::meet<Probe>(part, state, &m.last, m.local).depth;
+    });
+    add("neighbourhood watch", touching_, &Recording::contact,
+        [](const ScenePart& part, const Moment& m) {
+          return tick::walk<Probe>(*part.mesh, m.before.facet, m.local.tip,
+                                   m.local.tail - m.local.tip)
+              .depth;
+        });
+    if constexpr (Probe::kSegment) add_sides();
+    add("spring", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
+      return sum(m.loaded.stiffness * m.loaded.share * m.loaded.contact.normal);
+    });
+    add_materials();
+    return std::move(made_);
+  }
+
+ private:
+  using Recorded = std::shared_ptr<const Recording>;
+
+  /// Over the longest run of ticks that do, or do not, touch.
+  void add_whole(const char* name, const Recorded& recording, bool touching) {
+    std::size_t begin = 0, count = 0;
+    for (std::size_t from = 0, i = 0; i < recording->poses.size(); ++i) {
+      if (recording->touching[i] != touching) from = i + 1;
+      if (i + 1 - from > count) {
+        begin = from;
+        count = i + 1 - from;
+      }
+    }
+    const auto state = std::make_shared<RenderState>();
+    const auto run = [scene = &scene_, renderer = &renderer_, state, recording](std::size_t from,
+                                                                                std::size_t to) {
+      double total = 0;
+      for (std::size_t i = from; i < to; ++i)
+        total += renderer->tick(*scene, *state, recording->poses[i], 1e-3).force.x;
+      return total;
+    };
+    made_.push_back({name, count,
+                     [state, recording, run, begin] {
+                       *state = recording->start;
+                       run(0, begin);
+                     },
+                     [run, begin, count] { return run(begin, begin + count); }});
+  }
+
+  template <class Run>
+  void add(const char* name, const Recorded& recording, std::vector<Moment> Recording::*which,
+           Run stage) {
+    made_.push_back({name, (*recording.*which).size(), [] {},
+                     [part = &scene_.parts()[0], recording, which, stage] {
+                       double total = 0;
+                       for (const Moment& moment : *recording.*which) total += stage(*part, moment);
+                       return total;
+                     }});
+  }
+
+  void add_survey() {
+    const auto state = std::make_shared<RenderState>();
+    made_.push_back({"several parts", touching_->poses.size(),
+                     [state, recording = touching_] { *state = recording->start; },
+                     [scene = &scene_, state, recording = touching_] {
+                       double total = 0;
+                       for (const LineProbe& pose : recording->poses) {
+                         survey(*scene, *state, pose);
+                         total += static_cast<double>(state->near_parts.size());
+                       }
+                       return total;
+                     }});
+  }
+
+  void add_sides() {
+    add("side contact", touching_, &Recording::contact, [](const ScenePart& part, const Moment& m) {
+      LoadedContact c;
+      const Vec3 d = m.local.tail - m.local.tip;
+      Probe::describe(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
+      return c.place;
+    });
+    add("torque and second device", touching_, &Recording::contact,
+        [](const ScenePart&, const Moment& m) {
+          const Vec3 force = m.loaded.force * m.loaded.contact.normal;
+          const Vec3 torque = glm::cross(m.loaded.place * (m.probe.tail - m.probe.tip), force);
+          return sum(torque) + sum(m.loaded.place * force);
+        });
+  }
+
+  /// One material's share of the tick, by the tick's own code.
+  template <Needs kNeeds>
+  void add_material(const char* name) {
+    const auto state = std::make_shared<RenderState>();
+    made_.push_back({name, touching_->contact.size(),
+                     [state, recording = touching_] { *state = recording->start; },
+                     [scene = &scene_, state, recording = touching_] {
+                       double total = 0;
+                       for (const Moment& moment : recording->contact) {
+                         LoadedContact contact = moment.loaded;
+                         state->last = moment.last;
+                         tick::feel<kNeeds>(*scene, *state, moment.probe,
+                                            std::span<LoadedContact, 1>(&contact, 1), 1000);
+                         total += contact.force + contact.lag.x;
+                       }
+                       return total;
+                     }});
+  }
+
+  void add_materials() {
+    if (scene_.needs().layers) add_material<Needs{.layers = true}>("layers");
+    if (scene_.needs().damping) add_material<Needs{.damping = true}>("damping");
+    if (scene_.needs().friction) add_material<Needs{.friction = true}>("friction");
+  }
+
+  const Scene& scene_;
+  const Renderer& renderer_;
+  Recorded touching_, lifting_, hovering_;
+  std::vector<Rehearsal> made_;
+};
+
+}  // namespace
+
+std::vector<Rehearsal> rehearse(const Scene& scene, const Renderer& renderer) {
+  if (scene.parts().empty()) return {};
+  if (renderer.side_contact()) return Stages<tick::SegmentProbe>(scene, renderer).all();
+  return Stages<tick::PointProbe>(scene, renderer).all();
+}
+
+}  // namespace palpate

@@ -1,0 +1,55 @@
+#include "rendering/verification/search_entry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace palpate {
+
+bool plane_between(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
+  return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const Facet& facet) {
+    return std::min({glm::dot(facet.normal, before.tip), glm::dot(facet.normal, before.tail),
+                     glm::dot(facet.normal, after.tip), glm::dot(facet.normal, after.tail)}) >
+           facet.offset;
+  });
+}
+
+std::optional<ReferenceDepth> facet_of_sum(const ConvexMesh& mesh, bool is_edge, std::uint32_t i,
+                                           const LineProbe& probe) {
+  if (!is_edge) {
+    const Facet& facet = mesh.facets()[i];
+    return ReferenceDepth{facet.offset - std::min(glm::dot(facet.normal, probe.tip),
+                                                  glm::dot(facet.normal, probe.tail)),
+                          facet.normal};
+  }
+  const Edge& edge = mesh.edges()[i];
+  const Vec3 &left = mesh.facets()[edge.left].normal, &right = mesh.facets()[edge.right].normal;
+  const Vec3 d = probe.tail - probe.tip;
+  const double left_slope = glm::dot(left, d), right_slope = glm::dot(right, d);
+  if ((left_slope >= 0) == (right_slope >= 0)) return std::nullopt;
+  const Vec3 normal = glm::normalize(std::abs(right_slope) * left + std::abs(left_slope) * right);
+  return ReferenceDepth{glm::dot(normal, edge.from - probe.tip), normal};
+}
+
+std::optional<MinkowskiEntry> entry_at(const ConvexMesh& mesh, const LineProbe& probe) {
+  std::optional<MinkowskiEntry> best;
+  double least = std::numeric_limits<double>::infinity(), second = least;
+  const auto look = [&](bool is_edge, std::uint32_t i) {
+    const auto at = facet_of_sum(mesh, is_edge, i, probe);
+    if (!at) return;
+    second = std::min(second, std::max(at->depth, least));
+    if (at->depth < least) {
+      second = least;
+      least = at->depth;
+      best = MinkowskiEntry{is_edge, i};
+    }
+  };
+  for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) look(false, i);
+  for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) look(true, i);
+  // Where another is as near as this, rounding decides.
+  if (second - least < kNeighbouringDepths * mesh.size()) return std::nullopt;
+  return best;
+}
+
+}  // namespace palpate

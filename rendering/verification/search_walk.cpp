@@ -1,0 +1,232 @@
+// One walk of the search: its ticks, and what is wrong with them.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <sstream>
+#include <utility>
+
+#include "rendering/first_contact.h"
+#include "rendering/verification/random_paths.h"
+#include "rendering/verification/random_solids.h"
+#include "rendering/verification/reference.h"
+#include "rendering/verification/search.h"
+#include "rendering/verification/search_entry.h"
+#include "rendering/verification/tick_audit.h"
+#include "stimuli/orientation.h"
+
+namespace palpate {
+namespace {
+
+constexpr int kFineSteps = 100;      // of a tick, by brute force
+constexpr double kNoHand = 0.1;      // rad a tick: 100 rad/s
+constexpr double kAtSurface = 1e-6;  // sizes
+
+LineProbe mixed(const LineProbe& a, const LineProbe& b, double t) {
+  return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
+}
+
+LineProbe moved(const LineProbe& probe, const Vec3& by) {
+  return {probe.tip + by, probe.tail + by};
+}
+
+/// One walk under way.
+class Walk {
+ public:
+  Walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk)
+      : renderer_(renderer),
+        random_(seed, {walk}),
+        mesh_(std::make_shared<const ConvexMesh>(random_solid(random_))),
+        pose_(random_pose()),
+        length_(random_length()),
+        kind_(static_cast<PathKind>(random_.below(kPathKinds))),
+        scene_({{mesh_, pose_, Material{}, 0, nullptr}}, renderer.side_contact()),
+        state_(scene_.initial_state()) {
+    counts_.walks = 1;
+    fault_.seed = seed;
+    fault_.walk = walk;
+  }
+
+  SearchCounts run() {
+    const auto path =
+        random_path(random_, kind_, *mesh_, length_, renderer_.side_contact(), kTicksPerWalk);
+    for (const LineProbe& local : path) tick({to_world(local.tip), to_world(local.tail)});
+    return std::move(counts_);
+  }
+
+ private:
+  Pose random_pose() {
+    if (random_.below(2)) return {};
+    const double reach = random_.below(2) ? 1 : 10 * mesh_->size();
+    return {reach * (uniform_rotation(random_) * Vec3(0, 0, 1)), uniform_rotation(random_)};
+  }
+
+  double random_length() {
+    if (random_.below(8) == 0) return 0.12;
+    const double shares[] = {0, 1e-6, 0.05, 0.5, 1, 3, 10};
+    return shares[random_.below(7)] * (0.7 + 0.6 * random_.unit()) * mesh_->size();
+  }
+
+  Vec3 to_world(const Vec3& local) const { return pose_.orientation * local + pose_.position; }
+
+  void tick(const LineProbe& probe) {
+    const bool was_free = has_last_ && !last_held_;
+    const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
+    const LineProbe felt = felt_probe(scene_, renderer_, probe);
+    const TickAudit audit = audit_tick(scene_, renderer_, probe, r);
+    fault_.tick = counts_.ticks++;
+    depth_ = r.deepest.depth;
+    const bool held = audit.finite && r.contacts > 0;
+    counts_.in_contact += held;
+    counts_.worst_penetration =
+        std::max(counts_.worst_penetration, audit.penetrates / mesh_->size());
+    const auto wrong = [&](bool is, std::uint64_t& count, const char* what, double value) {
+      if (!is) return;
+      ++count;
+      report(what, value, felt);
+    };
+    wrong(!audit.finite, counts_.not_finite, "not finite", 0);
+    wrong(audit.missed > audit.tolerance, counts_.missed, "missed, depth", audit.missed);
+    wrong(audit.penetrates > audit.tolerance, counts_.penetrating, "ideal probe inside by",
+          audit.penetrates);
+    wrong(audit.floats > audit.tolerance + 1e-9 * length_, counts_.floating, "ideal probe off by",
+          audit.floats);
+    wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
+    wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
+    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless, "walk without end", 0);
+    wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
+    if (was_free && audit.finite) from_free_space(felt, r, held, audit.tolerance);
+    last_ = felt;
+    has_last_ = true;
+    last_held_ = held;
+  }
+
+  /// The tick began in free space: what a hundredth of it shows, by brute force.
+  void from_free_space(const LineProbe& felt, const Rendering& r, bool held, double tolerance) {
+    counts_.entries += held;
+    if (held) count_fallback(felt);
+    if (!held && plane_between(*mesh_, last_, felt)) return;
+    ++counts_.walked_finely;
+    const auto time = reference_first_contact(*mesh_, last_, felt, kFineSteps);
+    if (!time) {
+      if (held) expect_touch(felt, tolerance);
+      return;
+    }
+    // A start at the surface is within rounding of any facet there.
+    if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
+    // It came in. Where the facet that it came in by holds it at every step, it must be felt there.
+    const auto entry = entry_at(*mesh_, mixed(last_, felt, *time));
+    if (!entry) return;
+    ReferenceDepth at_end;
+    for (int step = static_cast<int>(std::ceil(*time * kFineSteps)); step <= kFineSteps; ++step) {
+      const LineProbe there = mixed(last_, felt, step / double{kFineSteps});
+      const auto on = facet_of_sum(*mesh_, entry->is_edge, entry->index, there);
+      if (!on || on->depth <= (step < kFineSteps ? -tolerance : tolerance)) return;
+      const LineProbe ideal = moved(there, on->depth * on->normal);
+      if (reference_depth(*mesh_, ideal).depth > tolerance) return;
+      if (step < kFineSteps ? reference_gap(*mesh_, ideal) > tolerance
+                            : !firmly_on(ideal, on->normal, tolerance)) {
+        return;
+      }
+      at_end = *on;
+    }
+    const bool elsewhere = !held || std::abs(r.deepest.depth - at_end.depth) >
+                                        kNeighbouringDepths * (mesh_->size() + at_end.depth);
+    if (turned(felt) > kNoHand) {
+      counts_.turned_elsewhere += elsewhere;
+      return;
+    }
+    ++counts_.passages;
+    if (elsewhere) {
+      ++counts_.passed_through;
+      report(held ? "held elsewhere, by" : "passed through, by",
+             held ? r.deepest.depth - at_end.depth : at_end.depth, felt);
+    }
+  }
+
+  /// Whether the probe lies on a facet of M with some room on all sides: at its rim rounding
+  /// decides who holds it.
+  bool firmly_on(const LineProbe& ideal, const Vec3& normal, double tolerance) const {
+    constexpr int kWays = 8;
+    const Vec3 u = glm::normalize(std::abs(normal.x) < 0.5 ? glm::cross(normal, Vec3(1, 0, 0))
+                                                           : glm::cross(normal, Vec3(0, 1, 0)));
+    const Vec3 v = glm::cross(normal, u);
+    for (int i = 0; i < kWays; ++i) {
+      const double turn = 2 * std::numbers::pi * i / kWays;
+      const Vec3 aside = kAtSurface * mesh_->size() * (std::cos(turn) * u + std::sin(turn) * v);
+      if (reference_gap(*mesh_, moved(ideal, aside)) > tolerance) return false;
+    }
+    return true;
+  }
+
+  /// A contact that began although no step shows the probe inside: it must at least come as near as
+  /// it moves in a step.
+  void expect_touch(const LineProbe& felt, double tolerance) {
+    const double step =
+        std::max(glm::length(felt.tip - last_.tip), glm::length(felt.tail - last_.tail)) /
+        kFineSteps;
+    double gap = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= kFineSteps && gap > step; ++i) {
+      gap = std::min(gap, reference_gap(*mesh_, mixed(last_, felt, i / double{kFineSteps})));
+    }
+    if (gap <= step + tolerance) return;
+    ++counts_.phantom;
+    report("contact without touch, gap", gap, felt);
+  }
+
+  void count_fallback(const LineProbe& felt) {
+    const ScenePart& part = scene_.parts()[0];
+    const FirstContact first =
+        renderer_.side_contact()
+            ? first_contact_segment(*mesh_, *part.trees, last_, felt, part.tolerance)
+            : first_contact_point(*mesh_, *part.trees, last_.tip, felt.tip, part.tolerance);
+    counts_.fallbacks += first.facet.kind == MinkowskiFacet::Kind::none;
+  }
+
+  /// How far the probe has turned in the tick, rad.
+  double turned(const LineProbe& felt) const {
+    const Vec3 a = last_.tail - last_.tip, b = felt.tail - felt.tip;
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  }
+
+  void report(const char* what, double value, const LineProbe& felt) {
+    if (counts_.faults.size() >= SearchCounts::kFaultsKept) return;
+    std::ostringstream out;
+    out.precision(17);
+    out << renderer_.name() << ", " << to_string(kind_) << " path, " << mesh_->facets().size()
+        << " facets, size " << mesh_->size() << " m, probe " << length_ << " m: " << what << " "
+        << value << " (" << value / mesh_->size() << " sizes), contact depth " << depth_
+        << " m, at (" << felt.tip.x << " " << felt.tip.y << " " << felt.tip.z << ") ("
+        << felt.tail.x << " " << felt.tail.y << " " << felt.tail.z << "), from (" << last_.tip.x
+        << " " << last_.tip.y << " " << last_.tip.z << ") (" << last_.tail.x << " " << last_.tail.y
+        << " " << last_.tail.z << "), turned by " << turned(felt) << " rad";
+    fault_.what = out.str();
+    counts_.faults.push_back(fault_);
+  }
+
+  const Renderer& renderer_;
+  Random random_;
+  std::shared_ptr<const ConvexMesh> mesh_;
+  Pose pose_;
+  double length_;
+  PathKind kind_;
+  Scene scene_;
+  RenderState state_;
+  LineProbe last_;  // as felt, mesh frame
+  bool has_last_ = false, last_held_ = false;
+  double depth_ = 0;  // m, of the contact under audit
+  SearchFault fault_;
+  SearchCounts counts_;
+};
+
+}  // namespace
+
+SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
+  return Walk(renderer, seed, walk).run();
+}
+
+}  // namespace palpate

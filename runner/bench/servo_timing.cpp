@@ -1,0 +1,244 @@
+#include "runner/bench/servo_timing.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "runner/safety/guard.h"
+#include "runner/servo/servo_thread.h"
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kRadius = 0.03;    // m
+constexpr double kLength = 0.12;    // m, of the stylus
+constexpr double kSpeed = 0.1;      // m/s, of the tip
+constexpr double kAtRest = 0.2;     // s, outside, before it is led
+constexpr double kHomeRest = 0.02;  // s, that the servo waits for
+constexpr double kFitShare = 2e-4;  // of ticks late by a period: one in five seconds at 1 kHz
+constexpr double kLosses = 2e-3;    // more than that is felt as a buzz
+constexpr int kTripping = 5;        // missed ticks in a row that cut the forces off
+
+std::int64_t thread_time_ns() noexcept {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return time.tv_sec * 1'000'000'000LL + time.tv_nsec;
+}
+
+/// Rests outside of the sphere, then is led over it, 1.5 mm deep, turning as it goes.
+class LedStylus final : public Device {
+ public:
+  explicit LedStylus(double rate) : rate_(rate) {
+    capabilities_.name = "led";
+    capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
+    capabilities_.max_force = 8.5;
+    capabilities_.max_rate = rate;
+  }
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  DeviceReading read() noexcept override {
+    const double t = ++tick_ / rate_ - kAtRest;
+    if (t < 0) return at({0, 0, 0.1}, 0);
+    const double angle = t * kSpeed / kRadius;
+    const double depth = 0.0015 * std::min(1.0, t / 0.1);
+    const Vec3 out(std::sin(angle) * std::cos(0.3 * angle), std::sin(0.3 * angle) * std::sin(angle),
+                   std::cos(angle));
+    return at((kRadius - depth) * out, angle);
+  }
+  void write(const Vec3&, const Vec3&) noexcept override {}
+
+ private:
+  DeviceReading at(const Vec3& tip, double angle) const noexcept {
+    // From pointing away from the sphere to lying along it.
+    const Vec3 out = tip / std::sqrt(tip.x * tip.x + tip.y * tip.y + tip.z * tip.z);
+    const double lean = 1.2 * std::sin(0.7 * angle) * std::sin(0.7 * angle);
+    const Vec3 side(-out.y, out.x, 0);
+    Vec3 axis = std::cos(lean) * out + std::sin(lean) * side;
+    axis /= std::sqrt(axis.x * axis.x + axis.y * axis.y + axis.z * axis.z);
+    return {{tip, tip + kLength * axis}, 0, false};
+  }
+
+  double rate_;
+  int tick_ = 0;
+  DeviceCapabilities capabilities_;
+};
+
+/// Notes the servo thread's own time about the transfers of the device it stands for.
+class MeteredDevice final : public Device {
+ public:
+  /// \param skip  ticks that are not noted; \param ticks  that are
+  MeteredDevice(Device& device, std::size_t skip, std::size_t ticks)
+      : device_(device), skip_(skip) {
+    compute_.reserve(ticks);
+    tick_.reserve(ticks);
+    asking_.reserve(ticks);
+  }
+  const DeviceCapabilities& capabilities() const override { return device_.capabilities(); }
+  DeviceReading read() noexcept override {
+    const std::int64_t began = thread_time_ns();
+    if (skip_ == 0 && tick_.size() < tick_.capacity())
+      tick_.push_back(began - written_ + last_compute_);
+    DeviceReading reading = device_.read();
+    read_ = thread_time_ns();
+    return reading;
+  }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    last_compute_ = thread_time_ns() - read_;
+    if (skip_ > 0) {
+      --skip_;
+    } else if (compute_.size() < compute_.capacity()) {
+      compute_.push_back(last_compute_);
+    }
+    device_.write(device1, device2);
+    const std::int64_t asked = thread_time_ns();
+    written_ = thread_time_ns();
+    if (asking_.size() < asking_.capacity()) asking_.push_back(written_ - asked);
+  }
+  /// Between two questions for the time with nothing between them.
+  const std::vector<std::int64_t>& asking() const { return asking_; }
+  const std::vector<std::int64_t>& compute() const { return compute_; }
+  /// From one command to the next reading and from that to its command.
+  const std::vector<std::int64_t>& whole() const { return tick_; }
+
+ private:
+  Device& device_;
+  std::size_t skip_;
+  std::int64_t read_ = 0, written_ = 0, last_compute_ = 0;
+  std::vector<std::int64_t> compute_, tick_, asking_;
+};
+
+std::int64_t quantile(const std::vector<std::int64_t>& sorted, double p) {
+  if (sorted.empty()) return 0;
+  const double rank = std::ceil(p * static_cast<double>(sorted.size()));
+  return sorted[static_cast<std::size_t>(std::clamp(rank, 1.0, static_cast<double>(sorted.size())) -
+                                         1)];
+}
+
+std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+/// One long trial; what came of each tick with forces on.
+void feel(ServoThread& servo, double rate, std::size_t wanted, const std::function<bool()>& wait,
+          ServoTiming& out, std::vector<std::int64_t>& compute,
+          std::vector<std::int64_t>& warm_up) {
+  const Scene scene({{std::make_shared<const ConvexMesh>(icosphere(kRadius, 3)), Pose{}, Material{},
+                      0, nullptr}});
+  const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
+  servo.prepare(scene, ray_renderer(), {2 * kRadius, kHomeRest, 0.005});
+  auto shown = std::chrono::steady_clock::now();
+  int run = 0;
+  bool tripped = false;
+  while (out.lateness.size() < wanted) {
+    const Sample& sample = servo.next();
+    if (sample.faults & servo_fault::kStalled) break;
+    const bool trips = (sample.faults & servo_fault::kTripped) != 0;
+    if (trips && !tripped) {
+      ++out.trips;
+      servo.clear_fault();
+    }
+    tripped = trips;
+    if (sample.phase != Phase::feeling) continue;
+    out.lateness.push_back(sample.lateness_ns);
+    compute.push_back(sample.compute_ns);
+    warm_up.push_back(sample.warm_up_ns);
+    const auto missed = sample.lateness_ns / period_ns;
+    out.missed_ticks += static_cast<std::uint64_t>(missed);
+    run = missed > 0 ? run + static_cast<int>(missed) : 0;
+    out.worst_run = std::max(out.worst_run, run);
+    out.old_readings += (sample.faults & servo_fault::kOldReading) != 0 ? 1 : 0;
+    const auto now = std::chrono::steady_clock::now();
+    if (!wait || now - shown < std::chrono::milliseconds(200)) continue;
+    shown = now;
+    if (wait()) break;
+  }
+}
+
+}  // namespace
+
+ServoTiming measure_servo(const TimingSettings& settings, const std::function<bool()>& wait) {
+  const double rate = settings.rate;
+  const auto wanted = static_cast<std::size_t>(std::llround(settings.seconds * rate));
+  LedStylus own(rate);
+  std::unique_ptr<GuardedDevice> guarded;
+  if (settings.guarded) {
+    GuardSettings guard;
+    guard.rate = rate;
+    guard.priority = settings.realtime.priority > 0 ? settings.realtime.priority + 5 : 0;
+    guarded = std::make_unique<GuardedDevice>([rate] { return std::make_unique<LedStylus>(rate); },
+                                              guard);
+  }
+  MeteredDevice device(guarded ? static_cast<Device&>(*guarded) : own,
+                       static_cast<std::size_t>(kAtRest * rate), wanted);
+  RealClock clock;
+  ServoSettings servo_settings;
+  servo_settings.rate = rate;
+  servo_settings.realtime = settings.realtime;
+  ServoTiming out;
+  out.rate = rate;
+  out.lateness.reserve(wanted);
+  std::vector<std::int64_t> by_clock, warm_up;
+  by_clock.reserve(wanted);
+  warm_up.reserve(wanted);
+  {
+    ServoThread servo(device, clock, servo_settings);
+    out.rights = servo.rights();
+    feel(servo, rate, wanted, wait, out, by_clock, warm_up);
+  }
+  std::sort(out.lateness.begin(), out.lateness.end());
+  out.ticks = out.lateness.size();
+  out.lateness_median = quantile(out.lateness, 0.5);
+  out.lateness_p99 = quantile(out.lateness, 0.99);
+  out.lateness_p999 = quantile(out.lateness, 0.999);
+  out.lateness_max = quantile(out.lateness, 1);
+  const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
+  const auto late =
+      out.lateness.end() - std::upper_bound(out.lateness.begin(), out.lateness.end(), period_ns);
+  if (out.ticks > 0) out.late_share = static_cast<double>(late) / static_cast<double>(out.ticks);
+  const auto compute = sorted(device.compute()), whole = sorted(device.whole());
+  out.asking_median = quantile(sorted(device.asking()), 0.5);
+  by_clock = sorted(std::move(by_clock));
+  warm_up = sorted(std::move(warm_up));
+  out.warm_up_median = quantile(warm_up, 0.5);
+  out.warm_up_p999 = quantile(warm_up, 0.999);
+  out.warm_up_max = quantile(warm_up, 1);
+  out.clock_median = quantile(by_clock, 0.5);
+  out.clock_p999 = quantile(by_clock, 0.999);
+  out.clock_max = quantile(by_clock, 1);
+  out.compute_median = quantile(compute, 0.5);
+  out.compute_p999 = quantile(compute, 0.999);
+  out.compute_max = quantile(compute, 1);
+  out.tick_median = quantile(whole, 0.5);
+  out.tick_p999 = quantile(whole, 0.999);
+  out.tick_max = quantile(whole, 1);
+  return out;
+}
+
+ServoTiming::Verdict ServoTiming::verdict() const {
+  if (ticks == 0 || trips > 0 || worst_run >= kTripping || late_share > kLosses)
+    return Verdict::unfit;
+  return late_share > kFitShare ? Verdict::fit_with_losses : Verdict::fit;
+}
+
+std::string ServoTiming::sentence() const {
+  if (ticks == 0) return "The servo gave no ticks: this machine is not fit for the experiment.";
+  const char* const words[] = {"fit", "fit, with losses,", "not fit"};
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "This machine is %s for the experiment at %g Hz: of %llu ticks %llu were missed, at "
+      "most %d in a row (%d cut the forces off, which happened %llu times), and 99.9 %% "
+      "began within %.0f us of their time.",
+      words[static_cast<int>(verdict())], rate, static_cast<unsigned long long>(ticks),
+      static_cast<unsigned long long>(missed_ticks), worst_run, kTripping,
+      static_cast<unsigned long long>(trips), static_cast<double>(lateness_p999) / 1000);
+  return text + (rights.missing.empty() ? "" : " " + rights.missing);
+}
+
+}  // namespace palpate

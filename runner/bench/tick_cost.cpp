@@ -1,0 +1,257 @@
+#include "runner/bench/tick_cost.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <memory>
+#include <numbers>
+
+#include "rendering/renderer.h"
+#include "runner/bench/allocation_count.h"
+#include "runner/servo/tick_clock.h"
+#include "stimuli/primitives.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kRadius = 0.03;  // m
+constexpr double kLength = 0.12;  // m, of the stylus
+constexpr double kSpeed = 0.1;    // m/s
+constexpr double kTick = 1e-3;    // s
+constexpr int kWarm = 1000;       // ticks
+constexpr double kContactTarget = 100, kFreeTarget = 100, kFirstTarget = 2000,
+                 kThousandTarget = 1000;  // ns
+
+/// Times ticks one by one.
+class Timer {
+ public:
+  Timer() : ns_(nanoseconds_per_count()) {
+    std::vector<std::uint64_t> empty(100'000);
+    for (auto& count : empty) {
+      const std::uint64_t start = begin_count();
+      count = end_count() - start;
+    }
+    empty_ns_ = at(empty, 0.5);
+  }
+
+  /// Runs one tick; what it took is kept when `state` is the wanted one.
+  Rendering tick(const Renderer& renderer, const Scene& scene, RenderState& state,
+                 const LineProbe& probe, bool touching_wanted) {
+    const std::uint64_t allocated = allocations();
+    const std::uint64_t start = begin_count();
+    Rendering rendering = renderer.tick(scene, state, probe, kTick);
+    const std::uint64_t count = end_count() - start;
+    allocations_ += allocations() - allocated;
+    if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
+    return rendering;
+  }
+
+  std::size_t ticks() const { return counts_.size(); }
+
+  /// The row so far; the next one starts from nothing.
+  TickCost take() {
+    TickCost cost;
+    cost.ticks = counts_.size();
+    if (!counts_.empty()) {
+      cost.median_ns = at(counts_, 0.5);
+      cost.p99_ns = at(counts_, 0.99);
+      cost.max_ns = at(counts_, 1);
+    }
+    cost.allocations = allocations_;
+    cost.empty_loop_ns = empty_ns_;
+    counts_.clear();
+    allocations_ = 0;
+    return cost;
+  }
+
+ private:
+  double at(std::vector<std::uint64_t>& counts, double share) const {
+    const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(counts.size() - 1));
+    std::nth_element(counts.begin(), counts.begin() + k, counts.end());
+    return static_cast<double>(counts[static_cast<std::size_t>(k)]) * ns_;
+  }
+
+  double ns_, empty_ns_ = 0;
+  std::vector<std::uint64_t> counts_;
+  std::size_t allocations_ = 0;
+};
+
+/// A seeded path over a solid about the origin, 0.1 mm a tick at 30 mm. For the point the tip
+/// slides; for the ray the contact wanders between the tip and 40 mm along the side.
+class Hand {
+ public:
+  Hand(const Renderer& renderer, bool touching)
+      : side_contact_(renderer.side_contact()), sign_(touching ? 1 : -1) {}
+
+  /// How far out the path runs follows what was felt, so that it keeps to the surface on any mesh:
+  /// `depth` m deep (the last tick's; 0 in free space).
+  LineProbe next(double depth) {
+    const double turn = 0.02 * random_.normal();
+    heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(normal_, heading_);
+    normal_ = glm::normalize(normal_ + kSpeed * kTick / kRadius * heading_);
+    heading_ = glm::normalize(heading_ - glm::dot(heading_, normal_) * normal_);
+    ++tick_;
+    const double wanted = 1.5e-3 + 0.5e-3 * std::sin(2 * std::numbers::pi * tick_ / 700.0);
+    radius_ += std::clamp(depth - sign_ * wanted, -kSpeed * kTick, kSpeed * kTick);
+    double along =
+        side_contact_ ? 0.01 + 0.03 * std::sin(2 * std::numbers::pi * tick_ / 3100.0) : -0.02;
+    const double tilt = along < 0 ? -along / 0.02 * 0.8 : 0;
+    along = std::max(0.0, along);
+    const Vec3 axis = std::cos(tilt) * glm::cross(normal_, heading_) + std::sin(tilt) * normal_;
+    const Vec3 tip = radius_ * normal_ - along * axis;
+    return {tip, tip + kLength * axis};
+  }
+
+ private:
+  Random random_{1};
+  bool side_contact_;
+  double sign_;
+  Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
+  double radius_ = 1.5 * kRadius;
+  double tick_ = 0;
+};
+
+struct Bench {
+  std::string name;
+  std::size_t triangles;
+  Scene scene;       ///< with side contact
+  double target_ns;  ///< in contact
+};
+
+/// m; how deep the tip or side is by the sphere about it, negative outside: to hover by.
+double depth_below(const Scene& scene, const LineProbe& probe) {
+  double gap = HUGE_VAL;
+  const ScenePart& part = scene.parts()[0];
+  const Vec3 d = probe.tail - probe.tip;
+  const double place =
+      std::clamp(glm::dot(part.sphere_centre - probe.tip, d) / glm::dot(d, d), 0.0, 1.0);
+  gap = glm::length(probe.tip + place * d - part.sphere_centre) - part.sphere_radius;
+  return -gap;
+}
+
+TickCost touching(Timer& timer, const Renderer& renderer, const Bench& bench, std::size_t ticks) {
+  RenderState state = bench.scene.initial_state();
+  Hand hand(renderer, true);
+  double depth = 0;
+  for (int i = 0; i < kWarm; ++i)
+    depth = renderer.tick(bench.scene, state, hand.next(depth), kTick).deepest.depth;
+  for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i)
+    depth = timer.tick(renderer, bench.scene, state, hand.next(depth), true).deepest.depth;
+  return timer.take();
+}
+
+TickCost hovering(Timer& timer, const Renderer& renderer, const Bench& bench, std::size_t ticks) {
+  RenderState state = bench.scene.initial_state();
+  Hand hand(renderer, false);
+  double depth = -kRadius;
+  for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i) {
+    const LineProbe probe = hand.next(depth);
+    if (i < kWarm) {
+      renderer.tick(bench.scene, state, probe, kTick);
+    } else {
+      timer.tick(renderer, bench.scene, state, probe, false);
+    }
+    depth = depth_below(bench.scene, probe);
+  }
+  return timer.take();
+}
+
+/// From a random side and 10 mm off, drifting a little along the surface; every second ray with its
+/// side first.
+TickCost meeting(Timer& timer, const Renderer& renderer, const Bench& bench,
+                 std::size_t approaches) {
+  Random random(2);
+  const auto any = [&] {
+    return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+  };
+  // Some pass by.
+  for (std::size_t i = 0; i < 4 * approaches && timer.ticks() < approaches; ++i) {
+    RenderState state = bench.scene.initial_state();
+    const Vec3 out = any(), level = glm::normalize(glm::cross(out, any()));
+    const bool side = i % 2 == 0 && renderer.side_contact();
+    const Vec3 axis = side ? level : glm::normalize(out + 0.3 * level);
+    const double along = side ? 0.04 : 0;
+    const std::size_t before = timer.ticks();
+    for (int t = 0; t < 500 && timer.ticks() == before; ++t) {
+      const Vec3 at =
+          (1.2 * bench.scene.parts()[0].sphere_radius + 0.01 - t * kSpeed * kTick) * out +
+          0.5 * t * kSpeed * kTick * glm::cross(out, level);
+      const Vec3 tip = at - along * axis;
+      timer.tick(renderer, bench.scene, state, {tip, tip + kLength * axis}, true);
+    }
+  }
+  return timer.take();
+}
+
+Scene one(const std::shared_ptr<const ConvexMesh>& mesh) {
+  SceneObject object;
+  object.mesh = mesh;
+  return Scene({object});
+}
+
+/// A thousand spheres; the first at the origin, the others a grid about it, 0.3 m apart.
+Scene thousand(const std::shared_ptr<const ConvexMesh>& mesh) {
+  const auto trees = std::make_shared<const ContactTrees>(*mesh, true);
+  std::vector<SceneObject> objects;
+  objects.reserve(1000);
+  for (int i = 0; i < 1000; ++i) {
+    SceneObject object;
+    object.mesh = mesh;
+    object.trees = trees;
+    object.object = i;
+    const int k = (i + 555) % 1000;  // the first is in the midst
+    object.pose.position = 0.3 * Vec3(k % 10 - 5, k / 10 % 10 - 5, k / 100 - 5);
+    objects.push_back(std::move(object));
+  }
+  return Scene(std::move(objects));
+}
+
+std::vector<Bench> benches() {
+  std::vector<Bench> all;
+  const auto add = [&](std::string name, const PolygonSoup& soup) {
+    auto mesh = std::make_shared<const ConvexMesh>(soup);
+    all.push_back({std::move(name), soup.faces.size(), one(mesh), kContactTarget});
+    return mesh;
+  };
+  std::shared_ptr<const ConvexMesh> ball;
+  for (const int subdivisions : {0, 3, 5, 7}) {
+    const auto mesh = add("icosphere", icosphere(kRadius, subdivisions));
+    if (subdivisions == 3) ball = mesh;
+  }
+  add("cube", cube(2 * kRadius));
+  add("cone", cone(kRadius, 2 * kRadius, 64));
+  add("cylinder", cylinder(kRadius, 2 * kRadius, 64));
+  all.push_back({"icosphere, 1000 of them", 1280, thousand(ball), kThousandTarget});
+  return all;
+}
+
+}  // namespace
+
+std::vector<TickCost> measure_tick_costs(
+    const TickCostSettings& settings, const std::function<void(std::size_t, std::size_t)>& done) {
+  Timer timer;
+  const std::vector<Bench> all = benches();
+  std::vector<TickCost> rows;
+  for (const Bench& bench : all) {
+    for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
+      const auto keep = [&](TickCost cost, const char* state, double target_ns) {
+        cost.mesh = bench.name;
+        cost.triangles = bench.triangles;
+        cost.renderer = renderer->name();
+        cost.state = state;
+        cost.target_ns = target_ns;
+        rows.push_back(std::move(cost));
+        if (done) done(rows.size(), 6 * all.size());
+      };
+      keep(touching(timer, *renderer, bench, settings.ticks), "contact", bench.target_ns);
+      keep(hovering(timer, *renderer, bench, settings.ticks), "free",
+           std::max(kFreeTarget, bench.target_ns));
+      keep(meeting(timer, *renderer, bench, settings.approaches), "first_contact", kFirstTarget);
+    }
+  }
+  return rows;
+}
+
+}  // namespace palpate

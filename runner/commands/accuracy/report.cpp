@@ -1,0 +1,125 @@
+#include "runner/commands/accuracy/report.h"
+
+#include <algorithm>
+#include <sstream>
+
+#include "analysis/text.h"
+#include "rendering/accuracy/peers.h"
+#include "runner/commands/shared/page.h"
+
+namespace palpate {
+namespace {
+
+/// What was measured, how the numbers are meant, and what the methods are.
+std::vector<std::string> how_to_read(const AccuracyReport& report) {
+  const AccuracySettings& s = report.settings;
+  std::vector<std::string> all;
+  all.emplace_back(
+      "Measured on " + std::to_string(s.paths) + " paths for each shape and probe, " +
+      std::to_string(s.contact_ticks) +
+      " ticks of contact each: a hand at 0.1 m/s, 1 to 2 mm deep, wandering over the shape "
+      "with a stylus of " +
+      significant(1e3 * s.length) + " mm (rendering/accuracy/hand_path.h; seeds 1 to " +
+      std::to_string(s.paths) +
+      "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
+      "mm. Forces at 800 N/m.");
+  all.emplace_back(
+      "An answer is held against the exact way out of the object that is nearest to it in "
+      "direction: a god-object keeps to the side that it came in by, which need not be the least "
+      "way out (\"not least\": ticks held so). A lost contact counts with its whole depth and "
+      "force.");
+  all.emplace_back(
+      "Depths are along the way out, angles in degrees, forces and torques (about the tip) "
+      "differences of vectors, points on the ideal probe. Times are means over the ticks in "
+      "contact, the fastest of three runs, on this machine.");
+  all.emplace_back(
+      "Contact points and torques are compared where the stylus is more than 2 degrees off every "
+      "flat that it touches; nearer, where it is touched along a length is a convention (equation "
+      "(2)).");
+  all.emplace_back(
+      "Worst: once in some 10,000 ticks a tessellation lets go of a side one tick before or after "
+      "the shape does.");
+  for (const MethodKind& method : accuracy_methods()) {
+    std::string line = "Method ";
+    line += method.name;
+    line += ": ";
+    line += method.description;
+    all.push_back(line + ".");
+  }
+  for (const PeerLibrary& library : peer_libraries()) {
+    if (library.make) continue;
+    std::string line = "Method ";
+    line += library.name;
+    all.push_back(line + ": absent from this build (PALPATE_PEERS).");
+  }
+  return all;
+}
+
+constexpr const char* kQuestion =
+    "Which tessellation? The coarsest with 99.9 % of ticks below what a hand can feel (force "
+    "direction 10 degrees, surface position 1 mm), and below what a device resolves (0.03 mm); "
+    "point and ray.";
+
+void put_wrapped(std::ostream& out, const std::string& text) {
+  constexpr std::size_t kColumns = 98;
+  for (const std::string& line :
+       wrapped(text, [](std::string_view part) { return width(part) <= kColumns; })) {
+    out << "  " << line << "\n";
+  }
+}
+
+}  // namespace
+
+void put_table(std::ostream& out, const Table& table) {
+  std::vector<std::size_t> widths;
+  for (const std::string& name : table.header) widths.push_back(width(name));
+  for (const auto& row : table.rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+  }
+  out << "\n" << table.caption << "\n";
+  const auto put = [&](const std::vector<std::string>& cells) {
+    std::string line;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      line += "  " +
+              (i < table.n_names ? pad_right(cells[i], widths[i]) : pad_left(cells[i], widths[i]));
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    out << line << "\n";
+  };
+  put(table.header);
+  for (const auto& row : table.rows) put(row);
+  for (const std::string& note : table.notes) out << "  " << note << "\n";
+}
+
+std::string accuracy_text(const AccuracyReport& report) {
+  std::ostringstream out;
+  if (!report.rows.empty()) {
+    put_wrapped(out, kQuestion);
+    out << "\n";
+    for (const std::string& sentence : recommendations(report)) out << "  " << sentence << "\n";
+  }
+  for (const Table& table : accuracy_tables(report)) put_table(out, table);
+  if (!report.rows.empty()) {
+    out << "\nHow to read it\n";
+    for (const std::string& note : how_to_read(report)) put_wrapped(out, note);
+  }
+  return out.str();
+}
+
+std::string accuracy_page(const AccuracyReport& report) {
+  ReportPage page;
+  page.title = report.rows.empty() ? "How many random ticks are wrong"
+                                   : "How far the forces are from the exact ones, and at what cost";
+  if (!report.rows.empty()) {
+    page.sentences = {kQuestion};
+    for (std::string& sentence : recommendations(report)) {
+      page.sentences.push_back(std::move(sentence));
+    }
+    page.figures.push_back({accuracy_figure(report), ""});
+    page.notes = how_to_read(report);
+  }
+  page.tables = accuracy_tables(report);
+  return page_html(page);
+}
+
+}  // namespace palpate

@@ -1,0 +1,227 @@
+#include "runner/commands/devices/calibrate.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <charconv>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "data/files/utc.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/devices/falcon/homing.h"
+#include "runner/devices/falcon/open.h"
+#include "runner/devices/falcon/registration.h"
+#include "runner/devices/falcon/weighing.h"
+#include "runner/safety/fault_signals.h"
+#include "runner/safety/guard.h"
+#include "runner/servo/realtime.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+using namespace palpate::falcon;
+
+/// Questions on stderr, ENTER on stdin; q, the end of stdin or a signal stops.
+class TerminalGuide final : public Guide {
+ public:
+  explicit TerminalGuide(const FaultSignals& signals) : signals_(signals) {}
+
+  void say(const std::string& text) override { std::cerr << printable_lines(text) << "\n"; }
+  void ask(const std::string& text) override {
+    std::cerr << printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
+  }
+  Answer answer() override {
+    if (signals_.end_requested() != 0) return Answer::stop;
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    while (poll(&input, 1, 0) > 0) {
+      char letter = 0;
+      if (read(STDIN_FILENO, &letter, 1) != 1) return Answer::stop;
+      if (letter == '\n') {
+        const bool stop = line_ == "q" || line_ == "Q";
+        line_.clear();
+        return stop ? Answer::stop : Answer::go_on;
+      }
+      if (line_.size() < 16) line_ += letter;
+    }
+    return Answer::none;
+  }
+
+ private:
+  const FaultSignals& signals_;
+  std::string line_;
+};
+
+std::vector<double> numbers(const std::string& text, const std::string& option) {
+  std::vector<double> values;
+  std::string_view rest = text;
+  while (true) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+    if (error != std::errc{}) break;
+    values.push_back(value);
+    rest.remove_prefix(static_cast<std::size_t>(end - rest.data()));
+    if (rest.empty()) return values;
+    if (rest.front() != ',') break;
+    rest.remove_prefix(1);
+  }
+  throw UsageError("--" + option + " takes numbers with commas between them, not '" + text + "'");
+}
+
+void check(bool good, const std::string& expectation) {
+  if (!good) throw UsageError(expectation);
+}
+
+WeighingSettings weighing_settings(const po::variables_map& values) {
+  WeighingSettings settings;
+  settings.weights = numbers(values["weights"].as<std::string>(), "weights");
+  settings.gravity = values["gravity"].as<double>();
+  settings.cycle = values["sweep-seconds"].as<double>();
+  settings.settle = 0.75 * settings.cycle;
+  check(settings.cycle >= 1 && settings.cycle <= 60, "--sweep-seconds is between 1 and 60");
+  for (const double weight : settings.weights) {
+    check(weight > 0 && weight <= 2, "--weights are masses in kg, above 0 and at most 2");
+  }
+  check(settings.gravity > 9.7 && settings.gravity < 9.9,
+        "--gravity is between 9.7 and 9.9 m/s^2 anywhere on earth");
+  return settings;
+}
+
+RegistrationSettings registration_settings(const po::variables_map& values) {
+  RegistrationSettings settings;
+  settings.stylus_length = values["stylus-length"].as<double>();
+  settings.points = values["points"].as<int>();
+  const auto offset = numbers(values["offset"].as<std::string>(), "offset");
+  check(offset.size() == 3, "--offset takes three numbers: x,y,z in m");
+  settings.offset = {offset[0], offset[1], offset[2]};
+  for (const double part : offset) {
+    check(part >= -1 && part <= 1, "--offset is at most 1 m each way");
+  }
+  check(settings.stylus_length >= 0.02 && settings.stylus_length <= 1,
+        "--stylus-length is between 0.02 and 1 m");
+  check(settings.points >= 4 && settings.points <= 100, "--points is between 4 and 100");
+  return settings;
+}
+
+std::string now_utc() {
+  return format_utc(std::chrono::system_clock::now().time_since_epoch() /
+                    std::chrono::nanoseconds(1));
+}
+
+/// The nominal scale: what is stored must not enter what is measured.
+DeviceOrder one_of(const DeviceOrder& order, const std::string& serial) {
+  DeviceOrder one = order;
+  one.serials.clear();
+  if (!serial.empty()) one.serials = {serial};
+  one.calibration.clear();
+  return one;
+}
+
+/// Owned by a guard process: the motors are at work here, too. It has more patience than in a
+/// session, where the hand is closer and a late tick spoils a trial. \param rate  Hz
+std::unique_ptr<GuardedDevice> guarded(const DeviceOrder& order, double rate) {
+  GuardSettings settings;
+  settings.rate = rate;
+  return std::make_unique<GuardedDevice>([order] { return open_falcon(order); }, settings);
+}
+constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force there is no hurry
+
+void store(const std::string& path, const Calibration& calibration) {
+  write_whole(path, to_json(calibration));
+  std::cerr << "Stored in " << printable(path) << "\n";
+}
+
+int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
+  const WeighingSettings settings = weighing_settings(values);
+  Calibration calibration = read_calibration(order.calibration);  // faults are found before work
+  FaultSignals signals;
+  const auto device =
+      guarded(one_of(order, order.serials.empty() ? "" : order.serials[0]), kWeighingRate);
+  signals.watch(device.get());
+  request_realtime({});
+  RealClock clock;
+  TerminalGuide guide(signals);
+  wait_until_homed(*device, clock, guide);
+  ForceCalibration force = weigh(*device, clock, guide, settings);
+  signals.watch(static_cast<GuardedDevice*>(nullptr));
+  force.made_utc = now_utc();
+  calibration.put(force);
+  store(order.calibration, calibration);
+  std::cout << "serial                   " << printable(force.serial) << "\n"
+            << "counts per newton metre  " << force.counts_per_torque << " (nominal "
+            << kCountsPerTorque << ")\n"
+            << "residual                 " << force.residual << " N\n"
+            << "sideways                 " << force.sideways << " N for each N\n"
+            << "weight of the arms       " << force.arm_weight << " N\n"
+            << "force in every direction " << sure_force(force.counts_per_torque) << " N\n";
+  if (!believable(force)) {
+    std::cerr << "This scale is more than " << kBelievableFactor
+              << " times off the nominal one and will not be used: were the weights right, and did "
+                 "they hang freely?\n";
+  }
+  return 0;
+}
+
+int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
+  const RegistrationSettings settings = registration_settings(values);
+  check(order.serials.size() == 2,
+        "falcon2 needs two --serial: first that of the Falcon at the stylus' tip");
+  Calibration calibration = read_calibration(order.calibration);
+  FaultSignals signals;
+  const auto tip = guarded(one_of(order, order.serials[0]), kRegistrationRate);
+  const auto tail = guarded(one_of(order, order.serials[1]), kRegistrationRate);
+  request_realtime({});
+  RealClock clock;
+  TerminalGuide guide(signals);
+  wait_until_homed(*tip, clock, guide);
+  wait_until_homed(*tail, clock, guide);
+  PairRegistration pair = register_pair(*tip, *tail, clock, guide, settings);
+  pair.made_utc = now_utc();
+  calibration.put(pair);
+  store(order.calibration, calibration);
+  const Vec3& p = pair.tail_in_tip.position;
+  std::cout << "tip, tail      " << printable(pair.tip_serial) << ", "
+            << printable(pair.tail_serial) << "\n"
+            << "tail's centre  " << p.x << ", " << p.y << ", " << p.z << " m from the tip's\n"
+            << "residual       " << pair.residual * 1e3 << " mm over " << pair.points
+            << " places\n";
+  return 0;
+}
+
+}  // namespace
+
+void add_calibrate_options(po::options_description& options) {
+  options.add_options()("weights", po::value<std::string>()->default_value("0.1,0.2,0.4"),
+                        "--calibrate falcon: masses to hang at the grip in turn, kg")(
+      "gravity", po::value<double>()->default_value(9.80665),
+      "--calibrate falcon: at this place, m/s^2")(
+      "sweep-seconds", po::value<double>()->default_value(4),
+      "--calibrate falcon: the grip goes up and down twice while it is weighed, so long each time, "
+      "s")("stylus-length", po::value<double>()->default_value(0.12),
+           "--calibrate falcon2: between the centres of the grips on the stylus, m")(
+      "offset", po::value<std::string>()->default_value("0,0,0"),
+      "--calibrate falcon2: from the tip's grip to the tail's while places are taken, x,y,z in m; "
+      "0,0,0: they are pinned together")("points", po::value<int>()->default_value(8),
+                                         "--calibrate falcon2: places to take");
+}
+
+int calibrate_devices(const std::string& device, const DeviceOrder& order,
+                      const po::variables_map& values) {
+  check(!order.calibration.empty(), "--calibrate needs --calibration FILE to store into");
+  TakenFiles firmware;
+  firmware.add(order.firmware, "--firmware reads it, it would be overwritten");
+  const std::string why = why_not_to_write(order.calibration, true, firmware);
+  check(why.empty(), "--calibration " + order.calibration + ": " + why);
+  if (device == "falcon") return calibrate_force(order, values);
+  if (device == "falcon2") return calibrate_pair(order, values);
+  throw UsageError("--calibrate is for the devices falcon and falcon2, not for '" + device + "'");
+}
+
+}  // namespace palpate

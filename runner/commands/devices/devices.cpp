@@ -1,0 +1,265 @@
+// palpate devices: what is connected, what it can do, and whether this machine keeps time.
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "runner/bench/servo_timing.h"
+#include "runner/commands/devices/calibrate.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/devices/registry.h"
+#include "runner/devices/self_test.h"
+#include "runner/safety/guard.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+using Json = nlohmann::ordered_json;
+
+Json to_json(const DeviceCapabilities& c) {
+  // What pushes nothing has no limits of pushing; what stands there keeps scenes from being cut.
+  const auto of_pushing = [&c](double limit) {
+    return c.actuated_freedom > 0 ? Json(limit) : Json();
+  };
+  return {{"sensed_freedom", c.sensed_freedom},
+          {"actuated_freedom", c.actuated_freedom},
+          {"max_force_n", of_pushing(c.max_force)},
+          {"max_stiffness_n_per_m", of_pushing(c.max_stiffness)},
+          {"max_rate_hz", c.any_rate ? Json() : Json(c.max_rate)},
+          {"workspace_radius_m", c.workspace_radius},
+          {"resolution_m", c.resolution},
+          {"damping_ns_per_m", c.damping},
+          {"friction_n", c.friction},
+          {"simulated", c.simulated},
+          {"serial", c.serial},
+          {"calibration", c.calibration}};
+}
+
+void print_limits(const DeviceCapabilities& c) {
+  std::string rate = "at any rate that is asked for";
+  if (!c.any_rate) rate = "up to " + std::to_string(std::lround(c.max_rate)) + " Hz";
+  std::printf("    senses %d degrees of freedom, ", c.sensed_freedom);
+  if (c.actuated_freedom > 0) {
+    std::printf("drives %d; up to %g N, %g N/m, %s;\n", c.actuated_freedom, c.max_force,
+                c.max_stiffness, rate.c_str());
+  } else {
+    std::printf("drives none: nothing is felt; %s;\n", rate.c_str());
+  }
+  std::printf("    reaches %g mm about its centre, resolves %g um\n", c.workspace_radius * 1e3,
+              c.resolution * 1e6);
+  if (!c.serial.empty()) std::printf("    serial number %s\n", printable(c.serial).c_str());
+  if (!c.calibration.empty())
+    std::printf("    calibration: %s\n", printable(c.calibration).c_str());
+}
+
+/// Opened, its limits, its self-test. \return whether the test was passed
+bool open_and_test(const DeviceKind& kind, const DeviceOrder& order, Json& row) {
+  const auto factory = [&kind, order] { return kind.open(order); };
+  GuardSettings settings;
+  settings.rate = order.rate;
+  const std::unique_ptr<Device> device =
+      kind.pushes ? std::make_unique<GuardedDevice>(factory, settings) : factory();
+  row["limits"] = to_json(device->capabilities());
+  print_limits(device->capabilities());
+  bool passed = true;
+  row["self_test"] = Json::array();
+  for (const SelfTestResult& result : self_test(*device, order.rate)) {
+    passed = passed && result.passed;
+    row["self_test"].push_back(
+        {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
+    std::printf("    %-8s%s: %s\n", result.passed ? "passed" : "FAILED", result.what.c_str(),
+                printable(result.found).c_str());
+  }
+  return passed;
+}
+
+/// What is there of a kind; \return false where a device that is there does not work.
+bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& rows) {
+  Json row = {{"name", kind.name}, {"description", kind.description}};
+  std::printf("%s: %s\n", kind.name, kind.description);
+  bool good = true, usable = false;
+  row["connected"] = Json::array();
+  try {
+    const std::vector<ConnectedDevice> connected = kind.connected();
+    for (const ConnectedDevice& found : connected) {
+      row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
+      usable = usable || found.trouble.empty();
+      if (!found.serial.empty())
+        std::printf("    connected: %s\n", printable(found.serial).c_str());
+      if (!found.trouble.empty())
+        std::printf("    cannot be used: %s\n", printable(found.trouble).c_str());
+    }
+    if (connected.empty()) std::printf("    none connected\n");
+    if (kind.pushes && !named) {
+      if (usable)
+        std::printf("    --device %s opens it: limits and self-test (nothing is pushed)\n",
+                    kind.name);
+    } else {
+      good = open_and_test(kind, order, row);
+    }
+  } catch (const std::runtime_error& error) {
+    row["trouble"] = error.what();
+    std::printf("    %s\n", printable(error.what()).c_str());
+    good = !named;
+  }
+  rows.push_back(std::move(row));
+  return good;
+}
+
+Json to_json(const ServoTiming& t) {
+  static constexpr const char* kVerdicts[] = {"fit", "fit_with_losses", "unfit"};
+  return {
+      {"rate_hz", t.rate},
+      {"ticks", t.ticks},
+      {"missed_ticks", t.missed_ticks},
+      {"missed_in_a_row", t.worst_run},
+      {"forces_cut_off", t.trips},
+      {"old_readings", t.old_readings},
+      {"lateness_ns",
+       {{"median", t.lateness_median},
+        {"p99", t.lateness_p99},
+        {"p99.9", t.lateness_p999},
+        {"max", t.lateness_max},
+        {"share_above_one_period", t.late_share}}},
+      {"warm_up_ns",
+       {{"median", t.warm_up_median}, {"p99.9", t.warm_up_p999}, {"max", t.warm_up_max}}},
+      {"compute_ns", {{"median", t.clock_median}, {"p99.9", t.clock_p999}, {"max", t.clock_max}}},
+      {"compute_cpu_ns",
+       {{"median", t.compute_median}, {"p99.9", t.compute_p999}, {"max", t.compute_max}}},
+      {"asking_cpu_ns", {{"median", t.asking_median}}},
+      {"tick_cpu_ns", {{"median", t.tick_median}, {"p99.9", t.tick_p999}, {"max", t.tick_max}}},
+      {"rights",
+       {{"fifo", t.rights.fifo},
+        {"locked_memory", t.rights.locked_memory},
+        {"core", t.rights.core},
+        {"awake", t.rights.awake},
+        {"missing", t.rights.missing}}},
+      {"verdict", kVerdicts[static_cast<int>(t.verdict())]},
+      {"sentence", t.sentence()}};
+}
+
+void print(const ServoTiming& t) {
+  const auto us = [](std::int64_t ns) { return static_cast<double>(ns) / 1000; };
+  std::printf("%-44s%10s%10s%10s%10s\n", "us", "median", "p99", "p99.9", "max");
+  std::printf("%-44s%10.1f%10.1f%10.1f%10.1f\n", "lateness of ticks", us(t.lateness_median),
+              us(t.lateness_p99), us(t.lateness_p999), us(t.lateness_max));
+  std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "warming the caches up, by the clock",
+              us(t.warm_up_median), "", us(t.warm_up_p999), us(t.warm_up_max));
+  std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "rendering and limits, by the clock",
+              us(t.clock_median), "", us(t.clock_p999), us(t.clock_max));
+  std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "rendering and limits, thread's own time",
+              us(t.compute_median), "", us(t.compute_p999), us(t.compute_max));
+  std::printf("%-44s%10.2f\n", "  of which asking for that time", us(t.asking_median));
+  std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "whole tick but the device's transfer",
+              us(t.tick_median), "", us(t.tick_p999), us(t.tick_max));
+  std::printf("later than a period: %.4g %% of ticks\n%s\n", t.late_share * 100,
+              t.sentence().c_str());
+}
+
+int timing(const po::variables_map& values, const DeviceOrder& order, Json& report) {
+  TimingSettings settings;
+  settings.rate = order.rate;
+  settings.seconds = values["seconds"].as<double>();
+  if (!(settings.seconds >= 0.1 && settings.seconds <= 86'400))
+    throw UsageError("--seconds: 0.1 to 86400 was expected");
+  settings.guarded = values.count("guarded") > 0;
+  settings.realtime.core = values["core"].as<int>();
+  const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+  if (settings.realtime.core < -1 || settings.realtime.core >= cores)
+    throw UsageError("--core: this machine has the processors 0 to " + std::to_string(cores - 1));
+  if (values.count("no-fifo") > 0) settings.realtime.priority = 0;
+  if (values.count("no-realtime") > 0)
+    settings.realtime = {0, false, settings.realtime.core, false};
+  if (isatty(STDERR_FILENO) != 0)
+    std::fprintf(stderr, "Measuring for %g s ...\n", settings.seconds);
+  const ServoTiming result = measure_servo(settings);
+  print(result);
+  report["timing"] = to_json(result);
+  return result.verdict() == ServoTiming::Verdict::unfit ? 1 : 0;
+}
+
+DeviceOrder order_of(const po::variables_map& values) {
+  DeviceOrder order;
+  order.rate = values["rate"].as<double>();
+  if (!(order.rate >= 10 && order.rate <= 10'000))
+    throw UsageError("--rate: 10 to 10000 Hz was expected");
+  if (values.count("serial") > 0) order.serials = values["serial"].as<std::vector<std::string>>();
+  if (values.count("firmware") > 0) order.firmware = values["firmware"].as<std::string>();
+  if (values.count("calibration") > 0) order.calibration = values["calibration"].as<std::string>();
+  return order;
+}
+
+}  // namespace
+
+int devices_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate devices [--device NAME] [--timing] [--calibrate] [--json FILE]";
+  line.summary =
+      "Lists the devices that are connected, their limits and what their self-tests found; "
+      "measures "
+      "whether this machine keeps a servo's time; calibrates forces. No self-test pushes.";
+  line.example =
+      "  palpate devices                                       what is there\n"
+      "  palpate devices --device falcon --firmware nvent.bin  opens one and tests it\n"
+      "  palpate devices --timing --seconds 60                 is this machine fit at 1 kHz?\n"
+      "  palpate devices --calibrate --device falcon --calibration lab.json --weights "
+      "0.1,0.2,0.4\n";
+  line.options.add_options()                                                                //
+      ("device", po::value<std::string>()->value_name("NAME"), "this kind of device only")  //
+      ("serial", po::value<std::vector<std::string>>()->value_name("S"),
+       "which one of several; falcon2: twice, the tip's first")  //
+      ("firmware", po::value<std::string>()->value_name("FILE"),
+       "to upload where the device asks for it")                                                 //
+      ("calibration", po::value<std::string>()->value_name("FILE"), "file of calibrations")      //
+      ("rate", po::value<double>()->default_value(1000)->value_name("HZ"), "of the servo")       //
+      ("timing", "measure this machine; exit status 1 when it is not fit")                       //
+      ("seconds", po::value<double>()->default_value(10)->value_name("S"), "--timing: so long")  //
+      ("guarded", "--timing: with the device in a guard process, as a Falcon is")                //
+      ("no-fifo", "--timing: without real-time priority")                                        //
+      ("no-realtime", "--timing: with no right that an ordinary program has not")                //
+      ("core", po::value<int>()->default_value(-1)->value_name("N"),
+       "--timing: on this processor alone")                                                 //
+      ("calibrate", "guided calibration of a device")                                       //
+      ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
+      ("force", "replace a file that is there");
+  add_calibrate_options(line.options);
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const DeviceOrder order = order_of(*values);
+  Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
+  const bool named = values->count("device") > 0;
+  const std::string name = named ? (*values)["device"].as<std::string>() : "";
+  Json report = {{"program_version", PALPATE_VERSION}};
+  int status = 0;
+  try {
+    const DeviceKind* const only = named ? &device_kind(name) : nullptr;
+    if (values->count("calibrate") > 0) {
+      if (!named) throw UsageError("--calibrate: --device says which");
+      return calibrate_devices(name, order, *values);
+    }
+    if (values->count("timing") > 0) {
+      status = timing(*values, order, report);
+    } else {
+      if (only != nullptr) only->check(order);
+      report["devices"] = Json::array();
+      for (const DeviceKind& kind : device_kinds()) {
+        if (only != nullptr && only != &kind) continue;
+        if (!list(kind, order, named, report["devices"])) status = 1;
+      }
+    }
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+  outputs.put("json", report.dump(2) + "\n");
+  outputs.write();
+  return status;
+}
+
+}  // namespace palpate

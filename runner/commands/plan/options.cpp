@@ -1,0 +1,232 @@
+#include "runner/commands/plan/options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "analysis/input/trials.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/text.h"
+#include "data/store/store.h"
+#include "protocols/parse.h"
+#include "runner/commands/shared/command.h"
+
+namespace palpate {
+
+namespace po = boost::program_options;
+
+namespace {
+
+constexpr std::size_t kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
+constexpr double kMostSd = 100;  // log seconds
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == at) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+std::size_t whole_number(const std::string& option, const std::string& text, std::size_t least,
+                         std::size_t most) {
+  std::size_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    throw UsageError("--" + option + ": expected a whole number from " + std::to_string(least) +
+                     " to " + std::to_string(most) + ", found '" + printable(text, 60) + "'");
+  }
+  return value;
+}
+
+double real_number(const std::string& option, const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw UsageError("--" + option + ": expected a number, found '" + printable(text, 60) + "'");
+  }
+  return value;
+}
+
+void check_within(const std::string& option, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  throw UsageError("--" + option + ": expected a number from " + fixed(low, 2) + " to " +
+                   fixed(high, 2));
+}
+
+std::string shapes_of(const StudyModel& model) {
+  std::string known;
+  for (const std::string& each : model.shapes)
+    known += (known.empty() ? "" : ", ") + printable(each, 60);
+  return known;
+}
+
+/// "cone=22,cube=11": percent reductions; shapes that are not named have no effect. "11": all.
+void put_effects(const std::string& text, StudyModel& model) {
+  const auto log_ratio = [](const std::string& percent) {
+    const double value = real_number("effect", percent);
+    if (!(value < 100) || value < -1000) {
+      throw UsageError("--effect: expected a percent reduction of time below 100, found '" +
+                       printable(percent, 60) + "'");
+    }
+    return std::log1p(-value / 100);
+  };
+  if (text.find('=') == std::string::npos) {
+    std::ranges::fill(model.log_ratios, log_ratio(text));
+    return;
+  }
+  std::ranges::fill(model.log_ratios, 0.0);
+  std::set<std::string> named;
+  for (const std::string& part : split(text, ',')) {
+    const std::size_t at = part.rfind('=');
+    const std::string name = part.substr(0, at);
+    const auto shape = std::ranges::find(model.shapes, name);
+    if (at == std::string::npos || shape == model.shapes.end()) {
+      throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + shapes_of(model) +
+                       ", found '" + printable(part, 60) + "'");
+    }
+    if (!named.insert(name).second) {
+      throw UsageError("--effect: expected each shape once, found '" + printable(name, 60) +
+                       "' again");
+    }
+    model.log_ratios[static_cast<std::size_t>(shape - model.shapes.begin())] =
+        log_ratio(part.substr(at + 1));
+  }
+}
+
+/// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
+/// paper's effects. \return what was taken
+std::string put_default_effects(StudyModel& model) {
+  constexpr double kCone = 22, kCube = 11;
+  bool known = false;
+  for (std::size_t s = 0; s < model.shapes.size(); ++s) {
+    const bool cone = model.shapes[s] == "cone", cube = model.shapes[s] == "cube";
+    model.log_ratios[s] = std::log1p(-(cone ? kCone : cube ? kCube : 0) / 100);
+    known = known || cone || cube;
+  }
+  std::string taken = "the paper's";
+  if (!known) {
+    std::ranges::fill(model.log_ratios, std::log1p(-kCube / 100));
+    taken = fixed(kCube, 0) +
+            " % for every shape, the smaller of the paper's, whose shapes are "
+            "not among these";
+  }
+  return "No wanted effects were given (--effect SHAPE=PERCENT,...): taken were " + taken +
+         ". The shapes: " + shapes_of(model) + ".";
+}
+
+TrialTable read_trials(const std::string& database, const std::string& csv) {
+  if (!csv.empty()) return read_trials_csv(csv);
+  try {
+    return read_trials_store(database);
+  } catch (const StoreRefused& error) {
+    throw UsageError(error.what());
+  }
+}
+
+}  // namespace
+
+Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
+  Pilot pilot;
+  if (options.database.empty() && options.csv.empty()) {
+    for (const char* needed : {"gain-sd", "residual-sd"}) {
+      if (values.count(needed) == 0) {
+        throw UsageError(std::string("without a pilot (--db or --csv) expected --") + needed +
+                         "; more: add --help");
+      }
+    }
+    pilot.pair = {"point", "ray", std::nullopt, std::nullopt};
+    pilot.model.shapes = {"sphere", "cone", "cylinder", "cube"};
+    pilot.model.log_ratios.assign(4, 0.0);
+    pilot.model.intercept_sd = options.intercept_sd;
+    return pilot;
+  }
+  const std::string& source = options.csv.empty() ? options.database : options.csv;
+  pilot = read_pilot(analyze(read_trials(options.database, options.csv), {}, PALPATE_VERSION));
+  if (!pilot.undefined.empty()) {
+    throw UsageError(
+        source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
+  }
+  pilot.notes.insert(pilot.notes.begin(), "Standard deviations and share of used trials from " +
+                                              printable(source, 200) + ", the wanted effects not.");
+  return pilot;
+}
+
+StudyModel model_of(Pilot& pilot, const PlanOptions& options, const po::variables_map& values) {
+  StudyModel model = std::move(pilot.model);
+  const auto put = [&](const char* option, double value, double low, double high, double& target) {
+    if (values.count(option) == 0) return;
+    check_within(option, value, low, high);
+    target = value;
+  };
+  put("gain-sd", options.gain_sd, 0, kMostSd, model.gain_sd);
+  put("shape-gain-sd", options.shape_gain_sd, 0, kMostSd, model.shape_gain_sd);
+  put("intercept-sd", options.intercept_sd, 0, kMostSd, model.intercept_sd);
+  put("correlation", options.correlation, -1, 1, model.correlation);
+  put("residual-sd", options.residual_sd, 0, kMostSd, model.residual_sd);
+  put("share-used", options.share_used, 0.01, 1, model.share_used);
+  if (model.gain_sd == 0 && model.shape_gain_sd == 0 && model.residual_sd == 0) {
+    throw UsageError(
+        "expected some variation: --gain-sd, --shape-gain-sd or --residual-sd above 0");
+  }
+  if (values.count("effect") != 0) {
+    put_effects(options.effect, model);
+  } else if (pilot.pair.is_ray_minus_point()) {
+    pilot.notes.push_back(put_default_effects(model));
+  } else {
+    throw UsageError(
+        "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
+        "point, this pilot is of " +
+        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60) +
+        "; its shapes: " + shapes_of(model));
+  }
+  if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
+    throw UsageError(
+        "expected the wanted effect of some shape: --effect SHAPE=PERCENT,... with a shape of " +
+        shapes_of(model));
+  }
+  return model;
+}
+
+PlanSettings settings_of(const PlanOptions& options, const po::variables_map& values) {
+  PlanSettings out;
+  const auto ends = split(options.participants, '-');
+  if (ends.size() > 2) throw UsageError("--participants: expected a range such as 4-40");
+  out.least = whole_number("participants", ends.front(), 2, kMostParticipants);
+  out.most = whole_number("participants", ends.back(), out.least, kMostParticipants);
+  for (const std::string& trials : split(options.trials, ',')) {
+    out.trials.push_back(whole_number("trials", trials, 1, kMostTrials));
+  }
+  check_within("power", options.power, 0.01, 0.9999);
+  check_within("alpha", options.alpha, 0.0001, 0.5);
+  out.power = options.power;
+  if (options.goal != "all" && options.goal != "any") {
+    throw UsageError("--goal: expected all or any");
+  }
+  out.goal = options.goal == "all" ? Goal::all : Goal::any;
+  if (options.test != "paired" && options.test != "model") {
+    throw UsageError("--test: expected paired or model");
+  }
+  PowerSettings& simulation = out.simulation;
+  simulation.test = options.test == "paired" ? StudyTest::paired : StudyTest::model;
+  simulation.alpha = options.alpha;
+  simulation.seed = options.seed;
+  simulation.studies = simulation.test == StudyTest::paired ? 10'000 : 1'000;
+  if (values.count("studies") != 0) {
+    simulation.studies = whole_number("studies", options.studies, 100, kMostStudies);
+  }
+  simulation.jobs = std::max(1U, std::thread::hardware_concurrency());
+  if (values.count("jobs") != 0) simulation.jobs = whole_number("jobs", options.jobs, 1, 256);
+  return out;
+}
+
+}  // namespace palpate

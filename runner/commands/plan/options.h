@@ -1,0 +1,35 @@
+#pragma once
+// What the options of 'palpate plan' ask for.
+
+#include <boost/program_options.hpp>
+#include <cstdint>
+#include <string>
+
+#include "analysis/statistics/pilot.h"
+#include "analysis/statistics/plan.h"
+
+namespace palpate {
+
+struct PlanOptions {
+  std::string database, csv, effect, participants = "2-100", trials = "10,20,40,76", goal = "all",
+                                     test = "paired", json, figure;
+  double gain_sd = 0, shape_gain_sd = 0, intercept_sd = 0.3, correlation = 0, residual_sd = 0,
+         share_used = 1, power = 0.8, alpha = 0.05;
+  std::string studies, jobs;
+  std::uint64_t seed = 2000;
+};
+
+// Each throws UsageError.
+
+/// The pilot's model, or the paper's shapes with the figures given.
+Pilot starting_point(const PlanOptions& options,
+                     const boost::program_options::variables_map& values);
+
+/// The pilot's model, which is moved from, with the figures and effects given.
+StudyModel model_of(Pilot& pilot, const PlanOptions& options,
+                    const boost::program_options::variables_map& values);
+
+PlanSettings settings_of(const PlanOptions& options,
+                         const boost::program_options::variables_map& values);
+
+}  // namespace palpate

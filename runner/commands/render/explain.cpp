@@ -1,0 +1,161 @@
+#include "runner/commands/render/explain.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <set>
+
+namespace palpate {
+namespace {
+
+/// ns a call: the least of several runs, each long enough for the clock.
+double cost_of(const Rehearsal& rehearsal) {
+  constexpr int kRuns = 15;
+  constexpr std::chrono::milliseconds kLong{1};
+  volatile double sink = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kRuns; ++i) {
+    std::chrono::steady_clock::duration passed{};
+    std::size_t calls = 0;
+    while (passed < kLong) {
+      rehearsal.prepare();
+      const auto start = std::chrono::steady_clock::now();
+      sink = sink + rehearsal.run();
+      passed += std::chrono::steady_clock::now() - start;
+      calls += rehearsal.calls;
+    }
+    const std::chrono::duration<double, std::nano> ns = passed;
+    least = std::min(least, ns.count() / static_cast<double>(calls));
+  }
+  return least;
+}
+
+std::string nanoseconds(const std::optional<double>& ns) {
+  if (!ns) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f", *ns);
+  return text;
+}
+
+/// Of the whole tick, where the stage is part of it.
+std::optional<double> share(const Explanation& e, const StageCost& cost) {
+  if (!cost.ns || !e.contact_ns) return std::nullopt;
+  if (cost.stage.time != StageTime::tick && cost.stage.time != StageTime::contact)
+    return std::nullopt;
+  return *cost.ns / *e.contact_ns;
+}
+
+std::string percent(const std::optional<double>& value) {
+  if (!value) return "-";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f %%", 100 * *value);
+  return text;
+}
+
+void pad(std::string& line, std::size_t column) {
+  line.append(line.size() < column ? column - line.size() : 1, ' ');
+}
+
+}  // namespace
+
+Explanation explain_with_costs(const Scene& scene, const Renderer& renderer) {
+  Explanation explanation;
+  explanation.renderer = renderer.name();
+  explanation.parts = scene.parts().size();
+  std::set<int> objects;
+  for (const ScenePart& part : scene.parts()) {
+    objects.insert(part.object);
+    explanation.facets += part.mesh->facets().size();
+    explanation.edges += part.mesh->edges().size();
+  }
+  explanation.objects = objects.size();
+  std::map<std::string, double> costs;
+  for (const Rehearsal& rehearsal : rehearse(scene, renderer)) {
+    if (rehearsal.calls > 0) costs[rehearsal.name] = cost_of(rehearsal);
+  }
+  const auto cost = [&](const std::string& name) -> std::optional<double> {
+    const auto found = costs.find(name);
+    if (found == costs.end()) return std::nullopt;
+    return found->second;
+  };
+  explanation.contact_ns = cost(kTickInContact);
+  explanation.free_ns = cost(kTickInFreeSpace);
+  for (Stage& stage : explain(scene, renderer)) {
+    StageCost with{std::move(stage), std::nullopt};
+    if (with.stage.runs) with.ns = cost(with.stage.name);
+    explanation.stages.push_back(std::move(with));
+  }
+  explanation.rest_ns = explanation.contact_ns;
+  for (const StageCost& c : explanation.stages) {
+    if (share(explanation, c)) *explanation.rest_ns -= *c.ns;
+  }
+  return explanation;
+}
+
+std::string to_text(const Explanation& e) {
+  std::string out = e.renderer + " renderer; objects: " + std::to_string(e.objects) +
+                    ", convex parts: " + std::to_string(e.parts) +
+                    ", facets: " + std::to_string(e.facets) +
+                    ", edges: " + std::to_string(e.edges) + "\n";
+  out += "a tick, ns: " + nanoseconds(e.contact_ns) + " in contact, " + nanoseconds(e.free_ns) +
+         " in free space\n\n";
+  std::string head = "stage";
+  pad(head, 25);
+  head += "when";
+  pad(head, 43);
+  head += "    ns  share";
+  out += head + "  what, or why not\n";
+  for (const StageCost& c : e.stages) {
+    std::string line = c.stage.name;
+    pad(line, 25);
+    line += c.stage.runs ? to_string(c.stage.time) : "left out";
+    const std::string ns = nanoseconds(c.ns), part = percent(share(e, c));
+    pad(line, 49 - ns.size());
+    line += ns;
+    pad(line, 56 - part.size());
+    line += part;
+    pad(line, 58);
+    out += line + c.stage.why + '\n';
+  }
+  if (e.rest_ns) {
+    out += "\nThe rest of a tick in contact: " + nanoseconds(e.rest_ns) +
+           " ns: results are written, memory is asked for ahead, other parts are followed.";
+  }
+  out +=
+      "\nEach stage was timed by itself over a hand that strokes the first part (0.1 m/s, 1 to 2 "
+      "mm "
+      "deep);\nin a tick they overlap, so shares of the tick in contact need not add up to 100 %. "
+      "-: does not run,\ndid not happen, or cannot be told apart.\n";
+  return out;
+}
+
+nlohmann::ordered_json to_json(const Explanation& e) {
+  using Json = nlohmann::ordered_json;
+  const auto figure = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  Json stages = Json::array();
+  for (const StageCost& c : e.stages) {
+    stages.push_back({{"stage", c.stage.name},
+                      {"when", to_string(c.stage.time)},
+                      {"runs", c.stage.runs},
+                      {"why", c.stage.why},
+                      {"ns", figure(c.ns)},
+                      {"share_of_contact", figure(share(e, c))}});
+  }
+  return {{"program_version", PALPATE_VERSION},
+          {"build", PALPATE_BUILD},
+          {"renderer", e.renderer},
+          {"objects", e.objects},
+          {"parts", e.parts},
+          {"facets", e.facets},
+          {"edges", e.edges},
+          {"contact_ns", figure(e.contact_ns)},
+          {"free_ns", figure(e.free_ns)},
+          {"rest_of_contact_ns", figure(e.rest_ns)},
+          {"stages", std::move(stages)}};
+}
+
+}  // namespace palpate

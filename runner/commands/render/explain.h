@@ -1,0 +1,34 @@
+#pragma once
+// `palpate render --explain`: what a tick over a scene consists of, and what each stage costs.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rendering/verification/explain.h"
+
+namespace palpate {
+
+/// A stage with what it costs on this machine.
+struct StageCost {
+  Stage stage;
+  /// ns a call, run by itself over recorded ticks; empty: left out, did not happen, or not to be
+  /// told apart from others.
+  std::optional<double> ns;
+};
+
+struct Explanation {
+  std::string renderer;
+  std::size_t objects = 0, parts = 0, facets = 0, edges = 0;
+  std::optional<double> contact_ns, free_ns;  ///< of a whole tick
+  std::optional<double> rest_ns;              ///< of contact_ns: what the stages leave over
+  std::vector<StageCost> stages;
+};
+
+Explanation explain_with_costs(const Scene& scene, const Renderer& renderer);
+
+std::string to_text(const Explanation& explanation);
+nlohmann::ordered_json to_json(const Explanation& explanation);
+
+}  // namespace palpate

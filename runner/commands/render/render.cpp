@@ -1,0 +1,113 @@
+#include <iostream>
+
+#include "protocols/parse.h"
+#include "runner/commands/render/explain.h"
+#include "runner/commands/render/trajectory_csv.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/scene_builder.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+namespace {
+
+namespace po = boost::program_options;
+
+Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& objects,
+                  const Renderer& renderer) {
+  try {
+    return SceneBuilder().build(objects, renderer.side_contact());
+  } catch (const MeshError& error) {
+    std::vector<std::string> faults;
+    for (const std::string& fault : error.faults()) {
+      faults.push_back(std::string(path).append(": ").append(fault));
+    }
+    throw MeshError(std::move(faults));
+  }
+}
+
+/// An option's value; \throws UsageError where it was not given.
+std::string given(const po::variables_map& values, const char* option, const char* because) {
+  if (values.count(option) == 0)
+    throw UsageError("the option '--" + std::string(option) + "' is required " + because);
+  return values[option].as<std::string>();
+}
+
+void explain_scene(Outputs& outputs, const Scene& scene, const Renderer& renderer) {
+  const Explanation explanation = explain_with_costs(scene, renderer);
+  std::cout << to_text(explanation);
+  outputs.put("json", to_json(explanation).dump(2) + "\n");
+  outputs.write();
+}
+
+ForceTable forces_along(const Scene& scene, const Renderer& renderer,
+                        const std::vector<TimedPose>& poses) {
+  RenderState state = scene.initial_state();
+  ForceTable table;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
+    table.add(poses[i], renderer.tick(scene, state, poses[i].probe, dt));
+  }
+  return table;
+}
+
+}  // namespace
+
+int render_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv\n"
+      "               [--force]\n"
+      "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
+  line.summary =
+      "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
+      "in; what a tick could not render stands in its column 'faults'. Or tells what a tick over "
+      "the scene consists of, what was left out and why, and what "
+      "each stage costs.";
+  line.example =
+      "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
+      "  palpate render --scene cube.json --renderer ray --explain\n";
+  line.options.add_options()                                                                  //
+      ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
+      ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
+      ("trajectory", po::value<std::string>()->value_name("FILE"),
+       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
+        " (s, m); at most " + std::to_string(kMostPoses) + " rows")
+           .c_str())                                                                              //
+      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
+      ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
+      ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON")  //
+      ("force", "replace a file that is there");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const std::string name = (*values)["renderer"].as<std::string>();
+  if (name != "point" && name != "ray") {
+    throw UsageError("--renderer: point or ray was expected, not '" + name + "'");
+  }
+  const bool explains = (*values)["explain"].as<bool>();
+  if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))
+    throw UsageError("--explain renders nothing: leave out --trajectory and --out");
+  if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
+  const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
+  const std::string scene_path = (*values)["scene"].as<std::string>();
+  Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
+  if (explains) {
+    const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+    for (const ObjectSpec& object : objects) outputs.keep(object);
+    explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
+    return 0;
+  }
+  const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
+  given(*values, "out", "unless --explain is given");
+  const std::vector<ObjectSpec> objects = parse_scene(scene_path);
+  for (const ObjectSpec& object : objects) outputs.keep(object);
+  const std::vector<TimedPose> poses = read_trajectory(trajectory);
+  const ForceTable table =
+      forces_along(build_scene(scene_path, objects, renderer), renderer, poses);
+  outputs.put("out", table.text());
+  outputs.write();
+  std::cerr << printable_lines(table.warnings(trajectory));
+  return 0;
+}
+
+}  // namespace palpate

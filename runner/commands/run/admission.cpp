@@ -1,0 +1,195 @@
+#include "runner/commands/run/admission.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "data/store/checks.h"
+#include "data/store/store.h"
+#include "protocols/difference.h"
+#include "protocols/parse.h"
+#include "runner/commands/run/parts.h"
+#include "runner/commands/run/resumption.h"
+#include "runner/commands/shared/ask.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/protocol_choice.h"
+#include "runner/session/clock_check.h"
+#include "runner/session/near_codes.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
+
+/// What the database holds already.
+struct Known {
+  std::vector<std::string> codes;          ///< in the order they came
+  bool enrolled = false;                   ///< the code, in this protocol
+  std::optional<EarlierProtocol> earlier;  ///< of the code, where it is not enrolled in this one
+  std::vector<std::string> others;         ///< what differs in protocols of the same name, in words
+  std::optional<int> number;               ///< that somebody new is to get, where texts changed
+  std::optional<std::int64_t> newest_ns;
+};
+
+/// Other texts, the same trials: one counterbalancing, so numbers count on.
+void count_on(Store& store, const Protocol& protocol, const RunSettings& settings, Known& known) {
+  std::set<int> taken;
+  for (const ProtocolInfo& info : store.protocols()) {
+    if (info.name != protocol.name) continue;
+    const bool same = info.sha256 == protocol.sha256;
+    const ProtocolDifference differs = difference(info.text, protocol.source_text);
+    const std::vector<Participant> people = store.participants(info.sha256);
+    if (!same && !people.empty()) known.others.push_back(in_words(differs));
+    if (!differs.only_texts()) continue;
+    for (const Participant& one : people) {
+      taken.insert(one.number);
+      if (settings.number == one.number && !same)
+        throw UsageError("--number: " + std::to_string(one.number) + " is taken by participant " +
+                         one.code + ", with other texts of the same protocol");
+    }
+  }
+  if (known.others.empty()) return;
+  int next = 1;
+  while (taken.contains(next)) ++next;
+  known.number = settings.number.value_or(next);
+}
+
+/// In a moment: nothing is held open while somebody thinks about a question, or a guard is forked.
+Known look_into(const RunSettings& settings, const Protocol& protocol, const std::string& code) {
+  Known known;
+  std::error_code error;
+  if (!fs::exists(settings.database, error)) return known;
+  Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  if (!settings.after_withdrawal) refuse_withdrawn(store, code);
+  known.codes = store.codes();
+  for (const Participant& one : store.participants(protocol.sha256))
+    known.enrolled = known.enrolled || one.code == code;
+  known.newest_ns = store.newest_record();
+  if (known.enrolled) return known;
+  known.earlier = earlier_protocol(store, protocol, code);
+  if (known.earlier) return known;
+  count_on(store, protocol, settings, known);
+  // Whether the code and the number can be given is said before anything is asked.
+  store.look_up(info_of(protocol), code, known.number ? known.number : settings.number);
+  return known;
+}
+
+/// The last ones, to recognise one's own among them.
+std::string latest(const std::vector<std::string>& codes) {
+  constexpr std::size_t kShown = 5;
+  const std::size_t shown = std::min(kShown, codes.size());
+  const std::vector<std::string> last(codes.end() - static_cast<std::ptrdiff_t>(shown),
+                                      codes.end());
+  const std::string all = codes.size() > shown ? std::to_string(codes.size()) + ", the last: " : "";
+  return all + in_words(last);
+}
+
+void confirm_new(const RunSettings& settings, const std::string& code,
+                 const std::vector<std::string>& codes) {
+  const std::vector<std::string> near = near_codes(code, codes);
+  const std::string alike = in_words(near) + (near.size() == 1 ? " is" : " are");
+  if (settings.new_participant) return;
+  if (!on_a_terminal()) {
+    if (!near.empty()) {
+      throw UsageError("--participant " + code + ": is not in " + settings.database + ", but " +
+                       alike + " there: give the code that was meant, or add --new-participant " +
+                       "if " + code + " is somebody new");
+    }
+    say(code + " is new in " + settings.database);
+    return;
+  }
+  std::string question = codes.empty() ? settings.database + " holds no participants yet.\n"
+                                       : settings.database + " does not hold " + code +
+                                             ", but others (" + latest(codes) + ").\n";
+  if (!near.empty()) question += alike + " there: a slip of the hand?\n";
+  const auto answer = ask(printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
+  if (answer != "y" && answer != "Y" && answer != "yes")
+    throw UsageError("nobody was enrolled, nothing was begun; the same command asks again");
+}
+
+void confirm_participant(const RunSettings& settings, const std::string& code, const Known& known) {
+  if (known.enrolled || known.earlier) {
+    if (!settings.new_participant) return;
+    throw UsageError("--new-participant: " + code + " is in " + settings.database +
+                     " already; leave the option out to go on with " + code +
+                     ", or give the new participant another code");
+  }
+  if (std::find(known.codes.begin(), known.codes.end(), code) == known.codes.end()) {
+    confirm_new(settings, code, known.codes);
+  } else {
+    say(code + " is known from another protocol in " + settings.database);
+  }
+  for (const std::string& difference : known.others)
+    say("others were enrolled with another text of this protocol (" + difference + ")" +
+        (known.number ? "; numbers count on where only texts differ" : ""));
+}
+
+std::optional<std::int64_t> written_ns(const std::string& file) {
+  std::error_code error;
+  const fs::file_time_type time = fs::last_write_time(file, error);
+  if (error) return std::nullopt;
+  return std::chrono::file_clock::to_sys(time).time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+void check_clock(const RunSettings& settings, const Known& known, Admission& admission) {
+  ClockEvidence evidence;
+  evidence.now_ns =
+      std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  evidence.newest_record_ns = known.newest_ns;
+  evidence.newest_file_ns = std::max(written_ns(settings.protocol), written_ns("/proc/self/exe"));
+  const std::string doubt = clock_doubt(evidence);
+  if (doubt.empty()) return;
+  say("CLOCK: " + doubt);
+  admission.warnings.push_back("CLOCK: " + doubt);
+  admission.notes.push_back(nlohmann::json{{"clock_warning", doubt}}.dump());
+}
+
+std::string ask_new_code() {
+  const auto code = ask("The new code: ");
+  if (!code || !is_participant_code(*code))
+    throw UsageError("a pseudonym of 1 to 32 letters and digits was expected");
+  return *code;
+}
+
+}  // namespace
+
+Admission admit(const RunSettings& settings) {
+  Admission admission;
+  admission.protocol = parse_protocol(settings.protocol);
+  admission.participant = settings.participant;
+  admission.number = settings.number;
+  Known known = look_into(settings, admission.protocol, admission.participant);
+  check_clock(settings, known, admission);
+  confirm_participant(settings, admission.participant, known);
+  while (known.earlier) {
+    const ChangedProtocol changed{*known.earlier, admission.protocol, settings.protocol,
+                                  admission.participant, settings.changed_protocol};
+    const ProtocolChoice choice = choose_protocol(changed);
+    admission.notes.push_back(to_json_text(changed, choice));
+    if (choice != ProtocolChoice::new_code) {
+      StoredFiles files;
+      for (const ProtocolFile& file : known.earlier->info.files)
+        files.emplace(file.name, file.bytes);
+      Protocol stored = parse_protocol_text(known.earlier->info.text, settings.protocol, files);
+      admission.enrolled = info_of(stored);
+      if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
+      return admission;
+    }
+    admission.participant = ask_new_code();
+    known = look_into(settings, admission.protocol, admission.participant);
+    confirm_participant(settings, admission.participant, known);
+  }
+  if (known.number) admission.number = known.number;
+  admission.enrolled = info_of(admission.protocol);
+  return admission;
+}
+
+}  // namespace palpate

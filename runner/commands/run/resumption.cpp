@@ -1,0 +1,90 @@
+#include "runner/commands/run/resumption.h"
+
+#include <chrono>
+#include <cstdint>
+#include <ctime>
+#include <optional>
+
+#include "runner/commands/shared/command.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+std::int64_t utc_now() {
+  return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+std::tm local(std::int64_t utc_ns) {
+  const std::time_t seconds = utc_ns / kSecond_ns;
+  std::tm out{};
+  localtime_r(&seconds, &out);
+  return out;
+}
+
+std::string in_format(const std::tm& time, const char* format) {
+  char text[40] = "";
+  std::strftime(text, sizeof text, format, &time);
+  return text;
+}
+
+/// The newest that `wanted` is true of.
+template <class Wanted>
+std::optional<StoredRun> newest_run(Store& store, Wanted wanted) {
+  std::optional<StoredRun> newest;
+  for (const StoredRun& run : store.runs()) {
+    if (wanted(run) && (!newest || run.info.clock.utc_ns >= newest->info.clock.utc_ns))
+      newest = run;
+  }
+  return newest;
+}
+
+}  // namespace
+
+std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
+  const std::tm then = local(utc_ns), today = local(now_utc_ns);
+  std::tm before = today;  // the day, whatever the hour and however long a day is
+  before.tm_mday -= 1;
+  before.tm_hour = 12;
+  before.tm_isdst = -1;
+  std::mktime(&before);
+  const std::string day = in_format(then, "%Y-%m-%d"), clock = in_format(then, " %H:%M");
+  if (day == in_format(today, "%Y-%m-%d")) return "today" + clock;
+  if (day == in_format(before, "%Y-%m-%d")) return "yesterday" + clock;
+  return day + clock;
+}
+
+std::string resumption(Store& store, const Participant& participant, int session,
+                       const SessionPlan& plan) {
+  const std::optional<StoredRun> last = newest_run(store, [&](const StoredRun& run) {
+    return run.participant.id == participant.id && run.info.session == session;
+  });
+  if (participant.id == 0 || !last) return "";
+  std::string text = std::to_string(plan.done()) + " of " + std::to_string(plan.size()) +
+                     " trials done, last run " + spoken_time(last->info.clock.utc_ns, utc_now()) +
+                     " (" + to_string(last->end) + ")";
+  if (!plan.finished()) text += ", goes on with trial " + std::to_string(plan.next().trial);
+  return text;
+}
+
+std::string withdrawn_when(Store& store, const std::string& code) {
+  const std::optional<StoredRun> last =
+      newest_run(store, [&code](const StoredRun& run) { return run.participant.code == code; });
+  if (!last || last->end != RunEnd::withdrawn) return "";
+  return spoken_time(last->info.clock.utc_ns, utc_now());
+}
+
+void throw_withdrawn(const std::string& code, const std::string& when) {
+  throw UsageError("participant " + code + " has withdrawn" +
+                   (when.empty() ? "" : " (" + when + ")") +
+                   " and is not begun again: add --after-withdrawal where the participant asks to "
+                   "take part again; 'palpate forget' removes what is on record");
+}
+
+void refuse_withdrawn(Store& store, const std::string& code) {
+  const std::string when = withdrawn_when(store, code);
+  if (!when.empty()) throw_withdrawn(code, when);
+}
+
+}  // namespace palpate

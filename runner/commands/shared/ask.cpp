@@ -1,0 +1,53 @@
+#include "runner/commands/shared/ask.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <iostream>
+
+#include "runner/commands/shared/command.h"
+
+namespace palpate {
+
+bool on_a_terminal() { return isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1; }
+
+std::optional<std::string> read_line() {
+  constexpr std::size_t kLongest = 200;
+  std::string line;
+  while (true) {
+    char c = 0;
+    const ssize_t got = read(STDIN_FILENO, &c, 1);  // byte by byte: the rest is somebody else's
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0 && line.empty()) return std::nullopt;
+    if (got <= 0 || c == '\n') break;
+    if (line.size() == kLongest) throw UsageError("standard input: a short line was expected");
+    line += c;
+  }
+  const std::size_t begin = line.find_first_not_of(" \t\r");
+  if (begin == std::string::npos) return "";
+  return line.substr(begin, line.find_last_not_of(" \t\r") - begin + 1);
+}
+
+std::optional<std::string> ask(const std::string& question) {
+  if (on_a_terminal()) std::cerr << question << std::flush;
+  return read_line();
+}
+
+std::string given_or_asked(const std::string& given, const std::string& what) {
+  if (given != "-") return given;
+  const auto answer = ask(what + ": ");
+  if (!answer) throw UsageError("-: a " + what + " was expected on standard input");
+  return *answer;
+}
+
+std::string in_words(const std::vector<std::string>& names) {
+  std::string words;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i > 0) words += i + 1 == names.size() ? " and " : ", ";
+    words += names[i];
+  }
+  return words;
+}
+
+}  // namespace palpate

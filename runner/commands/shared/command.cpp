@@ -1,0 +1,81 @@
+#include "runner/commands/shared/command.h"
+
+#include <cmath>
+#include <iostream>
+#include <optional>
+#include <typeinfo>
+
+#include "data/files/private_files.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+
+namespace po = boost::program_options;
+
+namespace {
+
+/// What boost lets through: "-1" as a whole number that has no sign (2^64 - 1), "nan" and "inf" as
+/// numbers.
+void check_number(const std::string& option, const std::string& text, const boost::any& value) {
+  const auto refuse = [&](const char* expected) {
+    throw UsageError("--" + option + ": expected " + expected + ", found '" + printable(text, 60) +
+                     "'");
+  };
+  const auto is = [&](const auto& example) { return value.type() == typeid(example); };
+  const bool no_sign = is(0U) || is(0UL) || is(0ULL);
+  if (no_sign && text.find('-') != std::string::npos) refuse("a whole number from 0");
+  if (is(0.0) && !std::isfinite(boost::any_cast<double>(value))) refuse("a finite number");
+}
+
+void check_numbers(const po::parsed_options& parsed, const po::variables_map& values) {
+  for (const auto& option : parsed.options) {
+    if (option.unregistered || option.value.empty()) continue;
+    const auto stored = values.find(option.string_key);
+    if (stored != values.end())
+      check_number(option.string_key, option.value.front(), stored->second.value());
+  }
+}
+
+}  // namespace
+
+std::optional<po::variables_map> CommandLine::parse(const std::vector<std::string>& args) {
+  options.add_options()("help,h", "show this help");
+  po::options_description all;
+  all.add(options);
+  po::options_description hidden;
+  for (const auto& name : positional_names) {
+    hidden.add_options()(name.c_str(), po::value<std::string>());
+    positional.add(name.c_str(), 1);
+  }
+  all.add(hidden);
+  po::variables_map values;
+  try {
+    const po::parsed_options parsed =
+        po::command_line_parser(args).options(all).positional(positional).run();
+    po::store(parsed, values);
+    if (values.count("help")) {
+      std::cout << "Usage: " << usage << "\n\n"
+                << summary << "\n\n"
+                << options << "\nExamples:\n"
+                << example << "\n";
+      return std::nullopt;
+    }
+    check_numbers(parsed, values);
+    po::notify(values);
+  } catch (const po::error& error) {
+    throw UsageError(std::string(error.what()) + "\nUsage: " + usage + "\nMore: add --help");
+  }
+  for (const auto& name : positional_names) {
+    if (!values.count(name)) {
+      throw UsageError("missing " + name + "\nUsage: " + usage + "\nMore: add --help");
+    }
+  }
+  return values;
+}
+
+void warn_of_exposure(const std::string& database) {
+  const std::string exposure = exposure_of(database);
+  if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";
+}
+
+}  // namespace palpate

@@ -1,0 +1,128 @@
+#include "runner/commands/shared/protocol_choice.h"
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "data/files/utc.h"
+#include "runner/commands/shared/ask.h"
+#include "runner/commands/shared/command.h"
+#include "stimuli/printable.h"
+
+namespace palpate {
+namespace {
+
+std::string to_the_minute(std::int64_t utc_ns) {
+  std::string text = format_utc(utc_ns).substr(0, 16);
+  text[10] = ' ';
+  return text + " UTC";
+}
+
+const char* to_string(ProtocolChoice choice) {
+  switch (choice) {
+    case ProtocolChoice::stored:
+      return "stored";
+    case ProtocolChoice::new_texts:
+      return "new texts";
+    case ProtocolChoice::new_code:
+      return "begun anew";
+  }
+  return "";
+}
+
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
+
+std::string what_happened(const ChangedProtocol& changed, const ProtocolDifference& difference) {
+  const EarlierProtocol& earlier = changed.earlier;
+  return changed.code + " began with another text of protocol " + changed.now.name + " (" +
+         std::to_string(earlier.trials) + (earlier.trials == 1 ? " trial" : " trials") +
+         " on record" + (earlier.last_run.empty() ? "" : ", last run on " + earlier.last_run) +
+         "). " + changed.path + " has changed since (" + in_words(difference) + ")";
+}
+
+ProtocolChoice ask_which(const std::string& code, bool only_texts) {
+  std::string question = "  s  go on with the protocol as it is stored (Enter alone)\n";
+  if (only_texts) question += "  t  go on with the new texts\n";
+  question += "  n  begin anew, as a new participant under another code\n  q  do nothing\n" + code +
+              ", which? ";
+  while (true) {
+    const auto answer = ask(question);
+    if (!answer || answer == "q")
+      throw UsageError("nothing was begun; the same command asks again");
+    if (answer == "" || answer == "s") return ProtocolChoice::stored;
+    if (answer == "t" && only_texts) return ProtocolChoice::new_texts;
+    if (answer == "n") return ProtocolChoice::new_code;
+  }
+}
+
+}  // namespace
+
+std::optional<EarlierProtocol> earlier_protocol(Store& store, const Protocol& protocol,
+                                                const std::string& code) {
+  std::optional<EarlierProtocol> found;
+  std::int64_t found_ns = 0;
+  const std::vector<StoredRun> runs = store.runs();
+  for (ProtocolInfo& info : store.protocols()) {
+    if (info.name != protocol.name || info.sha256 == protocol.sha256) continue;
+    for (const Participant& person : store.participants(info.sha256)) {
+      if (person.code != code) continue;
+      EarlierProtocol one{info, "", 0, ""};
+      one.info.files = store.files(info.sha256);
+      std::int64_t latest_ns = 0;
+      std::set<int> sessions;
+      for (const StoredRun& run : runs) {
+        if (run.participant.id != person.id) continue;
+        sessions.insert(run.info.session);
+        if (run.info.clock.utc_ns < latest_ns) continue;
+        latest_ns = run.info.clock.utc_ns;
+        one.shown_sha256 = run.info.protocol_sha256;
+        one.last_run = to_the_minute(latest_ns);
+      }
+      for (const int session : sessions)
+        one.trials += store.progress(person, session).completed.size();
+      if (found && latest_ns < found_ns) continue;
+      found = std::move(one);
+      found_ns = latest_ns;
+    }
+  }
+  return found;
+}
+
+ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
+  const ProtocolDifference differs = difference(changed.earlier.info.text, changed.now.source_text);
+  const std::string happened = what_happened(changed, differs);
+  if (changed.option == "texts" && !differs.only_texts()) {
+    throw UsageError("--changed-protocol texts: " + happened +
+                     ": not only texts. Leave the option out to go on with the protocol as it is "
+                     "stored, or begin anew with another --participant");
+  }
+  if (changed.option == "texts") {
+    say(happened + "; going on with the new texts");
+    return ProtocolChoice::new_texts;
+  }
+  if (changed.option.empty() && changed.earlier.shown_sha256 == changed.now.sha256) {
+    say(happened + "; going on with these texts, as in the last run");
+    return ProtocolChoice::new_texts;
+  }
+  if (changed.option.empty() && !differs.nothing() && on_a_terminal()) {
+    say(happened);
+    return ask_which(changed.code, differs.only_texts());
+  }
+  say(happened + "; going on with the protocol as it is stored" +
+      (!changed.option.empty() || differs.nothing() ? ""
+       : differs.only_texts() ? ". --changed-protocol texts shows the new texts"
+                              : ". To begin anew, give another --participant"));
+  return ProtocolChoice::stored;
+}
+
+std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) {
+  const ProtocolDifference differs = difference(changed.earlier.info.text, changed.now.source_text);
+  nlohmann::ordered_json what = {
+      {"shown", to_string(choice)},          {"stored_sha256", changed.earlier.info.sha256},
+      {"file_sha256", changed.now.sha256},   {"texts", differs.texts},
+      {"stimuli_and_order", differs.design}, {"other_settings", differs.settings}};
+  if (choice == ProtocolChoice::new_code) what["earlier_code"] = changed.code;
+  return nlohmann::ordered_json{{"protocol_change", what}}.dump();
+}
+
+}  // namespace palpate

@@ -1,0 +1,272 @@
+#include "runner/commands/stability/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "analysis/text.h"
+#include "runner/commands/accuracy/report.h"
+#include "runner/commands/shared/page.h"
+
+namespace palpate {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string times(double factor) { return significant(factor) + " times"; }
+
+Table theory_table(const StabilityReport& report) {
+  Table table;
+  table.caption = "The theory's own case: a plain wall, ends too heavy for their mass to matter";
+  table.header = {"curve", "stiffness N/m", "damping N s/m: theory", "measured", "ratio"};
+  for (const BoundaryCurve& curve : report.theory) {
+    for (const BoundaryPoint& p : curve.points) {
+      table.rows.push_back({curve.name, significant(p.stiffness), significant(p.theory),
+                            significant(p.measured), significant(p.measured / p.theory)});
+    }
+  }
+  return table;
+}
+
+Table curve_table(const StabilityReport& report, const std::string& panel) {
+  Table table;
+  table.caption = "Damping that a loop needs, N s/m at each end: " + panel;
+  table.header = {"curve", "stiffness N/m", "theory", "measured"};
+  for (const BoundaryCurve& curve : report.curves) {
+    if (curve.panel != panel) continue;
+    for (const BoundaryPoint& p : curve.points) {
+      table.rows.push_back({curve.name, significant(p.stiffness),
+                            p.promised ? significant(p.theory) : "no promise",
+                            p.measured == 0 ? "none" : significant(p.measured)});
+    }
+  }
+  return table;
+}
+
+std::vector<std::string> panels_of(const StabilityReport& report) {
+  std::vector<std::string> panels;
+  for (const BoundaryCurve& curve : report.curves) {
+    if (std::find(panels.begin(), panels.end(), curve.panel) == panels.end()) {
+      panels.push_back(curve.panel);
+    }
+  }
+  return panels;
+}
+
+Table gain_table(const StabilityReport& report) {
+  Table table;
+  table.caption = "The stiffest that is stable, N/m, without the passivity controller and with it";
+  table.header = {"scene", "probe",  "Hz",      "damping N s/m", "resolution um",
+                  "delay", "theory", "without", "with",          "factor"};
+  table.n_names = 2;
+  for (const ControllerGain& g : report.gains) {
+    const LoopSettings& s = g.loop.settings;
+    table.rows.push_back({to_string(g.loop.situation), to_string(g.loop.renderer),
+                          significant(s.rate), significant(g.damping),
+                          significant(1e6 * s.resolution), std::to_string(s.delay),
+                          significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
+                          significant(g.with), significant(g.with / g.without)});
+  }
+  return table;
+}
+
+Table integrator_table(const StabilityReport& report) {
+  Table table;
+  table.caption = "Integrators for what moves, 1 kHz: error after 500 ticks over run time";
+  table.header = {"case", "method", "steps a tick", "ns a tick", "worst error, m"};
+  table.n_names = 2;
+  for (const IntegratorRow& row : report.integrators) {
+    table.rows.push_back({row.oscillator, row.method, std::to_string(row.steps),
+                          significant(row.ns_per_tick),
+                          std::isfinite(row.error) ? significant(row.error) : "blows up"});
+  }
+  return table;
+}
+
+/// The cheapest of the others that comes within a micrometre, against the exact one, worst case.
+double integrator_gain(const StabilityReport& report) {
+  double worst = HUGE_VAL;
+  for (const IntegratorRow& exact : report.integrators) {
+    if (exact.method != "exact") continue;
+    double cheapest = HUGE_VAL;
+    for (const IntegratorRow& row : report.integrators) {
+      if (row.oscillator == exact.oscillator && row.method != "exact" && row.error <= 1e-6) {
+        cheapest = std::min(cheapest, row.ns_per_tick);
+      }
+    }
+    worst = std::min(worst, cheapest / exact.ns_per_tick);
+  }
+  return worst;
+}
+
+void put_wrapped(std::ostream& out, const std::string& text) {
+  constexpr std::size_t kColumns = 98;
+  for (const std::string& line :
+       wrapped(text, [](std::string_view part) { return width(part) <= kColumns; })) {
+    out << "  " << line << "\n";
+  }
+}
+
+std::vector<std::string> how_to_read() {
+  std::vector<std::string> notes;
+  notes.emplace_back(
+      "Each end of the stylus is a mass that moves along the direction of pressing, with the "
+      "device's damping and friction and the hand's impedance; exactly (matrix exponential) under "
+      "a force that is held over the tick. The renderers are the program's own. It is let go 0.1 "
+      "mm off its rest, 1 mm deep; it is unstable when what the springs feel swings wider in the "
+      "last quarter of 40 periods than in the second (and wider than three counts of the "
+      "resolution).");
+  notes.emplace_back(
+      "Theory: b > K (T/2 + t_d) + |B| (Colgate & Schenkel 1997; t_d: delay), as long as friction "
+      "holds each count of the resolution, K <= 2 f_c / Delta (Abbott & Okamura 2005). It bounds "
+      "passivity: below it no hand, however it holds on, can make the loop buzz. A given loop may "
+      "be stable far beyond.");
+  notes.emplace_back(
+      "Where two objects are touched, or the side of the stylus, the theory is that of one contact "
+      "at one end: the ends share the load.");
+  return notes;
+}
+
+Json loop_json(const LoopCase& loop) {
+  const LoopSettings& s = loop.settings;
+  return {{"scene", to_string(loop.situation)},
+          {"renderer", to_string(loop.renderer)},
+          {"rate_hz", s.rate},
+          {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
+          {"virtual_damping_ns_per_m", loop.virtual_damping},
+          {"friction_n", s.friction},
+          {"resolution_m", s.resolution},
+          {"delay_ticks", s.delay},
+          {"hand_stiffness_n_per_m", s.hand.stiffness},
+          {"hand_damping_ns_per_m", s.hand.damping},
+          {"hand_mass_kg", s.hand.mass}};
+}
+
+Json curve_json(const BoundaryCurve& curve) {
+  Json json = {{"panel", curve.panel}, {"name", curve.name}, {"loop", loop_json(curve.loop)}};
+  json["points"] = Json::array();
+  for (const BoundaryPoint& p : curve.points) {
+    json["points"].push_back({{"stiffness_n_per_m", p.stiffness},
+                              {"measured_ns_per_m", p.measured},
+                              {"theory_ns_per_m", p.theory},
+                              {"promised", p.promised}});
+  }
+  return json;
+}
+
+}  // namespace
+
+double StabilityReport::worst_disagreement() const {
+  double worst = 0;
+  for (const BoundaryCurve& curve : theory) {
+    for (const BoundaryPoint& p : curve.points) {
+      worst = std::max(worst, std::abs(p.measured / p.theory - 1));
+    }
+  }
+  return worst;
+}
+
+int StabilityReport::unsafe() const {
+  int count = 0;
+  for (const BoundaryCurve& curve : curves) {
+    for (const BoundaryPoint& p : curve.points) count += p.unsafe();
+  }
+  return count;
+}
+
+int StabilityReport::points() const {
+  std::size_t count = 0;
+  for (const BoundaryCurve& curve : curves) count += curve.points.size();
+  return static_cast<int>(count);
+}
+
+std::vector<std::string> stability_sentences(const StabilityReport& report) {
+  std::vector<std::string> out;
+  out.push_back(
+      "The measured boundary of a plain wall is the theory's, b = K (T/2 + t_d), within " +
+      significant(100 * report.worst_disagreement()) + " % at all rates, with and without delay.");
+  const int unsafe = report.unsafe();
+  out.push_back((unsafe == 0
+                     ? "Everywhere else the loop is stable where the theory promises it: at all "
+                     : "At " + std::to_string(unsafe) +
+                           " points the loop buzzes where the theory promises rest; of all ") +
+                std::to_string(report.points()) + " points of the map.");
+  double ideal = HUGE_VAL, coarse = HUGE_VAL, late = HUGE_VAL;
+  for (const ControllerGain& g : report.gains) {
+    const LoopSettings& settings = g.loop.settings;
+    double& least = settings.delay > 0 ? late : settings.resolution > 0 ? coarse : ideal;
+    least = std::min(least, g.with / g.without);
+  }
+  if (!report.gains.empty()) {
+    out.push_back(
+        "The passivity controller (\"servo\": {\"passivity_controller\": true}) makes at least " +
+        times(ideal) + " the stiffness stable in every scene, " + times(coarse) +
+        " with a resolution of 30 um and friction, but only " + times(late) +
+        " where forces come a tick late.");
+  }
+  if (!report.integrators.empty()) {
+    out.push_back(
+        "What moves is integrated exactly: within a micrometre, every other method takes at "
+        "least " +
+        times(integrator_gain(report)) +
+        " the run time on the stiff cases, or blows up; none of them is kept.");
+  }
+  return out;
+}
+
+std::vector<Table> stability_tables(const StabilityReport& report) {
+  std::vector<Table> tables;
+  if (!report.gains.empty()) tables.push_back(gain_table(report));
+  tables.push_back(theory_table(report));
+  for (const std::string& panel : panels_of(report)) tables.push_back(curve_table(report, panel));
+  if (!report.integrators.empty()) tables.push_back(integrator_table(report));
+  return tables;
+}
+
+std::string stability_text(const StabilityReport& report) {
+  std::ostringstream out;
+  for (const std::string& sentence : stability_sentences(report)) put_wrapped(out, sentence);
+  for (const Table& table : stability_tables(report)) put_table(out, table);
+  out << "\nHow to read it\n";
+  for (const std::string& note : how_to_read()) put_wrapped(out, note);
+  return out.str();
+}
+
+Json stability_json(const StabilityReport& report) {
+  Json json = {{"version", 1},
+               {"program_version", PALPATE_VERSION},
+               {"worst_disagreement", report.worst_disagreement()},
+               {"unsafe_points", report.unsafe()},
+               {"points", report.points()}};
+  for (const BoundaryCurve& curve : report.theory) json["theory"].push_back(curve_json(curve));
+  for (const BoundaryCurve& curve : report.curves) json["curves"].push_back(curve_json(curve));
+  for (const ControllerGain& g : report.gains) {
+    Json gain = {{"loop", loop_json(g.loop)},
+                 {"damping_ns_per_m", g.damping},
+                 {"stiffest_without_n_per_m", g.without},
+                 {"stiffest_with_n_per_m", g.with}};
+    json["passivity_controller"].push_back(std::move(gain));
+  }
+  for (const IntegratorRow& row : report.integrators) {
+    json["integrators"].push_back(
+        {{"case", row.oscillator},
+         {"method", row.method},
+         {"steps_per_tick", row.steps},
+         {"ns_per_tick", row.ns_per_tick},
+         {"worst_error_m", std::isfinite(row.error) ? Json(row.error) : Json()}});
+  }
+  return json;
+}
+
+std::string stability_page(const StabilityReport& report) {
+  ReportPage page;
+  page.title = "At what stiffness does it buzz?";
+  page.sentences = stability_sentences(report);
+  page.figures.push_back({stability_figure(report), ""});
+  if (!report.integrators.empty()) page.figures.push_back({integrator_figure(report), ""});
+  page.tables = stability_tables(report);
+  page.notes = how_to_read();
+  return page_html(page);
+}
+
+}  // namespace palpate

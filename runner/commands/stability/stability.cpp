@@ -1,0 +1,215 @@
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "runner/commands/accuracy/report.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/stability/report.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kRates[] = {500, 1000, 2000, 5000, 10000};  // Hz
+constexpr double kEndDamping = 0.25,
+                 kEndFriction = 0.025;  // N s/m, N: half of the simulated device
+constexpr double kResolution = 3e-5;    // m
+
+std::string in_khz(double rate) { return significant(rate / 1000) + " kHz"; }
+
+BoundaryCurve curve(const char* panel, std::string name, const LoopCase& loop) {
+  return {panel, std::move(name), loop, {}};
+}
+
+std::vector<BoundaryCurve> theory_curves() {
+  std::vector<BoundaryCurve> out;
+  for (const int delay : {0, 1}) {
+    for (const double rate : kRates) {
+      LoopCase loop;
+      loop.heavy = true;
+      loop.settings.rate = rate;
+      loop.settings.delay = delay;
+      out.push_back(curve("theory", in_khz(rate) + (delay ? ", one tick late" : ""), loop));
+    }
+  }
+  return out;
+}
+
+std::vector<BoundaryCurve> map_curves() {
+  std::vector<BoundaryCurve> out;
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const Situation situation : kSituations) {
+      LoopCase loop;
+      loop.situation = situation;
+      loop.renderer = renderer;
+      out.push_back(curve(renderer == RendererKind::point ? "scenes, point" : "scenes, ray",
+                          to_string(situation), loop));
+    }
+  }
+  for (const double rate : kRates) {
+    LoopCase loop;
+    loop.settings.rate = rate;
+    out.push_back(curve("rates, wall", in_khz(rate), loop));
+  }
+  for (const double damping : {0.0, 0.1, 1.0, 10.0}) {
+    LoopCase loop;
+    loop.virtual_damping = damping;
+    out.push_back(curve("damping of the wall", "B " + significant(damping) + " N s/m", loop));
+  }
+  struct Hand {
+    const char* name;
+    EndImpedance impedance;
+  };
+  const Hand hands[] = {{"none", {}},
+                        {"limp: 50 N/m", {50, 1, 0.02}},
+                        {"at ease: 200 N/m", {200, 5, 0.05}},
+                        {"stiff: 1000 N/m", {1000, 10, 0.05}}};
+  for (const Hand& hand : hands) {
+    LoopCase loop;
+    loop.settings.hand = hand.impedance;
+    out.push_back(curve("hand, wall", hand.name, loop));
+  }
+  struct Device {
+    const char* name;
+    double friction, resolution;
+    int delay;
+  };
+  const Device devices[] = {{"friction 0.025 N", kEndFriction, 0, 0},
+                            {"and resolution 30 um", kEndFriction, kResolution, 0},
+                            {"friction 0.5 N, 30 um", 0.5, kResolution, 0},
+                            {"one tick late", 0, 0, 1}};
+  for (const Device& device : devices) {
+    LoopCase loop;
+    loop.settings.friction = device.friction;
+    loop.settings.resolution = device.resolution;
+    loop.settings.delay = device.delay;
+    out.push_back(curve("device, wall", device.name, loop));
+  }
+  return out;
+}
+
+std::vector<ControllerGain> gain_cases() {
+  std::vector<ControllerGain> out;
+  const auto add = [&](const LoopCase& loop) { out.push_back({loop, kEndDamping, 0, 0}); };
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const Situation situation : kSituations) {
+      LoopCase loop;
+      loop.situation = situation;
+      loop.renderer = renderer;
+      add(loop);
+    }
+  }
+  for (const double rate : kRates) {
+    LoopCase loop;
+    loop.settings.rate = rate;
+    if (rate != 1000) add(loop);
+  }
+  LoopCase coarse;
+  coarse.settings.friction = kEndFriction;
+  coarse.settings.resolution = kResolution;
+  add(coarse);
+  LoopCase late;
+  late.settings.delay = 1;
+  add(late);
+  return out;
+}
+
+/// Stiffnesses from 10 N/m to 100 kN/m.
+std::vector<double> grid(bool fine) {
+  std::vector<double> out;
+  const int parts = fine ? 4 : 1;
+  for (int i = 0; i <= 4 * parts; ++i)
+    out.push_back(std::pow(10.0, 1 + static_cast<double>(i) / parts));
+  return out;
+}
+
+/// Does all tasks, shared out among threads.
+void do_all(const std::vector<std::function<void()>>& tasks, int jobs) {
+  ProgressLine progress("loops");
+  std::atomic<std::size_t> next{0};
+  std::vector<std::thread> threads;
+  const auto work = [&](bool shows) {
+    for (std::size_t i = next++; i < tasks.size(); i = next++) {
+      tasks[i]();
+      if (shows) progress.show(static_cast<double>(i + 1) / static_cast<double>(tasks.size()));
+    }
+  };
+  for (int j = 1; j < jobs; ++j) threads.emplace_back(work, false);
+  work(true);
+  for (std::thread& thread : threads) thread.join();
+}
+
+StabilityReport study(bool full, int jobs) {
+  StabilityReport report;
+  report.theory = theory_curves();
+  report.curves = map_curves();
+  report.gains = gain_cases();
+  const std::vector<double> stiffnesses = grid(full);
+  std::vector<std::function<void()>> tasks;
+  for (auto* curves : {&report.theory, &report.curves}) {
+    for (BoundaryCurve& one : *curves) {
+      one.points.resize(stiffnesses.size());
+      for (std::size_t i = 0; i < stiffnesses.size(); ++i) {
+        tasks.emplace_back(
+            [&one, i, k = stiffnesses[i]] { one.points[i] = boundary_at(one.loop, k); });
+      }
+    }
+  }
+  for (ControllerGain& gain : report.gains) {
+    tasks.emplace_back([&gain] { gain.without = stiffest_stable(gain.loop, gain.damping); });
+    tasks.emplace_back([&gain] {
+      LoopCase with = gain.loop;
+      with.settings.passivity_controller = true;
+      gain.with = stiffest_stable(with, gain.damping);
+    });
+  }
+  do_all(tasks, jobs);
+  report.integrators = compare_integrators(now_ns);
+  return report;
+}
+
+}  // namespace
+
+int stability_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate stability [--full] [--report FILE.html] [--json FILE]";
+  line.summary =
+      "At what stiffness does it buzz? A hand, two devices and the renderers in a closed loop,\n"
+      "against a wall, an edge, a sphere and two objects; where the loop stops being stable, and\n"
+      "what the theory of passivity says. Status 1 when the theory promises more than holds.";
+  line.example =
+      "  palpate stability\n"
+      "  palpate stability --full --report stability.html --json stability.json";
+  std::string json, page, figure;
+  int jobs = 0;
+  auto add = line.options.add_options();
+  namespace po = boost::program_options;
+  add("full", "four stiffnesses a decade instead of one");
+  add("report", po::value(&page)->value_name("FILE"),
+      "write all of it, with figures, as one HTML page");
+  add("figure", po::value(&figure)->value_name("FILE"), "write the map as SVG");
+  add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
+  add("jobs", po::value(&jobs)->value_name("J"), "threads; default: one a core");
+  add("force", "replace files that are there");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
+    throw UsageError("--jobs: expected 1 to 256, not " + std::to_string(jobs));
+  }
+  Outputs outputs(*values, {"json", "report", "figure"}, {});
+  if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const StabilityReport report = study(values->count("full") > 0, jobs);
+  if (outputs.wanted("json")) outputs.put("json", stability_json(report).dump(1) + "\n");
+  if (outputs.wanted("figure")) outputs.put("figure", stability_figure(report));
+  if (outputs.wanted("report")) outputs.put("report", stability_page(report));
+  outputs.write();
+  std::cout << stability_text(report);
+  return report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
+}
+
+}  // namespace palpate

@@ -1,0 +1,183 @@
+#include "runner/devices/falcon/boot.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "runner/devices/falcon/packets.h"
+
+namespace palpate::falcon {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::array<std::uint8_t, 3> kMonitorProbe = {0x0A, 0x43, 0x0D};
+constexpr std::array<std::uint8_t, 4> kMonitorReply = {0x0A, 0x44, 0x2C, 0x0D};
+constexpr std::array<std::uint8_t, 1> kLock = {0x41};  // the boot ROM finds its speed by it
+// A full IN packet for each echo, so that the chip's 16 ms timer does not hold it back.
+constexpr std::size_t kChunk = 62;
+
+/// One upload has failed; the next may not.
+class AttemptFailed : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+void purge(Transport& transport) {
+  transport.control(request::kPurge, 1);
+  transport.control(request::kPurge, 2);
+  std::array<std::uint8_t, 256> stale{};
+  while (transport.receive(stale, 0) > 0) {
+  }
+}
+
+void send(Transport& transport, Bytes bytes) {
+  if (transport.send(bytes)) return;
+  if (transport.gone()) {
+    throw TransportError("the Falcon " + transport.serial() + " was unplugged while starting");
+  }
+  throw AttemptFailed("bytes could not be sent");
+}
+
+/// Up to `count` bytes, fewer when the time is over.
+std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::int64_t wait_ns) {
+  std::vector<std::uint8_t> bytes(count);
+  std::size_t have = 0;
+  const std::int64_t end = transport.now_ns() + wait_ns;
+  while (have < count) {
+    const std::int64_t left = end - transport.now_ns();
+    if (left <= 0 || transport.gone()) break;
+    have += transport.receive(std::span(bytes).subspan(have), left);
+  }
+  bytes.resize(have);
+  return bytes;
+}
+
+/// The monitor's answer may follow litter: it is looked for in all that comes.
+void wake_monitor(Transport& transport, const BootSettings& settings) {
+  for (int probe = 0; probe < settings.monitor_probes; ++probe) {
+    send(transport, kMonitorProbe);
+    std::vector<std::uint8_t> heard;
+    const std::int64_t end = transport.now_ns() + settings.monitor_wait_ns;
+    for (std::int64_t left = settings.monitor_wait_ns; left > 0; left = end - transport.now_ns()) {
+      const auto more = receive(transport, 1, left);
+      heard.insert(heard.end(), more.begin(), more.end());
+      if (std::search(heard.begin(), heard.end(), kMonitorReply.begin(), kMonitorReply.end()) !=
+          heard.end()) {
+        return;
+      }
+      if (transport.gone()) break;
+    }
+  }
+  throw AttemptFailed("the monitor did not answer (is the device's power supply on?)");
+}
+
+void expect_echo(Transport& transport, Bytes sent, std::size_t at, std::int64_t wait_ns) {
+  const auto echo = receive(transport, sent.size(), wait_ns);
+  if (echo.size() < sent.size()) {
+    throw AttemptFailed("the echo was lost at byte " + std::to_string(at + echo.size()));
+  }
+  const auto wrong = std::mismatch(sent.begin(), sent.end(), echo.begin()).first;
+  if (wrong != sent.end()) {
+    throw AttemptFailed("a wrong echo at byte " +
+                        std::to_string(at + static_cast<std::size_t>(wrong - sent.begin())));
+  }
+}
+
+void upload(Transport& transport, const FirmwareImage& image, const BootSettings& settings,
+            BootProgress progress, const BootReport& report) {
+  const auto tell = [&progress, &report] {
+    if (report) report(progress);
+  };
+  progress.stage = BootProgress::Stage::monitor;
+  tell();
+  purge(transport);
+  transport.control(request::kEvent, kEventNone);
+  transport.control(request::kLatency, 16);
+  transport.control(request::kBaud, kBaudMonitor);
+  transport.control(request::kFormat, 8);
+  transport.control(request::kFlow, 0);
+  transport.control(request::kModem, kRtsLow);
+  transport.control(request::kModem, kDtrLow);
+  transport.control(request::kModem, kDtrHigh);
+  wake_monitor(transport, settings);
+
+  transport.control(request::kModem, kDtrLow);
+  transport.control(request::kBaud, kBaudBoot);
+  purge(transport);  // answers to probes that were sent once too often
+  send(transport, kLock);
+  expect_echo(transport, kLock, 0, settings.echo_wait_ns);
+
+  progress.stage = BootProgress::Stage::uploading;
+  progress.size = image.bytes.size();
+  for (std::size_t at = 0; at < image.bytes.size(); at += kChunk) {
+    const Bytes chunk = Bytes(image.bytes).subspan(at, std::min(kChunk, image.bytes.size() - at));
+    send(transport, chunk);
+    // The echo is the only check there is: the stream carries no sum.
+    expect_echo(transport, chunk, at, settings.echo_wait_ns);
+    progress.sent = at + chunk.size();
+    tell();
+  }
+}
+
+}  // namespace
+
+bool firmware_runs(Transport& transport, const BootSettings& settings) {
+  transport.control(request::kLatency, 1);
+  transport.control(request::kEvent, kEventReplyEnd);
+  transport.control(request::kBaud, kBaudNormal);
+  purge(transport);
+  const Packet zero = encode(Command{});
+  for (int probe = 0; probe < settings.packet_probes && !transport.gone(); ++probe) {
+    if (!transport.send(zero)) continue;
+    PacketStream stream;
+    const std::int64_t end = transport.now_ns() + settings.packet_wait_ns;
+    for (std::int64_t left = settings.packet_wait_ns; left > 0; left = end - transport.now_ns()) {
+      for (const std::uint8_t byte : receive(transport, 1, left)) {
+        const auto packet = stream.take(byte);
+        if (packet && decode_reply(*packet)) return true;
+      }
+      if (transport.gone()) break;
+    }
+  }
+  if (transport.gone()) {
+    throw TransportError("the Falcon " + transport.serial() + " was unplugged while starting");
+  }
+  return false;
+}
+
+void boot(Transport& transport, const FirmwareImage* image, const BootSettings& settings,
+          const BootReport& report) {
+  BootProgress progress;
+  if (report) report(progress);
+  if (!firmware_runs(transport, settings)) {
+    if (image == nullptr) {
+      throw TransportError("the Falcon " + transport.serial() +
+                           " has no firmware (it forgets it when its power goes): name a file with "
+                           "--firmware, from its own driver or a libnifalcon checkout");
+    }
+    std::string troubles;
+    bool runs = false;
+    for (; progress.attempt <= settings.uploads; ++progress.attempt) {
+      try {
+        upload(transport, *image, settings, progress, report);
+        runs = firmware_runs(transport, settings);
+        if (runs) break;
+        throw AttemptFailed("the firmware did not answer after its upload");
+      } catch (const AttemptFailed& failed) {
+        progress.trouble = failed.what();
+        troubles += "\n  attempt " + std::to_string(progress.attempt) + ": " + failed.what();
+        transport.reopen();
+      }
+    }
+    if (!runs) {
+      throw TransportError("the Falcon " + transport.serial() + " took no firmware in " +
+                           std::to_string(settings.uploads) + " attempts:" + troubles);
+    }
+  }
+  progress.stage = BootProgress::Stage::running;
+  if (report) report(progress);
+}
+
+}  // namespace palpate::falcon

@@ -1,0 +1,150 @@
+#include "runner/devices/falcon/open.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "protocols/parse.h"
+#include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/falcon2.h"
+#include "runner/devices/falcon/image.h"
+#include "runner/devices/falcon/usb.h"
+#include "stimuli/printable.h"
+
+namespace palpate::falcon {
+namespace {
+
+std::int64_t unix_ns() {
+  return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+Calibration calibration_in(const std::string& path) {
+  return path.empty() ? Calibration{} : read_calibration(path);
+}
+
+std::optional<FirmwareImage> image_in(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  return read_image(path);
+}
+
+/// \throws InputError: the calibration has none of these two.
+const PairRegistration& registration_in(const Calibration& calibration, const DeviceOrder& order) {
+  const std::string &tip = order.serials[0], &tail = order.serials[1];
+  if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
+  throw InputError(
+      {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
+        "expected a registration of the Falcons " + tip + " (tip) and " + tail +
+            " (tail), without which nobody knows how they stand to each other: run "
+            "palpate devices --calibrate --device falcon2"}});
+}
+
+CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::string>& serials) {
+  CalibrationVerdict verdict = judge_forces(calibration, serials, unix_ns());
+  if (serials.size() == 2) {
+    verdict = both(verdict, judge_pair(calibration, serials[0], serials[1], unix_ns()));
+  }
+  return verdict;
+}
+
+/// As DeviceCapabilities tells it: nothing when it is missing.
+std::string in_short(const CalibrationVerdict& verdict) {
+  switch (verdict.state) {
+    case CalibrationState::good:
+      return verdict.text;
+    case CalibrationState::stale:
+      return "stale: " + verdict.text;
+    case CalibrationState::implausible:
+      return "implausible: " + verdict.text;
+    case CalibrationState::missing:
+      return "";
+  }
+  return "";
+}
+
+void tell(const std::string& serial, const BootProgress& progress) {
+  if (isatty(STDERR_FILENO) == 0) return;
+  using Stage = BootProgress::Stage;
+  if (progress.stage == Stage::monitor && progress.attempt > 1) {
+    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
+  }
+  if (progress.stage != Stage::uploading) return;
+  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
+            << 100 * progress.sent / progress.size << " %"
+            << (progress.sent == progress.size ? "\n" : "") << std::flush;
+}
+
+}  // namespace
+
+std::vector<ConnectedDevice> connected_falcons() {
+  std::vector<ConnectedDevice> connected;
+  for (UsbListing& listing : list_usb()) {
+    connected.push_back({std::move(listing.serial), std::move(listing.trouble)});
+  }
+  return connected;
+}
+
+CalibrationVerdict judge_calibration(const std::string& path,
+                                     const std::vector<std::string>& serials) {
+  return judge(calibration_in(path), serials);
+}
+
+std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
+                                    const Calibration& calibration) {
+  const auto image = image_in(firmware);  // a bad file is found before the device is touched
+  auto line = open_usb(serial);
+  const std::string name = line->serial();
+  ArmSettings settings;
+  settings.boot = [image, name](Transport& transport) {
+    boot(transport, image ? &*image : nullptr, {},
+         [&name](const BootProgress& progress) { tell(name, progress); });
+  };
+  settings.boot(*line);
+  const ForceCalibration* force = calibration.force_of(name);
+  if (force != nullptr && believable(*force)) {
+    settings.counts_per_torque = force->counts_per_torque;
+  }
+  return std::make_unique<FalconArm>(std::move(line), settings);
+}
+
+void check_falcon(const DeviceOrder& order) {
+  if (order.serials.size() > 1) {
+    throw std::invalid_argument("falcon is one device; " + std::to_string(order.serials.size()) +
+                                " serial numbers are given");
+  }
+  calibration_in(order.calibration);
+  image_in(order.firmware);
+}
+
+void check_falcon2(const DeviceOrder& order) {
+  if (order.serials.size() != 2 || order.serials[0] == order.serials[1]) {
+    throw std::invalid_argument(
+        "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
+        "the one at its tail (palpate devices lists them)");
+  }
+  registration_in(calibration_in(order.calibration), order);
+  image_in(order.firmware);
+}
+
+std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
+  const Calibration calibration = calibration_in(order.calibration);
+  auto arm = open_arm(order.serials.empty() ? "" : order.serials[0], order.firmware, calibration);
+  const std::string known = in_short(judge(calibration, {arm->serial()}));
+  return std::make_unique<FalconDevice>(std::move(arm), known);
+}
+
+std::unique_ptr<Device> open_falcon2(const DeviceOrder& order) {
+  const Calibration calibration = calibration_in(order.calibration);
+  const PairRegistration& pair = registration_in(calibration, order);
+  auto tip = open_arm(order.serials[0], order.firmware, calibration);
+  auto tail = open_arm(order.serials[1], order.firmware, calibration);
+  const std::string known = in_short(judge(calibration, order.serials));
+  return std::make_unique<Falcon2Device>(
+      std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
+}
+
+}  // namespace palpate::falcon

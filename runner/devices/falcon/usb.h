@@ -1,0 +1,48 @@
+#pragma once
+// The real line to a Falcon: libusb-1.0, asynchronous transfers with two reads always queued, all
+// in the calling thread. Where the program is built without libusb, these throw and say so.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "runner/devices/falcon/transport.h"
+
+namespace palpate::falcon {
+
+/// A Falcon that is plugged in.
+struct UsbListing {
+  std::string serial;  ///< its serial number, else "port-BUS-PATH"
+  int bus = 0, address = 0;
+  std::string trouble;  ///< why it cannot be opened; empty: it can
+};
+
+/// Is USB compiled in?
+bool usb_available() noexcept;
+
+/// \throws TransportError where USB cannot be used at all.
+std::vector<UsbListing> list_usb();
+
+/// Opens and claims a Falcon. \param serial empty: the only one. \throws TransportError.
+std::unique_ptr<Transport> open_usb(const std::string& serial);
+
+/// Falcons that come and go.
+class HotplugWatch {
+ public:
+  virtual ~HotplugWatch() = default;
+  /// Looks what has happened since, for at most so long.
+  virtual void poll(std::int64_t wait_ns) = 0;
+  int arrived() const { return arrived_; }  ///< in all, with those plugged in at first
+  int left() const { return left_; }
+
+ protected:
+  int arrived_ = 0, left_ = 0;
+};
+/// \throws TransportError.
+std::unique_ptr<HotplugWatch> watch_usb();
+
+/// A libusb error code in words, with what would help. \param what e.g. "cannot open the Falcon"
+std::string usb_error(const std::string& what, int code);
+
+}  // namespace palpate::falcon

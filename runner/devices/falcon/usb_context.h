@@ -1,0 +1,23 @@
+#pragma once
+// Owners of what libusb hands out, for falcon_usb*.cpp.
+
+#include <libusb-1.0/libusb.h>
+
+#include <memory>
+
+#include "runner/devices/falcon/usb.h"
+
+namespace palpate::falcon {
+
+using UsbContext = std::unique_ptr<libusb_context, decltype(&libusb_exit)>;
+using UsbHandle = std::unique_ptr<libusb_device_handle, decltype(&libusb_close)>;
+using UsbDevice = std::unique_ptr<libusb_device, decltype(&libusb_unref_device)>;
+
+/// \throws TransportError.
+UsbContext make_usb_context();
+/// Every Falcon on the bus.
+std::vector<UsbDevice> falcons_on(libusb_context* context);
+/// Opens one; nullptr and the reason in `listing.trouble` where it cannot be.
+UsbHandle open_listed(libusb_device* device, UsbListing& listing);
+
+}  // namespace palpate::falcon

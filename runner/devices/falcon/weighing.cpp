@@ -1,0 +1,238 @@
+#include "runner/devices/falcon/weighing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <optional>
+#include <sstream>
+
+#include "runner/devices/falcon/parameters.h"
+
+namespace palpate::falcon {
+namespace {
+
+constexpr double kTick = 1e-3;  // s
+constexpr std::int64_t kTickNs = 1'000'000;
+constexpr double kNearCentre = 0.01;  // m, to begin with
+constexpr int kLastTicks = 20;
+constexpr int kMaxAttempts = 5;
+constexpr long kMaxInterrupted = 20;  // ticks of a measurement
+constexpr double kMaxDrift = 0.035;   // m; beyond, the weight has won
+constexpr double kRamp = 0.5;         // s, from nothing to full force
+// By the nominal scale; the true one may be 4 times stronger, and the loop must bear that.
+constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
+constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
+constexpr double kMostResidual = 0.1;                              // of the heaviest weight
+
+/// Holds the grip at a target.
+class Holder {
+ public:
+  Holder(const Vec3& position, double max_force) : last_(position), max_force_(max_force) {}
+
+  Vec3 force(const Vec3& position, const Vec3& target) {
+    const double blend = kTick / (kVelocityTime + kTick);
+    velocity_ += blend * ((position - last_) / kTick - velocity_);
+    last_ = position;
+    const Vec3 error = target - position;
+    sum_ += kTick * error;
+    const double strength = kIntegral * glm::length(sum_);
+    if (strength > max_force_) sum_ *= max_force_ / strength;
+    ramp_ = std::min(1.0, ramp_ + kTick / kRamp);
+    const Vec3 wanted = kStiffness * error + kIntegral * sum_ - kDamping * velocity_;
+    const double size = glm::length(wanted);
+    if (ramp_ == 1 && size > max_force_) ++saturated_;
+    return ramp_ * std::min(1.0, max_force_ / std::max(size, max_force_)) * wanted;
+  }
+  long saturated() const { return saturated_; }  ///< ticks
+
+ private:
+  Vec3 last_, velocity_, sum_;
+  double max_force_;  // N, nominal
+  double ramp_ = 0;
+  long saturated_ = 0;
+};
+
+class Procedure {
+ public:
+  Procedure(Device& device, Clock& clock, Guide& guide)
+      : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
+  ~Procedure() {
+    for (int i = 0; i < kLastTicks; ++i) {  // one may come while a reply is still awaited
+      next_reading();
+      device_.write(Vec3(0), Vec3(0));
+    }
+  }
+  Procedure(const Procedure&) = delete;
+  Procedure& operator=(const Procedure&) = delete;
+
+  void find_centre() {
+    guide_.ask("Take the grip to the middle of its space, hold it there, and press ENTER.");
+    for (;;) {
+      const Vec3 position = tick_free();
+      if (!answered()) continue;
+      if (glm::length(position) <= kNearCentre) break;
+      std::ostringstream where;
+      where << "That is not the middle yet: move it " << centimetres(-position.x) << " cm right, "
+            << centimetres(-position.y) << " cm away from you, " << centimetres(-position.z)
+            << " cm up (less than 1 cm off is enough), and press ENTER.";
+      guide_.ask(where.str());
+    }
+    holder_.emplace(device_.read().stylus.tip, device_.capabilities().max_force);
+  }
+
+  Weighing measure(double weight, const std::string& question, const WeighingSettings& settings) {
+    guide_.ask(question);
+    do {
+      tick_held(Vec3(0));
+    } while (!answered());
+    guide_.say("  measuring; do not touch it");
+    for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
+      const long interrupted = interrupted_, saturated = holder_->saturated();
+      Weighing weighing{weight, mean_force(settings)};
+      if (holder_->saturated() > saturated) {
+        throw GuideError("the motors were at their limit: take lighter weights");
+      }
+      if (interrupted_ - interrupted <= kMaxInterrupted) return weighing;
+    }
+    throw GuideError(
+        "this computer does not keep time: close other programs, or see palpate devices --timing");
+  }
+
+ private:
+  /// Told over whole cycles of slow motion up and down.
+  Vec3 mean_force(const WeighingSettings& settings) {
+    const auto ticks = [](double seconds) { return std::lround(seconds / kTick); };
+    for (long i = 0; i < ticks(settings.settle); ++i) tick_held(Vec3(0));
+    Vec3 mean(0);
+    const long count = ticks(settings.cycle * settings.cycles);
+    for (long i = 0; i < count; ++i) {
+      const double phase = static_cast<double>(i) * kTick / settings.cycle;
+      const double part = phase - std::floor(phase);
+      const double triangle = part < 0.25 ? 4 * part : part < 0.75 ? 2 - 4 * part : 4 * part - 4;
+      mean += tick_held({0, 0, settings.sweep * triangle}) / static_cast<double>(count);
+    }
+    return mean;
+  }
+
+  static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
+
+  DeviceReading next_reading() {
+    // A stall is not made up for by a burst.
+    due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
+    clock_.wait_until(due_ns_);
+    return device_.read();
+  }
+
+  /// Nothing where a guard process has just cut the force off; a zero command takes it on again.
+  std::optional<Vec3> position() {
+    const DeviceReading reading = next_reading();
+    if (reading.trouble == DeviceTrouble::guarded) {
+      ++interrupted_;
+      device_.write(Vec3(0), Vec3(0));
+      return std::nullopt;
+    }
+    if (reading.lost) throw GuideError(advice(reading.trouble));
+    return reading.stylus.tip;
+  }
+
+  Vec3 tick_free() {
+    for (;;) {
+      const auto at = position();
+      if (!at) continue;
+      device_.write(Vec3(0), Vec3(0));
+      return *at;
+    }
+  }
+
+  /// The force that was told.
+  Vec3 tick_held(const Vec3& target) {
+    const auto at = position();
+    if (!at) return told_;
+    if (glm::length(*at - target) > kMaxDrift) {
+      throw GuideError(
+          "the grip got away from the middle: take lighter weights, and let them down slowly");
+    }
+    told_ = holder_->force(*at, target);
+    device_.write(told_, Vec3(0));
+    return told_;
+  }
+
+  bool answered() {
+    const Guide::Answer answer = guide_.answer();
+    if (answer == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
+    return answer == Guide::Answer::go_on;
+  }
+
+  Device& device_;
+  Clock& clock_;
+  Guide& guide_;
+  std::int64_t due_ns_;
+  std::optional<Holder> holder_;
+  Vec3 told_;
+  long interrupted_ = 0;  // ticks
+};
+
+}  // namespace
+
+ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
+  const auto n = static_cast<double>(weighings.size());
+  double mean_weight = 0;
+  Vec3 mean_force(0);
+  for (const Weighing& w : weighings) {
+    mean_weight += w.weight / n;
+    mean_force += w.force / n;
+  }
+  double spread = 0, heaviest = 0;
+  Vec3 slope(0);  // nominal N for each N of weight
+  for (const Weighing& w : weighings) {
+    spread += (w.weight - mean_weight) * (w.weight - mean_weight);
+    slope += (w.weight - mean_weight) * (w.force - mean_force);
+    heaviest = std::max(heaviest, w.weight);
+  }
+  if (!(spread > 0)) throw GuideError("at least two different weights are needed");
+  slope /= spread;
+  if (!(slope.z > kLeastSlope && slope.z < kMostSlope)) {
+    std::ostringstream text;
+    text << "the motors were told " << slope.z << " N more for each N of weight, which cannot be: "
+         << "did every weight hang at the grip, and hang freely?";
+    throw GuideError(text.str());
+  }
+  double square = 0;
+  for (const Weighing& w : weighings) {
+    const double off = w.force.z - mean_force.z - slope.z * (w.weight - mean_weight);
+    square += off * off / n;
+  }
+  ForceCalibration force;
+  // More told than weighed: a count is weaker than thought, so more of them make a newton metre.
+  force.counts_per_torque = kCountsPerTorque * slope.z;
+  force.residual = std::sqrt(square) / slope.z;
+  force.sideways = std::hypot(slope.x, slope.y) / slope.z;
+  force.arm_weight = (mean_force.z - slope.z * mean_weight) / slope.z;
+  if (force.residual > kMostResidual * heaviest) {
+    std::ostringstream text;
+    text << "the weights lie " << force.residual << " N off a line (" << kMostResidual * heaviest
+         << " N are borne): was a weight wrong or touched?";
+    throw GuideError(text.str());
+  }
+  return force;
+}
+
+ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
+                       const WeighingSettings& settings) {
+  Procedure procedure(device, clock, guide);
+  procedure.find_centre();
+  std::vector<Weighing> weighings = {
+      procedure.measure(0, "Let go of the grip: it holds itself. Press ENTER.", settings)};
+  for (const double mass : settings.weights) {
+    std::ostringstream question;
+    question << "Hang " << mass
+             << " kg at the grip, let it down slowly, still it, and press ENTER.";
+    weighings.push_back(procedure.measure(mass * settings.gravity, question.str(), settings));
+  }
+  ForceCalibration force = fit_scale(weighings);
+  force.serial = device.capabilities().serial;
+  force.weights = settings.weights;
+  return force;
+}
+
+}  // namespace palpate::falcon

@@ -1,0 +1,44 @@
+#include "runner/servo/force_limiter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+
+DeviceForces ForceLimiter::apply(const Vec3& device1, const Vec3& device2) noexcept {
+  // A sum is finite only when each of its terms is.
+  const double size1 = glm::length(device1), size2 = glm::length(device2);
+  if (!std::isfinite(size1 + size2)) trip();
+  if (tripped_) return {};
+  ramp_ = std::min(1.0, ramp_ + ramp_step_);
+  DeviceForces out;
+  const double strongest = std::max(size1, size2);
+  const double scale = ramp_ * (strongest > limits_.max_force ? limits_.max_force / strongest : 1);
+  out.device1 = scale * device1;
+  out.device2 = scale * device2;
+  out.limited = strongest > limits_.max_force;
+  const Vec3 change1 = out.device1 - last1_, change2 = out.device2 - last2_;
+  const double change = std::max(glm::length(change1), glm::length(change2));
+  if (change > limits_.max_change) {
+    const double part = limits_.max_change / change;
+    out.device1 = last1_ + part * change1;
+    out.device2 = last2_ + part * change2;
+    out.limited = true;
+  }
+  last1_ = out.device1;
+  last2_ = out.device2;
+  return out;
+}
+
+void ForceLimiter::release() noexcept {
+  ramp_ = 0;
+  last1_ = last2_ = Vec3(0);
+}
+
+void ForceLimiter::trip() noexcept {
+  release();
+  tripped_ = true;
+}
+
+}  // namespace palpate

@@ -1,0 +1,58 @@
+#include "runner/servo/passivity.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate {
+namespace {
+
+/// The part of `motion` along the force, which is all that the damping may touch: a stylus that
+/// slides over a face keeps its way along it.
+Vec3 part_along(Vec3& towards, const Vec3& force, const Vec3& motion) {
+  const double size = glm::length(force);
+  if (size > 0) towards = force / size;
+  return glm::dot(motion, towards) * towards;
+}
+
+}  // namespace
+
+DeviceForces PassivityController::damping(const Ends& at, const DeviceForces& scene) noexcept {
+  DeviceForces out;
+  const Vec3 way1 = at.tip - last_.tip, way2 = at.tail - last_.tail;
+  const Vec3 moved1 = part_along(towards1_, scene.device1, way1);
+  const Vec3 moved2 = part_along(towards2_, scene.device2, way2);
+  if (started_) {
+    const double fed = glm::dot(commanded_.device1, way1) + glm::dot(commanded_.device2, way2);
+    const double due = 0.5 * (glm::dot(scene_.device1 + scene.device1, way1) +
+                              glm::dot(scene_.device2 + scene.device2, way2));
+    excess_ = std::max(0.0, excess_ + fed - due);
+    const double moved = glm::dot(moved1, moved1) + glm::dot(moved2, moved2);  // m^2
+    if (excess_ > 0 && moved > 0) {
+      // Over the next tick, at this speed, damping b takes out b v^2 T = b moved / T.
+      const double b = std::min(excess_ * tick_ / moved, settings_.most_damping);
+      out.device1 = -b / tick_ * moved1;
+      out.device2 = -b / tick_ * moved2;
+      taken_ += b / tick_ * moved;
+    }
+  }
+  started_ = true;
+  last_ = at;
+  scene_ = scene;
+  // Poses that are not finite: no force of ours, and a new account.
+  if (!std::isfinite(excess_ + glm::dot(way1, way1) + glm::dot(way2, way2))) {
+    reset();
+    out = {};
+  }
+  return out;
+}
+
+void PassivityController::reset() noexcept {
+  started_ = false;
+  last_ = {};
+  commanded_ = scene_ = {};
+  towards1_ = towards2_ = Vec3(0);
+  excess_ = taken_ = 0;
+}
+
+}  // namespace palpate

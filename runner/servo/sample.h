@@ -1,0 +1,65 @@
+#pragma once
+// What happens in one servo tick, and what is asked of the servo between ticks. Plain values.
+
+#include <algorithm>
+#include <cstdint>
+
+#include "rendering/renderer.h"
+#include "runner/servo/device.h"
+#include "runner/servo/servo_fault.h"
+
+namespace palpate {
+
+enum class Phase : std::uint8_t {
+  idle,     ///< no forces
+  homing,   ///< no forces; waits for the stylus to rest in the home zone
+  feeling,  ///< forces on
+};
+
+/// Why forces are not on yet, in homing.
+enum class Waiting : std::uint8_t {
+  nothing,
+  for_distance,  ///< the stylus is not in the home zone
+  for_rest,      ///< it is, and has not rested there long enough
+};
+
+/// What happened in one tick.
+struct Sample {
+  std::int64_t time_ns = 0;      ///< session clock, at the start of the tick
+  std::int64_t period_ns = 0;    ///< since the tick before
+  std::int64_t lateness_ns = 0;  ///< time_ns less the time at which the tick was due
+  std::int64_t warm_up_ns = 0;   ///< from there to the device's reading, by the clock
+  std::int64_t compute_ns = 0;   ///< from the device's reading to the command for it, by the clock
+  std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
+  Phase phase = Phase::idle;
+  Waiting waiting = Waiting::nothing;
+  LineProbe probe;        ///< virtual probe, m
+  Rendering rendering;    ///< as rendered
+  Vec3 device1, device2;  ///< N, as commanded after the limits
+  std::uint8_t buttons = 0;
+  std::uint32_t faults = 0;
+  DeviceTrouble trouble = DeviceTrouble::none;
+};
+
+/// As a sample keeps it: 255 stands for more as well.
+inline std::uint8_t recorded_contacts(int contacts) {
+  return static_cast<std::uint8_t>(std::min(contacts, 255));
+}
+
+/// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.
+struct HomeZone {
+  double radius = 0.062;     ///< m, bounding sphere and margin
+  double rest = 0.5;         ///< s
+  double stillness = 0.005;  ///< m; the tip stays this near to where it came to rest
+};
+
+/// Servo-quality figures of one trial, from time zero.
+struct ServoQuality {
+  std::uint64_t ticks = 0, missed_ticks = 0;
+  std::int64_t longest_period_ns = 0;
+  std::int64_t longest_compute_ns = 0;
+  std::uint32_t faults = 0;
+  double max_force = 0;  ///< N, commanded to the hand
+};
+
+}  // namespace palpate

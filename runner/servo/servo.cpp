@@ -1,0 +1,188 @@
+#include "runner/servo/servo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+double distance_of_segment(const LineProbe& probe) {  // from the origin, m
+  const Vec3 d = probe.tail - probe.tip;
+  const double d2 = glm::dot(d, d);
+  const double t = d2 > 0 ? std::clamp(-glm::dot(probe.tip, d) / d2, 0.0, 1.0) : 0;
+  return glm::length(probe.tip + t * d);
+}
+
+}  // namespace
+
+Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limits,
+             const WorkspaceMap& workspace)
+    : device_(device),
+      clock_(clock),
+      period_(1 / rate),
+      period_ns_(std::llround(1e9 / rate)),
+      due_ns_(clock.now_ns()),
+      limiter_({std::min(limits.max_force, device.capabilities().max_force), limits.max_change,
+                limits.ramp},
+               1 / rate),
+      workspace_(workspace) {}
+
+void Servo::prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) {
+  own_ = std::make_unique<Stage>(scene, renderer, home);
+  begin(*own_);
+  due_ns_ = clock_.now_ns();
+  sample_.time_ns = 0;  // the first period is the nominal one
+}
+
+void Servo::start() noexcept {
+  const std::int64_t now = clock_.now_ns();
+  due_ns_ = now - now % period_ns_ + period_ns_ / 4 + now % period_ns_ / 2;
+  if (due_ns_ < now) due_ns_ += period_ns_;
+}
+
+void Servo::begin(Stage& stage) noexcept {
+  stage_ = &stage;
+  rested_ = 0;
+  quality_ = {};
+  limiter_.release();
+  if (passivity_) passivity_->reset();
+  const std::int64_t last_ns = sample_.time_ns;
+  sample_ = {};
+  sample_.time_ns = last_ns;
+  sample_.phase = Phase::homing;
+}
+
+void Servo::clear_fault() noexcept {
+  emergency_.store(false);  // first: a request that comes from now on is kept
+  clear_trip();
+}
+
+bool Servo::at_home(const LineProbe& probe) noexcept {
+  const HomeZone& home = stage_->home;
+  const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home.stillness;
+  if (!still) {
+    rested_ = 0;
+    rest_tip_ = probe.tip;
+  }
+  if (!(distance_of_segment(probe) >= home.radius)) {
+    rested_ = 0;
+    sample_.waiting = Waiting::for_distance;
+    return false;
+  }
+  sample_.waiting = Waiting::for_rest;
+  return ++rested_ >= home.rest / period_;
+}
+
+void Servo::keep_time() noexcept {
+  clock_.wait_until(due_ns_);
+  const std::int64_t now = clock_.now_ns();
+  const std::int64_t late = (now - due_ns_) / period_ns_;  // whole ticks that were missed
+  sample_.period_ns = sample_.time_ns > 0 ? now - sample_.time_ns : period_ns_;
+  sample_.time_ns = now;
+  sample_.lateness_ns = now - due_ns_;
+  due_ns_ += (late + 1) * period_ns_;
+  late_in_a_row_ =
+      late > 0 ? late_in_a_row_ + static_cast<int>(std::min<std::int64_t>(late, kMissedInARow)) : 0;
+  if (sample_.phase != Phase::feeling) return;
+  quality_.missed_ticks += static_cast<std::uint64_t>(late);
+  quality_.longest_period_ns = std::max(quality_.longest_period_ns, sample_.period_ns);
+}
+
+void Servo::warm_up() noexcept {
+  if (!warm_ || sample_.phase != Phase::feeling) return;
+  stage_->renderer->tick(stage_->scene, stage_->shadow, sample_.probe, period_);
+  sample_.warm_up_ns = clock_.now_ns() - sample_.time_ns;
+}
+
+void Servo::check(const DeviceReading& reading) noexcept {
+  sample_.faults = 0;
+  if (clear_.load(std::memory_order_relaxed) && clear_.exchange(false)) limiter_.clear();
+  if (reading.lost) {
+    sample_.faults |= servo_fault::kDeviceLost;
+    limiter_.trip();
+  } else {
+    sample_.probe = {workspace_.to_virtual(reading.stylus.tip),
+                     workspace_.to_virtual(reading.stylus.tail)};
+  }
+  if (reading.trouble == DeviceTrouble::late) sample_.faults |= servo_fault::kOldReading;
+  sample_.trouble = reading.trouble;
+  sample_.buttons = reading.buttons;
+  if (sample_.phase == Phase::feeling && late_in_a_row_ >= kMissedInARow) {
+    sample_.faults |= servo_fault::kMissedTicks;
+    limiter_.trip();
+  }
+}
+
+void Servo::command(const Vec3& device1, const Vec3& device2) noexcept {
+  if (emergency_.load()) {
+    sample_.faults |= servo_fault::kEmergency;
+    limiter_.trip();
+  }
+  const DeviceForces forces =
+      passivity_ ? kept_passive(device1, device2) : limiter_.apply(device1, device2);
+  sample_.compute_ns = clock_.now_ns() - read_ns_;
+  device_.write(forces.device1, forces.device2);
+  sample_.device1 = forces.device1;
+  sample_.device2 = forces.device2;
+  sample_.faults |= (forces.limited ? servo_fault::kForceLimited : 0) |
+                    (limiter_.tripped() ? servo_fault::kTripped : 0);
+}
+
+DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexcept {
+  if (sample_.phase != Phase::feeling || limiter_.tripped()) {
+    passivity_->reset();
+    return limiter_.apply(device1, device2);
+  }
+  ForceLimiter preview = limiter_;  // what the limits leave of the scene's forces alone
+  const DeviceForces damping = passivity_->damping(
+      {workspace_.to_device(sample_.probe.tip), workspace_.to_device(sample_.probe.tail)},
+      preview.apply(device1, device2));
+  DeviceForces forces = limiter_.apply(device1 + damping.device1, device2 + damping.device2);
+  passivity_->commanded(forces);
+  return forces;
+}
+
+const Sample& Servo::tick() noexcept {
+  keep_time();
+  warm_up();
+  const DeviceReading reading = device_.read();
+  read_ns_ = clock_.now_ns();
+  check(reading);
+  if (sample_.phase == Phase::homing && !reading.lost && at_home(sample_.probe)) {
+    sample_.phase = Phase::feeling;
+    sample_.waiting = Waiting::nothing;
+    sample_.tick = 0;
+  } else if (sample_.phase == Phase::feeling) {
+    ++sample_.tick;
+  }
+  if (sample_.phase != Phase::feeling) {
+    command(Vec3(0), Vec3(0));
+    limiter_.release();  // the ramp begins with the forces
+    return sample_;
+  }
+  sample_.rendering = stage_->renderer->tick(stage_->scene, stage_->state, sample_.probe,
+                                             static_cast<double>(sample_.period_ns) * 1e-9);
+  sample_.faults |= sample_.rendering.faults;
+  if (sample_.rendering.faults & render_fault::kNonFinite) limiter_.trip();
+  command(sample_.rendering.device1, sample_.rendering.device2);
+  ++quality_.ticks;
+  quality_.faults |= sample_.faults;
+  quality_.longest_compute_ns = std::max(quality_.longest_compute_ns, sample_.compute_ns);
+  quality_.max_force = std::max(quality_.max_force, glm::length(sample_.device1 + sample_.device2));
+  return sample_;
+}
+
+ServoQuality Servo::stop() noexcept {
+  limiter_.release();
+  device_.write(Vec3(0), Vec3(0));
+  sample_.phase = Phase::idle;
+  sample_.waiting = Waiting::nothing;
+  sample_.device1 = sample_.device2 = Vec3(0);
+  sample_.rendering = {};
+  stage_ = nullptr;
+  return std::exchange(quality_, {});
+}
+
+}  // namespace palpate

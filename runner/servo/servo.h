@@ -1,0 +1,117 @@
+#pragma once
+// The servo tick: device.read -> renderer -> force limit -> device.write. The same code for a
+// simulated participant (as fast as the processor goes) and a live one (paced by the clock).
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "rendering/renderer.h"
+#include "runner/servo/device.h"
+#include "runner/servo/force_limiter.h"
+#include "runner/servo/passivity.h"
+#include "runner/servo/sample.h"
+#include "runner/servo/tick_source.h"
+
+namespace palpate {
+
+/// Where the virtual world stands in the device's frame: virtual = scale * (device - centre).
+struct WorkspaceMap {
+  Vec3 centre;       ///< m, device frame
+  double scale = 1;  ///< virtual metres per device metre
+
+  Vec3 to_virtual(const Vec3& device) const { return scale * (device - centre); }
+  Vec3 to_device(const Vec3& virtual_point) const { return virtual_point / scale + centre; }
+};
+
+/// What one trial puts before the stylus, with the memory that rendering it needs.
+struct Stage {
+  Stage(const Scene& what, const Renderer& how, const HomeZone& where)
+      : scene(what),
+        renderer(&how),
+        state(scene.initial_state()),
+        shadow(scene.initial_state()),
+        home(where) {}
+
+  const Scene scene;
+  const Renderer* renderer;
+  RenderState state;   ///< the servo's alone while it has the stage
+  RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
+  HomeZone home;
+};
+
+class Servo final : public TickSource {
+ public:
+  Servo(Device& device, Clock& clock, double rate, const ForceLimits& limits,
+        const WorkspaceMap& workspace = {});
+
+  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) override;
+  /// Waits for the tick's time, then does one tick. Never throws, allocates, locks or does I/O but
+  /// the device's own transfer.
+  const Sample& tick() noexcept;
+  const Sample& next() noexcept override { return tick(); }
+  ServoQuality stop() noexcept override;
+
+  /// As prepare, but with what was made elsewhere: no allocation, and time runs on. `stage` must
+  /// outlive the next begin(), prepare() or stop().
+  void begin(Stage& stage) noexcept;
+  /// Zero force from the tick under way on, until clear_fault(). From any thread or signal handler.
+  void emergency_zero() noexcept { emergency_.store(true); }
+  /// The experimenter allows forces again. From any thread.
+  void clear_fault() noexcept;
+  /// The same, but zero force that was asked for stays asked for.
+  void clear_trip() noexcept { clear_.store(true); }
+
+  /// Takes out the energy that sampling feeds to the hand; off unless asked for. Before start().
+  void control_passivity() {
+    constexpr double kLightestEnd = 0.1;  // kg, of a stylus at its tip
+    passivity_.emplace(PassivitySettings{0.5 * kLightestEnd / period_}, period_);
+  }
+
+  /// Each tick renders the last one again, for nobody, before it reads the device: what other
+  /// programs have put out of the processor's caches meanwhile is back when the reading comes, and
+  /// the command follows it sooner. For ticks with sleep between them. Before start().
+  void keep_warm() noexcept { warm_ = true; }
+
+  /// The next tick is due within a period, and all are a quarter to three quarters of a period past
+  /// its multiples, as chance has it: at some of these the kernel has a tick of its own (Linux 6.4
+  /// and later), and a servo's tick that begins just before is interrupted for some 30 us, time and
+  /// again.
+  void start() noexcept;
+
+  double period() const { return period_; }  ///< s
+  std::int64_t period_ns() const { return period_ns_; }
+
+ private:
+  bool at_home(const LineProbe& probe) noexcept;
+  void keep_time() noexcept;
+  void warm_up() noexcept;
+  void check(const DeviceReading& reading) noexcept;
+  void command(const Vec3& device1, const Vec3& device2) noexcept;
+  DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
+
+  static constexpr int kMissedInARow = 5;  ///< so many and the forces go off
+
+  Device& device_;
+  Clock& clock_;
+  const double period_;
+  const std::int64_t period_ns_;
+  std::int64_t due_ns_;
+  std::int64_t read_ns_ = 0;  ///< when the device had been read
+  ForceLimiter limiter_;
+  WorkspaceMap workspace_;
+  std::optional<PassivityController> passivity_;
+  std::unique_ptr<Stage> own_;  ///< of prepare()
+  Stage* stage_ = nullptr;
+  Vec3 rest_tip_;
+  bool warm_ = false;
+  int rested_ = 0;  ///< ticks
+  int late_in_a_row_ = 0;
+  Sample sample_;
+  ServoQuality quality_;
+  std::atomic<bool> emergency_{false}, clear_{false};
+  static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
+};
+
+}  // namespace palpate

@@ -1,0 +1,124 @@
+#include "runner/servo/servo_thread.h"
+
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <future>
+#include <utility>
+
+namespace palpate {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
+constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as stalled
+
+}  // namespace
+
+ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& settings)
+    : wish_(settings.realtime),
+      servo_(device, clock, settings.rate, settings.limits, settings.workspace),
+      awake_(settings.realtime.awake),
+      ring_(settings.ring) {
+  servo_.keep_warm();
+  if (settings.passivity_controller) servo_.control_passivity();
+  std::promise<RealtimeRights> granted;
+  thread_ = std::jthread([this, &granted] {
+    granted.set_value(request_realtime(wish_));
+    run();
+  });
+  rights_ = granted.get_future().get();
+  rights_.awake = awake_.granted();
+}
+
+ServoThread::~ServoThread() {
+  quit_ = true;
+  thread_.join();
+}
+
+int ServoThread::current_thread() noexcept { return static_cast<int>(syscall(SYS_gettid)); }
+
+void ServoThread::run() noexcept {
+  thread_id_ = current_thread();
+  servo_.start();
+  while (!quit_.load(std::memory_order_relaxed)) {
+    take_orders();
+    publish(servo_.tick());
+  }
+  servo_.stop();
+}
+
+void ServoThread::take_orders() noexcept {
+  if (incoming_.load(std::memory_order_relaxed) != nullptr) {
+    servo_.begin(*incoming_.exchange(nullptr, std::memory_order_acquire));
+    gap_ = lost_samples_ = false;
+  }
+  const std::uint32_t asked = stops_asked_.load(std::memory_order_acquire);
+  if (asked != stops_done_.load(std::memory_order_relaxed)) {
+    quality_ = servo_.stop();
+    if (lost_samples_) quality_.faults |= servo_fault::kSamplesLost;
+    stops_done_.store(asked, std::memory_order_release);
+  }
+}
+
+void ServoThread::publish(const Sample& sample) noexcept {
+  off_.store((sample.faults & servo_fault::kTripped) != 0 || sample.phase != Phase::feeling);
+  health_.add(sample, servo_.period_ns());
+  latest_.write(sample);
+  if (sample.phase == Phase::idle) return;
+  if (!gap_) {
+    gap_ = !ring_.push(sample);
+  } else {
+    Sample after_gap = sample;
+    after_gap.faults |= servo_fault::kSamplesLost;
+    gap_ = !ring_.push(after_gap);
+  }
+  if (!gap_) return;
+  lost_samples_ = true;
+  health_.add_lost_sample();
+}
+
+void ServoThread::prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) {
+  auto stage = std::make_unique<Stage>(scene, renderer, home);
+  if (staged_) stop();
+  if (!staged_) stages_.clear();
+  while (ring_.pop(popped_)) {
+  }
+  popped_ = {};
+  stages_.push_back(std::move(stage));
+  staged_ = true;
+  incoming_.store(stages_.back().get(), std::memory_order_release);
+}
+
+const Sample& ServoThread::next() noexcept {
+  const auto give_up = steady_clock::now() + kPatience;
+  while (!ring_.pop(popped_)) {
+    if (steady_clock::now() >= give_up) {
+      popped_.faults |= servo_fault::kStalled | servo_fault::kTripped;
+      break;
+    }
+    std::this_thread::sleep_for(kNap);
+  }
+  return popped_;
+}
+
+ServoQuality ServoThread::stop() noexcept {
+  const std::uint32_t asked = stops_asked_.load(std::memory_order_relaxed) + 1;
+  stops_asked_.store(asked, std::memory_order_release);
+  const auto give_up = steady_clock::now() + kPatience;
+  while (stops_done_.load(std::memory_order_acquire) != asked) {
+    if (steady_clock::now() >= give_up) {
+      emergency_zero();  // should it ever come back
+      ServoQuality stalled;
+      stalled.faults = servo_fault::kStalled | servo_fault::kTripped;
+      return stalled;
+    }
+    std::this_thread::sleep_for(kNap);
+  }
+  staged_ = false;
+  return quality_;
+}
+
+}  // namespace palpate

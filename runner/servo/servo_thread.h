@@ -1,0 +1,91 @@
+#pragma once
+// The servo of a live session: a thread of its own that nothing else can make wait. Scenes go in by
+// an exchange of pointers, every sample comes out through a fixed ring, the newest through a triple
+// buffer. No locks.
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "runner/servo/realtime.h"
+#include "runner/servo/ring.h"
+#include "runner/servo/servo.h"
+#include "runner/servo/servo_health.h"
+#include "runner/servo/triple_buffer.h"
+
+namespace palpate {
+
+struct ServoSettings {
+  double rate = 1000;  ///< Hz
+  ForceLimits limits;
+  WorkspaceMap workspace;
+  bool passivity_controller = false;
+  RealtimeWish realtime;
+  std::size_t ring = 16384;  ///< samples that wait for the session before some are lost
+};
+
+/// prepare, next and stop belong to one thread, the session's; latest to one, which may be another.
+class ServoThread final : public TickSource {
+ public:
+  /// Ticks from now on, without forces until prepare. The device and the clock are the thread's
+  /// alone and must outlive it. \throws std::system_error where no thread can be had
+  ServoThread(Device& device, Clock& clock, const ServoSettings& settings);
+  /// Zero force, then the end of the thread.
+  ~ServoThread() override;
+  ServoThread(const ServoThread&) = delete;
+  ServoThread& operator=(const ServoThread&) = delete;
+
+  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) override;
+  /// Every sample since prepare, in order. Where the ring overflowed, the first one after the gap
+  /// says so (kSamplesLost); where the thread gives nothing for a second, what comes back is its
+  /// last sample with kStalled and kTripped.
+  const Sample& next() noexcept override;
+  ServoQuality stop() noexcept override;
+
+  /// The newest sample, also between trials; false where there is none that is newer than the last.
+  bool latest(Sample& sample) noexcept { return latest_.read(sample); }
+  /// Zero force within the tick and until clear_fault(). From any thread or signal handler.
+  void emergency_zero() noexcept { servo_.emergency_zero(); }
+  void clear_fault() noexcept { servo_.clear_fault(); }
+  void clear_trip() noexcept { servo_.clear_trip(); }
+  /// True once zero force was commanded to the device after emergency_zero(). Signal safe.
+  bool forces_are_off() const noexcept { return off_.load(); }
+
+  /// Whether the caller is the servo's thread. Signal safe.
+  bool in_this_thread() const noexcept { return thread_id_.load() == current_thread(); }
+
+  const RealtimeRights& rights() const { return rights_; }
+  /// Every tick since the thread began, trials or not. From any thread.
+  const ServoHealth& health() const { return health_; }
+
+ private:
+  static int current_thread() noexcept;
+  void run() noexcept;
+  void take_orders() noexcept;
+  void publish(const Sample& sample) noexcept;
+
+  const RealtimeWish wish_;
+  Servo servo_;
+  const AwakeProcessors awake_;
+  RealtimeRights rights_;
+  ServoHealth health_;
+
+  std::vector<std::unique_ptr<Stage>> stages_;  ///< the session's; freed once the servo left them
+  std::atomic<Stage*> incoming_{nullptr};
+  std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
+  ServoQuality quality_;  ///< written before stops_done_ moves
+  bool staged_ = false;   ///< the session's: something stands before the stylus, or may
+
+  Ring<Sample> ring_;
+  TripleBuffer<Sample> latest_;
+  // The servo's own:
+  bool gap_ = false;           ///< samples were lost since the last one in the ring
+  bool lost_samples_ = false;  ///< in this trial
+  std::atomic<bool> off_{true}, quit_{false};
+  std::atomic<int> thread_id_{0};
+  Sample popped_;
+  std::jthread thread_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "runner/servo/sample.h"
+
+namespace palpate {
+
+/// The servo as a session sees it: in this thread for a simulated participant, in a thread of its
+/// own for a live one.
+class TickSource {
+ public:
+  virtual ~TickSource() = default;
+  /// Puts a scene before the stylus and waits for it in the home zone.
+  virtual void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) = 0;
+  /// The next tick's sample: every one, in order. Waits for it.
+  virtual const Sample& next() noexcept = 0;
+  /// Forces off; what the trial was like.
+  virtual ServoQuality stop() noexcept = 0;
+};
+
+}  // namespace palpate

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "runner/scene_builder.h"
+#include "runner/servo/device.h"
+
+namespace palpate {
+
+/// Why a protocol cannot be run on a device, one sentence each with what would help; empty: it can.
+std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary& library,
+                                 const DeviceCapabilities& device);
+
+/// What of a material a device can show at a rate without feeding energy to the hand.
+struct ShowableMaterial {
+  double share = 1;    ///< of its stiffness and damping together; 1: all, 0: nothing
+  std::string reason;  ///< what is in the way; empty: nothing
+};
+
+/// Sampled spring and damper: K T / 2 + |B| <= b (Colgate & Schenkel 1997), K <= 2 f_c / Delta
+/// (Abbott & Okamura 2005), as far as the device's damping, friction and resolution are known, and
+/// the stiffness that its maker gives for its highest rate, in proportion to the rate. Bounds of
+/// passivity: no hand can make it buzz. The passivity controller makes up for kPassivityExtension
+/// times what the device's own damping does.
+/// \param scale  virtual metres per device metre: the device shows so many times the stiffness
+ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
+                          double scale, bool passivity_controller);
+
+/// `palpate stability` measures far more than this on every scene, as long as a force is written in
+/// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).
+inline constexpr double kPassivityExtension = 2;
+
+/// A material that was scaled down to what a device can show.
+struct LimitedMaterial {
+  std::string stimulus;
+  int part = 0;      ///< of a compound: 0 itself, then its parts with theirs, in order
+  double share = 1;  ///< of stiffness and damping that is left
+  double stiffness = 0, damping = 0;  ///< N/m and N s/m, as the protocol asks
+  std::string text;                   ///< a sentence
+};
+
+/// Where the protocol asks for limits (servo.material_limit), scales down what the device cannot
+/// show; to be called before its stimuli are made. What was, in order.
+std::vector<LimitedMaterial> limit_materials(Protocol& protocol, const DeviceCapabilities& device);
+
+/// An event for the session's record, one line of JSON: which materials, as asked and as shown, on
+/// which device and at which rate.
+std::string to_json_text(const std::vector<LimitedMaterial>& limited,
+                         const DeviceCapabilities& device, double rate);
+
+/// Limits the protocol again, to the bit, as an event of to_json_text says; false: it is another
+/// note. \throws std::invalid_argument: it is not of this protocol, or damaged
+bool limit_as_recorded(Protocol& protocol, const std::string& event);
+
+}  // namespace palpate

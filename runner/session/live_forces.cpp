@@ -1,0 +1,89 @@
+#include "runner/session/live_forces.h"
+
+#include <algorithm>
+
+#include "runner/session/session.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t kNap_ns = 5'000'000;
+constexpr double kPatience = 0.5;  // s, for a reading; a servo has several in that time
+constexpr double kPlugging = 2;    // s; a bus tells of what was plugged in with some delay
+
+bool is_well(const Sample& sample) { return (sample.faults & servo_fault::kDeviceLost) == 0; }
+
+/// Not in passing only.
+bool is_settled(const Sample& sample) {
+  return is_well(sample) ||
+         (sample.trouble != DeviceTrouble::guarded && sample.trouble != DeviceTrouble::guard_late &&
+          sample.trouble != DeviceTrouble::reopening);
+}
+
+}  // namespace
+
+void LiveForces::off() noexcept {
+  if (guard_ != nullptr) guard_->emergency_zero();
+  servo_.emergency_zero();
+}
+
+const Sample& LiveForces::newest() noexcept {
+  servo_.latest(sample_);
+  return sample_;
+}
+
+bool LiveForces::device_is_gone() noexcept {
+  return !is_well(newest()) && is_settled(sample_) && sample_.trouble != DeviceTrouble::guard_lost;
+}
+
+/// Whether a sample of a tick from now on was as wished. The newest one stays.
+template <class Wished>
+bool LiveForces::await(Wished wished, double seconds, const std::function<bool()>& stop) {
+  const std::int64_t began_ns = clock_.now_ns();
+  const std::int64_t end_ns = began_ns + static_cast<std::int64_t>(seconds * 1e9);
+  while (!stop()) {
+    const Sample& sample = newest();
+    if (sample.time_ns > began_ns && wished(sample)) return true;
+    if (clock_.now_ns() >= end_ns) return false;
+    clock_.wait_until(clock_.now_ns() + kNap_ns);
+  }
+  return false;
+}
+
+std::string LiveForces::open_again(const std::function<bool()>& stop) {
+  const std::int64_t end_ns = clock_.now_ns() + static_cast<std::int64_t>(kPlugging * 1e9);
+  while (true) {
+    guard_->ask_to_reopen();
+    while (guard_->reopening() && newest().trouble != DeviceTrouble::guard_lost && !stop())
+      clock_.wait_until(clock_.now_ns() + kNap_ns);
+    if (guard_->reopening()) return advice(sample_.trouble);
+    std::string trouble = guard_->reopen_trouble();
+    if (trouble.empty() || clock_.now_ns() >= end_ns || stop()) return trouble;
+    clock_.wait_until(clock_.now_ns() + 20 * kNap_ns);
+  }
+}
+
+std::string LiveForces::allow(const std::function<bool()>& stop) {
+  const std::int64_t asked_ns = clock_.now_ns();
+  // Zero force that is asked for from now on is kept, however long this takes.
+  servo_.clear_fault();
+  await(is_settled, kPatience, stop);
+  const bool away =
+      sample_.trouble == DeviceTrouble::unplugged || sample_.trouble == DeviceTrouble::silent;
+  if (guard_ != nullptr && away) {
+    std::string trouble = open_again(stop);
+    if (!trouble.empty()) return trouble;
+    await(is_well, kPatience, stop);
+  }
+  if (sample_.time_ns <= asked_ns)
+    return "the servo gives no more samples: start the program again";
+  if (!is_well(sample_)) return advice(sample_.trouble);
+  servo_.clear_trip();
+  const auto is_on = [](const Sample& sample) {
+    return (sample.faults & servo_fault::kTripped) == 0;
+  };
+  if (await(is_on, kPatience, stop)) return "";
+  return trip_reason(sample_.faults, sample_.trouble);
+}
+
+}  // namespace palpate

@@ -1,0 +1,44 @@
+#pragma once
+// The forces of a live session as the experimenter switches them: off at once, on again only where
+// nothing stands against it.
+
+#include <functional>
+#include <string>
+
+#include "runner/safety/guard.h"
+#include "runner/servo/servo_thread.h"
+
+namespace palpate {
+
+/// Belongs to the session's thread: it takes the servo's newest samples.
+class LiveForces {
+ public:
+  /// \param guard  may be none. All must outlive it.
+  LiveForces(ServoThread& servo, GuardedDevice* guard, Clock& clock)
+      : servo_(servo), guard_(guard), clock_(clock) {}
+
+  /// Zero force at once, until allow().
+  void off() noexcept;
+  /// Allows forces again, once the device has given a good reading. One that is unplugged or silent
+  /// is opened again first, which takes as long as it takes.
+  /// \param stop  asked every few milliseconds: true gives it up
+  /// \return what stands against it, in words; empty: forces may go on
+  std::string allow(const std::function<bool()>& stop);
+
+  /// The servo's newest sample.
+  const Sample& newest() noexcept;
+  /// It gives no readings, not only in passing.
+  bool device_is_gone() noexcept;
+
+ private:
+  template <class Wished>
+  bool await(Wished wished, double seconds, const std::function<bool()>& stop);
+  std::string open_again(const std::function<bool()>& stop);
+
+  ServoThread& servo_;
+  GuardedDevice* guard_;
+  Clock& clock_;
+  Sample sample_;
+};
+
+}  // namespace palpate

@@ -1,0 +1,61 @@
+#include "runner/session/replay.h"
+
+#include <limits>
+#include <stdexcept>
+
+#include "runner/devices/replay.h"
+#include "runner/scene_builder.h"
+#include "runner/servo/servo.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::uint32_t kRendererFaults = servo_fault::kForceLimited - 1;  // the low bits
+
+Trial trial_of(const Protocol& protocol, const TrialRecord& recorded, RendererKind renderer) {
+  Trial trial;
+  trial.session = recorded.session;
+  trial.block = recorded.block;
+  trial.trial = recorded.trial;
+  trial.renderer = renderer;
+  trial.practice = recorded.practice;
+  const auto& q = recorded.orientation_wxyz;
+  trial.orientation = Quat(q[0], q[1], q[2], q[3]);
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    if (protocol.stimuli[i].name != recorded.shape) continue;
+    trial.stimulus = static_cast<int>(i);
+    return trial;
+  }
+  throw std::invalid_argument("the protocol has no stimulus named " + recorded.shape);
+}
+
+bool equal(const std::array<double, 3>& recorded, const Vec3& again) {
+  return recorded[0] == again.x && recorded[1] == again.y && recorded[2] == again.z;
+}
+
+}  // namespace
+
+void replay(const Protocol& protocol, const TrialRecord& recorded, RendererKind renderer,
+            const std::function<void(const SampleRecord&, const Sample&)>& visit) {
+  const StimulusLibrary library(protocol);
+  ReplayDevice device(recorded.samples, protocol.servo_rate);
+  ForceLimits limits;
+  limits.max_force = limits.max_change = std::numeric_limits<double>::max();
+  Servo servo(device, device, protocol.servo_rate, limits);
+  // The record begins where the stylus had rested in the home zone.
+  constexpr HomeZone kAnywhere{0, 0};
+  servo.prepare(library.scene(trial_of(protocol, recorded, renderer)), renderer_for(renderer),
+                kAnywhere);
+  for (const SampleRecord& sample : recorded.samples) visit(sample, servo.tick());
+  servo.stop();
+}
+
+bool equals_record(const SampleRecord& recorded, const Sample& again) {
+  const Rendering& r = again.rendering;
+  return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
+         recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
+         recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
+         (recorded.faults & kRendererFaults) == (r.faults & kRendererFaults);
+}
+
+}  // namespace palpate

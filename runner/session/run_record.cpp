@@ -1,0 +1,50 @@
+#include "runner/session/run_record.h"
+
+#include <utility>
+
+namespace palpate {
+
+RunRecord::RunRecord(Store& store, const ProtocolInfo& protocol, const Participant& participant,
+                     const RunInfo& info, const std::optional<ProtocolInfo>& shown_with)
+    : store_(store),
+      protocol_(protocol),
+      participant_(participant),
+      info_(info),
+      shown_with_(shown_with) {
+  store_.require_sound(participant_, info_);
+}
+
+void RunRecord::begin() {
+  if (run_) return;
+  participant_ = store_.enrol(protocol_, participant_.code, participant_.number,
+                              participant_.simulated, participant_.seed);
+  run_ = store_.begin_run(participant_, info_, shown_with_ ? &*shown_with_ : nullptr);
+  for (const Note& note : std::exchange(waiting_, {}))
+    store_.add_note(*run_, note.at_ns, note.text);
+}
+
+void RunRecord::note(std::int64_t at_ns, const std::string& text) {
+  if (run_) {
+    store_.add_note(*run_, at_ns, text);
+    return;
+  }
+  store_.require_sound(text);
+  waiting_.push_back({at_ns, text});
+}
+
+void RunRecord::end(RunEnd how, std::int64_t ended_ns) {
+  if (run_) store_.end_run(*run_, how, ended_ns);
+}
+
+std::vector<std::string> RunRecord::waiting() const {
+  std::vector<std::string> texts;
+  for (const Note& note : waiting_) texts.push_back(note.text);
+  return texts;
+}
+
+int RunRecord::begin(const TrialRecord& planned, std::int64_t began_ns) {
+  begin();
+  return store_.begin_attempt(*run_, planned, began_ns);
+}
+
+}  // namespace palpate

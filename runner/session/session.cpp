@@ -1,0 +1,219 @@
+#include "runner/session/session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "data/files/utc.h"
+
+namespace palpate {
+namespace {
+
+constexpr double kPerSecond_ns = 1e9;
+
+std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
+
+}  // namespace
+
+bool SessionFault::passed() const {
+  if (faults & (servo_fault::kEmergency | render_fault::kNonFinite)) return false;
+  if (faults & servo_fault::kDeviceLost)
+    return trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded;
+  return (faults & (servo_fault::kMissedTicks | servo_fault::kStalled)) != 0;
+}
+
+std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
+  using namespace servo_fault;
+  for (const std::uint32_t bit :
+       {kEmergency, kStalled, kDeviceLost, kMissedTicks, render_fault::kNonFinite}) {
+    if ((faults & bit) == 0) continue;
+    std::string why = bit == kDeviceLost ? advice(trouble) : "";
+    if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
+      if (!why.empty()) return why;
+    }
+    return fault_bit(bit).why + (why.empty() ? why : ": " + why);
+  }
+  return fault_bit(kTripped).why;
+}
+
+Session::Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp)
+    : parts_(parts), plan_(std::move(plan)), stamp_(stamp) {}
+
+Session::State Session::before_trial() const {
+  if (plan_.finished()) return State::end;
+  if (plan_.block_begins()) return plan_.next().practice ? State::practice : State::block;
+  const auto& every = parts_.protocol.breaks.every_trials;
+  if (every && plan_.done() % static_cast<std::size_t>(*every) == 0) return State::rest;
+  return State::trial;
+}
+
+void Session::step() {
+  const auto& texts = parts_.protocol.texts;
+  switch (state_) {
+    case State::instruction:
+      parts_.participant.read(texts.instructions);
+      state_ = before_trial();
+      break;
+    case State::practice:
+      parts_.participant.read(texts.practice);
+      state_ = State::trial;
+      break;
+    case State::block:
+    case State::rest:
+      if (plan_.done() > 0) end_rest();
+      state_ = State::trial;
+      break;
+    case State::trial:
+      if (run_trial()) state_ = State::response;
+      break;
+    case State::response:
+      parts_.log.finish(record_);
+      if (parts_.events != nullptr) parts_.events->recorded(record_);
+      plan_.answered(record_.correct);  // first: whoever leaves during the feedback has answered
+      if (record_.practice || parts_.protocol.response.feedback)
+        parts_.participant.feedback(record_.correct);
+      state_ = before_trial();
+      if (state_ == State::end) parts_.participant.read(texts.end);
+      break;
+    case State::end:
+      break;
+  }
+}
+
+TrialRecord Session::planned_record(const Trial& trial) const {
+  TrialRecord record;
+  record.session = trial.session;
+  record.block = trial.block;
+  record.trial = trial.trial;
+  record.renderer = to_string(trial.renderer);
+  record.shape = parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
+  record.practice = trial.practice;
+  const Quat& q = trial.orientation;
+  record.orientation_wxyz = {q.w, q.x, q.y, q.z};
+  return record;
+}
+
+void Session::end_rest() {
+  const std::int64_t until =
+      parts_.clock.now_ns() + std::llround(parts_.protocol.breaks.min_seconds * kPerSecond_ns);
+  parts_.participant.rest(parts_.protocol.texts.break_text, until);
+  parts_.clock.wait_until(until);
+}
+
+void Session::cut_off(const std::string& reason) {
+  if (parts_.events != nullptr) parts_.events->cut_off(reason);
+  parts_.log.cut_off(reason);
+}
+
+std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& trouble) {
+  const std::int64_t limit_ns = std::llround(parts_.protocol.response.time_out * kPerSecond_ns);
+  while (true) {
+    const Sample& sample = parts_.servo.next();
+    faults = sample.faults;
+    trouble = sample.trouble;
+    if (faults & servo_fault::kTripped) return std::nullopt;
+    if (sample.phase == Phase::feeling) {
+      note(sample);
+      if (parts_.protocol.samples) keep(sample);
+      record_.response_ns = sample.time_ns;
+    }
+    const std::optional<Answer> answer = parts_.participant.step(sample);
+    if (answer && answer->time_ns - record_.onset_ns < limit_ns) return answer;
+    record_.timed_out =
+        sample.phase == Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
+    if (record_.timed_out) return std::nullopt;
+  }
+}
+
+bool Session::run_trial() {
+  const Trial& trial = plan_.next();
+  const Protocol& protocol = parts_.protocol;
+  record_ = planned_record(trial);
+  record_.attempt = parts_.log.begin(record_, parts_.clock.now_ns());
+  if (parts_.events != nullptr) parts_.events->began(trial);
+  const HomeZone home{
+      std::max(parts_.library.reach(trial.stimulus), parts_.least_reach) + protocol.home.margin,
+      protocol.home.rest};
+  std::optional<Answer> answer;
+  std::uint32_t faults = 0;
+  DeviceTrouble trouble = DeviceTrouble::none;
+  try {
+    parts_.participant.begin_trial(trial);
+    parts_.servo.prepare(parts_.library.scene(trial), renderer_for(trial.renderer), home);
+    answer = feel_trial(faults, trouble);
+  } catch (const TrialCutOff& again) {
+    parts_.servo.stop();
+    cut_off(again.what());
+    return false;
+  } catch (const std::exception& error) {
+    parts_.servo.stop();
+    cut_off(error.what());
+    throw;
+  }
+  const ServoQuality quality = parts_.servo.stop();
+  if (faults & servo_fault::kTripped) {
+    const std::string reason = trip_reason(faults, trouble);
+    cut_off(reason);
+    throw SessionFault("forces are off: " + reason + "; trial " + std::to_string(record_.trial) +
+                           " will be shown again",
+                       reason, faults, trouble);
+  }
+  record_.response_time = protocol.response.time_out;
+  if (answer) {
+    record_.response_ns = answer->time_ns;
+    record_.response_time =
+        static_cast<double>(record_.response_ns - record_.onset_ns) / kPerSecond_ns;
+    record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
+    record_.correct = answer->stimulus == trial.stimulus;
+  }
+  // The answer may have come before the tick that was looked at last.
+  if (record_.first_contact_time && *record_.first_contact_time > record_.response_time)
+    record_.first_contact_time.reset();
+  record_.ticks = quality.ticks;
+  record_.missed_ticks = quality.missed_ticks;
+  record_.longest_period_ns = quality.longest_period_ns;
+  record_.faults = quality.faults;
+  record_.started_inside = (quality.faults & render_fault::kStartedInside) != 0;
+  record_.max_force = quality.max_force;
+  if (parts_.events != nullptr) parts_.events->answered(record_);
+  return true;
+}
+
+void Session::note(const Sample& sample) {
+  if (sample.tick == 0) {
+    record_.onset_ns = sample.time_ns;
+    record_.onset_utc = format_utc(to_unix_ns(stamp_, sample.time_ns));
+    record_.start_tip = values(sample.probe.tip);
+    record_.start_tail = values(sample.probe.tail);
+    if (parts_.events != nullptr) parts_.events->onset(record_);
+  }
+  const Rendering& rendering = sample.rendering;
+  if (rendering.contacts > 0 && !record_.first_contact_time) {
+    record_.first_contact_time =
+        static_cast<double>(sample.time_ns - record_.onset_ns) / kPerSecond_ns;
+    if (parts_.events != nullptr) parts_.events->first_contact(record_, sample.time_ns);
+  }
+}
+
+void Session::keep(const Sample& sample) {
+  const Rendering& rendering = sample.rendering;
+  SampleRecord kept;
+  kept.tick = sample.tick;
+  kept.period_ns = sample.period_ns;
+  kept.lateness_ns = sample.lateness_ns;
+  kept.compute_ns = sample.compute_ns;
+  kept.tip = values(sample.probe.tip);
+  kept.tail = values(sample.probe.tail);
+  kept.force = values(rendering.force);
+  kept.torque = values(rendering.torque);
+  kept.device1 = values(sample.device1);
+  kept.device2 = values(sample.device2);
+  kept.depth = rendering.deepest.depth;
+  kept.contacts = recorded_contacts(rendering.contacts);
+  kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
+  kept.buttons = sample.buttons;
+  kept.faults = sample.faults;
+  record_.samples.push_back(kept);
+}
+
+}  // namespace palpate

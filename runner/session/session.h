@@ -1,0 +1,103 @@
+#pragma once
+// A session as a state machine, the same for simulated and live participants.
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "data/record.h"
+#include "runner/participants/respondent.h"
+#include "runner/scene_builder.h"
+#include "runner/servo/tick_source.h"
+#include "runner/session/session_plan.h"
+#include "runner/session/trial_log.h"
+
+namespace palpate {
+
+/// What was in front of the participant was no trial any more: lost device, forces tripped. The
+/// attempt is on record as cut off, the forces are zero.
+class SessionFault : public std::runtime_error {
+ public:
+  SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
+      : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
+  /// It is over by itself: the machine was late, nothing is wrong with device or stylus.
+  bool passed() const;
+  std::string reason;    ///< that forces are off
+  std::uint32_t faults;  ///< of the tick
+  DeviceTrouble trouble;
+};
+
+/// Why forces went off, in words. \param faults, trouble  of a sample with kTripped
+std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
+
+/// What happens in a trial, as it happens: for markers and the experimenter's console.
+class SessionEvents {
+ public:
+  virtual ~SessionEvents() = default;
+  virtual void began(const Trial& trial) = 0;
+  /// Time zero.
+  virtual void onset(const TrialRecord& so_far) = 0;
+  /// \param time_ns  session clock
+  virtual void first_contact(const TrialRecord& so_far, std::int64_t time_ns) = 0;
+  virtual void answered(const TrialRecord& record) = 0;  ///< not on record yet; also a time-out
+  virtual void cut_off(const std::string& reason) = 0;
+  virtual void recorded(const TrialRecord& record) = 0;
+};
+
+class Session {
+ public:
+  enum class State {
+    instruction,  ///< what this is about; also after an interruption
+    practice,     ///< a block that is not analysed begins
+    block,        ///< a block begins
+    rest,         ///< a break is due
+    trial,        ///< from the home zone to the answer
+    response,     ///< on record, feedback
+    end,
+  };
+
+  /// All of it must outlive the session.
+  struct Parts {
+    const Protocol& protocol;
+    const StimulusLibrary& library;
+    TickSource& servo;
+    Clock& clock;
+    Respondent& participant;
+    TrialLog& log;
+    SessionEvents* events = nullptr;  ///< may be none
+    /// m; the home zone leaves at least so much room, whichever the stimulus. A person whom the
+    /// screen tells to move away must not learn a shape from where that ends.
+    double least_reach = 0;
+  };
+
+  /// \param plan  already fed with what is on record
+  /// \param stamp  ties the clock to the calendar
+  Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp);
+
+  State state() const { return state_; }
+  const SessionPlan& plan() const { return plan_; }
+  /// Does what the state asks for and moves on. Between any two calls everything that happened is
+  /// on record: whatever is thrown in a trial, forces are zero, the attempt is cut off, and the
+  /// next call shows the trial again. \throws SessionFault; StoreError when a record could not be
+  /// written; what the participant throws, but TrialCutOff.
+  void step();
+
+ private:
+  State before_trial() const;
+  TrialRecord planned_record(const Trial& trial) const;
+  bool run_trial();  ///< false: it was cut off
+  std::optional<Answer> feel_trial(std::uint32_t& faults, DeviceTrouble& trouble);
+  void cut_off(const std::string& reason);
+  void end_rest();
+  void note(const Sample& sample);
+  void keep(const Sample& sample);  ///< among the record's samples
+
+  Parts parts_;
+  SessionPlan plan_;
+  ClockStamp stamp_;
+  State state_ = State::instruction;
+  TrialRecord record_;  ///< of the trial under way
+};
+
+}  // namespace palpate

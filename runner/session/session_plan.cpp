@@ -1,0 +1,49 @@
+#include "runner/session/session_plan.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace palpate {
+
+SessionPlan::SessionPlan(const Protocol& protocol, int participant_number, int session)
+    : protocol_(&protocol), participant_number_(participant_number) {
+  const std::vector<Trial> all = schedule(protocol, participant_number);
+  std::copy_if(all.begin(), all.end(), std::back_inserter(trials_),
+               [session](const Trial& trial) { return trial.session == session; });
+  const bool warms_up = session > 1 && protocol.sessions.warm_up_trials > 0;
+  if (!trials_.empty()) first_practice_block_ = trials_.front().block + (warms_up ? 1 : 0);
+}
+
+bool SessionPlan::block_begins() const {
+  return next_ == 0 || trials_[next_].block != trials_[next_ - 1].block;
+}
+
+void SessionPlan::answered(bool correct) {
+  const Trial& trial = trials_[next_++];
+  if (!trial.practice || trial.block < first_practice_block_) return;
+  ++shown_;
+  correct_ += correct ? 1 : 0;
+  if (finished() || trials_[next_].block != trial.block) judge_practice();
+}
+
+void SessionPlan::judge_practice() {
+  const auto& practice = protocol_->practice;
+  const bool passed = !practice.criterion || correct_ >= *practice.criterion * shown_;
+  correct_ = shown_ = 0;
+  if (passed || round_ >= practice.max_rounds) {
+    round_ = 1;
+    return;
+  }
+  const Trial& last = trials_[next_ - 1];
+  const int session = last.session, block = last.block;
+  std::vector<Trial> again =
+      practice_round(*protocol_, participant_number_, last.renderer, ++round_);
+  for (Trial& trial : again) {
+    trial.session = session;
+    trial.block = block;
+  }
+  trials_.insert(trials_.begin() + static_cast<std::ptrdiff_t>(next_), again.begin(), again.end());
+  for (std::size_t i = 0; i < trials_.size(); ++i) trials_[i].trial = static_cast<int>(i) + 1;
+}
+
+}  // namespace palpate

@@ -1,0 +1,302 @@
+#include "runner/session/simulated_study.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "runner/build_info.h"
+#include "runner/participants/simulated.h"
+#include "runner/session/device_check.h"
+#include "runner/session/protocol_info.h"
+#include "runner/session/session.h"
+
+namespace palpate {
+namespace {
+
+constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
+
+/// One session of one participant, with what the store already holds of it.
+struct Work {
+  Participant participant;
+  int session = 1;
+  std::vector<bool> answers;  ///< correct or not, of the trials on record
+  std::int64_t clock_ns = 0;  ///< where the session's clock stood
+  RunInfo info;
+};
+
+/// From the workers to the thread that owns the store.
+class Queue {
+ public:
+  explicit Queue(std::size_t room) : room_(room) {}
+
+  void push(std::size_t work, const TrialRecord& record) {
+    std::unique_lock lock(mutex_);
+    drained_.wait(lock, [&] { return records_.size() < room_; });
+    records_.emplace_back(work, record);
+    if (records_.size() >= room_) done_.notify_all();
+  }
+  void worker_done(const std::exception_ptr& error) {
+    const std::lock_guard lock(mutex_);
+    ++workers_done_;
+    if (error && !error_) error_ = error;
+    done_.notify_all();
+  }
+  /// Waits for up to 0.2 s, or until the workers are done or held up; takes what has come.
+  std::deque<std::pair<std::size_t, TrialRecord>> take(int workers, bool& all_done) {
+    std::unique_lock lock(mutex_);
+    done_.wait_for(lock, std::chrono::milliseconds(200),
+                   [&] { return workers_done_ == workers || records_.size() >= room_; });
+    all_done = workers_done_ == workers;
+    drained_.notify_all();
+    return std::exchange(records_, {});
+  }
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  const std::size_t room_;
+  std::mutex mutex_;
+  std::condition_variable drained_, done_;
+  std::deque<std::pair<std::size_t, TrialRecord>> records_;
+  int workers_done_ = 0;
+  std::exception_ptr error_;
+};
+
+class QueueLog final : public TrialLog {
+ public:
+  QueueLog(Queue& queue, std::size_t work) : queue_(queue), work_(work) {}
+  int begin(const TrialRecord&, std::int64_t) override { return 1; }
+  void finish(const TrialRecord& record) override { queue_.push(work_, record); }
+  void cut_off(const std::string& reason) override {
+    throw std::logic_error("a simulated trial was cut off: " + reason);
+  }
+
+ private:
+  Queue& queue_;
+  std::size_t work_;
+};
+
+SessionPlan plan_of(const Protocol& protocol, const Work& work) {
+  SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
+  for (const bool correct : work.answers) plan.answered(correct);
+  return plan;
+}
+
+/// What all workers share, read only.
+struct Shared {
+  const Protocol& protocol;
+  const SimulatedSettings& settings;
+  StimulusLibrary library;
+  ShapeHypotheses hypotheses;
+  std::uint64_t seed;
+  const std::atomic<bool>& stop;    ///< asked for from outside
+  std::atomic<bool> failed{false};  ///< a worker or the store threw
+
+  bool halting() const { return stop || failed; }
+};
+
+void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue) {
+  const Protocol& protocol = shared.protocol;
+  const SimulatedSettings own =
+      individual(shared.settings, shared.seed, work.participant.enrolled_number);
+  SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
+                         1 / protocol.servo_rate);
+  VirtualClock clock(work.clock_ns);
+  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{},
+              {protocol.workspace.centre, protocol.workspace.scale});
+  if (protocol.passivity_controller) servo.control_passivity();
+  SimulatedParticipant participant(own, shared.hypotheses, stylus, protocol, shared.seed,
+                                   work.participant.enrolled_number);
+  QueueLog log(queue, index);
+  Session session({protocol, shared.library, servo, clock, participant, log},
+                  plan_of(protocol, work), work.info.clock);
+  // A trial that was shown is recorded, also when it is the last for now.
+  while (session.state() != Session::State::end &&
+         (!shared.halting() || session.state() == Session::State::response)) {
+    session.step();
+  }
+}
+
+std::vector<Work> unfinished_work(const Protocol& protocol, Store& store,
+                                  const SimulatedSettings& settings, const StudyPlan& plan,
+                                  StudyProgress& progress) {
+  std::vector<Work> todo;
+  const ProtocolInfo info = info_of(protocol);
+  for (int number = 1; number <= plan.participants; ++number) {
+    const Participant participant =
+        store.enrol(info, simulated_code(number), number, true, plan.seed);
+    for (int session = 1; session <= protocol.sessions.count; ++session) {
+      Work work;
+      work.participant = participant;
+      work.session = session;
+      const SessionProgress before = store.progress(participant, session);
+      for (const TrialRecord& record : before.completed) work.answers.push_back(record.correct);
+      work.clock_ns = before.latest_ns;
+      const std::int64_t day =
+          (number - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
+      work.info.session = session;
+      work.info.clock = {kFirstMorning_ns + day * kDay_ns, 0};
+      work.info.program_version = PALPATE_VERSION;
+      work.info.build = build_description();
+      work.info.device = "simulated";
+      work.info.response_device = "simulated";
+      work.info.response_latency = 0;
+      work.info.observer_sha256 = settings.sha256;
+      const SessionPlan trials = plan_of(protocol, work);
+      progress.recorded += static_cast<std::int64_t>(trials.done());
+      progress.expected += static_cast<std::int64_t>(trials.size());
+      if (!trials.finished()) todo.push_back(std::move(work));
+    }
+  }
+  return todo;
+}
+
+/// The store's side: begins a run with its first record, ends it when its session is complete.
+class Recorder {
+ public:
+  Recorder(const Protocol& protocol, Store& store, std::vector<Work>& work, std::string event)
+      : store_(store), work_(work), event_(std::move(event)) {
+    for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
+  }
+
+  void record(std::deque<std::pair<std::size_t, TrialRecord>>&& came, StudyProgress& progress) {
+    std::map<std::size_t, std::vector<TrialRecord>> by_work;
+    for (auto& [index, record] : came) by_work[index].push_back(std::move(record));
+    for (auto& [index, records] : by_work) {
+      auto run = runs_.find(index);
+      if (run == runs_.end()) {
+        const RunInfo& info = work_[index].info;
+        run = runs_.emplace(index, store_.begin_run(work_[index].participant, info)).first;
+        if (!event_.empty()) store_.add_note(run->second, info.clock.monotonic_ns, event_);
+      }
+      store_.record_simulated(run->second, records);
+      SessionPlan& plan = plans_[index];
+      for (const TrialRecord& record : records) {
+        const std::size_t size = plan.size();
+        plan.answered(record.correct);
+        progress.expected += static_cast<std::int64_t>(plan.size() - size);
+      }
+      progress.recorded += static_cast<std::int64_t>(records.size());
+      progress.this_run += static_cast<std::int64_t>(records.size());
+      std::int64_t& clock = work_[index].clock_ns;
+      progress.simulated_seconds += static_cast<double>(records.back().response_ns - clock) * 1e-9;
+      clock = records.back().response_ns;
+      if (plan.finished()) {
+        store_.end_run(run->second, RunEnd::done, clock);
+        runs_.erase(run);
+      }
+    }
+  }
+  void pause() {
+    for (const auto& [index, run] : runs_)
+      store_.end_run(run, RunEnd::paused, work_[index].clock_ns);
+    runs_.clear();
+  }
+
+ private:
+  Store& store_;
+  std::vector<Work>& work_;
+  const std::string event_;
+  std::vector<SessionPlan> plans_;
+  std::map<std::size_t, Run> runs_;
+};
+
+std::vector<ObjectSpec> shapes_of(const Protocol& protocol) {
+  std::vector<ObjectSpec> shapes;
+  for (const StimulusSpec& stimulus : protocol.stimuli) shapes.push_back(stimulus.object);
+  return shapes;
+}
+
+}  // namespace
+
+std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+                                           const SimulatedSettings& settings) {
+  SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
+                         protocol.stylus.grip, 1 / protocol.servo_rate);
+  std::vector<std::string> faults = misfits(protocol, library, device.capabilities());
+  bool known = true;
+  for (const StimulusSpec& stimulus : protocol.stimuli) {
+    const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
+    if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
+    known = known && fault.empty();
+  }
+  if (!known) return faults;
+  try {  // settings that were patched
+    const ShapeHypotheses hypotheses(shapes_of(protocol));
+    SimulatedParticipant(individual(settings, 0, 1), hypotheses, device, protocol, 0, 1);
+  } catch (const std::invalid_argument& error) {
+    faults.emplace_back(error.what());
+  }
+  return faults;
+}
+
+std::string simulated_code(int number) {
+  std::string digits = std::to_string(number);
+  return "S" + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+}
+
+StudyProgress simulate_study(const Protocol& protocol, Store& store,
+                             const SimulatedSettings& settings, const StudyPlan& plan,
+                             const std::atomic<bool>& stop,
+                             const std::function<void(const StudyProgress&)>& report) {
+  StimulusLibrary library(protocol);
+  std::string reasons;
+  for (const std::string& fault : simulation_faults(protocol, library, settings)) {
+    reasons += (reasons.empty() ? "" : "\n") + fault;
+  }
+  if (!reasons.empty()) throw std::invalid_argument(reasons);
+  Shared shared{protocol,  settings, std::move(library), ShapeHypotheses(shapes_of(protocol)),
+                plan.seed, stop};
+
+  StudyProgress progress;
+  std::vector<Work> work = unfinished_work(protocol, store, settings, plan, progress);
+  Recorder recorder(protocol, store, work, plan.event);
+  const std::vector<Work> sessions =
+      work;  // the workers' own copy: the recorder moves its clocks on
+  Queue queue(protocol.samples ? 8 : 4096);
+  std::atomic<std::size_t> next{0};
+  const int workers = std::max(1, std::min(plan.jobs, static_cast<int>(work.size())));
+  const auto worker = [&] {
+    std::exception_ptr error;
+    try {
+      for (std::size_t i = next++; i < sessions.size() && !shared.halting(); i = next++) {
+        run_session(shared, sessions[i], i, queue);
+      }
+    } catch (...) {
+      error = std::current_exception();
+      shared.failed = true;
+    }
+    queue.worker_done(error);
+  };
+  std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(workers));
+  for (int i = 0; i < workers; ++i) threads.emplace_back(worker);
+  std::exception_ptr failure;
+  for (bool all_done = false; !all_done;) {
+    auto came = queue.take(workers, all_done);
+    if (failure) continue;  // the workers are finishing their trials; nothing more can be recorded
+    try {
+      recorder.record(std::move(came), progress);
+      if (report) report(progress);
+    } catch (...) {
+      failure = std::current_exception();
+      shared.failed = true;
+    }
+  }
+  threads.clear();
+  if (failure) std::rethrow_exception(failure);
+  recorder.pause();
+  queue.rethrow();
+  return progress;
+}
+
+}  // namespace palpate

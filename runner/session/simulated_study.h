@@ -1,0 +1,50 @@
+#pragma once
+// A whole study with simulated participants, several at a time, through the same session, servo,
+// renderers and store as a live one.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "data/store/store.h"
+#include "protocols/protocol.h"
+#include "runner/participants/simulated_settings.h"
+#include "runner/scene_builder.h"
+
+namespace palpate {
+
+struct StudyPlan {
+  int participants = 7;
+  std::uint64_t seed = 1;  ///< of the participants; the schedule has the protocol's own
+  int jobs = 1;            ///< threads
+  std::string event = {};  ///< for each session's record; empty: none
+};
+
+struct StudyProgress {
+  std::int64_t recorded = 0;     ///< trials in the store, earlier runs included
+  std::int64_t expected = 0;     ///< in all, as far as is known
+  std::int64_t this_run = 0;     ///< recorded since this call
+  double simulated_seconds = 0;  ///< of session time since this call
+};
+
+/// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
+std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+                                           const SimulatedSettings& settings);
+
+/// Runs what has no record yet. The same seed gives the same records whatever the number of jobs
+/// and of interruptions: each trial has a random stream, each session a virtual clock and calendar
+/// of its own, and a trial that was not recorded is run again as if for the first time. \param stop
+/// set from outside (a signal): the trials under way are finished and recorded \param report called
+/// every 0.2 s or so \throws std::invalid_argument where the simulated device or participant cannot
+/// do the protocol; StoreError
+StudyProgress simulate_study(const Protocol& protocol, Store& store,
+                             const SimulatedSettings& settings, const StudyPlan& plan,
+                             const std::atomic<bool>& stop,
+                             const std::function<void(const StudyProgress&)>& report);
+
+/// "S001": the code of simulated participant 1.
+std::string simulated_code(int number);
+
+}  // namespace palpate

@@ -1,0 +1,239 @@
+#include "analysis/statistics/practice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "analysis/input/trial_table_builder.h"
+#include "analysis/report/report_text.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/statistics/speed_accuracy.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+/// A person who does `first` and then the other renderer, a trial after the other, shapes in turn.
+struct Person {
+  std::string name, first;
+  double gain = 0;         ///< log ray - log point
+  double learning = 0;     ///< of log time per 100 trials with a renderer
+  int wrong_with_ray = 0;  ///< of the first trials
+  bool mixed = false;      ///< trials of the two renderers in turn
+};
+
+constexpr int kTrials = 40;  // with each renderer
+
+Analysis analysis_of(const std::vector<Person>& people) {
+  TrialTableBuilder builder;
+  for (const Person& person : people) {
+    for (const std::string renderer : {"point", "ray"}) {
+      for (int i = 0; i < kTrials; ++i) {
+        RawTrial raw;
+        raw.participant = person.name;
+        raw.renderer = renderer;
+        raw.shape = i % 2 == 0 ? "cone" : "cube";
+        raw.trial = person.mixed ? 2 * i + (renderer == person.first ? 0 : 1)
+                                 : i + (renderer == person.first ? 0 : kTrials);
+        raw.response = raw.shape;
+        if (renderer == "ray" && i < person.wrong_with_ray) raw.response = "sphere";
+        raw.correct = raw.response == raw.shape;
+        raw.response_time = std::exp(2 + (renderer == "ray" ? person.gain : 0) +
+                                     (i % 2 == 0 ? 0.5 : 0) + person.learning * i / 100);
+        builder.add(raw);
+      }
+    }
+  }
+  return analyze(builder.finish({}), {}, "test");
+}
+
+TEST(Learning, SlopesAreThoseOfTheTimesWithinShapes) {
+  const Analysis analysis = analysis_of(
+      {{"A", "point", -0.2, -0.3}, {"B", "ray", -0.2, -0.1}, {"C", "point", -0.2, -0.2}});
+  const Practice& practice = analysis.practice;
+  ASSERT_EQ(practice.learning.size(), 2U);
+  for (const Learning& learning : practice.learning) {
+    EXPECT_EQ(learning.n_participants, 3U);
+    EXPECT_NEAR(*learning.mean_slope, -0.2, 1e-12);
+    EXPECT_NEAR(*learning.slope.t, -0.2 / (0.1 / std::sqrt(3.0)), 1e-9);
+    EXPECT_EQ(*learning.slope.df, 2);
+    // Bins: 5 trials each, centred on trial 2 of 39; the mean of all stands at trial 19.5.
+    for (std::size_t b = 0; b < kLearningBins; ++b) {
+      EXPECT_EQ(learning.bins[b].n_participants, 3U);
+      EXPECT_EQ(learning.bins[b].n_trials, 15U);
+    }
+    // Cones stand at even trials, cubes at odd ones: each relative to its own mean trial.
+    const double first = (3 * (2 - 19.0) + 2 * (2 - 20.0)) / 5;
+    const double last = (2 * (37 - 19.0) + 3 * (37 - 20.0)) / 5;
+    EXPECT_NEAR(*learning.bins[7].mean_log - *learning.bins[0].mean_log,
+                -0.2 * (last - first) / 100, 1e-12);
+  }
+  EXPECT_NEAR(*practice.pairs[0].mean_slope_difference, 0, 1e-12);
+  EXPECT_NE(practice.pairs[0].slope_difference.undefined, "");  // all alike
+}
+
+TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
+  const Analysis analysis = analysis_of({{"A", "point", -0.5},
+                                         {"B", "point", -0.3},
+                                         {"C", "ray", 0.1},
+                                         {"D", "ray", 0},
+                                         {"E", "ray", -0.1},
+                                         {"F", "ray", 5, 0, 0, true}});
+  const PairPractice& practice = analysis.practice.pairs[0];
+  EXPECT_EQ(practice.n_interleaved, 1U);
+  std::vector<OrderEffect> effects = practice.shapes;
+  effects.push_back(practice.all_shapes);
+  for (const OrderEffect& effect : effects) {
+    EXPECT_EQ(effect.reference_first.n_participants, 2U);
+    EXPECT_EQ(effect.renderer_first.n_participants, 3U);
+    EXPECT_NEAR(*effect.difference, -0.4, 1e-12);
+    EXPECT_NEAR(*effect.balanced_log_ratio, -0.2, 1e-12);
+    // R: t.test(c(-.5, -.3), c(.1, 0, -.1), var.equal = TRUE)
+    EXPECT_NEAR(*effect.test.t, -3.79473319220206, 1e-10);
+    EXPECT_NEAR(*effect.test.p, 0.0321194160504168, 1e-10);
+    EXPECT_NEAR(effect.test.log_ratio_ci95->low, -0.735459295196136, 1e-10);
+    EXPECT_NEAR(effect.test.log_ratio_ci95->high, -0.0645407048038645, 1e-10);
+    const double half = (-0.0645407048038645 - -0.735459295196136) / 4;
+    EXPECT_NEAR(effect.balanced_ci95->low, -0.2 - half, 1e-10);
+    EXPECT_NEAR(effect.balanced_ci95->high, -0.2 + half, 1e-10);
+  }
+  // One of several tests of practice at 5 %: the warning goes by the adjusted p.
+  EXPECT_EQ(analysis.practice.n_tests, 3U) << "two shapes, all shapes; nobody's slope varies";
+  EXPECT_NEAR(*practice.all_shapes.test.p_holm, 3 * 0.0321194160504168, 1e-10);
+  const auto warned = [](const Analysis& of) {
+    return report_text(of).find("depends on which renderer came first") != std::string::npos;
+  };
+  EXPECT_FALSE(warned(analysis));
+  EXPECT_TRUE(warned(analysis_of({{"A", "point", -0.5},
+                                  {"B", "point", -0.45},
+                                  {"C", "ray", 0.1},
+                                  {"D", "ray", 0},
+                                  {"E", "ray", 0.05}})));
+}
+
+/// Participants who cannot learn, of noise alone.
+Analysis study_without_learning(Random& random) {
+  TrialTableBuilder builder;
+  for (int p = 0; p < 7; ++p) {
+    const std::string name(1, static_cast<char>('A' + p));
+    for (int i = 0; i < 2 * kTrials; ++i) {
+      const bool ray = (i < kTrials) == (p % 2 == 0);
+      RawTrial raw;
+      raw.participant = name;
+      raw.renderer = ray ? "ray" : "point";
+      raw.shape = raw.response = i % 2 == 0 ? "cone" : "cube";
+      raw.trial = i + 1;
+      raw.correct = true;
+      raw.response_time = std::exp(2 + 0.4 * random.normal());
+      builder.add(raw);
+    }
+  }
+  return analyze(builder.finish({}), {}, "test");
+}
+
+TEST(Learning, IsNoVerdictAndPracticeIsOneFamilyOfTests) {
+  for (const std::uint64_t seed : {41, 42}) {
+    Random random(seed);
+    constexpr int kStudies = 400;
+    int any_raw = 0, any_adjusted = 0, warned = 0;
+    for (int i = 0; i < kStudies; ++i) {
+      const Analysis analysis = study_without_learning(random);
+      const Practice& practice = analysis.practice;
+      ASSERT_EQ(practice.n_tests, 6U);  // two slopes, their difference, two shapes, all shapes
+      bool raw = false, adjusted = false;
+      const auto look = [&](const TTest& test) {
+        raw = raw || *test.p < 0.05;
+        adjusted = adjusted || *test.p_holm < 0.05;
+      };
+      for (const Learning& learning : practice.learning) look(learning.slope);
+      look(practice.pairs[0].slope_difference);
+      look(practice.pairs[0].all_shapes.test);
+      for (const OrderEffect& shape : practice.pairs[0].shapes) look(shape.test);
+      any_raw += raw;
+      any_adjusted += adjusted;
+      warned += std::ranges::any_of(analysis.warnings, [](const std::string& warning) {
+        return warning.find("came first") != std::string::npos;
+      });
+      if (i > 3) continue;
+      const std::string text = report_text(analysis);
+      for (const char* verdict : {"faster with practice", "slower with time"}) {
+        EXPECT_EQ(text.find(verdict), std::string::npos);
+      }
+      EXPECT_NE(text.find("of time per 100 trials (95 % interval"), std::string::npos);
+    }
+    EXPECT_GT(any_raw, 0.12 * kStudies) << "unadjusted, they find something again and again";
+    EXPECT_LT(any_adjusted, 0.08 * kStudies);
+    EXPECT_LT(warned, 0.06 * kStudies);
+  }
+}
+
+TEST(Learning, SaysNothingOfFewTrials) {
+  TrialTableBuilder builder;
+  for (const std::string who : {"A", "B", "C"}) {
+    for (const std::string renderer : {"point", "ray"}) {
+      // With the ray one trial too few for a slope.
+      for (std::size_t i = 0; i < kSlopeTrials - (renderer == "ray" ? 1 : 0); ++i) {
+        RawTrial raw;
+        raw.participant = who;
+        raw.renderer = renderer;
+        raw.shape = raw.response = "cone";
+        raw.trial = static_cast<int>(i) + (renderer == "ray" ? 100 : 0);
+        raw.correct = true;
+        raw.response_time = 5 + 0.1 * static_cast<double>(i % 7) + (who == "A" ? 1 : 0);
+        builder.add(raw);
+      }
+    }
+  }
+  const Analysis analysis = analyze(builder.finish({}), {}, "test");
+  EXPECT_TRUE(analysis.practice.learning[0].mean_slope.has_value());
+  EXPECT_FALSE(analysis.practice.learning[1].mean_slope.has_value());
+  EXPECT_EQ(
+      analysis.practice.learning[1].slope.undefined,
+      "every participant has fewer than 32 times or no shape twice with it: too few for a slope");
+  EXPECT_FALSE(analysis.practice.pairs[0].mean_slope_difference.has_value());
+}
+
+TEST(RendererOrder, SaysWhyItCannotBeTold) {
+  const auto undefined = [](const std::vector<Person>& people) {
+    return analysis_of(people).practice.pairs[0].all_shapes.test.undefined;
+  };
+  EXPECT_EQ(undefined({{"A", "point", 0.1}, {"B", "point", 0.2}}),
+            "all participants had the point first");
+  EXPECT_EQ(undefined({{"A", "ray", 0.1}}), "all participants had the ray first");
+  EXPECT_EQ(undefined({{"A", "ray", 0.1, 0, 0, true}}),
+            "no participant did one renderer after the other");
+  EXPECT_EQ(undefined({{"A", "ray", 0.1}, {"B", "point", 0.2}}),
+            "one participant in each order cannot tell chance from effect");
+  EXPECT_EQ(undefined({{"A", "ray", 0.1}, {"B", "point", 0.2}, {"C", "ray", 0.1}}),
+            "no variance: all differences are alike");
+  EXPECT_NE(report_text(analysis_of({{"A", "ray", 0.1}, {"B", "ray", 0.2}}))
+                .find("All participants had the ray first"),
+            std::string::npos);
+}
+
+TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
+  const Analysis bought = analysis_of(
+      {{"A", "point", -0.3, 0, 4}, {"B", "ray", -0.2, 0, 8}, {"C", "ray", -0.1, 0, 12}});
+  for (const SpeedAccuracy& shape : bought.comparisons[0].speed_accuracy) {
+    EXPECT_EQ(shape.reading, "trade-off possible");
+    EXPECT_NEAR(*shape.percent_change_time, 100 * std::expm1(-0.2), 1e-9);
+    EXPECT_NEAR(*shape.accuracy_reference, 1, 1e-15);
+    EXPECT_NEAR(*shape.accuracy_renderer, 0.8, 1e-15);
+    EXPECT_NEAR(*shape.accuracy_change, -0.2, 1e-15);
+    EXPECT_NEAR(*shape.test.t, -0.2 / (0.1 / std::sqrt(3.0)), 1e-9);
+    EXPECT_EQ(shape.n_pairs, 3U);
+  }
+  const Analysis slower = analysis_of({{"A", "point", 0.3, 0, 4}, {"B", "ray", 0.2, 0, 8}});
+  EXPECT_EQ(slower.comparisons[0].speed_accuracy[0].reading, "no trade-off");
+  const Analysis clean = analysis_of({{"A", "point", -0.3}, {"B", "ray", -0.2}});
+  EXPECT_EQ(clean.comparisons[0].speed_accuracy[0].reading, "no trade-off");
+  EXPECT_NE(clean.comparisons[0].speed_accuracy[0].test.undefined, "");
+  const Analysis none = analysis_of({{"A", "point", -0.3, 0, kTrials}});
+  EXPECT_EQ(none.comparisons[0].speed_accuracy[0].reading, "");
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,240 @@
+#include "data/store/samples_codec.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "data/store/store.h"
+#include "tests/shared/peak_memory.h"
+
+namespace palpate {
+namespace {
+
+std::vector<std::uint64_t> bits_of(const SampleRecord& sample) {
+  std::vector<std::uint64_t> bits{sample.tick,
+                                  static_cast<std::uint64_t>(sample.period_ns),
+                                  static_cast<std::uint64_t>(sample.lateness_ns),
+                                  static_cast<std::uint64_t>(sample.compute_ns),
+                                  sample.contacts,
+                                  sample.contact_type,
+                                  sample.buttons,
+                                  sample.faults,
+                                  std::bit_cast<std::uint64_t>(sample.depth)};
+  for (const auto& vector :
+       {sample.tip, sample.tail, sample.force, sample.torque, sample.device1, sample.device2}) {
+    for (const double x : vector) bits.push_back(std::bit_cast<std::uint64_t>(x));
+  }
+  return bits;
+}
+
+void expect_same_bits(const std::vector<SampleRecord>& samples) {
+  const std::string packed = pack_samples(samples);
+  const auto back =
+      unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(samples.size()));
+  ASSERT_EQ(back.size(), samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    ASSERT_EQ(bits_of(back[i]), bits_of(samples[i])) << "sample " << i;
+  }
+}
+
+/// A stroke over an object, sampled at 1 kHz with sensor noise.
+std::vector<SampleRecord> a_stroke(int ticks) {
+  std::mt19937 noise(7);
+  std::vector<SampleRecord> samples(static_cast<std::size_t>(ticks));
+  for (int t = 0; t < ticks; ++t) {
+    auto& s = samples[static_cast<std::size_t>(t)];
+    s.tick = static_cast<std::uint32_t>(t);
+    s.period_ns = 1'000'000 + static_cast<std::int64_t>(noise() % 1000);
+    const auto jitter = [&] { return 1e-6 * static_cast<double>(noise() % 100); };
+    s.tip = {0.03 * std::sin(t * 1e-3) + jitter(), 0.02 * std::cos(t * 2e-3) + jitter(),
+             0.03 + jitter()};
+    s.tail = {s.tip[0], s.tip[1] + jitter(), s.tip[2] + 0.12};
+    s.depth = t % 2000 < 1000 ? 1e-3 * std::abs(std::sin(t * 3e-3)) : 0;
+    s.force = s.device1 = {0, 0, 800 * s.depth};
+    s.lateness_ns = static_cast<std::int64_t>(noise() % 50'000);
+    s.compute_ns = 1000 + static_cast<std::int64_t>(noise() % 1000);
+    s.contacts = s.depth > 0;
+  }
+  return samples;
+}
+
+TEST(SamplesCodec, EveryBitPatternComesBack) {
+  std::mt19937_64 random(1);
+  std::vector<SampleRecord> samples(257);
+  for (auto& s : samples) {
+    s.tick = static_cast<std::uint32_t>(random());
+    s.period_ns = static_cast<std::int64_t>(random());
+    s.lateness_ns = static_cast<std::int64_t>(random());
+    s.compute_ns = static_cast<std::int64_t>(random());
+    for (auto* vector : {&s.tip, &s.tail, &s.force, &s.torque, &s.device1, &s.device2}) {
+      for (double& x : *vector) x = std::bit_cast<double>(random());
+    }
+    s.depth = std::bit_cast<double>(random());
+    s.contacts = static_cast<std::uint8_t>(random());
+    s.contact_type = static_cast<std::uint8_t>(random());
+    s.buttons = static_cast<std::uint8_t>(random());
+    s.faults = static_cast<std::uint32_t>(random());
+  }
+  using Limits = std::numeric_limits<double>;
+  samples[3].tip = {Limits::quiet_NaN(), std::bit_cast<double>(0x7FF0000000000001u), -0.0};
+  samples[4].force = {Limits::infinity(), -Limits::infinity(), Limits::denorm_min()};
+  samples[5].depth = std::bit_cast<double>(0xFFFFFFFFFFFFFFFFu);
+  expect_same_bits(samples);
+}
+
+TEST(SamplesCodec, NoneOneAndManyComeBack) {
+  expect_same_bits({});
+  expect_same_bits(a_stroke(1));
+  expect_same_bits(a_stroke(10'000));
+}
+
+TEST(SamplesCodec, AStrokeWithNoiseTakesLessThanHalf) {
+  const auto samples = a_stroke(10'000);
+  EXPECT_LT(pack_samples(samples).size(), samples.size() * 94);  // 187 bytes each before
+}
+
+TEST(SamplesCodec, TheFirstPackingIsReadWithoutPeriods) {
+  // Two samples of packing 1, made by the program that wrote it.
+  const unsigned char packed[] = {
+      0x78, 0x5e, 0x63, 0x60, 0x00, 0x03, 0x46, 0x7b, 0x86, 0x16, 0x86, 0x2a, 0x86, 0x87, 0x0c,
+      0xee, 0x0c, 0xeb, 0x18, 0x44, 0x18, 0xaa, 0x19, 0xf6, 0x33, 0x4c, 0x41, 0xe1, 0xdb, 0x33,
+      0xcc, 0x63, 0xd8, 0xc1, 0x10, 0xc8, 0xf0, 0x9a, 0xa1, 0x95, 0x41, 0x0e, 0xc8, 0xa2, 0x18,
+      0x34, 0xa0, 0x99, 0x60, 0xcf, 0xf0, 0x92, 0x61, 0x26, 0x1c, 0xce, 0x22, 0xd9, 0x7c, 0x7b,
+      0x86, 0x00, 0x86, 0x24, 0x06, 0x5f, 0x86, 0x4b, 0x0c, 0x1f, 0x19, 0x56, 0x32, 0xfc, 0x61,
+      0x60, 0x04, 0x42, 0x06, 0x06, 0x01, 0x00, 0xf9, 0x68, 0x15, 0xf9};
+  const auto back = unpack_samples(packed, sizeof packed, 2, 1);
+  ASSERT_EQ(back.size(), 2u);
+  EXPECT_EQ(back[0].tick, 0u);
+  EXPECT_EQ(back[1].tick, 1u);
+  EXPECT_EQ(back[1].period_ns, 0);
+  EXPECT_EQ(back[0].tip, (std::array<double, 3>{0.01, -0.02, 0.03}));
+  EXPECT_EQ(back[1].force, (std::array<double, 3>{0, -0.0, 0.8}));
+  EXPECT_EQ(back[1].depth, 0.001);
+  EXPECT_EQ(back[1].faults, 16u);
+  EXPECT_THROW(unpack_samples(packed, sizeof packed, 2, 2), StoreError);
+}
+
+TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
+  // Two samples of packing 2, made from its description by another program.
+  const unsigned char packed[] = {
+      0x78, 0x5e, 0x63, 0x60, 0x00, 0x03, 0x46, 0x08, 0x05, 0x02, 0xfc, 0x0c, 0x4e, 0x8c, 0x0e,
+      0x5f, 0xec, 0x19, 0x5a, 0x18, 0xaa, 0x18, 0x1e, 0x32, 0xb8, 0x33, 0xac, 0x63, 0x10, 0x61,
+      0xa8, 0x66, 0xd8, 0xcf, 0x30, 0x05, 0x85, 0x6f, 0xcf, 0x30, 0x8f, 0x71, 0x07, 0x5b, 0xa0,
+      0xca, 0xeb, 0xbb, 0xad, 0xfa, 0x72, 0x52, 0x3b, 0x16, 0x10, 0x56, 0x7f, 0x98, 0xc1, 0x58,
+      0xc1, 0xf8, 0x88, 0xf1, 0x6c, 0xe3, 0xa5, 0xc6, 0x8f, 0x8d, 0x43, 0x10, 0xf6, 0x41, 0x59,
+      0x0d, 0x68, 0x22, 0xf6, 0x0c, 0x2f, 0x19, 0x66, 0xc2, 0xe1, 0x2c, 0x0c, 0xf5, 0x84, 0x04,
+      0xec, 0x19, 0x02, 0x18, 0x92, 0x18, 0x7c, 0x19, 0x2e, 0x31, 0x7c, 0x64, 0x58, 0xc9, 0xf0,
+      0x07, 0xe8, 0x43, 0x46, 0x06, 0x16, 0x06, 0x01, 0x00, 0x08, 0x90, 0x26, 0xd7};
+  const auto back = unpack_samples(packed, sizeof packed, 2, 2);
+  ASSERT_EQ(back.size(), 2u);
+  EXPECT_EQ(back[1].tick, 1u);
+  EXPECT_EQ(back[1].period_ns, 1'000'500);
+  EXPECT_EQ(back[1].lateness_ns, 0);
+  EXPECT_EQ(back[1].tail, (std::array<double, 3>{0.01, -0.02, 0.151}));
+  EXPECT_EQ(back[1].force, (std::array<double, 3>{0, -0.0, 0.8}));
+  EXPECT_EQ(back[1].device1, (std::array<double, 3>{}));
+  EXPECT_EQ(back[1].depth, 0.001);
+  EXPECT_EQ(back[1].buttons, 4);
+  EXPECT_EQ(back[1].faults, 16u);
+  EXPECT_THROW(unpack_samples(packed, sizeof packed, 2, 3), StoreError);
+}
+
+TEST(SamplesCodec, AnAbsurdCountIsRefusedBeforeMemoryIsAskedFor) {
+  const std::string packed = pack_samples(a_stroke(10));
+  EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 99'999'999), StoreError);
+  const std::vector<SampleRecord> still(200'000);  // as small as samples get
+  expect_same_bits(still);
+}
+
+/// A blob of the third packing, whole and in order, of samples that are all zero.
+std::string a_bomb(std::size_t count) {
+  std::string packed(count, '\0');
+  const std::vector<unsigned char> zeros(count);
+  z_stream stream{};
+  deflateInit(&stream, 6);
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  uLong crc = crc32_z(0, nullptr, 0);
+  constexpr int kBytesASample = 187;  // as data/store/samples_codec.h has it
+  for (int i = 0; i < kBytesASample; ++i) {
+    stream.next_in = const_cast<Bytef*>(zeros.data());
+    stream.avail_in = static_cast<uInt>(count);
+    crc = crc32_z(crc, zeros.data(), count);
+    deflate(&stream, i + 1 == kBytesASample ? Z_FINISH : Z_NO_FLUSH);
+  }
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+  return packed;
+}
+
+TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
+  const auto peak = [](const std::string& packed, std::size_t count, bool good) {
+    return peak_memory([&] {
+      try {
+        const auto samples =
+            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count));
+        if (!good || samples.size() != count) _exit(2);
+      } catch (const StoreError&) {
+        if (good) _exit(2);
+      }
+    });
+  };
+  constexpr std::size_t kRecord = sizeof(SampleRecord);
+  const std::string stroke = pack_samples(a_stroke(100'000));
+  const auto whole = peak(stroke, 100'000, true);
+  ASSERT_TRUE(whole);
+  EXPECT_LT(*whole, 100'000 * (kRecord + 8) + (4U << 20U));  // no copy besides
+  // 180 kB that unpack to a million samples, 187 MB; in memory they would take more.
+  const std::string bomb = a_bomb(1'000'000);
+  EXPECT_LT(bomb.size(), 500'000U);
+  const auto refused = peak(bomb, 1'000'000, false);
+  ASSERT_TRUE(refused);
+  EXPECT_LT(*refused, 4U << 20U);
+  // As many as are let through whatever their bytes.
+  const auto most = peak(a_bomb(400'000), 400'000, true);
+  ASSERT_TRUE(most);
+  EXPECT_LT(*most, 100U << 20U);
+}
+
+TEST(SamplesCodec, ALongStandstillIsStoredSoThatItIsReadAgain) {
+  constexpr std::size_t kTicks = 450'000;
+  const std::string packed = pack_samples(std::vector<SampleRecord>(kTicks));
+  const auto back = unpack_samples(packed.data(), packed.size(), kTicks);
+  ASSERT_EQ(back.size(), kTicks);
+  EXPECT_EQ(bits_of(back.back()), bits_of(SampleRecord{}));
+}
+
+TEST(SamplesCodec, DamageIsRefused) {
+  const auto samples = a_stroke(100);
+  const std::string packed = pack_samples(samples);
+  const auto unpack = [](const std::string& bytes, std::int64_t count) {
+    return unpack_samples(bytes.data(), bytes.size(), count);
+  };
+  EXPECT_THROW(unpack(packed.substr(0, packed.size() - 1), 100), StoreError);
+  EXPECT_THROW(unpack(packed + "x", 100), StoreError);
+  EXPECT_THROW(unpack(packed, 99), StoreError);
+  EXPECT_THROW(unpack(packed, 101), StoreError);
+  EXPECT_THROW(unpack(packed, -1), StoreError);
+  EXPECT_THROW(unpack(packed, std::numeric_limits<std::int64_t>::max()), StoreError);
+  EXPECT_THROW(unpack("", 1), StoreError);
+  for (std::size_t i = 0; i < packed.size(); ++i) {
+    std::string damaged = packed;
+    damaged[i] = static_cast<char>(damaged[i] ^ 0x10);
+    try {
+      const auto back = unpack(damaged, 100);
+      // A bit that zlib does not use (in its header) changes nothing.
+      for (std::size_t k = 0; k < back.size(); ++k)
+        ASSERT_EQ(bits_of(back[k]), bits_of(samples[k]));
+    } catch (const StoreError&) {
+      continue;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <SQLiteCpp/Database.h>
+
+#include "data/store/seal_writer.h"
+
+namespace palpate::testing {
+
+/// As somebody who deceives would: every seal is made anew over what the rows say now.
+inline void seal_again(SQLite::Database& db) {
+  db.exec(
+      "UPDATE runs SET link = NULL, seal = NULL, end_link = NULL, end_seal = NULL;"
+      "UPDATE notes SET link = NULL, seal = NULL;"
+      "UPDATE attempts SET link = NULL, seal = NULL, samples_sha256 = NULL;");
+  SealWriter(db).all_as_found();
+}
+
+}  // namespace palpate::testing

@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "rendering/accuracy/study.h"
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+TEST(AccuracyStudy, CountsTrianglesAsTheMeshesHaveThem) {
+  for (const ShapeKind shape :
+       {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder, ShapeKind::cube}) {
+    int last = 0;
+    for (const ObjectSpec& spec : tessellations(shape, 5000)) {
+      int triangles = 0;
+      for (const auto& face : polygons_of(spec).faces)
+        triangles += static_cast<int>(face.size()) - 2;
+      EXPECT_EQ(triangles_of(spec), triangles);
+      EXPECT_GT(triangles, last);
+      EXPECT_LE(triangles, 5000);
+      last = triangles;
+    }
+    EXPECT_GT(last, shape == ShapeKind::cube ? 0 : 900);
+  }
+}
+
+AccuracySettings tiny() {
+  AccuracySettings settings;
+  settings.paths = 1;
+  settings.contact_ticks = 60;
+  settings.most_triangles = 80;
+  settings.timings = 1;
+  settings.visits = 2000;
+  return settings;
+}
+
+TEST(AccuracyStudy, MeasuresEveryMethodOnEveryTessellationWithBothProbes) {
+  double time = 0, share = -1;
+  const auto rows = accuracy_study(
+      tiny(), [&] { return time += 1000; },
+      [&](double done) {
+        EXPECT_GE(done, share);
+        share = done;
+      });
+  EXPECT_EQ(share, 1);
+  std::set<std::string> seen;
+  for (const AccuracyRow& row : rows) {
+    EXPECT_TRUE(
+        seen.insert(row.shape + std::to_string(row.triangles) + row.probe + row.method).second);
+    EXPECT_GT(row.shape_errors.ticks, 0u);
+    EXPECT_GT(row.polyhedron_errors.ticks, 0u);
+    EXPECT_LE(row.polyhedron_errors.ticks, row.shape_errors.ticks);
+    // One look at the clock before and one after: 1000 ns over the ticks between.
+    EXPECT_DOUBLE_EQ(row.ns_per_tick, 1000.0 / static_cast<double>(row.shape_errors.ticks));
+  }
+  // 2 spheres, 3 cones, 2 cylinders, 1 cube.
+  EXPECT_EQ(rows.size(), 8 * 2 * accuracy_methods().size());
+}
+
+TEST(AccuracyStudy, EveryNthTickGivesTheSameAnswersThere) {
+  AccuracySettings all = tiny(), some = tiny();
+  all.visits = 1e9;
+  const auto clock = [] { return 0.0; };
+  const auto a = accuracy_study(all, clock, [](double) {});
+  const auto b = accuracy_study(some, clock, [](double) {});
+  ASSERT_EQ(a.size(), b.size());
+  bool fewer = false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    fewer |= b[i].polyhedron_errors.ticks < a[i].polyhedron_errors.ticks;
+    EXPECT_LE(b[i].polyhedron_errors.depth.worst, a[i].polyhedron_errors.depth.worst + 1e-15);
+  }
+  EXPECT_TRUE(fewer);
+}
+
+AccuracyRow row(int triangles, const char* probe, double depth, double normal, std::size_t lost) {
+  AccuracyRow r;
+  r.shape = "sphere";
+  r.triangles = triangles;
+  r.probe = probe;
+  r.method = "tick";
+  r.shape_errors.depth.p999 = depth;
+  r.shape_errors.normal.p999 = normal;
+  r.shape_errors.lost = lost;
+  return r;
+}
+
+TEST(AccuracyStudy, ChoosesTheCoarsestThatIsGoodEnoughForBothProbes) {
+  std::vector<AccuracyRow> rows;
+  for (const char* probe : {"ray", "point"}) {
+    rows.push_back(row(20, probe, 2e-3, 0.5, 0));
+    rows.push_back(row(80, probe, 5e-4, 0.1, probe[0] == 'p' ? 1 : 0));
+    rows.push_back(row(320, probe, 1e-4, probe[0] == 'p' ? 0.15 : 0.05, 0));
+    rows.push_back(row(1280, probe, 1e-5, 0.01, 0));
+  }
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.2}), 320);    // 80 loses a contact
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.12}), 1280);  // the point's direction
+  EXPECT_EQ(triangles_for(rows, "sphere", {3e-5, kNoDemand}), 1280);
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-6, kNoDemand}), 0);
+  EXPECT_EQ(triangles_for(rows, "cube", {1, 1}), 0);
+  // A finer one that fails: chance, so the coarser does not count either.
+  rows.push_back(row(5120, "ray", 2e-3, 0.01, 0));
+  rows.push_back(row(20480, "ray", 1e-6, 0.001, 0));
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.2}), 20480);
+  // Other methods do not decide.
+  rows.push_back(row(81920, "ray", 1, 1, 5));
+  rows.back().method = "bullet";
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.2}), 20480);
+}
+
+}  // namespace
+}  // namespace palpate

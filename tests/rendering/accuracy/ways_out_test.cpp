@@ -1,0 +1,217 @@
+// The exact ways out, against dense sampling of directions, small changes of direction, the
+// distances of stimuli/signed_distance and the brute-force reference.
+
+#include "rendering/accuracy/ways_out.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "rendering/verification/reference.h"
+#include "stimuli/primitives.h"
+#include "stimuli/signed_distance.h"
+#include "tests/shared/probe_paths.h"
+
+namespace palpate {
+namespace {
+
+using testing::probe_at;
+using testing::random_direction;
+using testing::uniform;
+
+constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
+                                 ShapeKind::cube};
+
+ObjectSpec primitive(ShapeKind shape) {
+  ObjectSpec spec;
+  spec.shape = shape;
+  return spec;
+}
+
+/// Random poses that overlap the shape, tips and sides, also shallow ones.
+std::vector<LineProbe> inside_poses(const ObjectSpec& spec, int count, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<LineProbe> poses;
+  while (static_cast<int>(poses.size()) < count) {
+    const double length = poses.size() % 4 == 0 ? 0 : uniform(random, 0.01, 0.15);
+    const LineProbe probe = probe_at(uniform(random, 0, 0.045) * random_direction(random),
+                                     random_direction(random), length, random.unit());
+    if (!ways_out(spec, probe).empty()) poses.push_back(probe);
+  }
+  return poses;
+}
+
+/// Evenly spread directions (a Fibonacci lattice).
+std::vector<Vec3> directions(int count) {
+  std::vector<Vec3> all;
+  for (int i = 0; i < count; ++i) {
+    const double z = 1 - (2 * i + 1.0) / count, out = std::sqrt(1 - z * z);
+    const double turn = 2 * std::numbers::pi * i / std::numbers::phi;
+    all.emplace_back(out * std::cos(turn), out * std::sin(turn), z);
+  }
+  return all;
+}
+
+TEST(WaysOut, NoDirectionIsShorterThanTheLeast) {
+  const auto sample = directions(4000);
+  for (const ShapeKind shape : kShapes) {
+    const ObjectSpec spec = primitive(shape);
+    for (const LineProbe& probe : inside_poses(spec, 200, 1)) {
+      double sampled = 1;
+      for (const Vec3& n : sample) sampled = std::min(sampled, depth_along(spec, probe, n));
+      EXPECT_LE(ways_out(spec, probe).front().depth, sampled + 1e-15) << static_cast<int>(shape);
+    }
+  }
+}
+
+TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
+  Random random(2);
+  for (const ShapeKind shape : kShapes) {
+    const ObjectSpec spec = primitive(shape);
+    for (const LineProbe& probe : inside_poses(spec, 200, 3)) {
+      for (const WayOut& way : ways_out(spec, probe)) {
+        EXPECT_NEAR(glm::length(way.normal), 1, 1e-14);
+        EXPECT_NEAR(depth_along(spec, probe, way.normal), way.depth, 1e-14);
+        for (const double step : {1e-3, 1e-5}) {
+          for (int i = 0; i < 20; ++i) {
+            const Vec3 n = glm::normalize(way.normal + step * random_direction(random));
+            EXPECT_GE(depth_along(spec, probe, n), way.depth - 1e-15)
+                << static_cast<int>(shape) << " step " << step;
+          }
+        }
+        // The contact is on the surface: on the plane, and not outside along any other direction.
+        const Vec3 touch =
+            probe.tip + way.place * (probe.tail - probe.tip) + way.depth * way.normal;
+        EXPECT_NEAR(signed_distance(spec, touch).distance, 0, 1e-13) << static_cast<int>(shape);
+      }
+    }
+  }
+}
+
+TEST(WaysOut, AreThoseOfAFinePolyhedron) {
+  // Each has its like among the polyhedron's, both ways round, but for a few that are about to be
+  // born or to vanish.
+  for (const ShapeKind shape : kShapes) {
+    ObjectSpec spec = primitive(shape);
+    spec.subdivisions = 4;
+    spec.segments = 720;
+    const ConvexMesh mesh(polygons_of(spec));
+    int all = 0, made_up = 0, missing = 0;
+    const auto alone = [](const WayOut& way, const std::vector<WayOut>& others) {
+      for (const WayOut& other : others) {
+        if (glm::dot(way.normal, other.normal) > std::cos(0.05) &&
+            std::abs(way.depth - other.depth) < 1e-4) {
+          return 0;
+        }
+      }
+      return 1;
+    };
+    for (const LineProbe& probe : inside_poses(spec, 300, 5)) {
+      if (reference_depth(mesh, probe).depth < 1e-3) continue;
+      const auto analytic = ways_out(spec, probe);
+      const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+      for (const WayOut& way : analytic) made_up += alone(way, polyhedral);
+      // Near the middle a fine polyhedron has a way out through every other facet.
+      for (const WayOut& way : polyhedral) missing += way.depth < 5e-3 ? alone(way, analytic) : 0;
+      all += static_cast<int>(analytic.size());
+    }
+    EXPECT_LE(made_up, all / 50) << static_cast<int>(shape) << " of " << all;
+    EXPECT_LE(missing, all / 50) << static_cast<int>(shape) << " of " << all;
+  }
+}
+
+TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
+  Random random(6);
+  for (const ShapeKind shape : kShapes) {
+    const ObjectSpec spec = primitive(shape);
+    for (int i = 0; i < 500; ++i) {
+      const Vec3 p = uniform(random, 0, 0.06) * random_direction(random);
+      const SurfaceDistance distance = signed_distance(spec, p);
+      const auto ways = ways_out(spec, {p, p});
+      ASSERT_EQ(ways.empty(), distance.distance > 0);
+      if (ways.empty()) continue;
+      EXPECT_NEAR(ways.front().depth, -distance.distance, 1e-15);
+      EXPECT_NEAR(glm::dot(ways.front().normal, distance.normal), 1, 1e-12);
+    }
+  }
+}
+
+TEST(WaysOut, SegmentsThatStayOutHaveNone) {
+  // The reference on a fine mesh inside of the shape says who overlaps for certain.
+  Random random(7);
+  for (const ShapeKind shape : kShapes) {
+    ObjectSpec spec = primitive(shape);
+    spec.subdivisions = 4;
+    spec.segments = 500;
+    const ConvexMesh mesh(polygons_of(spec));
+    int out = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const LineProbe probe = probe_at(uniform(random, 0, 0.09) * random_direction(random),
+                                       random_direction(random), 0.1, random.unit());
+      const bool inside = !ways_out(spec, probe).empty();
+      const double depth = reference_depth(mesh, probe).depth;
+      if (depth > 0) {
+        EXPECT_TRUE(inside);
+      }
+      // Between mesh and shape there are at most 0.02 mm.
+      if (inside && ways_out(spec, probe).front().depth > 5e-5) {
+        EXPECT_GT(depth, 0);
+      }
+      out += inside ? 0 : 1;
+    }
+    EXPECT_GT(out, 200);
+  }
+}
+
+TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
+  Random random(8);
+  for (const ShapeKind shape : kShapes) {
+    ObjectSpec spec = primitive(shape);
+    spec.subdivisions = 2;
+    spec.segments = 12;
+    const ConvexMesh mesh(polygons_of(spec));
+    for (const LineProbe& probe : inside_poses(spec, 300, 9)) {
+      const ReferenceDepth reference = reference_depth(mesh, probe);
+      if (reference.depth <= 0) continue;
+      const auto all = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+      ASSERT_FALSE(all.empty());
+      EXPECT_NEAR(all.front().depth, reference.depth, 1e-16);
+      const auto near = ways_out(mesh, probe, reference.normal, 0.1);
+      ASSERT_FALSE(near.empty());
+      EXPECT_NEAR(glm::dot(near.front().normal, reference.normal), 1, 1e-12);
+      for (const WayOut& way : all) {
+        // Moved out it touches: it neither penetrates nor floats.
+        const LineProbe ideal = testing::moved(probe, way.depth * way.normal);
+        EXPECT_LE(reference_depth(mesh, ideal).depth, 1e-14);
+        EXPECT_LE(reference_gap(mesh, ideal), 1e-14);
+        const Vec3 touch = ideal.tip + way.place * (ideal.tail - ideal.tip);
+        EXPECT_LE(reference_gap(mesh, {touch, touch}), 1e-13);
+      }
+    }
+  }
+}
+
+TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
+  const ObjectSpec spec = primitive(ShapeKind::cube);
+  const ConvexMesh mesh(polygons_of(spec));
+  for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
+    const auto analytic = ways_out(spec, probe);
+    const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+    ASSERT_EQ(analytic.size(), polyhedral.size());
+    for (std::size_t i = 0; i < analytic.size(); ++i) {
+      EXPECT_NEAR(analytic[i].depth, polyhedral[i].depth, 1e-16);
+      EXPECT_NEAR(analytic[i].place, polyhedral[i].place, 1e-12);
+      EXPECT_NEAR(analytic[i].flat_angle, polyhedral[i].flat_angle, 1e-9);
+    }
+  }
+}
+
+TEST(WaysOut, RefusesWhatIsNoPrimitive) {
+  EXPECT_THROW(ways_out(primitive(ShapeKind::mesh), LineProbe()), std::invalid_argument);
+  EXPECT_THROW(ways_out(primitive(ShapeKind::compound), LineProbe()), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace palpate

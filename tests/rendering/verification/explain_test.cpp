@@ -1,0 +1,163 @@
+// What explain() says follows the scene as it was compiled: each feature changes its line alone.
+
+#include "rendering/verification/explain.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "stimuli/primitives.h"
+
+namespace palpate {
+namespace {
+
+SceneObject sphere(int subdivisions, int object = 0, const Vec3& position = Vec3(0)) {
+  SceneObject made;
+  made.mesh = std::make_shared<const ConvexMesh>(icosphere(0.03, subdivisions));
+  made.pose.position = position;
+  made.object = object;
+  return made;
+}
+
+Scene scene_of(std::vector<SceneObject> objects, const Renderer& renderer) {
+  return Scene(std::move(objects), renderer.side_contact());
+}
+
+/// Counts apart, which follow every change of the scene.
+std::string without_digits(std::string text) {
+  std::erase_if(text, [](char c) { return c >= '0' && c <= '9'; });
+  return text;
+}
+
+using Names = std::vector<std::string>;
+
+/// The names of the lines that differ between two scenes.
+Names changed(const std::vector<Stage>& a, const std::vector<Stage>& b) {
+  Names names;
+  EXPECT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].name, b[i].name);
+    EXPECT_FALSE(a[i].why.empty());
+    const bool same_text = without_digits(a[i].why) == without_digits(b[i].why);
+    EXPECT_TRUE(same_text || a[i].runs != b[i].runs) << a[i].name << ": " << b[i].why;
+    if (!same_text || a[i].runs != b[i].runs) names.push_back(a[i].name);
+  }
+  return names;
+}
+
+Names changed_by_mesh(const PolygonSoup& from, const PolygonSoup& to, const Renderer& renderer) {
+  const auto lines = [&](const PolygonSoup& soup) {
+    SceneObject object;
+    object.mesh = std::make_shared<const ConvexMesh>(soup);
+    return explain(scene_of({object}, renderer), renderer);
+  };
+  return changed(lines(from), lines(to));
+}
+
+Names changed_by_material(const Material& material, const Renderer& renderer) {
+  SceneObject plain = sphere(1), other = plain;
+  other.material = material;
+  return changed(explain(scene_of({plain}, renderer), renderer),
+                 explain(scene_of({other}, renderer), renderer));
+}
+
+class Explain : public ::testing::TestWithParam<const Renderer*> {};
+
+TEST_P(Explain, EachMaterialPropertyIsALineOfItsOwn) {
+  const Renderer& renderer = *GetParam();
+  Material damped, rough, layered, soft;
+  damped.damping = 2;
+  rough.friction_static = rough.friction_dynamic = 0.4;
+  layered.layers = {{0.001, 200}};
+  soft.stiffness = 100;
+  EXPECT_EQ(changed_by_material(damped, renderer), Names{"damping"});
+  EXPECT_EQ(changed_by_material(rough, renderer), Names{"friction"});
+  EXPECT_EQ(changed_by_material(layered, renderer), Names{"layers"});
+  EXPECT_EQ(changed_by_material(soft, renderer), Names{});
+}
+
+TEST_P(Explain, SeveralPartsAndCompoundsAndFarObjects) {
+  const Renderer& renderer = *GetParam();
+  const SceneObject here = sphere(1);
+  const auto with = [&](int object, double x) {
+    SceneObject there = here;
+    there.object = object;
+    there.pose.position.x = x;
+    return explain(scene_of({here, there}, renderer), renderer);
+  };
+  const auto one = explain(scene_of({here}, renderer), renderer);
+  EXPECT_EQ(changed(one, with(1, 0.05)), Names{"several parts"});
+  EXPECT_EQ(changed(with(1, 0.05), with(0, 0.05)), Names{"parts of one object"});
+  const auto near = with(1, 0.05), far = with(1, 5);
+  ASSERT_EQ(near.size(), far.size());
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    EXPECT_EQ(near[i].runs, far[i].runs);
+    EXPECT_EQ(near[i].why == far[i].why, near[i].name != "objects out of reach") << far[i].why;
+  }
+}
+
+TEST_P(Explain, TreesFollowTheMesh) {
+  const Renderer& renderer = *GetParam();
+  const bool sides = renderer.side_contact();
+  // 22 facets and 60 edges; 32 and 90; 72 and 210.
+  const PolygonSoup few = cylinder(0.03, 0.06, 20), some = cylinder(0.03, 0.06, 30),
+                    many = cylinder(0.03, 0.06, 70);
+  EXPECT_EQ(changed_by_mesh(few, some, renderer), sides ? Names{"tree of edges"} : Names{});
+  EXPECT_EQ(changed_by_mesh(some, many, renderer), Names{"tree of polygons"});
+  EXPECT_EQ(changed_by_mesh(icosphere(0.03, 3), icosphere(0.03, 4), renderer),
+            Names{"support map"});
+}
+
+TEST(ExplainRenderers, ThePointLeavesOutWhatIsTheSides) {
+  const SceneObject object = sphere(1);
+  const Scene with_sides({object}, true), without({object}, false);
+  EXPECT_EQ(changed(explain(with_sides, ray_renderer()), explain(without, point_renderer())),
+            (Names{"tree of edges", "side contact", "torque and second device"}));
+  // It tells what was built, not what should have been.
+  EXPECT_EQ(changed(explain(with_sides, point_renderer()), explain(without, point_renderer())),
+            Names{"tree of edges"});
+}
+
+TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
+  const Renderer& renderer = *GetParam();
+  SceneObject object = sphere(2), other = sphere(1, 1, {0.2, 0, 0});
+  for (const bool all : {false, true}) {
+    if (all) {
+      object.material.damping = 2;
+      object.material.friction_static = object.material.friction_dynamic = 0.3;
+      object.material.layers = {{0.001, 200}};
+    }
+    const Scene scene = all ? scene_of({object, other}, renderer) : scene_of({object}, renderer);
+    std::map<std::string, bool> runs{{kTickInContact, true}, {kTickInFreeSpace, true}};
+    for (const Stage& stage : explain(scene, renderer)) {
+      if (stage.time != StageTime::once) runs[stage.name] = stage.runs;
+    }
+    std::size_t rehearsed = 0;
+    for (const Rehearsal& rehearsal : rehearse(scene, renderer)) {
+      ++rehearsed;
+      EXPECT_TRUE(runs[rehearsal.name]) << rehearsal.name;
+      EXPECT_GT(rehearsal.calls, 0u) << rehearsal.name;
+      rehearsal.prepare();
+      const double first = rehearsal.run();
+      rehearsal.prepare();
+      EXPECT_EQ(first, rehearsal.run()) << rehearsal.name;
+      EXPECT_TRUE(std::isfinite(first)) << rehearsal.name;
+    }
+    std::size_t expected = 0;
+    for (const auto& [name, run] : runs) expected += run ? 1 : 0;
+    EXPECT_EQ(rehearsed, expected);
+  }
+}
+
+TEST_P(Explain, AnEmptySceneHasNothingToRehearse) {
+  const Scene scene({}, GetParam()->side_contact());
+  EXPECT_TRUE(rehearse(scene, *GetParam()).empty());
+  EXPECT_FALSE(explain(scene, *GetParam()).empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(Renderers, Explain, ::testing::Values(&point_renderer(), &ray_renderer()),
+                         [](const auto& tested) { return std::string(tested.param->name()); });
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,69 @@
+// Every extreme of the list, with both renderers; and a broken renderer fails it.
+
+#include "rendering/verification/extreme_cases.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace palpate {
+namespace {
+
+class Extreme : public ::testing::TestWithParam<ExtremeCase> {};
+
+TEST_P(Extreme, WithThePoint) {
+  const ExtremeResult result = GetParam().run(point_renderer());
+  EXPECT_TRUE(result.passed) << result.detail;
+  EXPECT_LE(result.worst, result.limit);
+  EXPECT_GT(result.in_contact, 20u);
+}
+
+TEST_P(Extreme, WithTheRay) {
+  const ExtremeResult result = GetParam().run(ray_renderer());
+  EXPECT_TRUE(result.passed) << result.detail;
+  EXPECT_LE(result.worst, result.limit);
+  EXPECT_GT(result.in_contact, 20u);
+}
+
+/// Feels everything except, each time in some twenty, that it is in contact; forgets bad poses.
+class HardOfFeeling final : public Renderer {
+ public:
+  const char* name() const override { return "hard of feeling"; }
+  bool side_contact() const override { return true; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    const bool began_inside = state.parts[0].blocked;
+    Rendering r = ray_renderer().tick(scene, state, probe, dt);
+    if (began_inside || (r.faults & render_fault::kNonFinite)) {
+      r.force = Vec3(0, 0, 1);
+      return r;
+    }
+    if (r.contacts == 0 || ++count_ % 7 != 0) return r;
+    r = Rendering{};
+    r.ideal = probe;
+    return r;
+  }
+
+ private:
+  mutable int count_ = 0;
+};
+
+TEST_P(Extreme, OfARendererThatIsHardOfFeelingFails) {
+  // One million triangles take long, and show what the others show.
+  if (GetParam().name == std::string("million-triangles")) return;
+  const ExtremeResult result = GetParam().run(HardOfFeeling());
+  EXPECT_FALSE(result.passed);
+  EXPECT_NE(result.detail, "");
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Extreme, ::testing::ValuesIn(extreme_cases()),
+                         [](const auto& parameter) {
+                           std::string name = parameter.param.name;
+                           for (char& c : name) {
+                             if (c == '-') c = '_';
+                           }
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,206 @@
+// The search for ticks that are wrong: it finds none in ours, and it finds those of broken
+// renderers.
+
+#include "rendering/verification/search.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "rendering/verification/random_solids.h"
+
+namespace palpate {
+namespace {
+
+std::string told(const SearchCounts& counts) {
+  std::string text;
+  for (const SearchFault& fault : counts.faults) {
+    text += "seed " + std::to_string(fault.seed) + " walk " + std::to_string(fault.walk) +
+            " tick " + std::to_string(fault.tick) + ": " + fault.what + "\n";
+  }
+  return text;
+}
+
+// Rounding beside edges nearly parallel to the probe once made an entry of a motion that passed by,
+// or by a facet that it was already below.
+TEST(Search, FindsNothingWrongWhereItOnceDid) {
+  struct Place {
+    std::uint64_t seed, walk;
+  };
+  for (const auto [seed, walk] :
+       {Place{1, 11098}, Place{1, 15326}, Place{77, 9231}, Place{77, 14631}}) {
+    const SearchCounts counts = search_walks(seed, walk, 1);
+    EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+    EXPECT_GT(counts.in_contact, 0u);
+  }
+}
+
+TEST(Search, FindsNothingWrong) {
+  const SearchCounts counts = search(100'000, 1);
+  EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+  EXPECT_EQ(counts.ticks, 100'000u);
+  // And it has been where it can go wrong.
+  EXPECT_GT(counts.in_contact, 30'000u);
+  EXPECT_GT(counts.entries, 3'000u);
+  EXPECT_GT(counts.walked_finely, 5'000u);
+  EXPECT_GT(counts.passages, 500u);
+  EXPECT_LT(counts.worst_penetration, 1e-9);
+  EXPECT_LT(counts.fallbacks, 100u);
+}
+
+TEST(Search, IsTheSameWhoeverWalks) {
+  const SearchCounts whole = search(20'000, 7);
+  SearchCounts shared = search_walks(7, 0, 13);
+  shared += search_walks(7, 13, 20'000 / kTicksPerWalk - 13);
+  EXPECT_EQ(shared.in_contact, whole.in_contact);
+  EXPECT_EQ(shared.entries, whole.entries);
+  EXPECT_EQ(shared.passages, whole.passages);
+  EXPECT_EQ(shared.worst_penetration, whole.worst_penetration);
+  EXPECT_NE(search(20'000, 8).in_contact, whole.in_contact);
+}
+
+/// A renderer that goes wrong now and then.
+class Broken final : public Renderer {
+ public:
+  enum class How { deaf, sunk, floating, infinite, weak, endless, blind_to_motion, ghostly };
+  explicit Broken(How how) : how_(how) {}
+
+  const char* name() const override { return "broken"; }
+  bool side_contact() const override { return true; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    // Sees where it is, but not the way there.
+    if (how_ == How::blind_to_motion && state.has_last) state.last = probe;
+    Rendering r = ray_renderer().tick(scene, state, probe, dt);
+    const double size = scene.parts()[0].mesh->size();
+    if (how_ == How::ghostly && r.contacts == 0 && unlucky(probe)) {
+      r.contacts = 1;
+      r.object = 0;
+      r.deepest.normal = Vec3(1, 0, 0);
+      r.deepest.depth = 1e-3 * size;
+      r.deepest.point = r.ideal.tip += 1e-3 * size * r.deepest.normal;
+      r.force = r.device1 = 800 * r.deepest.depth * r.deepest.normal;
+    }
+    if (r.contacts == 0 || !unlucky(probe)) return r;
+    switch (how_) {
+      case How::deaf:
+        r = Rendering{};
+        r.ideal = probe;
+        break;
+      case How::sunk:
+        move(r, -3e-9 * size);
+        break;
+      case How::floating:
+        move(r, 2e-8 * (size + glm::length(probe.tail - probe.tip)));
+        break;
+      case How::infinite:
+        r.torque.y = std::numeric_limits<double>::infinity();
+        break;
+      case How::weak:
+        r.force *= 1 - 1e-8;
+        break;
+      case How::endless:
+        r.faults |= render_fault::kWalkCapped;
+        break;
+      case How::blind_to_motion:
+      case How::ghostly:
+        break;
+    }
+    return r;
+  }
+
+ private:
+  /// One tick in some fifty, by its pose alone.
+  static bool unlucky(const LineProbe& probe) {
+    const double x = std::abs(probe.tip.x);
+    return x > 0 && static_cast<std::uint64_t>(x / 1e-17 * 0.37) % 53 == 0;
+  }
+  static void move(Rendering& r, double out) {
+    r.ideal.tip += out * r.deepest.normal;
+    r.ideal.tail += out * r.deepest.normal;
+  }
+
+  How how_;
+};
+
+SearchCounts search_with(Broken::How how) {
+  const Broken broken(how);
+  SearchCounts counts;
+  for (std::uint64_t walk = 0; walk < 60; ++walk) counts += search_walk(broken, 3, walk);
+  return counts;
+}
+
+TEST(Search, FindsMissedContacts) { EXPECT_GT(search_with(Broken::How::deaf).missed, 50u); }
+
+TEST(Search, FindsIdealProbesThatPenetrate) {
+  EXPECT_GT(search_with(Broken::How::sunk).penetrating, 20u);
+}
+
+TEST(Search, FindsIdealProbesThatFloat) {
+  EXPECT_GT(search_with(Broken::How::floating).floating, 20u);
+}
+
+TEST(Search, FindsWhatIsNotFinite) {
+  EXPECT_GT(search_with(Broken::How::infinite).not_finite, 50u);
+}
+
+TEST(Search, FindsForcesThatAreNotThoseOfTheContact) {
+  EXPECT_GT(search_with(Broken::How::weak).wrong_force, 50u);
+}
+
+TEST(Search, FindsWalksWithoutEnd) { EXPECT_GT(search_with(Broken::How::endless).endless, 50u); }
+
+TEST(Search, FindsPlatesThatAreCrossed) {
+  EXPECT_GT(search_with(Broken::How::blind_to_motion).passed_through, 20u);
+}
+
+TEST(Search, FindsContactsOutOfNowhere) {
+  EXPECT_GT(search_with(Broken::How::ghostly).phantom, 20u);
+}
+
+TEST(Search, SaysWhereToLook) {
+  const Broken broken(Broken::How::deaf);
+  SearchCounts counts;
+  for (std::uint64_t walk = 0; counts.faults.empty(); ++walk) {
+    counts += search_walk(broken, 3, walk);
+  }
+  const SearchFault fault = counts.faults.front();
+  EXPECT_EQ(fault.seed, 3u);
+  const SearchCounts again = search_walk(broken, fault.seed, fault.walk);
+  ASSERT_FALSE(again.faults.empty());
+  EXPECT_EQ(again.faults.front().tick, fault.tick);
+  EXPECT_EQ(again.faults.front().what, fault.what);
+  EXPECT_EQ(fault.what.substr(0, 8), "broken, ");
+}
+
+TEST(RandomSolids, AreOfEveryKindAndSize) {
+  double smallest = 1e9, largest = 0, flattest = 1;
+  std::size_t most_sides = 0, most_edges_at_a_corner = 0;
+  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+    Random random(seed);
+    const ConvexMesh mesh = random_solid(random);
+    smallest = std::min(smallest, mesh.size());
+    largest = std::max(largest, mesh.size());
+    for (const Facet& facet : mesh.facets()) {
+      most_sides = std::max<std::size_t>(most_sides, facet.side_count);
+      double low = 0;
+      for (const Vec3& v : mesh.vertices()) {
+        low = std::max(low, facet.offset - glm::dot(facet.normal, v));
+      }
+      flattest = std::min(flattest, low / mesh.size());
+    }
+    for (std::size_t v = 0; v < mesh.vertices().size(); ++v) {
+      most_edges_at_a_corner = std::max<std::size_t>(most_edges_at_a_corner,
+                                                     mesh.fan_first()[v + 1] - mesh.fan_first()[v]);
+    }
+  }
+  EXPECT_LT(smallest, 1e-3);
+  EXPECT_GT(largest, 50);
+  EXPECT_LT(flattest, 1e-3);
+  EXPECT_GT(most_sides, 10u);
+  EXPECT_GT(most_edges_at_a_corner, 10u);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,46 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "runner/commands/accuracy/report.h"
+
+namespace palpate {
+namespace {
+
+AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
+  AccuracyRow row;
+  row.shape = shape;
+  row.triangles = triangles;
+  row.probe = probe;
+  row.method = "tick";
+  row.ns_per_tick = 50;
+  return row;
+}
+
+// A shape that is added is measured; it must stand in all that is shown of it as well.
+TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
+  AccuracyReport report;
+  for (const char* probe : {"ray", "point"}) {
+    report.rows.push_back(row_of("sphere", 20, probe));
+    report.rows.push_back(row_of("sphere", 80, probe));
+    for (const char* added : {"octahedron", "wedge", "prism", "pyramid"}) {
+      report.rows.push_back(row_of(added, 8, probe));
+    }
+  }
+  const std::string text = accuracy_text(report), figure = accuracy_figure(report);
+  const auto json = accuracy_json(report);
+  ASSERT_EQ(json["recommended"].size(), 5U);
+  EXPECT_EQ(json["recommended"][0]["shape"], "sphere");
+  EXPECT_EQ(json["recommended"][1]["shape"], "octahedron");
+  EXPECT_NE(text.find("  octahedron: its 8 triangles are the shape itself"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("Whole ticks on the pyramid"), std::string::npos);
+  for (const char* shape : {"sphere", "octahedron", "wedge", "prism", "pyramid"}) {
+    EXPECT_NE(figure.find(std::string(">") + shape + "<"), std::string::npos) << shape;
+  }
+  // Five panels of 230, four gaps of 58, and the margins.
+  EXPECT_NE(figure.find("width=\"1464\""), std::string::npos) << figure.substr(0, 300);
+}
+
+}  // namespace
+}  // namespace palpate

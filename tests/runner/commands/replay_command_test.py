@@ -1,0 +1,158 @@
+"""palpate replay from outside. Usage: replay_command_test.py PALPATE"""
+
+import csv
+import json
+import pathlib
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data"))
+import seals  # noqa: E402
+
+PALPATE = sys.argv[1]
+
+
+def protocol(samples=True, **material):
+    return {"version": 1, "name": "short", "renderers": ["point", "ray"], "samples": samples,
+            "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
+                        {"name": "cube", "shape": "cube", "edge_m": 0.05}],
+            "repetitions": 1, "material": {"stiffness_n_per_m": 800, **material},
+            "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 5}, "seed": 7}
+
+
+class Replay(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def study(self, name="study", **wanted):
+        path, db = self.dir / f"{name}.json", self.dir / f"{name}.db"
+        path.write_text(json.dumps(protocol(**wanted)))
+        self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3)
+        with sqlite3.connect(db) as base:
+            trials = base.execute("SELECT p.code, s.number, a.trial, a.renderer FROM attempts a JOIN runs r ON r.id = a.run_id "
+                                  "JOIN sessions s ON s.id = r.session_id JOIN participants p ON p.id = s.participant_id "
+                                  "ORDER BY a.trial").fetchall()
+        base.close()
+        return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
+
+    def test_every_trial_is_equal_bit_by_bit_whatever_the_material(self):
+        for name, material in [("plain", {}), ("rough", {"friction_static": 0.4, "friction_dynamic": 0.3, "damping_ns_per_m": 0.05})]:
+            db, trials = self.study(name, **material)
+            self.assertEqual({renderer for _, renderer in trials}, {"point", "ray"})
+            for trial, renderer in trials:
+                out = self.dir / "out.json"
+                done = self.palpate("replay", "--db", db, "--trial", trial, "--json", out, "--force")
+                self.assertIn("equal the record, bit by bit", done.stdout)
+                self.assertIn("SIMULATED", done.stdout)
+                result = json.loads(out.read_text())
+                self.assertEqual(result["ticks"], result["equal_ticks"])
+                self.assertGreater(result["ticks"], 100)
+                self.assertGreater(result["recorded"]["share_in_contact"], 0)
+                self.assertEqual(result["recorded"]["renderer"], renderer)
+
+    def test_a_material_that_was_limited_to_the_device_is_limited_again(self):
+        stiff = {"stiffness_n_per_m": 60000, "damping_ns_per_m": 0.3}
+        path, db = self.dir / "stiff.json", self.dir / "stiff.db"
+        path.write_text(json.dumps(protocol(**stiff) | {"servo": {"material_limit": "limit"}}))
+        said = self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3).stderr
+        self.assertIn("limited to", said)
+        with sqlite3.connect(db) as base:
+            events = [json.loads(text) for (text,) in base.execute("SELECT text FROM notes")]
+        base.close()
+        (event,) = events
+        self.assertEqual([one["stimulus"] for one in event["material_limited"]], ["sphere", "cube"])
+        for one in event["material_limited"]:
+            self.assertEqual((one["asked_stiffness_n_per_m"], one["asked_damping_ns_per_m"]), (60000, 0.3))
+            self.assertLess(one["shown_stiffness_n_per_m"], 60000)
+            self.assertAlmostEqual(one["shown_damping_ns_per_m"], 0.3 * one["shown_stiffness_n_per_m"] / 60000)
+        self.assertEqual(event["rate_hz"], 1000)
+        out = self.dir / "out.json"
+        for trial in range(1, 5):
+            done = self.palpate("replay", "--db", db, "--trial", f"S001/1/{trial}", "--json", out, "--force")
+            self.assertIn("equal the record, bit by bit", done.stdout)
+            self.assertIn("as they were limited", done.stdout)
+            result = json.loads(out.read_text())
+            self.assertTrue(result["material_limited"])
+            self.assertGreater(result["recorded"]["max_force_n"], 0)
+        with sqlite3.connect(db) as base:
+            base.execute("UPDATE notes SET text = replace(text, '60000', '50000')")
+            seals.seal_again(base)
+        base.close()
+        refused = self.palpate("replay", "--db", db, "--trial", "S001/1/1", status=2)
+        self.assertIn("limits another material", refused.stderr)
+
+    def test_compares_with_the_other_renderer_tick_by_tick(self):
+        db, trials = self.study()
+        trial = next(trial for trial, renderer in trials if renderer == "ray")
+        out, figures = self.dir / "both.csv", self.dir / "both.json"
+        done = self.palpate("replay", "--db", db, "--trial", trial, "--compare", "--out", out, "--json", figures)
+        self.assertIn("their forces differ by", done.stdout)
+        result = json.loads(figures.read_text())
+        self.assertEqual(result["other"]["renderer"], "point")
+        rows = list(csv.DictReader(out.read_text().splitlines()))
+        self.assertEqual(len(rows), result["ticks"])
+
+        def size(row, name):
+            return sum(float(row[f"{name}_{axis}"]) ** 2 for axis in "xyz") ** 0.5
+        for name, figure in [("recorded_force", result["recorded"]), ("other_force", result["other"])]:
+            self.assertAlmostEqual(max(size(row, name) for row in rows), figure["max_force_n"], 12)
+        # The point has no side: it feels no torque, and less often something.
+        self.assertTrue(all(size(row, "other_torque") == 0 for row in rows))
+        self.assertLess(result["other"]["share_in_contact"], result["recorded"]["share_in_contact"])
+        for row in rows:
+            for axis in "xyz":
+                self.assertEqual(row[f"recorded_force_{axis}"], row[f"again_force_{axis}"])
+
+    def test_a_record_that_was_changed_differs(self):
+        db, trials = self.study()
+        with sqlite3.connect(db) as base:
+            self.assertEqual(seals.faults(base), [])
+            base.execute("UPDATE attempts SET orientation_w = orientation_x, orientation_x = orientation_w")
+            self.assertEqual(len(seals.faults(base)), len(trials))
+        base.commit()
+        refused = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=2)
+        self.assertIn(f"{db}: participant S001, session 1, trial 1, attempt 1: was changed", refused.stderr)
+        seals.seal_again(base)
+        self.assertEqual(seals.faults(base), [])
+        base.close()
+        done = self.palpate("replay", "--db", db, "--trial", trials[-1][0], status=1)
+        self.assertRegex(done.stdout, r"ticks differ from the record, the first is tick \d+")
+
+    def test_a_shape_that_the_protocol_does_not_have_is_refused(self):
+        db, trials = self.study()
+        with sqlite3.connect(db) as base:
+            base.execute("UPDATE attempts SET shape = 'torus'")
+            seals.seal_again(base)
+        base.close()
+        done = self.palpate("replay", "--db", db, "--trial", trials[0][0], status=2)
+        for said in (str(db), trials[0][0], "'torus'"):
+            self.assertIn(said, done.stderr)
+
+    def test_says_what_is_missing(self):
+        db, trials = self.study()
+        bare, names = self.study("bare", samples=False)
+        for args, message in [((db, "P9/1/1"), "not on record"), ((db, "nonsense"), "CODE/SESSION/TRIAL"),
+                              ((db, trials[0][0] + "x"), "CODE/SESSION/TRIAL"), ((db, "/1/1"), "CODE/SESSION/TRIAL"),
+                              ((bare, names[0][0]), "without servo samples"), ((self.dir / "no.db", "P1/1/1"), "no.db")]:
+            done = self.palpate("replay", "--db", args[0], "--trial", args[1], status=2)
+            self.assertIn(message, done.stderr)
+            self.assertEqual(done.stdout, "")
+        kept = self.dir / "kept.csv"
+        kept.write_text("mine")
+        self.palpate("replay", "--db", db, "--trial", trials[0][0], "--out", kept, status=2)
+        self.assertEqual(kept.read_text(), "mine")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

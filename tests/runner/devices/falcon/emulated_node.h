@@ -1,0 +1,59 @@
+#pragma once
+// The device node of one emulated Falcon: it comes to the mocked bus and goes, and hands what
+// processes ask of it to its usbfs. Internal to the emulated bus.
+
+#include <umockdev.h>
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/runner/devices/falcon/emulated_usbfs.h"
+
+namespace palpate::falcon::testing {
+
+class EmulatedNode {
+ public:
+  /// Plugged in.
+  EmulatedNode(UMockdevTestbed* testbed, int port, std::string serial)
+      : testbed_(testbed), port_(port), usbfs_(std::move(serial)) {
+    plug(2 + port);
+  }
+  ~EmulatedNode() { unplug(); }
+  EmulatedNode(const EmulatedNode&) = delete;
+  EmulatedNode& operator=(const EmulatedNode&) = delete;
+
+  void plug(int address);
+  void unplug();
+  /// Only when nobody has the node open any more: umockdev would lose its clients.
+  void bury();
+
+  /// While no process is answered.
+  void with(const std::function<void(EmulatedUsbfs&)>& use) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    use(usbfs_);
+  }
+
+ private:
+  struct Retired {
+    UMockdevIoctlBase* handler;
+    std::string path;
+  };
+
+  std::string sys_path() const;
+  // What umockdev calls, in its own threads.
+  static gboolean handle(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
+  static void vanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
+
+  UMockdevTestbed* testbed_;
+  const int port_;
+  std::mutex mutex_;  // of usbfs_
+  EmulatedUsbfs usbfs_;
+  std::string path_;
+  UMockdevIoctlBase* handler_ = nullptr;
+  std::vector<Retired> retired_;
+};
+
+}  // namespace palpate::falcon::testing

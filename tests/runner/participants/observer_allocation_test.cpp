@@ -1,0 +1,32 @@
+#include <gtest/gtest.h>
+
+#include "runner/bench/allocation_count.h"
+#include "runner/participants/shape_observer.h"
+#include "tests/runner/participants/observer_reference.h"
+
+namespace palpate {
+namespace {
+
+TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
+  if (!counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
+  const ShapeHypotheses hypotheses(test::four_shapes());
+  ShapeObserver observer(hypotheses);
+  EXPECT_GT(allocations(), 0u);
+  Percept percept;
+  percept.tip = {-0.06, 0, 0.03};
+  percept.tail = {0.06, 0, 0.03};
+  percept.direction = {0, 0, 1};
+  for (const bool ray : {false, true}) {
+    for (const bool contact : {false, true}) {
+      percept.ray = ray;
+      percept.contact = contact;
+      if (ray) percept.along = 0.05;
+      const std::uint64_t before = allocations();
+      observer.update(percept);
+      EXPECT_EQ(allocations(), before) << ray << contact;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate

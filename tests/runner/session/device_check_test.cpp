@@ -1,0 +1,161 @@
+// A material that the device cannot show is refused or limited, as the protocol says.
+
+#include "runner/session/device_check.h"
+
+#include <gtest/gtest.h>
+
+#include "stimuli/object_spec.h"
+
+namespace palpate {
+namespace {
+
+DeviceCapabilities some_device() {
+  DeviceCapabilities device;
+  device.name = "some";
+  device.sensed_freedom = device.actuated_freedom = 5;
+  device.max_force = 8;
+  device.max_stiffness = 4000;
+  device.max_rate = 2000;
+  device.workspace_radius = 1;
+  device.resolution = 4e-5;
+  device.damping = 1;
+  device.friction = 0.06;  // holds 3000 N/m
+  return device;
+}
+
+Protocol some_protocol(const Material& material) {
+  Protocol protocol;
+  protocol.renderers = {RendererKind::point};
+  protocol.servo_rate = 1000;
+  StimulusSpec stimulus;
+  stimulus.name = "ball";
+  stimulus.object.subdivisions = 1;
+  stimulus.object.material = material;
+  protocol.stimuli = {stimulus};
+  return protocol;
+}
+
+Material of(double stiffness, double damping = 0) {
+  Material material;
+  material.stiffness = stiffness;
+  material.damping = damping;
+  return material;
+}
+
+double share(const Material& material, const DeviceCapabilities& device, double rate = 1000,
+             double scale = 1, bool controlled = false) {
+  return showable(material, device, rate, scale, controlled).share;
+}
+
+TEST(DeviceCheck, TheBoundsOfAMaterial) {
+  const DeviceCapabilities device = some_device();
+  EXPECT_EQ(share(of(2000), device), 1);  // at the bound: b = K T / 2
+  EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
+  EXPECT_NEAR(share(of(1000, 0.75), device), 0.8, 1e-12);  // 0.5 + 0.75 N s/m
+  EXPECT_NEAR(share(of(2000), device, 500), 0.5, 1e-12);
+  EXPECT_NEAR(share(of(2000), device, 1000, 2), 0.5, 1e-12);  // magnified: twice as stiff
+  EXPECT_EQ(share(of(2800), device, 2000), 1);
+  EXPECT_NEAR(share(of(6000), device, 2000), 0.5, 1e-12);  // 3000 N/m by friction
+  EXPECT_NEAR(share(of(2000 * kPassivityExtension), device, 2000, 1, true), 0.75, 1e-12);
+  EXPECT_EQ(share(of(0), device), 1);
+}
+
+TEST(DeviceCheck, WhatIsNotKnownOfADeviceDoesNotBound) {
+  DeviceCapabilities device = some_device();
+  device.damping = device.friction = 0;
+  EXPECT_EQ(share(of(2000, 100), device), 1);  // by the maker's figure at half its rate
+  EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
+}
+
+TEST(DeviceCheck, LayersAndPartsCount) {
+  Material layered = of(1000);
+  layered.layers = {{1e-3, 4000}};
+  EXPECT_NEAR(share(layered, some_device()), 0.5, 1e-12);
+
+  Protocol protocol = some_protocol(of(500));
+  ObjectSpec part;
+  part.material = of(8000);
+  protocol.stimuli[0].object.parts = {part};
+  protocol.material_limit = MaterialLimit::limit;
+  EXPECT_EQ(limit_materials(protocol, some_device()).size(), 1u);
+  EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 500);
+  EXPECT_NEAR(protocol.stimuli[0].object.parts[0].material.stiffness, 2000, 1e-6);
+}
+
+TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
+  Protocol protocol = some_protocol(of(2500, 0.1));
+  EXPECT_TRUE(limit_materials(protocol, some_device()).empty());
+  EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 2500);
+  const auto refused = misfits(protocol, StimulusLibrary(protocol), some_device());
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_NE(refused[0].find("'ball' has 2500 N/m and 0.1 N s/m"), std::string::npos) << refused[0];
+  EXPECT_NE(refused[0].find("material_limit"), std::string::npos);
+  EXPECT_NE(refused[0].find("set /servo/passivity_controller to true (then up to 2000 N/m)"),
+            std::string::npos)
+      << refused[0];
+  protocol.stimuli[0].object.material = of(1e5);
+  const auto stiff = misfits(protocol, StimulusLibrary(protocol), some_device());
+  ASSERT_EQ(stiff.size(), 1u);
+  EXPECT_NE(stiff[0].find("passivity_controller"), std::string::npos) << stiff[0];
+  protocol.stimuli[0].object.material = of(2500, 0.1);
+
+  protocol.material_limit = MaterialLimit::limit;
+  const auto limited = limit_materials(protocol, some_device());
+  ASSERT_EQ(limited.size(), 1u);
+  EXPECT_NE(limited[0].text.find("limited to 1851.85 N/m and 0.0740741 N s/m"), std::string::npos)
+      << limited[0].text;
+  const Material& shown = protocol.stimuli[0].object.material;
+  EXPECT_NEAR(shown.stiffness / 2000 + shown.damping, 1, 1e-9);
+  EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), some_device()).empty());
+  EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing is left to do
+}
+
+TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
+  const auto compound = [] {
+    Protocol protocol = some_protocol(of(2500, 0.1));
+    ObjectSpec part;
+    part.material = of(7777, 0.3);
+    part.material.layers = {{1e-3, 9876.5}};
+    protocol.stimuli[0].object.parts = {ObjectSpec{}, part};
+    protocol.material_limit = MaterialLimit::limit;
+    return protocol;
+  };
+  Protocol limited = compound();
+  const auto materials = limit_materials(limited, some_device());
+  ASSERT_EQ(materials.size(), 2u);
+  const std::string event = to_json_text(materials, some_device(), 1000);
+  EXPECT_NE(event.find("\"asked_stiffness_n_per_m\":2500.0"), std::string::npos) << event;
+  EXPECT_NE(event.find("\"rate_hz\":1000.0"), std::string::npos) << event;
+
+  Protocol again = compound();
+  EXPECT_FALSE(limit_as_recorded(again, "a note {"));
+  EXPECT_FALSE(limit_as_recorded(again, R"({"masking_noise":"on"})"));
+  EXPECT_EQ(again.stimuli[0].object.material.stiffness, 2500);
+  EXPECT_TRUE(limit_as_recorded(again, event));
+  const ObjectSpec &was = limited.stimuli[0].object, &is = again.stimuli[0].object;
+  EXPECT_EQ(is.material.stiffness, was.material.stiffness);
+  EXPECT_EQ(is.material.damping, was.material.damping);
+  EXPECT_EQ(is.parts[0].material.stiffness, was.parts[0].material.stiffness);
+  EXPECT_EQ(is.parts[1].material.stiffness, was.parts[1].material.stiffness);
+  EXPECT_EQ(is.parts[1].material.layers[0].stiffness, was.parts[1].material.layers[0].stiffness);
+  EXPECT_NE(is.parts[1].material.stiffness, 7777);
+
+  EXPECT_THROW(limit_as_recorded(again, event), std::invalid_argument) << "it is limited already";
+  Protocol other = some_protocol(of(2500, 0.1));  // no parts
+  EXPECT_THROW(limit_as_recorded(other, event), std::invalid_argument);
+  Protocol whole = compound();
+  EXPECT_THROW(limit_as_recorded(whole, R"({"material_limited":[{"stimulus":"ball"}]})"),
+               std::invalid_argument);
+}
+
+TEST(DeviceCheck, ADeviceThatDoesNotPushShowsNothingAndRefusesNothing) {
+  DeviceCapabilities mouse = some_device();
+  mouse.actuated_freedom = 0;
+  Protocol protocol = some_protocol(of(1e5));
+  EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), mouse).empty());
+  protocol.material_limit = MaterialLimit::limit;
+  EXPECT_TRUE(limit_materials(protocol, mouse).empty());
+}
+
+}  // namespace
+}  // namespace palpate

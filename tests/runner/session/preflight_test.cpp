@@ -1,0 +1,245 @@
+#include "runner/session/preflight.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "runner/servo/servo.h"
+
+namespace palpate {
+namespace {
+
+using Step = Preflight::Step;
+
+Sample sample(const Vec3& tip, unsigned buttons = 0, bool lost = false) {
+  Sample out;
+  out.probe.tip = tip;
+  out.buttons = static_cast<std::uint8_t>(buttons);
+  out.faults = lost ? servo_fault::kDeviceLost : 0;
+  return out;
+}
+
+void home(Preflight& preflight) {
+  for (int i = 0; i < 20; ++i) preflight.add(sample({0, 0, 0}));
+}
+
+TEST(Preflight, NothingNeededIsDoneOnceHomed) {
+  Preflight preflight({});
+  for (int i = 0; i < 100; ++i) preflight.add(sample({0, 0, 0}, 0, true));
+  EXPECT_EQ(preflight.step(), Step::homing);
+  preflight.skip();
+  EXPECT_EQ(preflight.step(), Step::homing) << "it cannot be left out";
+  EXPECT_NE(preflight.checklist().instruction.find("home the device"), std::string::npos);
+  home(preflight);
+  EXPECT_EQ(preflight.step(), Step::done);
+  EXPECT_EQ(preflight.checklist().instruction, "");
+}
+
+TEST(Preflight, EverySideMustBeReached) {
+  Preflight preflight({0.03, 0});
+  home(preflight);
+  const Vec3 sides[] = {{-0.03, 0, 0}, {0.03, 0, 0}, {0, -0.03, 0}, {0, 0.03, 0}, {0, 0, -0.03}};
+  for (const Vec3& side : sides) {
+    preflight.add(sample(side));
+    EXPECT_EQ(preflight.step(), Step::range);
+  }
+  EXPECT_NE(
+      preflight.checklist().instruction.find("30 mm from the centre; still to come: towards you"),
+      std::string::npos);
+  preflight.add(sample({0, 0, 0.0299}));
+  EXPECT_EQ(preflight.step(), Step::range);
+  preflight.add(sample({0, 0, 0.03}));
+  EXPECT_EQ(preflight.step(), Step::done);
+}
+
+TEST(Preflight, AnEmergencyDoesNotUndoWhatIsDone) {
+  Preflight preflight({0.03, 0});
+  home(preflight);
+  Sample off = sample({0, 0, 0}, 0, true);
+  off.trouble = DeviceTrouble::guarded;
+  preflight.add(off);
+  EXPECT_EQ(preflight.step(), Step::range);
+  off.trouble = DeviceTrouble::unplugged;
+  preflight.add(off);
+  EXPECT_EQ(preflight.step(), Step::homing);
+}
+
+TEST(Preflight, ButtonsMustBeUpAndThenDown) {
+  Preflight preflight({0, 2});
+  home(preflight);
+  for (const unsigned buttons : {1u, 1u, 3u, 1u}) preflight.add(sample({0, 0, 0}, buttons));
+  EXPECT_EQ(preflight.step(), Step::buttons) << "button 1 is stuck";
+  EXPECT_EQ(preflight.checklist().instruction.substr(0, 14), "press button 1");
+  preflight.add(sample({0, 0, 0}, 0));
+  preflight.add(sample({0, 0, 0}, 1));
+  EXPECT_EQ(preflight.step(), Step::done);
+}
+
+TEST(Preflight, WhatIsLeftOutIsOnRecord) {
+  Preflight preflight({0.03, 2});
+  home(preflight);
+  preflight.skip();
+  preflight.skip();
+  EXPECT_EQ(preflight.step(), Step::done);
+  std::string states;
+  for (const Checklist::Step& step : preflight.checklist().steps)
+    states += step.words + std::to_string(static_cast<int>(step.state)) + " ";
+  EXPECT_EQ(states, "Home the device2 Move to every side3 Press the buttons3 ");
+  ASSERT_EQ(preflight.findings().size(), 3u);
+  EXPECT_NE(preflight.findings()[1].find("range NOT checked"), std::string::npos);
+  EXPECT_NE(preflight.findings()[2].find("NOT checked"), std::string::npos);
+}
+
+TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
+  const FeeblePush push({2.5, 0.5, 0.2}, false);
+  PreflightNeeds needs{0.03, 0};
+  needs.push = &push;
+  needs.device_limit = 2.5;
+  Preflight preflight(needs);
+  preflight.repeat();
+  EXPECT_FALSE(preflight.push_due()) << "not before it is homed";
+  home(preflight);
+  EXPECT_EQ(preflight.step(), Step::limits);
+  EXPECT_FALSE(preflight.push_due()) << "not before somebody holds the grip";
+  EXPECT_NE(
+      preflight.checklist().instruction.find(
+          "forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of change "
+          "a tick; hold the grip: a push of 1.0 N to the right"),
+      std::string::npos)
+      << preflight.checklist().instruction;
+  preflight.skip();
+  EXPECT_TRUE(preflight.push_due());
+  preflight.pushed("7 N were commanded");
+  EXPECT_FALSE(preflight.push_due());
+  EXPECT_NE(preflight.checklist().instruction.find("7 N were commanded"), std::string::npos);
+  preflight.skip();
+  EXPECT_TRUE(preflight.push_due()) << "it cannot be left out";
+  preflight.pushed("");
+  EXPECT_EQ(preflight.step(), Step::limits);
+  EXPECT_NE(preflight.checklist().instruction.find("felt?"), std::string::npos);
+  preflight.repeat();
+  EXPECT_TRUE(preflight.push_due());
+  preflight.pushed("");
+  preflight.skip();
+  EXPECT_EQ(preflight.step(), Step::range);
+  ASSERT_EQ(preflight.findings().size(), 2u);
+  EXPECT_NE(preflight.findings()[1].find("a push of 1.0 N to the right was felt"),
+            std::string::npos);
+}
+
+TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
+  const FeeblePush push({6, 0.5, 0.2}, false);
+  PreflightNeeds needs{0, 0};
+  needs.push = &push;
+  Preflight preflight(needs);
+  home(preflight);
+  preflight.skip();
+  preflight.pushed("");
+  preflight.add(sample({0, 0, 0}, 0, true));
+  EXPECT_EQ(preflight.step(), Step::homing);
+  home(preflight);
+  EXPECT_EQ(preflight.step(), Step::limits);
+  preflight.skip();
+  EXPECT_EQ(preflight.step(), Step::limits) << "it has not pushed since";
+  EXPECT_TRUE(preflight.push_due());
+}
+
+/// Keeps every command.
+class Grip final : public Device {
+ public:
+  explicit Grip(double limit) {
+    able_.sensed_freedom = 5;
+    able_.max_force = limit;
+  }
+  const DeviceCapabilities& capabilities() const override { return able_; }
+  DeviceReading read() noexcept override { return {{{0, 0, 0}, {0, 0, 0.12}}}; }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    commands.emplace_back(device1, device2);
+  }
+  std::vector<std::pair<Vec3, Vec3>> commands;
+
+ private:
+  DeviceCapabilities able_;
+};
+
+TEST(FeeblePush, PushesToTheRightWithinTheLimitsAndLetsGo) {
+  for (const bool both : {false, true}) {
+    for (const double limit : {6.0, 0.8}) {
+      Grip grip(limit);
+      VirtualClock clock;
+      const ForceLimits limits{limit, 0.5, 0.2};
+      Servo servo(grip, clock, 1000, limits);
+      const FeeblePush push(limits, both);
+      EXPECT_EQ(push.force(), std::min(1.0, limit / 2));
+      EXPECT_EQ(push.give(servo, [] { return false; }), "");
+      double most = 0, before = 0;
+      for (const auto& [tip, tail] : grip.commands) {
+        EXPECT_EQ(Vec3(tip.x, 0, 0), tip);
+        EXPECT_EQ(tail, both ? tip : Vec3(0));
+        EXPECT_LE(tip.x - before, 0.01) << "a ramp";
+        before = tip.x;
+        most = std::max(most, tip.x);
+      }
+      EXPECT_DOUBLE_EQ(most, push.force());
+      EXPECT_GT(grip.commands.size(), 1000u);
+      EXPECT_EQ(grip.commands.back().first, Vec3(0));
+      EXPECT_EQ(grip.commands.back().second, Vec3(0));
+    }
+  }
+}
+
+/// A servo whose limits do not hold.
+class WrongServo final : public TickSource {
+ public:
+  explicit WrongServo(const std::function<void(Sample&)>& spoil) : spoil_(spoil) {}
+  void prepare(const Scene&, const Renderer&, const HomeZone&) override { sample_.tick = ~0u; }
+  const Sample& next() noexcept override {
+    sample_.phase = Phase::feeling;
+    sample_.time_ns += 1'000'000;
+    ++sample_.tick;
+    sample_.device1 = Vec3(std::min(1.0, 0.005 * sample_.tick), 0, 0);
+    spoil_(sample_);
+    return sample_;
+  }
+  ServoQuality stop() noexcept override {
+    stopped = true;
+    return {};
+  }
+  bool stopped = false;
+
+ private:
+  const std::function<void(Sample&)> spoil_;
+  Sample sample_;
+};
+
+TEST(FeeblePush, TellsWhatIsWrongWithTheCommands) {
+  const FeeblePush push({2, 0.5, 0.2}, true);
+  const std::pair<std::string, std::function<void(Sample&)>> cases[] = {
+      {"", [](Sample&) {}},
+      {"above the limit of 2.00 N", [](Sample& s) { s.device2.z = s.tick < 400 ? 0 : 2.1; }},
+      {"for a push of 1.00 N", [](Sample& s) { s.device1.x = 0.01 * s.tick; }},
+      {"changed by 0.60 N in a tick", [](Sample& s) { s.device1.x = s.tick < 9 ? 0 : 0.6; }},
+      {"no more than 0.40 N", [](Sample& s) { s.device1 *= 0.4; }},
+      {"the forces went off",
+       [](Sample& s) { s.faults = s.tick > 9 ? servo_fault::kTripped : 0; }}};
+  for (const auto& [what, spoil] : cases) {
+    WrongServo servo(spoil);
+    const std::string said = push.give(servo, [] { return false; });
+    EXPECT_NE(said.find(what), std::string::npos) << said;
+    EXPECT_EQ(said.empty(), what.empty()) << said;
+    EXPECT_TRUE(servo.stopped);
+  }
+  WrongServo servo([](Sample&) {});
+  EXPECT_NE(push.give(servo, [] { return true; }), "");
+  EXPECT_TRUE(servo.stopped);
+}
+
+TEST(Preflight, ADeviceThatIsLostMeanwhileIsHomedAgain) {
+  Preflight preflight({0.03, 0});
+  home(preflight);
+  preflight.add(sample({0, 0, 0}, 0, true));
+  EXPECT_EQ(preflight.step(), Step::homing);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,219 @@
+// The session as a state machine, with a scripted respondent on a fake device.
+
+#include "runner/session/session.h"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+#include <filesystem>
+#include <limits>
+
+#include "protocols/parse.h"
+#include "runner/session/run_record.h"
+#include "tests/runner/fake_device.h"
+
+namespace palpate {
+namespace {
+
+using testing::FakeDevice;
+
+constexpr const char* kTwoShapes = R"({"version": 1, "name": "two", "renderers": ["point"],
+  "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+              {"name": "box", "shape": "cube", "edge_m": 0.04}],
+  "repetitions": 2, "blocks_per_renderer": 2,
+  "practice": {"repetitions": 1, "criterion": 1.0, "max_rounds": 3},
+  "breaks": {"every_trials": 3, "min_seconds": 20},
+  "texts": {"instructions": "hello", "practice": "try", "break": "rest", "end": "bye"},
+  "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 2}})";
+
+/// Answers after 0.3 s, right or wrong as told; -1: never.
+class Scripted final : public Respondent {
+ public:
+  explicit Scripted(std::deque<int> right) : right_(std::move(right)) {}
+  void read(const std::string& text) override { pages += text + ";"; }
+  void feedback(bool correct) override { pages += correct ? "right;" : "wrong;"; }
+  void begin_trial(const Trial& trial) override {
+    right_now_ = right_.empty() ? 1 : right_.front();
+    if (!right_.empty()) right_.pop_front();
+    answer_ = right_now_ == 1 ? trial.stimulus : 1 - trial.stimulus;
+  }
+  std::optional<Answer> step(const Sample& sample) override {
+    if (right_now_ < 0 || sample.phase != Phase::feeling || sample.tick < 300) return std::nullopt;
+    return Answer{answer_, sample.time_ns};
+  }
+  std::string pages;
+
+ private:
+  std::deque<int> right_;
+  int right_now_ = 1, answer_ = 0;
+};
+
+class MemoryLog final : public TrialLog {
+ public:
+  int begin(const TrialRecord& planned, std::int64_t) override {
+    began.push_back(planned.trial);
+    return 1;
+  }
+  void finish(const TrialRecord& record) override { finished.push_back(record); }
+  void cut_off(const std::string& reason) override { cut.push_back(reason); }
+  std::vector<int> began;
+  std::vector<TrialRecord> finished;
+  std::vector<std::string> cut;
+};
+
+struct Station {
+  Protocol protocol = parse_protocol_text(kTwoShapes, "two.json");
+  StimulusLibrary library{protocol};
+  FakeDevice device{[](int) { return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, false}; }};
+  VirtualClock clock;
+  Servo servo{device, clock, protocol.servo_rate, ForceLimits{}};
+  MemoryLog log;
+
+  Session session(Respondent& respondent, SessionPlan plan) {
+    return Session({protocol, library, servo, clock, respondent, log}, std::move(plan), {0, 0});
+  }
+};
+
+void run(Session& session) {
+  while (session.state() != Session::State::end) session.step();
+}
+
+TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
+  Station station;
+  Scripted respondent({});
+  Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+  run(session);
+  // Practice of 2, then blocks of 2: pages at the beginning of each, rest after every third trial.
+  EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;rest;rest;bye;");
+  ASSERT_EQ(station.log.finished.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const TrialRecord& record = station.log.finished[i];
+    EXPECT_EQ(record.trial, static_cast<int>(i) + 1);
+    EXPECT_EQ(record.practice, i < 2);
+    EXPECT_TRUE(record.correct);
+    EXPECT_EQ(record.response, record.shape);
+    EXPECT_DOUBLE_EQ(record.response_time, 0.3);
+    EXPECT_EQ(record.onset_utc.substr(0, 11), "1970-01-01T");
+  }
+  EXPECT_GE(station.log.finished[3].onset_ns - station.log.finished[2].response_ns, 20'000'000'000);
+}
+
+TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
+  Station station;
+  Scripted respondent({1, 1, -1});
+  Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+  run(session);
+  const TrialRecord& record = station.log.finished[2];
+  EXPECT_TRUE(record.timed_out);
+  EXPECT_FALSE(record.correct);
+  EXPECT_EQ(record.response, "");
+  EXPECT_EQ(record.response_time, 2);
+}
+
+TEST(Session, PracticeIsRepeatedUntilTheCriterionOrTheLastRound) {
+  const struct {
+    std::deque<int> right;
+    std::size_t trials;
+  } cases[] = {{{}, 6}, {{0}, 8}, {{0, 1, 1, 0}, 10}, {{0, 0, 0, 0, 0, 0}, 10}};
+  for (const auto& [right, trials] : cases) {
+    Station station;
+    Scripted respondent(right);
+    Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+    run(session);
+    ASSERT_EQ(station.log.finished.size(), trials);
+    for (std::size_t i = 0; i < trials; ++i) {
+      EXPECT_EQ(station.log.finished[i].trial, static_cast<int>(i) + 1);
+      EXPECT_EQ(station.log.finished[i].practice, i + 4 < trials);
+    }
+  }
+}
+
+TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
+  const std::deque<int> script = {0, 1, 1, 1, 0, -1, 1, 0};
+  Station whole;
+  Scripted respondent(script);
+  Session session = whole.session(respondent, SessionPlan(whole.protocol, 1, 1));
+  run(session);
+  const auto& expected = whole.log.finished;
+  for (std::size_t stop = 0; stop <= expected.size(); ++stop) {
+    Station station;
+    SessionPlan plan(station.protocol, 1, 1);
+    for (std::size_t i = 0; i < stop; ++i) plan.answered(expected[i].correct);
+    Scripted rest({script.begin() + static_cast<std::ptrdiff_t>(std::min(stop, script.size())),
+                   script.end()});
+    Session resumed = station.session(rest, plan);
+    run(resumed);
+    ASSERT_EQ(station.log.finished.size(), expected.size() - stop);
+    for (std::size_t i = stop; i < expected.size(); ++i) {
+      const TrialRecord& record = station.log.finished[i - stop];
+      EXPECT_EQ(record.trial, expected[i].trial);
+      EXPECT_EQ(record.shape, expected[i].shape);
+      EXPECT_EQ(record.orientation_wxyz, expected[i].orientation_wxyz);
+    }
+  }
+}
+
+TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
+  Station station;
+  FakeDevice failing([](int tick) {
+    const double z = tick == 700 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
+    return DeviceReading{{{0, 0, z}, {0, 0, 0.22}}, 0, false};
+  });
+  Servo servo(failing, station.clock, 1000, ForceLimits{});
+  Scripted respondent({-1});
+  Session session(
+      {station.protocol, station.library, servo, station.clock, respondent, station.log},
+      SessionPlan(station.protocol, 1, 1), {0, 0});
+  EXPECT_THROW(run(session), SessionFault);
+  EXPECT_EQ(failing.force, Vec3(0));
+  EXPECT_EQ(station.log.began.size(), 1u);
+  EXPECT_TRUE(station.log.finished.empty());
+  ASSERT_EQ(station.log.cut.size(), 1u);
+  EXPECT_NE(station.log.cut[0].find("not finite"), std::string::npos);
+}
+
+// The way of a live session into the store: begun on disk, cut off by a fault, shown again.
+TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
+  std::string pattern = ::testing::TempDir() + "session-XXXXXX";
+  const std::filesystem::path folder = mkdtemp(pattern.data());
+  {
+    Station station;
+    const Protocol& protocol = station.protocol;
+    Store store = Store::open(folder / "live.db", Store::Mode::write_or_create);
+    const Participant participant = store.enrol(info_of(protocol), "P01");
+    RunInfo info;
+    info.program_version = "0.0.0";
+    info.device = "fake";
+    FakeDevice failing([](int tick) {
+      return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
+    });
+    Servo servo(failing, station.clock, 1000, ForceLimits{});
+    RunRecord log(store, info_of(protocol), participant, info);
+    Scripted respondent({});
+    Session session({protocol, station.library, servo, station.clock, respondent, log},
+                    SessionPlan(protocol, participant.number, 1), {0, 0});
+    EXPECT_THROW(run(session), SessionFault);
+    EXPECT_EQ(failing.force, Vec3(0));
+    log.end(RunEnd::aborted, station.clock.now_ns());
+
+    const SessionProgress before = store.progress(participant, 1);
+    EXPECT_EQ(before.completed.size(), 2u);
+    EXPECT_EQ(before.cut_off, 1);
+    SessionPlan plan(protocol, participant.number, 1);
+    for (const TrialRecord& record : before.completed) plan.answered(record.correct);
+    RunRecord again(store, info_of(protocol), participant, info);
+    Session resumed({protocol, station.library, station.servo, station.clock, respondent, again},
+                    plan, {0, 0});
+    run(resumed);
+    again.end(RunEnd::done, station.clock.now_ns());
+    const SessionProgress after = store.progress(participant, 1);
+    ASSERT_EQ(after.completed.size(), 6u);
+    for (const TrialRecord& record : after.completed) {
+      EXPECT_EQ(record.attempt, record.trial == 3 ? 2 : 1);
+    }
+  }
+  std::filesystem::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,146 @@
+// The same seed gives the same records, whatever the number of jobs and of interruptions.
+
+#include "runner/session/simulated_study.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "data/export/export_csv.h"
+#include "protocols/parse.h"
+#include "stimuli/random.h"
+
+namespace palpate {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SimulatedStudy : public ::testing::Test {
+ protected:
+  SimulatedStudy() {
+    std::string pattern = ::testing::TempDir() + "study-XXXXXX";
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~SimulatedStudy() override { fs::remove_all(folder_); }
+
+  /// Two short sessions for each participant, so that simulation of the whole takes a second.
+  Protocol protocol(const std::string& more = "") const {
+    return parse_protocol_text(R"({"version": 1, "name": "brief", "renderers": ["point", "ray"],
+      "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
+                  {"name": "cone", "shape": "cone", "radius_m": 0.03, "height_m": 0.06}],
+      "repetitions": 3, "sessions": {"count": 2}, "practice": {"repetitions": 1, "criterion": 1, "max_rounds": 2},
+      "breaks": {"every_trials": 4, "min_seconds": 5},
+      "response": {"keys": {"1": "sphere", "2": "cone"}, "time_out_s": 9.0005}, "seed": 3)" +
+                                   more + "}",
+                               "brief.json");
+  }
+
+  std::string csv_of(const fs::path& db) const {
+    Store store = Store::open(db, Store::Mode::read_only);
+    const fs::path csv = folder_ / "out.csv";
+    export_csv(store, csv, true);
+    EXPECT_FALSE(fs::exists(folder_ / "attempts.csv"))
+        << "a simulated trial leaves no cut-off attempt";
+    std::ifstream in(csv, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+
+  StudyProgress simulate(const Protocol& protocol, const fs::path& db, int jobs,
+                         std::uint64_t seed = 1) const {
+    Store store = Store::open(db, Store::Mode::write_or_create);
+    const std::atomic<bool> never{false};
+    return simulate_study(protocol, store, load_simulated_settings(""), {3, seed, jobs}, never, {});
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(SimulatedStudy, IsTheSameForAnyNumberOfJobs) {
+  const Protocol p = protocol();
+  const StudyProgress progress = simulate(p, folder_ / "one.db", 1);
+  EXPECT_EQ(progress.recorded, progress.expected);
+  EXPECT_GE(progress.recorded, 3 * (12 + 4));
+  const std::string one = csv_of(folder_ / "one.db");
+  simulate(p, folder_ / "four.db", 4);
+  EXPECT_EQ(csv_of(folder_ / "four.db"), one);
+  simulate(p, folder_ / "other.db", 2, 2);
+  EXPECT_NE(csv_of(folder_ / "other.db"), one) << "another seed, other participants";
+}
+
+TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
+  const Protocol p = protocol();
+  simulate(p, folder_ / "whole.db", 2);
+  const fs::path db = folder_ / "stopped.db";
+  Random random(11);
+  int stops = 0;
+  for (bool done = false; !done;) {
+    ASSERT_LT(stops, 1000);
+    Store store = Store::open(db, Store::Mode::write_or_create);
+    std::atomic<bool> stop{false};
+    // A stop before the first report still finishes and records the trials under way.
+    std::jthread stopper([&, after = random.below(40)] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(after));
+      stop = true;
+    });
+    const StudyProgress progress =
+        simulate_study(p, store, load_simulated_settings(""), {3, 1, 2}, stop, {});
+    done = progress.recorded == progress.expected;
+    ++stops;
+  }
+  EXPECT_GT(stops, 1) << "nothing was interrupted";
+  EXPECT_EQ(csv_of(db), csv_of(folder_ / "whole.db"));
+}
+
+TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
+  const Protocol p = protocol(R"(, "samples": true)");
+  simulate(p, folder_ / "samples.db", 2);
+  Store store = Store::open(folder_ / "samples.db", Store::Mode::read_only);
+  int trials = 0;
+  store.for_each_trial(
+      [&](const StoredTrial& trial) {
+        ++trials;
+        ASSERT_EQ(trial.record.samples.size(), trial.record.ticks);
+        EXPECT_EQ(trial.record.samples.back().tick + 1, trial.record.ticks);
+      },
+      true);
+  EXPECT_GE(trials, 48);
+}
+
+TEST_F(SimulatedStudy, RefusesWhatTheDeviceOrTheParticipantCannotDo) {
+  const auto refusal = [&](const std::string& more) -> std::string {
+    try {
+      simulate(protocol(more), folder_ / "refused.db", 1);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(refusal(R"(, "material": {"stiffness_n_per_m": 50000})").find("N/m"),
+            std::string::npos);
+  EXPECT_NE(refusal(R"(, "workspace": {"scale": 0.1})").find("reaches"), std::string::npos);
+}
+
+TEST(SimulatedSettings, PatchesAreCheckedAndChangeTheChecksum) {
+  const fs::path path = fs::path(::testing::TempDir()) / "patch.json";
+  const auto patched = [&](const std::string& text) {
+    std::ofstream(path) << text;
+    return load_simulated_settings(path);
+  };
+  const SimulatedSettings defaults = load_simulated_settings("");
+  const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})");
+  EXPECT_EQ(quick.motor.reaction_delay, 0.02);
+  EXPECT_NE(quick.sha256, defaults.sha256);
+  EXPECT_THROW(patched(R"({"motor": {"reaction": 0.02}})"), InputError);
+  EXPECT_THROW(patched(R"({"motor": {"reaction_delay_s": "soon"}})"), InputError);
+  EXPECT_THROW(patched(R"({"motor": 3})"), InputError);
+  EXPECT_THROW(patched("{"), InputError);
+  fs::remove(path);
+}
+
+}  // namespace
+}  // namespace palpate

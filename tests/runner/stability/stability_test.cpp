@@ -1,0 +1,124 @@
+// The closed loop against theory: where it must agree, and on which side it must lie.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <string>
+
+#include "runner/servo/passivity.h"
+#include "runner/stability/boundary.h"
+#include "runner/stability/integrators.h"
+
+namespace palpate {
+namespace {
+
+TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const double rate : {500.0, 1000.0, 10000.0}) {
+      for (const int delay : {0, 1}) {
+        for (const double stiffness : {10.0, 1000.0, 1e5}) {
+          LoopCase loop;
+          loop.renderer = renderer;
+          loop.heavy = true;
+          loop.settings.rate = rate;
+          loop.settings.delay = delay;
+          const BoundaryPoint p = boundary_at(loop, stiffness);
+          EXPECT_DOUBLE_EQ(p.theory, stiffness / rate * (0.5 + delay));
+          EXPECT_NEAR(p.measured / p.theory, 1, 0.05)
+              << to_string(renderer) << ", " << rate << " Hz, delay " << delay << ", " << stiffness;
+        }
+      }
+    }
+  }
+}
+
+TEST(Stability, IsWhereTheTheoryPromisesIt) {
+  std::vector<LoopCase> loops;
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const Situation situation : kSituations) {
+      for (const double damping : {0.0, 1.0}) {
+        LoopCase loop;
+        loop.situation = situation;
+        loop.renderer = renderer;
+        loop.virtual_damping = damping;
+        loops.push_back(loop);
+      }
+    }
+  }
+  LoopCase held, rough;
+  held.settings.hand = {1000, 10, 0.05};
+  rough.settings.friction = 0.5;
+  rough.settings.resolution = 3e-5;
+  loops.push_back(held);
+  loops.push_back(rough);
+  for (const LoopCase& loop : loops) {
+    for (const double stiffness : {30.0, 3000.0, 30000.0}) {
+      const BoundaryPoint p = boundary_at(loop, stiffness);
+      EXPECT_TRUE(p.promised);
+      EXPECT_FALSE(p.unsafe()) << to_string(loop.situation) << ", " << to_string(loop.renderer)
+                               << ", B " << loop.virtual_damping << ", " << stiffness << ": "
+                               << p.measured << " of " << p.theory;
+    }
+  }
+}
+
+TEST(Stability, TouchesWhatItSays) {
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const Situation situation : kSituations) {
+      const LoopScene scene(situation, renderer, Material{});
+      EXPECT_EQ(scene.contacts(), situation == Situation::two_objects ? 2 : 1);
+      EXPECT_GT(scene.force_tip(), 0);
+      const bool side = renderer == RendererKind::ray && situation != Situation::wall;
+      EXPECT_EQ(scene.force_tail() > 0, side) << to_string(situation);
+    }
+  }
+}
+
+TEST(Stability, FrictionMustHoldACountOfTheResolution) {
+  LoopCase loop;
+  loop.settings.friction = 0.025;
+  loop.settings.resolution = 3e-5;
+  EXPECT_TRUE(boundary_at(loop, 1600).promised);
+  EXPECT_FALSE(boundary_at(loop, 1700).promised);  // 2 f_c / Delta = 1667 N/m
+}
+
+TEST(Stability, ThePassivityControllerExtendsIt) {
+  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+    for (const Situation situation : kSituations) {
+      LoopCase loop;
+      loop.situation = situation;
+      loop.renderer = renderer;
+      const double without = stiffest_stable(loop, 0.25);
+      loop.settings.passivity_controller = true;
+      EXPECT_GT(stiffest_stable(loop, 0.25), 10 * without) << to_string(situation);
+    }
+  }
+}
+
+TEST(Integrators, TheExactOneIsAndTheOthersConverge) {
+  const auto rows = compare_integrators([] {
+    return std::chrono::duration<double, std::nano>(
+               std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  });
+  int blown_up = 0;
+  for (const IntegratorRow& row : rows) {
+    if (row.method == "exact") {
+      EXPECT_LT(row.error, 1e-12) << row.oscillator;
+      continue;
+    }
+    blown_up += std::isinf(row.error);
+    if (row.method == "implicit") {
+      EXPECT_TRUE(std::isfinite(row.error));
+    }
+    if (row.steps == 1024) {
+      EXPECT_LT(row.error, 1e-5) << row.oscillator << " " << row.method;
+      EXPECT_GT(row.error, 1e-12);
+    }
+  }
+  EXPECT_GT(blown_up, 2);
+}
+
+}  // namespace
+}  // namespace palpate
