@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -23,7 +23,7 @@ std::size_t bytes_of(std::string_view text, std::size_t characters) {
 
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : printable(text)) {
+  for (const char c : stimuli::printable(text)) {
     switch (c) {
       case '&':
         out += "&amp;";
@@ -111,4 +111,4 @@ std::string p_text(double p) {
   return fixed(p, 3);
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// For text and quoted attributes of XML and HTML.
 std::string escaped(std::string_view text);
@@ -50,4 +50,4 @@ std::string joined(const Strings& parts) {
   return all;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::data {
 
 /// The database could not be read or written; what() names the file and says what to do.
 class StoreError : public std::runtime_error {
@@ -15,4 +15,4 @@ class StoreRefused : public StoreError {
   using StoreError::StoreError;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

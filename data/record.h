@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::data {
 
 /// One servo tick of a trial, as it is kept when the protocol asks for samples.
 struct SampleRecord {
@@ -117,4 +117,4 @@ struct RunInfo {
   std::string files_sha256;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -8,7 +8,7 @@
 
 #include "protocols/json_document.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -108,4 +108,4 @@ std::string in_words(const ProtocolDifference& difference) {
   return words;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// JSON pointers of what is there, or has another value, in one of two texts only.
 struct ProtocolDifference {
@@ -24,4 +24,4 @@ ProtocolDifference difference(const std::string& before, const std::string& afte
 /// "only texts: /texts/break", "stimuli and order: /seed, /stimuli; other settings: /home/rest_s"
 std::string in_words(const ProtocolDifference& difference);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -9,7 +9,7 @@
 
 #include "stimuli/input_file.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -269,10 +269,10 @@ json read_json(const std::string& text, FaultList& faults) { return Builder(text
 
 std::string read_text_file(const std::string& path) {
   try {
-    return read_whole(path, kMaxBytes);
+    return stimuli::read_whole(path, kMaxBytes);
   } catch (const std::runtime_error& error) {
     throw InputError({{path, "(file)", std::string("a readable JSON file: ") + error.what(), 0}});
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

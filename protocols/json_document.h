@@ -11,7 +11,7 @@
 
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// Stands for a JSON pointer: FNV-1a of its characters, which goes on from that of its parent. Two
 /// pointers with the same hash would at worst show each other's line.
@@ -69,4 +69,4 @@ nlohmann::json read_json(const std::string& text, FaultList& faults);
 /// The bytes of a file. \throws InputError where it cannot be read or is beyond all reason large.
 std::string read_text_file(const std::string& path);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::protocols {
 
 int latin_square_rows(int n) { return n % 2 == 0 || n == 1 ? n : 2 * n; }
 
@@ -22,4 +22,4 @@ std::vector<int> latin_square_row(int n, int participant_number) {
   return order;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

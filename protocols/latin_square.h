@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// Number of different rows of a balanced Latin square of n conditions: n where n is even, 2 n
 /// where it is odd (1 for a single condition).
@@ -15,4 +15,4 @@ int latin_square_rows(int n);
 /// \throws std::invalid_argument unless n >= 1 and participant_number >= 1.
 std::vector<int> latin_square_row(int n, int participant_number);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

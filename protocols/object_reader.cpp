@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -282,4 +282,4 @@ void ObjectReader::refuse_unknown_keys() {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -13,7 +13,7 @@
 #include "protocols/json_document.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// The numbers that a key takes.
 struct Interval {
@@ -104,4 +104,4 @@ class ObjectReader {
   std::set<std::string> known_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::protocols

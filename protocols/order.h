@@ -8,7 +8,7 @@
 #include "protocols/protocol.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// How many single draws order_block may spend on plain random orders before it constructs one.
 std::size_t uniform_draw_budget(std::size_t trials);
@@ -28,14 +28,14 @@ std::size_t uniform_draw_budget(std::size_t trials);
 ///
 /// \throws ScheduleError naming the stimulus (by `names`) and what would help.
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, Random& random);
+                             const std::vector<std::string>& names, stimuli::Random& random);
 
 /// The same with another budget; 0 always constructs.
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, Random& random,
+                             const std::vector<std::string>& names, stimuli::Random& random,
                              std::size_t draw_budget);
 
 /// Whether any order of these counts holds the limits. Exact.
 bool can_order(const std::vector<int>& counts, const Protocol::Order& order);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

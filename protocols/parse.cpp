@@ -4,17 +4,17 @@
 
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 // Keys and names from a file must not break the lines of the list.
 std::string list(const std::vector<Fault>& faults) {
   std::string text;
   for (const Fault& fault : faults) {
-    text += (text.empty() ? "" : "\n") + printable(fault.file);
+    text += (text.empty() ? "" : "\n") + stimuli::printable(fault.file);
     // A place that is a line says it itself.
     if (fault.line > 0 && fault.place.front() == '/') (text += ':') += std::to_string(fault.line);
-    text += ": " + printable(fault.place) + ": " + printable(fault.expected);
+    text += ": " + stimuli::printable(fault.place) + ": " + stimuli::printable(fault.expected);
   }
   return text;
 }
@@ -24,4 +24,4 @@ std::string list(const std::vector<Fault>& faults) {
 InputError::InputError(std::vector<Fault> faults)
     : std::runtime_error(list(faults)), faults_(std::move(faults)) {}
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -7,7 +7,7 @@
 
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// One thing wrong with an input file.
 struct Fault {
@@ -41,6 +41,6 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
 
 /// Reads and checks a scene file: {"objects": [...]}. Mesh files are resolved relative to it.
 /// \throws InputError with every fault.
-std::vector<ObjectSpec> parse_scene(const std::string& path);
+std::vector<stimuli::ObjectSpec> parse_scene(const std::string& path);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -11,7 +11,7 @@
 #include "stimuli/mesh_file.h"
 #include "stimuli/shapes.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -29,10 +29,10 @@ constexpr Interval kSegments{3, 4096};
 constexpr int kMaxCompounds = 8;  // within each other
 constexpr std::size_t kMaxParts = 1000;
 
-ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
-                       const MeshFiles& files, int compounds);
+stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files, int compounds);
 
-void read_file(ObjectReader& reader, const MeshFiles& files, ObjectSpec& spec) {
+void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec& spec) {
   std::string name;
   reader.text("file", name);
   const json* const value = reader.member("file", Need::required);
@@ -51,8 +51,9 @@ void read_file(ObjectReader& reader, const MeshFiles& files, ObjectSpec& spec) {
                         "expected an existing file; there is no " + path.string());
   } else {
     try {
-      spec.file_bytes = std::make_shared<const std::string>(mesh_file_bytes(path.string()));
-    } catch (const MeshError& unreadable) {
+      spec.file_bytes =
+          std::make_shared<const std::string>(stimuli::mesh_file_bytes(path.string()));
+    } catch (const stimuli::MeshError& unreadable) {
       reader.faults().add(reader.pointer("file"), unreadable.what());
     }
   }
@@ -60,7 +61,8 @@ void read_file(ObjectReader& reader, const MeshFiles& files, ObjectSpec& spec) {
   spec.file = path.string();
 }
 
-void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds, ObjectSpec& spec) {
+void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
+                stimuli::ObjectSpec& spec) {
   const json* const parts = reader.array("parts", 1, kMaxParts, Need::required);
   if (parts == nullptr) return;
   if (compounds == kMaxCompounds) {
@@ -76,19 +78,20 @@ void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds, Obj
   }
 }
 
-ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
-                       const MeshFiles& files, int compounds) {
-  ObjectSpec spec;
+stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files, int compounds) {
+  stimuli::ObjectSpec spec;
   spec.material = default_material;
   reader.vector("position_m", spec.pose.position, kPosition);
   reader.quaternion("orientation_wxyz", spec.pose.orientation);
   read_material(reader, spec.material);
 
-  std::optional<ShapeKind> shape;
-  std::vector<std::pair<const char*, std::optional<ShapeKind>>> shapes;
-  shapes.reserve(std::size(kShapes));
-  for (const ShapeKind kind : kShapes) shapes.emplace_back(needs_of(kind).name, kind);
-  reader.choice<std::optional<ShapeKind>>("shape", shape, shapes, Need::required);
+  std::optional<stimuli::ShapeKind> shape;
+  std::vector<std::pair<const char*, std::optional<stimuli::ShapeKind>>> shapes;
+  shapes.reserve(std::size(stimuli::kShapes));
+  for (const stimuli::ShapeKind kind : stimuli::kShapes)
+    shapes.emplace_back(stimuli::needs_of(kind).name, kind);
+  reader.choice<std::optional<stimuli::ShapeKind>>("shape", shape, shapes, Need::required);
   if (!shape) {
     // Which keys belong here cannot be told: none of the shapes' is called unknown.
     for (const char* key :
@@ -98,19 +101,19 @@ ObjectSpec read_nested(ObjectReader& reader, const Material& default_material,
     return spec;
   }
   spec.shape = *shape;
-  const ShapeNeeds needs = needs_of(spec.shape);
+  const stimuli::ShapeNeeds needs = stimuli::needs_of(spec.shape);
   if (needs.radius) reader.number("radius_m", spec.radius, kLength, Need::required);
   if (needs.height) reader.number("height_m", spec.height, kLength, Need::required);
   if (needs.edge) reader.number("edge_m", spec.edge, kLength, Need::required);
   if (needs.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
   if (needs.segments) reader.integer("segments", spec.segments, kSegments);
-  if (spec.shape == ShapeKind::mesh) read_file(reader, files, spec);
-  if (spec.shape == ShapeKind::compound) read_parts(reader, files, compounds, spec);
+  if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);
+  if (spec.shape == stimuli::ShapeKind::compound) read_parts(reader, files, compounds, spec);
   return spec;
 }
 
 /// A coefficient given alone serves for both; given both, sticking holds at least as much.
-void read_friction(ObjectReader& reader, Material& material) {
+void read_friction(ObjectReader& reader, stimuli::Material& material) {
   reader.number("friction_dynamic", material.friction_dynamic, kFriction);
   if (reader.has("friction_dynamic") && !reader.has("friction_static"))
     material.friction_static = material.friction_dynamic;
@@ -124,14 +127,14 @@ void read_friction(ObjectReader& reader, Material& material) {
   }
 }
 
-void read_layers(ObjectReader& reader, Material& material) {
+void read_layers(ObjectReader& reader, stimuli::Material& material) {
   const nlohmann::json* const list = reader.array("layers", 0, kMaxLayers);
   if (list == nullptr) return;
   material.layers.clear();
   double above = 0;
   for (std::size_t i = 0; i < list->size(); ++i) {
     ObjectReader layer((*list)[i], child_pointer(reader.pointer("layers"), i), reader.faults());
-    Layer read;
+    stimuli::Layer read;
     layer.number("depth_m", read.depth, kLength, Need::required);
     layer.number("stiffness_n_per_m", read.stiffness, kStiffness, Need::required);
     layer.refuse_unknown_keys();
@@ -145,15 +148,15 @@ void read_layers(ObjectReader& reader, Material& material) {
 
 }  // namespace
 
-void read_material(ObjectReader& reader, Material& material) {
+void read_material(ObjectReader& reader, stimuli::Material& material) {
   reader.number("stiffness_n_per_m", material.stiffness, kStiffness);
   reader.number("damping_ns_per_m", material.damping, kDamping);
   read_friction(reader, material);
   read_layers(reader, material);
 }
 
-ObjectSpec read_object(ObjectReader& reader, const Material& default_material,
-                       const MeshFiles& files) {
+stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files) {
   return read_nested(reader, default_material, files, 0);
 }
 
@@ -161,4 +164,4 @@ std::string folder_of(const std::string& file) {
   return std::filesystem::path(file).parent_path().string();
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -9,7 +9,7 @@
 #include "protocols/schedule.h"
 #include "protocols/sha256.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -49,7 +49,7 @@ void read_renderers(ObjectReader& reader, Protocol& protocol) {
 StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol, const MeshFiles& files) {
   StimulusSpec stimulus;
   reader.name("name", stimulus.name);
-  Material material = protocol.material;
+  stimuli::Material material = protocol.material;
   reader.section("material", [&](ObjectReader& section) {
     read_material(section, material);
     for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m", "friction_static",
@@ -335,4 +335,4 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   return protocol;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

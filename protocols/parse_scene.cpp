@@ -2,19 +2,19 @@
 #include "protocols/parse.h"
 #include "protocols/parse_object.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
-std::vector<ObjectSpec> parse_scene(const std::string& path) {
+std::vector<stimuli::ObjectSpec> parse_scene(const std::string& path) {
   constexpr std::size_t kMaxObjects = 1000;
   FaultList faults(path);
   const nlohmann::json root = read_json(read_text_file(path), faults);
   ObjectReader scene(root, "", faults);
   scene.member("$schema");
-  std::vector<ObjectSpec> objects;
+  std::vector<stimuli::ObjectSpec> objects;
   if (const auto* const list = scene.array("objects", 1, kMaxObjects, Need::required)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       ObjectReader object((*list)[i], child_pointer("/objects", i), faults);
-      objects.push_back(read_object(object, Material{}, {folder_of(path)}));
+      objects.push_back(read_object(object, stimuli::Material{}, {folder_of(path)}));
       object.refuse_unknown_keys();
     }
   }
@@ -23,4 +23,4 @@ std::vector<ObjectSpec> parse_scene(const std::string& path) {
   return objects;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -1,6 +1,6 @@
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 const char* to_string(RendererKind kind) { return kind == RendererKind::point ? "point" : "ray"; }
 const char* to_string(NoiseKind kind) { return kind == NoiseKind::white ? "white" : "pink"; }
@@ -10,4 +10,4 @@ const std::string& answer_label(const Protocol& protocol, const std::string& sti
   return label != protocol.response.labels.end() ? label->second : stimulus;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -10,7 +10,7 @@
 
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 enum class RendererKind { point, ray };
 const char* to_string(RendererKind kind);  ///< "point", "ray"
@@ -32,8 +32,8 @@ struct MaskingNoise {
 };
 
 struct StimulusSpec {
-  std::string name;   ///< unique within the protocol
-  ObjectSpec object;  ///< material already resolved against the protocol's default
+  std::string name;            ///< unique within the protocol
+  stimuli::ObjectSpec object;  ///< material already resolved against the protocol's default
 };
 
 struct Protocol {
@@ -80,7 +80,7 @@ struct Protocol {
     Vec3 centre{0, 0, 0};  ///< m, in the device's frame: where the stimuli's origin stands
     double scale = 1;      ///< virtual metres per device metre
   } workspace;
-  Material material;
+  stimuli::Material material;
   double servo_rate = 1000;           ///< Hz
   bool passivity_controller = false;  ///< takes out the energy that sampling feeds to the hand
   MaterialLimit material_limit = MaterialLimit::refuse;
@@ -108,4 +108,4 @@ struct Protocol {
 /// What the participant reads for a stimulus: its label, else its name. Answers are stored by name.
 const std::string& answer_label(const Protocol& protocol, const std::string& stimulus);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

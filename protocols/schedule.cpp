@@ -10,7 +10,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 // One stream of random numbers for each use, so that a change to one part of a protocol leaves the
@@ -64,7 +64,7 @@ std::vector<Group> groups_in_order(const Protocol& protocol, int participant_num
 /// Gives every trial its renderer: each stimulus meets each renderer of the group equally often.
 /// Together with a uniform order of the stimuli this makes every mixed order equally likely.
 void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Trial>& trials,
-                   Random& random) {
+                   stimuli::Random& random) {
   for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
     std::vector<Trial*> shown;
     for (Trial& trial : trials) {
@@ -80,7 +80,7 @@ void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Tri
 
 /// A block without orientations: counts[i] trials of stimulus i.
 std::vector<Trial> ordered_trials(const Protocol& protocol, const Group& group,
-                                  const std::vector<int>& counts, Random& random) {
+                                  const std::vector<int>& counts, stimuli::Random& random) {
   std::vector<Trial> trials;
   for (const int stimulus : order_block(counts, protocol.order, names_of(protocol), random)) {
     Trial trial;
@@ -98,7 +98,8 @@ std::vector<int> equal_counts(const Protocol& protocol, const Group& group, int 
 }
 
 /// Listed orientations: for each stimulus and renderer the list as evenly as it goes, shuffled.
-void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
+void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials,
+                      stimuli::Random& random) {
   if (protocol.orientations.empty()) throw ScheduleError("the list of orientations is empty");
   for (const RendererKind renderer : protocol.renderers) {
     for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
@@ -119,10 +120,10 @@ void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trial
   }
 }
 
-void orient(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
+void orient(const Protocol& protocol, const std::vector<Trial*>& trials, stimuli::Random& random) {
   switch (protocol.orientation) {
     case OrientationKind::uniform:
-      for (Trial* trial : trials) trial->orientation = uniform_rotation(random);
+      for (Trial* trial : trials) trial->orientation = stimuli::uniform_rotation(random);
       break;
     case OrientationKind::fixed:
       for (Trial* trial : trials) trial->orientation = Quat(1, 0, 0, 0);
@@ -133,7 +134,7 @@ void orient(const Protocol& protocol, const std::vector<Trial*>& trials, Random&
   }
 }
 
-void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, Random random) {
+void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, stimuli::Random random) {
   std::vector<Trial*> all;
   int number = 0;
   for (Trial& trial : trials) {
@@ -148,12 +149,12 @@ std::vector<Trial> practice_trials(const Protocol& protocol, int participant_num
                                    const Group& group, int round) {
   const auto participant = static_cast<std::uint64_t>(participant_number);
   const auto number = static_cast<std::uint64_t>(round);
-  Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
+  stimuli::Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
   std::vector<Trial> trials = ordered_trials(
       protocol, group, equal_counts(protocol, group, protocol.practice.repetitions), random);
   finish_practice(
       protocol, trials,
-      Random(protocol.seed, {participant, kPractice, kOrientation, code(group), number}));
+      stimuli::Random(protocol.seed, {participant, kPractice, kOrientation, code(group), number}));
   return trials;
 }
 
@@ -161,7 +162,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
                                   const Group& group, int session) {
   const auto participant = static_cast<std::uint64_t>(participant_number);
   const auto number = static_cast<std::uint64_t>(session);
-  Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
+  stimuli::Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
   const int stimuli = static_cast<int>(protocol.stimuli.size());
   std::vector<int> counts;
   counts.reserve(protocol.stimuli.size());
@@ -171,7 +172,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
   if (protocol.order.kind == OrderKind::random) random.shuffle(counts);
   std::vector<Trial> trials = ordered_trials(protocol, group, counts, random);
   finish_practice(protocol, trials,
-                  Random(protocol.seed, {participant, kWarmUp, kOrientation, number}));
+                  stimuli::Random(protocol.seed, {participant, kWarmUp, kOrientation, number}));
   return trials;
 }
 
@@ -181,8 +182,8 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
   std::vector<Block> blocks;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     for (int b = 0; b < protocol.blocks_per_renderer; ++b) {
-      Random random(protocol.seed,
-                    {participant, kOrder, code(groups[g]), static_cast<std::uint64_t>(b)});
+      stimuli::Random random(protocol.seed,
+                             {participant, kOrder, code(groups[g]), static_cast<std::uint64_t>(b)});
       const int repetitions = share(protocol.repetitions, protocol.blocks_per_renderer, b);
       blocks.push_back({1, static_cast<int>(g),
                         ordered_trials(protocol, groups[g],
@@ -193,7 +194,7 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
   for (Block& block : blocks) {
     for (Trial& trial : block.trials) all.push_back(&trial);
   }
-  Random random(protocol.seed, {participant, kOrientation});
+  stimuli::Random random(protocol.seed, {participant, kOrientation});
   orient(protocol, all, random);
   return blocks;
 }
@@ -281,4 +282,4 @@ std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
   return trials;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

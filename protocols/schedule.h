@@ -16,7 +16,7 @@
 
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::protocols {
 
 /// One scheduled presentation. Numbers count from 1; `trial` counts within the session.
 struct Trial {
@@ -51,4 +51,4 @@ int renderer_orders(const Protocol& protocol);
 /// Trials that count, without practice and warm-up, in all sessions of a participant.
 long long main_trials(const Protocol& protocol);
 
-}  // namespace palpate
+}  // namespace palpate::protocols

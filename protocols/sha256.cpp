@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 // FIPS 180-4, 4.2.2: fractional parts of the cube roots of the first 64 primes.
@@ -78,4 +78,4 @@ std::string sha256_hex(std::string_view bytes) {
   return hex;
 }
 
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -7,7 +7,7 @@
 
 #include "rendering/minkowski_facets.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using namespace minkowski;
@@ -38,9 +38,9 @@ double fall(double before, double after) {
 
 /// When the probe's line comes down through the line of an edge, from time t on: a root of the
 /// quadratic (w(t) x d(t)) . e, whose sign says on which side the line passes.
-double fall_on_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead, const Motion& m,
-                    double t) {
-  const Edge& edge = mesh.edges()[index];
+double fall_on_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
+                    const Motion& m, double t) {
+  const stimuli::Edge& edge = mesh.edges()[index];
   const Vec3& v0 = edge.from;
   const Vec3 e = (left_ahead ? -1.0 : 1.0) * (edge.to - v0);
   const Vec3 w = m.tip - v0;
@@ -92,8 +92,8 @@ Stage go_on(MinkowskiFacet facet, double since) {
 }
 
 template <bool kSegment>
-Stage over_face(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
-  const Facet& facet = mesh.facets()[at.facet.index];
+Stage over_face(const stimuli::ConvexMesh& mesh, const Watch& at, const Motion& m) {
+  const stimuli::Facet& facet = mesh.facets()[at.facet.index];
   const double tip_before = glm::dot(facet.normal, m.tip) - facet.offset;
   const double tip_after = tip_before + glm::dot(facet.normal, m.tip_motion);
   double time = fall(tip_before, tip_after);
@@ -110,7 +110,7 @@ Stage over_face(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
   const Vec3 d = m.d_at(time);
   Vec3 end = m.tip_at(time);
   if (tail_first) end += d;
-  const Neighbour side = beyond_side(mesh, at.facet.index, end);
+  const stimuli::Neighbour side = beyond_side(mesh, at.facet.index, end);
   if (side.edge == kNone) return entered(at, time);
   if constexpr (kSegment) {
     const bool here = glm::dot(facet.normal, d) >= 0;
@@ -130,10 +130,10 @@ double turn_time(const Vec3& normal, bool ahead, const Motion& m) {
   return before == after ? 0 : before / (before - after);
 }
 
-Stage over_edge(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
+Stage over_edge(const stimuli::ConvexMesh& mesh, const Watch& at, const Motion& m) {
   const std::uint32_t index = at.facet.index;
   const bool left_ahead = at.facet.left_ahead;
-  const Edge& edge = mesh.edges()[index];
+  const stimuli::Edge& edge = mesh.edges()[index];
   const double left_turns = turn_time(mesh.facets()[edge.left].normal, left_ahead, m);
   const double right_turns = turn_time(mesh.facets()[edge.right].normal, !left_ahead, m);
   const double turns = std::min(left_turns, right_turns);
@@ -167,7 +167,7 @@ Stage over_edge(const ConvexMesh& mesh, const Watch& at, const Motion& m) {
 /// An entry, if the probe is on the facet then; undecided where rounding put it beside or below:
 /// edges nearly parallel to the probe.
 template <bool kSegment>
-Approach checked(const ConvexMesh& mesh, const Approach& entry, const Motion& m) {
+Approach checked(const stimuli::ConvexMesh& mesh, const Approach& entry, const Motion& m) {
   const Vec3 tip = m.tip_at(entry.time), d = m.d_at(entry.time);
   Measured at;
   if (!kSegment || entry.facet.kind == Kind::face) {
@@ -182,7 +182,7 @@ Approach checked(const ConvexMesh& mesh, const Approach& entry, const Motion& m)
 }
 
 template <bool kSegment>
-Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
+Approach approach(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
                   const LineProbe& after) {
   const Motion motion(before, after);
   Watch at{start, 0}, last{};
@@ -205,14 +205,14 @@ Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe&
 
 }  // namespace
 
-Approach approach_segment(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
-                          const LineProbe& after) {
+Approach approach_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                          const LineProbe& before, const LineProbe& after) {
   return approach<true>(mesh, start, before, after);
 }
 
-Approach approach_point(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
-                        const LineProbe& after) {
+Approach approach_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                        const LineProbe& before, const LineProbe& after) {
   return approach<false>(mesh, start, before, after);
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -7,7 +7,7 @@
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// How a tick of motion near an object ended. Mesh frame.
 struct Approach {
@@ -25,11 +25,11 @@ struct Approach {
 /// outside: an entry is the first one, for any speed. Undecided (rounding, or a long way round the
 /// object): ask first_contact.
 /// \param start  a facet whose plane separates the probe at `before`
-Approach approach_segment(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
-                          const LineProbe& after);
+Approach approach_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                          const LineProbe& before, const LineProbe& after);
 
 /// The same for the tip alone.
-Approach approach_point(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
-                        const LineProbe& after);
+Approach approach_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                        const LineProbe& before, const LineProbe& after);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

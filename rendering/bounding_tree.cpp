@@ -4,7 +4,7 @@
 #include <glm/common.hpp>
 #include <numeric>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 constexpr std::uint32_t kLeaf =
     4;  // primitives; smaller leaves cost more nodes than they save tests
@@ -43,4 +43,4 @@ void BoundingTree::build(std::span<const Box> boxes, std::uint32_t begin, std::u
   build(boxes, middle, end);
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

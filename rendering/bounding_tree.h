@@ -6,7 +6,7 @@
 #include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 struct Box {
   Vec3 low, high;  ///< m
@@ -26,16 +26,16 @@ class BoundingTree {
   BoundingTree() = default;
   explicit BoundingTree(std::span<const Box> boxes);
 
-  const LargeArray<Node>& nodes() const {
+  const stimuli::LargeArray<Node>& nodes() const {
     return nodes_;
   }  ///< root first; empty without primitives
-  const LargeArray<std::uint32_t>& order() const { return order_; }
+  const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
  private:
   void build(std::span<const Box> boxes, std::uint32_t begin, std::uint32_t end);
 
-  LargeArray<Node> nodes_;
-  LargeArray<std::uint32_t> order_;
+  stimuli::LargeArray<Node> nodes_;
+  stimuli::LargeArray<std::uint32_t> order_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -7,7 +7,7 @@
 
 #include "rendering/tick.h"
 
-namespace palpate::tick {
+namespace palpate::rendering::tick {
 
 /// Each part is met where the others let the ideal probe be, so that the probe slides over a seam
 /// instead of running into the inner wall behind it.
@@ -161,4 +161,4 @@ struct Compound {
   }
 };
 
-}  // namespace palpate::tick
+}  // namespace palpate::rendering::tick

@@ -1,6 +1,6 @@
 #include "rendering/contact.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 const char* to_string(ContactType type) {
   switch (type) {
@@ -16,4 +16,4 @@ const char* to_string(ContactType type) {
   return "none";
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -4,7 +4,7 @@
 
 #include "rendering/probe.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// The contact types of Ho, Basdogan & Srinivasan 2000, fig. 4.
 enum class ContactType : std::uint8_t { none, point_polygon, segment_edge, segment_face };
@@ -22,4 +22,4 @@ struct Contact {
   ContactType type = ContactType::none;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

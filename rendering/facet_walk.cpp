@@ -5,7 +5,7 @@
 
 #include "rendering/minkowski_facets.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 // Ho, Basdogan & Srinivasan 2000, 4(b). Departs: the paper's rules are steps between adjacent
@@ -24,8 +24,8 @@ constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is roun
 /// From a face over one of its sides: to the edge where it is a silhouette edge, else to the next
 /// face.
 template <bool kSegment>
-Measured step_from_face(const ConvexMesh& mesh, const Measured& from, const Neighbour& side,
-                        const Vec3& tip, const Vec3& d) {
+Measured step_from_face(const stimuli::ConvexMesh& mesh, const Measured& from,
+                        const stimuli::Neighbour& side, const Vec3& tip, const Vec3& d) {
   Measured next = measure_face<kSegment>(mesh, side.across, tip, d);
   if constexpr (kSegment) {
     const bool here = from.rise >= 0, there = next.rise >= 0;
@@ -40,10 +40,10 @@ Measured step_from_face(const ConvexMesh& mesh, const Measured& from, const Neig
 
 /// From an edge past an end of the probe (to the face ahead or behind) or past an end of the edge
 /// (to the next silhouette edge). False when the probe is within both.
-bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d,
-                    Measured& next) {
+bool step_from_edge(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
+                    const Vec3& d, Measured& next) {
   if (at.within) return false;
-  const Edge& edge = mesh.edges()[at.index];
+  const stimuli::Edge& edge = mesh.edges()[at.index];
   if (at.place < 0 || at.place > 1) {
     const bool to_left = (at.place < 0) == at.left_ahead;
     next = measure_face<true>(mesh, to_left ? edge.left : edge.right, tip, d);
@@ -66,10 +66,11 @@ bool step_from_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip,
 
 /// The facet that the last tick ended on, measured against where the probe is now.
 template <bool kSegment>
-Measured resume(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
+Measured resume(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                const Vec3& d) {
   if constexpr (kSegment) {
     if (start.kind == Kind::edge) {
-      const Edge& edge = mesh.edges()[start.index];
+      const stimuli::Edge& edge = mesh.edges()[start.index];
       const Slopes slopes = slopes_at(mesh, edge, d);
       Measured m;
       if (slopes.silhouette() && measure_edge(mesh, start.index, slopes.left >= 0, tip, d, m))
@@ -86,8 +87,9 @@ Measured resume(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, c
 
 // gcc takes a function that only prefetches for one that does nothing: it must be inlined.
 template <bool kEdges>
-[[gnu::always_inline]] inline void fetch_beyond(const ConvexMesh& mesh, std::uint32_t facet) {
-  for (const Neighbour& next : mesh.facets()[facet].triangle) {
+[[gnu::always_inline]] inline void fetch_beyond(const stimuli::ConvexMesh& mesh,
+                                                std::uint32_t facet) {
+  for (const stimuli::Neighbour& next : mesh.facets()[facet].triangle) {
     __builtin_prefetch(&mesh.facets()[next.across]);
     if constexpr (kEdges) __builtin_prefetch(&mesh.edges()[next.edge]);
   }
@@ -109,8 +111,8 @@ template <bool kEdges>
 
 // Rare. Takes a copy: what has been passed by reference stays in memory for the whole walk.
 template <bool kSegment>
-[[gnu::cold, gnu::noinline]] bool is_off(const ConvexMesh& mesh, Measured at, const Vec3& tip,
-                                         const Vec3& d) {
+[[gnu::cold, gnu::noinline]] bool is_off(const stimuli::ConvexMesh& mesh, Measured at,
+                                         const Vec3& tip, const Vec3& d) {
   return off_facet<kSegment>(mesh, at, tip, d) > kOff * (mesh.size() + glm::length(d));
 }
 
@@ -118,7 +120,7 @@ template <bool kSegment>
 bool lies_flat(double rise, const Vec3& d) { return rise * rise <= kFlat * kFlat * glm::dot(d, d); }
 
 template <bool kSegment>
-[[gnu::always_inline]] inline WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start,
+[[gnu::always_inline]] inline WalkResult walk(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
                                               const Vec3& tip, const Vec3& d) {
   const double gain = kDepthRounding * mesh.size();
   Measured at = resume<kSegment>(mesh, start, tip, d);
@@ -130,7 +132,7 @@ template <bool kSegment>
       if (!step_from_edge(mesh, at, tip, d, next)) break;
     } else {
       const Vec3 end = kSegment && at.place > 0 ? tip + d : tip;
-      const Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
+      const stimuli::Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
       if (side.edge == kNone) break;
       if (kSegment && lies_flat(at.rise, d) && !is_off<kSegment>(mesh, at, tip, d)) break;
       next = step_from_face<kSegment>(mesh, at, side, tip, d);
@@ -154,7 +156,7 @@ template <bool kSegment>
 }
 
 template <bool kSegment>
-WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+WalkResult nearest_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
   Measured nearest = measure_face<kSegment>(mesh, 0, tip, d);
   for (std::uint32_t i = 1; i < mesh.facets().size(); ++i) {
     const Measured m = measure_face<kSegment>(mesh, i, tip, d);
@@ -174,7 +176,7 @@ WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d)
 }
 
 template <bool kSegment>
-WalkResult holding_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+WalkResult holding_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
                          const Vec3& shift) {
   WalkResult best;
   double nearest = HUGE_VAL;
@@ -200,53 +202,55 @@ WalkResult holding_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
 
 }  // namespace
 
-WalkResult holding_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+WalkResult holding_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
                                  const Vec3& shift) {
   return holding_facet<true>(mesh, tip, d, shift);
 }
 
-WalkResult holding_facet_point(const ConvexMesh& mesh, const Vec3& tip, const Vec3& shift) {
+WalkResult holding_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip,
+                               const Vec3& shift) {
   return holding_facet<false>(mesh, tip, Vec3(0), shift);
 }
 
-WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+WalkResult walk_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
                         const Vec3& d) {
   return walk<true>(mesh, start, tip, d);
 }
 
-WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
+WalkResult walk_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
   return walk<false>(mesh, start, tip, Vec3(0));
 }
 
-void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at) {
+void fetch_ahead(const stimuli::ConvexMesh& mesh, MinkowskiFacet at) {
   if (at.kind == Kind::face) {
-    for (const Neighbour& next : mesh.facets()[at.index].triangle)
+    for (const stimuli::Neighbour& next : mesh.facets()[at.index].triangle)
       fetch_beyond<false>(mesh, next.across);
     return;
   }
   for (const std::uint32_t facet : {mesh.edges()[at.index].left, mesh.edges()[at.index].right}) {
-    for (const Neighbour& next : mesh.facets()[facet].triangle) {
+    for (const stimuli::Neighbour& next : mesh.facets()[facet].triangle) {
       if (next.edge == at.index) continue;
       fetch_beyond<true>(mesh, next.across);
     }
   }
 }
 
-WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
-                              const Vec3& d) {
+WalkResult same_facet_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                              const Vec3& tip, const Vec3& d) {
   return to_result(resume<true>(mesh, start, tip, d), false);
 }
 
-WalkResult same_facet_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip) {
+WalkResult same_facet_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                            const Vec3& tip) {
   return to_result(resume<false>(mesh, start, tip, Vec3(0)), false);
 }
 
-WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+WalkResult nearest_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
   return nearest_facet<true>(mesh, tip, d);
 }
 
-WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip) {
+WalkResult nearest_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip) {
   return nearest_facet<false>(mesh, tip, Vec3(0));
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

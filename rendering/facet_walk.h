@@ -7,7 +7,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// A facet of M, the Minkowski sum of the object and the mirrored probe: a facet of the object with
 /// the deeper end of the probe, or a silhouette edge of the object with the probe's direction. One
@@ -47,32 +47,32 @@ struct WalkResult {
 /// Walks from `start` to the facet of M that the probe is held by. Mesh frame.
 /// \param tip   the virtual probe's tip, m
 /// \param d     tail - tip, m; zero for a point
-WalkResult walk_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+WalkResult walk_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
                         const Vec3& d);
 
 /// The same walk with the probe shrunk to its tip: faces only.
-WalkResult walk_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+WalkResult walk_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
 
 /// Asks for the memory two steps from a facet that the walk has come to, so that later walks need
 /// not wait for it; changes nothing. What is one step away was asked for one facet before.
 /// Neighbours of triangles only: other facets are few.
-void fetch_ahead(const ConvexMesh& mesh, MinkowskiFacet at);
+void fetch_ahead(const stimuli::ConvexMesh& mesh, MinkowskiFacet at);
 
 /// The facet of M of least depth, by looking at all of them: where there is no history to walk
 /// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.
-WalkResult nearest_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
-WalkResult nearest_facet_point(const ConvexMesh& mesh, const Vec3& tip);
+WalkResult nearest_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
+WalkResult nearest_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip);
 
 /// Of the facets of M that hold the probe (with the ideal probe on them), the one whose ideal probe
 /// is nearest to the virtual probe moved by `shift`; kind none: there is none. For walks that are
 /// unsure. Costs O(facets + edges).
-WalkResult holding_facet_segment(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+WalkResult holding_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
                                  const Vec3& shift);
-WalkResult holding_facet_point(const ConvexMesh& mesh, const Vec3& tip, const Vec3& shift);
+WalkResult holding_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& shift);
 
 /// The plane of the facet of the last tick, wherever on it the probe is now: a walk of no steps.
-WalkResult same_facet_segment(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
-                              const Vec3& d);
-WalkResult same_facet_point(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+WalkResult same_facet_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                              const Vec3& tip, const Vec3& d);
+WalkResult same_facet_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

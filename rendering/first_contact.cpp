@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 // Ho, Basdogan & Srinivasan 2000, 4(a), appendix 7 and 8. Departs: appendix 8 holds for small
@@ -59,9 +59,9 @@ void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a,
 }
 
 /// An end point moving from a to b against one polygon (appendix 7).
-void meet_polygon(const ConvexMesh& mesh, std::uint32_t index, const Vec3& a, const Vec3& b,
-                  double tolerance, FirstContact& first) {
-  const Facet& facet = mesh.facets()[index];
+void meet_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& a,
+                  const Vec3& b, double tolerance, FirstContact& first) {
+  const stimuli::Facet& facet = mesh.facets()[index];
   const double before = glm::dot(facet.normal, a) - facet.offset;
   const double after = glm::dot(facet.normal, b) - facet.offset;
   if (!(after < 0) || before < -tolerance || !(after < before)) return;
@@ -80,9 +80,9 @@ struct MovingSegment {
 };
 
 /// The moving segment against one edge (appendix 8, made exact).
-void meet_edge(const ConvexMesh& mesh, std::uint32_t index, const MovingSegment& probe,
+void meet_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const MovingSegment& probe,
                double tolerance, FirstContact& first) {
-  const Edge& edge = mesh.edges()[index];
+  const stimuli::Edge& edge = mesh.edges()[index];
   const Vec3& v0 = edge.from;
   const Vec3 e = edge.to - v0;
   const Vec3 w = probe.tip - v0;
@@ -125,24 +125,24 @@ void meet_edge(const ConvexMesh& mesh, std::uint32_t index, const MovingSegment&
   }
 }
 
-void meet_polygons(const ConvexMesh& mesh, const ContactTrees& trees, const Vec3& a, const Vec3& b,
-                   double tolerance, FirstContact& first) {
+void meet_polygons(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, const Vec3& a,
+                   const Vec3& b, double tolerance, FirstContact& first) {
   visit_near(trees.polygons(), mesh.facets().size(), a, b - a, Vec3(-tolerance), Vec3(tolerance),
              [&](std::uint32_t i) { meet_polygon(mesh, i, a, b, tolerance, first); });
 }
 
 }  // namespace
 
-ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t scanned)
+ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scanned)
     : support_map_(mesh) {
   if (mesh.facets().size() > scanned) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-      const Facet& facet = mesh.facets()[f];
+      const stimuli::Facet& facet = mesh.facets()[f];
       Box box{Vec3(HUGE_VAL), Vec3(-HUGE_VAL)};
       for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-        const Edge& edge = mesh.edges()[mesh.sides()[i].edge];
+        const stimuli::Edge& edge = mesh.edges()[mesh.sides()[i].edge];
         for (const std::uint32_t v : {edge.v0, edge.v1}) {
           box.low = glm::min(box.low, mesh.vertices()[v]);
           box.high = glm::max(box.high, mesh.vertices()[v]);
@@ -155,7 +155,7 @@ ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t 
   if (with_edges && mesh.edges().size() > scanned) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.edges().size());
-    for (const Edge& edge : mesh.edges()) {
+    for (const stimuli::Edge& edge : mesh.edges()) {
       const Vec3 &a = edge.from, &b = edge.to;
       boxes.push_back({glm::min(a, b), glm::max(a, b)});
     }
@@ -163,7 +163,7 @@ ContactTrees::ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t 
   }
 }
 
-FirstContact first_contact_segment(const ConvexMesh& mesh, const ContactTrees& trees,
+FirstContact first_contact_segment(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                    const LineProbe& before, const LineProbe& after,
                                    double tolerance) {
   FirstContact first;
@@ -180,11 +180,11 @@ FirstContact first_contact_segment(const ConvexMesh& mesh, const ContactTrees& t
   return first;
 }
 
-FirstContact first_contact_point(const ConvexMesh& mesh, const ContactTrees& trees,
+FirstContact first_contact_point(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                  const Vec3& before, const Vec3& after, double tolerance) {
   FirstContact first;
   meet_polygons(mesh, trees, before, after, tolerance, first);
   return first;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,7 +9,7 @@
 #include "rendering/support_map.h"
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// The two hierarchies of the paper's section 4(a). A mesh that is small enough to scan has none,
 /// and where only points are shown there is no tree of edges.
@@ -19,7 +19,7 @@ class ContactTrees {
   static constexpr std::size_t kScan = 64;
 
   /// \param scanned  for measurements: so many primitives get no tree
-  ContactTrees(const ConvexMesh& mesh, bool with_edges, std::size_t scanned = kScan);
+  ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scanned = kScan);
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
@@ -40,12 +40,12 @@ struct FirstContact {
 /// Exact for any length of motion and any rotation within the tick: an end point meets a facet's
 /// plane at the root of a linear equation, the segment meets an edge at a root of a quadratic one.
 /// \param tolerance  m; how far outside of a polygon's or edge's rim still counts, against rounding
-FirstContact first_contact_segment(const ConvexMesh& mesh, const ContactTrees& trees,
+FirstContact first_contact_segment(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                    const LineProbe& before, const LineProbe& after,
                                    double tolerance);
 
 /// The same for the tip alone.
-FirstContact first_contact_point(const ConvexMesh& mesh, const ContactTrees& trees,
+FirstContact first_contact_point(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                  const Vec3& before, const Vec3& after, double tolerance);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 /// The shortest translation x with dot(n_i, x) >= depth_i for all contacts, as x = sum of share_i
@@ -39,9 +39,9 @@ void share_depths(std::span<LoadedContact> contacts) {
   }
 }
 
-double layered_force(const Material& material, double share) {
+double layered_force(const stimuli::Material& material, double share) {
   double force = 0, from = 0, stiffness = material.stiffness;
-  for (const Layer& layer : material.layers) {
+  for (const stimuli::Layer& layer : material.layers) {
     if (share <= layer.depth) break;
     force += stiffness * (layer.depth - from);
     from = layer.depth;
@@ -50,7 +50,7 @@ double layered_force(const Material& material, double share) {
   return force + stiffness * (share - from);
 }
 
-void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& grip) {
+void rub(LoadedContact& c, const stimuli::Material& material, const Vec3& motion, Grip& grip) {
   const Vec3& n = c.contact.normal;
   Vec3 lag = grip.lag - motion;
   lag -= glm::dot(lag, n) * n;
@@ -62,4 +62,4 @@ void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& g
   grip.held = true;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -10,7 +10,7 @@
 #include "rendering/probe.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// A contact in the world frame with what decides its force.
 struct LoadedContact {
@@ -43,7 +43,7 @@ void load(std::span<LoadedContact, kCount> contacts) {
 
 /// The force, N, of a material with layers at `share` m below its surface: the sum of each layer's
 /// stiffness times the part of the way that lies in it.
-double layered_force(const Material& material, double share);
+double layered_force(const stimuli::Material& material, double share);
 
 /// What a contact remembers for friction.
 struct Grip {
@@ -58,7 +58,7 @@ struct Grip {
 /// Melder 2002 (friction cone). The lag turns with the surface by projection, which never feeds it.
 /// \param c       loaded; its lag is set
 /// \param motion  m, of the probe at the contact since the last tick
-void rub(LoadedContact& c, const Material& material, const Vec3& motion, Grip& grip);
+void rub(LoadedContact& c, const stimuli::Material& material, const Vec3& motion, Grip& grip);
 
 /// Force and moment of contacts, and their split on two devices at the ends of the stylus.
 struct Loads {
@@ -106,4 +106,4 @@ template <bool kSegment, bool kFriction, std::size_t kCount>
   return loads;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -11,7 +11,7 @@
 #include "rendering/facet_walk.h"
 #include "stimuli/convex_mesh.h"
 
-namespace palpate::minkowski {
+namespace palpate::rendering::minkowski {
 
 using Kind = MinkowskiFacet::Kind;
 
@@ -22,22 +22,26 @@ inline constexpr double kNearlyParallel =
     1e-3;  // below this the direction of e x d has lost digits
 
 /// Where a side of the facet begins.
-inline const Vec3& corner(const ConvexMesh& mesh, std::uint32_t facet, const Side& side) {
-  const Edge& edge = mesh.edges()[side.edge];
+inline const Vec3& corner(const stimuli::ConvexMesh& mesh, std::uint32_t facet,
+                          const stimuli::Side& side) {
+  const stimuli::Edge& edge = mesh.edges()[side.edge];
   return edge.left == facet ? edge.from : edge.to;
 }
 
-inline bool outside(const Side& side, const Vec3& p) {
+inline bool outside(const stimuli::Side& side, const Vec3& p) {
   return glm::dot(side.inward, p) < side.offset;
 }
 
 /// What p, a point of the plane of a polygon with many sides, lies over: halving over the fan of
 /// triangles at corner 0, so that a cap of a thousand sides costs ten comparisons.
-inline Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
-  const Facet& facet = mesh.facets()[index];
-  const Side* sides = &mesh.sides()[facet.first_side];
+inline stimuli::Neighbour beyond_many(const stimuli::ConvexMesh& mesh, std::uint32_t index,
+                                      const Vec3& p) {
+  const stimuli::Facet& facet = mesh.facets()[index];
+  const stimuli::Side* sides = &mesh.sides()[facet.first_side];
   const std::uint32_t count = facet.side_count;
-  const auto beyond = [&](std::uint32_t i) { return Neighbour{sides[i].edge, sides[i].across}; };
+  const auto beyond = [&](std::uint32_t i) {
+    return stimuli::Neighbour{sides[i].edge, sides[i].across};
+  };
   if (outside(sides[0], p)) return beyond(0);
   if (outside(sides[count - 1], p)) return beyond(count - 1);
   const Vec3 apex = corner(mesh, index, sides[0]);
@@ -48,16 +52,17 @@ inline Neighbour beyond_many(const ConvexMesh& mesh, std::uint32_t index, const 
     const Vec3 ray = corner(mesh, index, sides[middle]) - apex;
     (glm::dot(ray, turn) <= 0 ? low : high) = middle;
   }
-  return outside(sides[low], p) ? beyond(low) : Neighbour{kNone, kNone};
+  return outside(sides[low], p) ? beyond(low) : stimuli::Neighbour{kNone, kNone};
 }
 
 /// The same for a triangle. Past a side is above the plane of the facet there, which a step reads
 /// next anyway. One branch: whether p is past any side can be guessed on a coarse mesh, past which
 /// one on none.
-inline Neighbour beyond_triangle(const ConvexMesh& mesh, const Facet& facet, const Vec3& p) {
+inline stimuli::Neighbour beyond_triangle(const stimuli::ConvexMesh& mesh,
+                                          const stimuli::Facet& facet, const Vec3& p) {
   std::array<double, 3> height;
   for (std::size_t i = 0; i < 3; ++i) {
-    const Facet& across = mesh.facets()[facet.triangle[i].across];
+    const stimuli::Facet& across = mesh.facets()[facet.triangle[i].across];
     height[i] = glm::dot(across.normal, p) - across.offset;
   }
   const double highest = std::max(height[0], height[1]);
@@ -69,14 +74,15 @@ inline Neighbour beyond_triangle(const ConvexMesh& mesh, const Facet& facet, con
 
 /// What p, a point of the facet's plane, lies over when it is past a side; edge kNone when it is
 /// inside.
-inline Neighbour beyond_side(const ConvexMesh& mesh, std::uint32_t index, const Vec3& p) {
-  const Facet& facet = mesh.facets()[index];
+inline stimuli::Neighbour beyond_side(const stimuli::ConvexMesh& mesh, std::uint32_t index,
+                                      const Vec3& p) {
+  const stimuli::Facet& facet = mesh.facets()[index];
   if (facet.side_count == 3) return beyond_triangle(mesh, facet, p);
   if (facet.side_count > kScanSides) return beyond_many(mesh, index, p);
-  Neighbour beyond{kNone, kNone};
+  stimuli::Neighbour beyond{kNone, kNone};
   double worst = 0;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const Side& side = mesh.sides()[i];
+    const stimuli::Side& side = mesh.sides()[i];
     const double distance = side.offset - glm::dot(side.inward, p);
     if (distance > worst) {
       worst = distance;
@@ -101,8 +107,9 @@ struct Measured {
 };
 
 template <bool kSegment>
-Measured measure_face(const ConvexMesh& mesh, std::uint32_t index, const Vec3& tip, const Vec3& d) {
-  const Facet& facet = mesh.facets()[index];
+Measured measure_face(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& tip,
+                      const Vec3& d) {
+  const stimuli::Facet& facet = mesh.facets()[index];
   Measured m;
   m.index = index;
   m.normal = facet.normal;
@@ -122,24 +129,24 @@ struct Slopes {
   bool silhouette() const { return (left >= 0) != (right >= 0); }
 };
 
-inline Slopes slopes_at(const ConvexMesh& mesh, const Edge& edge, const Vec3& d) {
+inline Slopes slopes_at(const stimuli::ConvexMesh& mesh, const stimuli::Edge& edge, const Vec3& d) {
   return {glm::dot(mesh.facets()[edge.left].normal, d),
           glm::dot(mesh.facets()[edge.right].normal, d)};
 }
 
 /// The normal of an edge as the mixture of its faces' normals that is at right angles to d: however
 /// small e x d is, it stays between the two.
-[[gnu::cold, gnu::noinline]] inline Vec3 mixed_normal(const ConvexMesh& mesh, const Edge& edge,
-                                                      const Vec3& d) {
+[[gnu::cold, gnu::noinline]] inline Vec3 mixed_normal(const stimuli::ConvexMesh& mesh,
+                                                      const stimuli::Edge& edge, const Vec3& d) {
   const Slopes slopes = slopes_at(mesh, edge, d);
   return glm::normalize(std::abs(slopes.right) * mesh.facets()[edge.left].normal +
                         std::abs(slopes.left) * mesh.facets()[edge.right].normal);
 }
 
 /// False where the edge and the probe are parallel: then it is no contact edge.
-inline bool measure_edge(const ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
+inline bool measure_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
                          const Vec3& tip, const Vec3& d, Measured& m) {
-  const Edge& edge = mesh.edges()[index];
+  const stimuli::Edge& edge = mesh.edges()[index];
   const Vec3& v0 = edge.from;
   const Vec3 e = edge.to - v0;
   const Vec3 c = glm::cross(e, d);
@@ -176,18 +183,21 @@ struct SilhouetteEdge {
 /// The other silhouette edge at one end of `from`, which is one; the faces around a vertex change
 /// sides exactly twice. Turns about the vertex counter-clockwise, from face to face, until they do.
 /// Edge kNone when rounding hides the second one, or where not all faces are triangles.
-inline SilhouetteEdge turn_about(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+inline SilhouetteEdge turn_about(const stimuli::ConvexMesh& mesh, std::uint32_t from, bool about_v1,
                                  bool left_ahead, const Vec3& d) {
   // Out of the face on the left the next side starts at v1, out of the one on the right at v0.
   const bool ahead = about_v1 == left_ahead;
   std::uint32_t edge = from;
-  const Facet* face = &mesh.facets()[about_v1 ? mesh.edges()[from].left : mesh.edges()[from].right];
+  const stimuli::Facet* face =
+      &mesh.facets()[about_v1 ? mesh.edges()[from].left : mesh.edges()[from].right];
   while (face->side_count == 3) {
     const auto& sides = face->triangle;
-    const Neighbour& next = sides[edge == sides[0].edge ? 1 : edge == sides[1].edge ? 2 : 0];
+    const stimuli::Neighbour& next = sides[edge == sides[0].edge   ? 1
+                                           : edge == sides[1].edge ? 2
+                                                                   : 0];
     edge = next.edge;
     if (edge == from) return {};
-    const Facet* across = &mesh.facets()[next.across];
+    const stimuli::Facet* across = &mesh.facets()[next.across];
     if ((glm::dot(across->normal, d) >= 0) != ahead) {
       const bool face_is_left = face == &mesh.facets()[mesh.edges()[edge].left];
       return {edge, face_is_left == ahead};
@@ -198,7 +208,7 @@ inline SilhouetteEdge turn_about(const ConvexMesh& mesh, std::uint32_t from, boo
 }
 
 /// The same by looking through the vertex' fan.
-inline SilhouetteEdge search_fan(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
+inline SilhouetteEdge search_fan(const stimuli::ConvexMesh& mesh, std::uint32_t from, bool about_v1,
                                  const Vec3& d) {
   const std::uint32_t vertex = about_v1 ? mesh.edges()[from].v1 : mesh.edges()[from].v0;
   for (std::uint32_t i = mesh.fan_first()[vertex]; i < mesh.fan_first()[vertex + 1]; ++i) {
@@ -211,8 +221,8 @@ inline SilhouetteEdge search_fan(const ConvexMesh& mesh, std::uint32_t from, boo
 
 /// The other silhouette edge at one end of the silhouette edge `from`: the faces around a vertex
 /// change sides exactly twice. Edge kNone where rounding hides it.
-inline SilhouetteEdge other_silhouette(const ConvexMesh& mesh, std::uint32_t from, bool about_v1,
-                                       bool left_ahead, const Vec3& d) {
+inline SilhouetteEdge other_silhouette(const stimuli::ConvexMesh& mesh, std::uint32_t from,
+                                       bool about_v1, bool left_ahead, const Vec3& d) {
   const SilhouetteEdge other = turn_about(mesh, from, about_v1, left_ahead, d);
   return other.edge != kNone ? other : search_fan(mesh, from, about_v1, d);
 }
@@ -225,14 +235,15 @@ inline double distance_to(const Vec3& p, const Vec3& a, const Vec3& along) {
 
 /// How far the ideal probe is off a polygon that it should lie on, m.
 template <bool kSegment>
-double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
-  const Facet& facet = mesh.facets()[at.index];
+double off_face(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
+                const Vec3& d) {
+  const stimuli::Facet& facet = mesh.facets()[at.index];
   const bool tail = kSegment && at.place > 0;
   const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
   const Vec3 along = tail ? -d : d;
   double past = 0, enter = 0, leave = 1;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const Side& side = mesh.sides()[i];
+    const stimuli::Side& side = mesh.sides()[i];
     const double inside = glm::dot(side.inward, end) - side.offset;
     const double slope = glm::dot(side.inward, along);
     past = std::max(past, -inside);
@@ -246,8 +257,9 @@ double off_face(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, con
 }
 
 /// How far the ideal probe is off an edge that it should cross, m.
-inline double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
-  const Edge& edge = mesh.edges()[at.index];
+inline double off_edge(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
+                       const Vec3& d) {
+  const stimuli::Edge& edge = mesh.edges()[at.index];
   const Vec3& v0 = edge.from;
   const Vec3 e = edge.to - v0;
   const Vec3 ideal = tip + at.depth * at.normal;
@@ -257,10 +269,10 @@ inline double off_edge(const ConvexMesh& mesh, const Measured& at, const Vec3& t
 
 /// How far the ideal probe is off the facet of M that it should be on, m.
 template <bool kSegment>
-[[gnu::cold, gnu::noinline]] double off_facet(const ConvexMesh& mesh, const Measured& at,
+[[gnu::cold, gnu::noinline]] double off_facet(const stimuli::ConvexMesh& mesh, const Measured& at,
                                               const Vec3& tip, const Vec3& d) {
   if (kSegment && at.edge) return off_edge(mesh, at, tip, d);
   return off_face<kSegment>(mesh, at, tip, d);
 }
 
-}  // namespace palpate::minkowski
+}  // namespace palpate::rendering::minkowski

@@ -2,7 +2,7 @@
 #include "rendering/render.h"
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 class PointRenderer final : public Renderer {
@@ -22,4 +22,4 @@ const Renderer& point_renderer() {
   return renderer;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

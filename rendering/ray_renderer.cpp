@@ -2,7 +2,7 @@
 #include "rendering/renderer.h"
 #include "rendering/segment_probe.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 class RayRenderer final : public Renderer {
@@ -22,4 +22,4 @@ const Renderer& ray_renderer() {
   return renderer;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

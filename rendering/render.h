@@ -12,7 +12,7 @@
 #include "rendering/compound.h"
 #include "rendering/tick.h"
 
-namespace palpate::tick {
+namespace palpate::rendering::tick {
 
 /// What materials add to plain springs: layers, damping, friction.
 /// \param rate  1/s, ticks; 0 when unknown
@@ -35,7 +35,7 @@ void feel(const Scene& scene, RenderState& state, const LineProbe& probe,
     for (const std::uint32_t i : state.near_parts) state.parts[i].grip.held = false;
   }
   for (auto& c : contacts) {
-    const Material& material = parts[c.part].material;
+    const stimuli::Material& material = parts[c.part].material;
     if constexpr (kNeeds.layers) {
       if (!material.layers.empty()) c.force = layered_force(material, c.share);
     }
@@ -181,4 +181,4 @@ Rendering render(const Scene& scene, RenderState& state, const LineProbe& probe,
   return kTicks[scene.needs_index()](scene, state, probe, dt);
 }
 
-}  // namespace palpate::tick
+}  // namespace palpate::rendering::tick

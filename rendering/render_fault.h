@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// What a fault bit is called and what it means.
 struct FaultBit {
@@ -36,4 +36,4 @@ inline constexpr std::array<FaultBit, 4> kRenderFaults = {{
      "more objects were touched at once than are rendered: the force is too small"},
 }};
 
-}  // namespace palpate
+}  // namespace palpate::rendering

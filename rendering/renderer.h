@@ -8,7 +8,7 @@
 #include "rendering/render_fault.h"
 #include "rendering/scene.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// What a tick renders. World frame.
 struct Rendering {
@@ -38,4 +38,4 @@ class Renderer {
 const Renderer& point_renderer();  ///< only the tip is felt
 const Renderer& ray_renderer();    ///< tip and side are felt
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 double distance_to_segment(const Vec3& p, const LineProbe& probe) {
@@ -75,4 +75,4 @@ void list_near_parts(const Scene& scene, RenderState& state, const LineProbe& pr
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -16,13 +16,13 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// One convex part to be placed in a scene.
 struct SceneObject {
-  std::shared_ptr<const ConvexMesh> mesh;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh;
   Pose pose;
-  Material material;
+  stimuli::Material material;
   int object =
       0;  ///< index of the object in the scene; the parts of a compound share it, side by side
   std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
@@ -30,14 +30,14 @@ struct SceneObject {
 
 /// One convex part as the tick sees it. World frame unless said otherwise.
 struct ScenePart {
-  std::shared_ptr<const ConvexMesh> mesh;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh;
   std::shared_ptr<const ContactTrees> trees;
   Mat3 to_world;             ///< rotation from the mesh frame
   Vec3 position;             ///< m, of the mesh frame's origin
   Vec3 sphere_centre;        ///< m
   double sphere_radius = 0;  ///< m
   double tolerance = 0;      ///< m; below it a length is rounding, for this size and distance
-  Material material;
+  stimuli::Material material;
   int object = 0;
 
   // Inlined: a tick turns three to five vectors, at ten instructions each.
@@ -131,4 +131,4 @@ inline void survey(const Scene& scene, RenderState& state, const LineProbe& prob
   if (moved2 >= state.clearance * state.clearance) list_near_parts(scene, state, probe);
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,7 +9,7 @@
 
 #include "rendering/tick.h"
 
-namespace palpate::tick {
+namespace palpate::rendering::tick {
 
 inline constexpr double kEpsilon =
     std::numbers::pi / 180;  // 1 degree: the paper's choice for segment-face
@@ -41,22 +41,22 @@ struct Portion {
 
 /// Where a probe that lies on a face enters and leaves its polygon, as fractions of the probe;
 /// enter > leave when rounding leaves nothing of it on the polygon.
-inline Portion touching_portion(const ConvexMesh& mesh, std::uint32_t index, const Vec3& ideal_tip,
-                                const Vec3& d) {
-  const Facet& facet = mesh.facets()[index];
+inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t index,
+                                const Vec3& ideal_tip, const Vec3& d) {
+  const stimuli::Facet& facet = mesh.facets()[index];
   Portion portion;
   if (facet.side_count == 3) {
     // In the face's plane, inside of a side is below the plane of the facet beyond it.
     const Vec3 a = ideal_tip - (glm::dot(facet.normal, ideal_tip) - facet.offset) * facet.normal;
     const Vec3 along = d - glm::dot(facet.normal, d) * facet.normal;
-    for (const Neighbour& next : facet.triangle) {
-      const Facet& across = mesh.facets()[next.across];
+    for (const stimuli::Neighbour& next : facet.triangle) {
+      const stimuli::Facet& across = mesh.facets()[next.across];
       portion.clip(across.offset - glm::dot(across.normal, a), -glm::dot(across.normal, along));
     }
     return portion;
   }
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const Side& side = mesh.sides()[i];
+    const stimuli::Side& side = mesh.sides()[i];
     portion.clip(glm::dot(side.inward, ideal_tip) - side.offset, glm::dot(side.inward, d));
   }
   return portion;
@@ -66,10 +66,10 @@ inline Portion touching_portion(const ConvexMesh& mesh, std::uint32_t index, con
 /// The other two sides are measured from the crossing, which is known sooner than the ideal tip.
 /// No branches: from edge to edge they could not be guessed.
 /// \param on_left  whether the face is the one on the edge's left; \param rise  dot(its normal, d)
-inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, bool on_left,
-                                 double rise, const Vec3& d) {
-  const Edge& edge = mesh.edges()[hit.facet.index];
-  const Facet& facet = mesh.facets()[on_left ? edge.left : edge.right];
+inline Portion portion_from_edge(const stimuli::ConvexMesh& mesh, const WalkResult& hit,
+                                 bool on_left, double rise, const Vec3& d) {
+  const stimuli::Edge& edge = mesh.edges()[hit.facet.index];
+  const stimuli::Facet& facet = mesh.facets()[on_left ? edge.left : edge.right];
   const Vec3 crossing = edge.from + hit.along_edge * (edge.to - edge.from);
   const Vec3 along = d - rise * facet.normal;
   const double enters = on_left == hit.facet.left_ahead ? 1 : 0;
@@ -79,7 +79,7 @@ inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, 
       unsigned{sides[1].edge == hit.facet.index} + 2 * unsigned{sides[2].edge == hit.facet.index};
   constexpr std::array<std::uint8_t, 4> kSides{1, 2, 0, 1};
   for (const unsigned other : {kSides[here], kSides[here + 1]}) {
-    const Facet& across = mesh.facets()[sides[other].across];
+    const stimuli::Facet& across = mesh.facets()[sides[other].across];
     portion.clip(across.offset - glm::dot(across.normal, crossing), -glm::dot(across.normal, along),
                  hit.place);
   }
@@ -90,21 +90,21 @@ inline Portion portion_from_edge(const ConvexMesh& mesh, const WalkResult& hit, 
 struct SegmentProbe {
   static constexpr bool kSegment = true;
 
-  static Approach approach(const ConvexMesh& mesh, MinkowskiFacet start, const LineProbe& before,
-                           const LineProbe& after) {
+  static Approach approach(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+                           const LineProbe& before, const LineProbe& after) {
     return approach_segment(mesh, start, before, after);
   }
 
-  static FirstContact first_contact(const ConvexMesh& mesh, const ContactTrees& trees,
+  static FirstContact first_contact(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                     const LineProbe& before, const LineProbe& after,
                                     double tolerance) {
     return first_contact_segment(mesh, trees, before, after, tolerance);
   }
 
   /// Type of the contact and its place along the probe. Frame of the mesh.
-  [[gnu::always_inline]] static void describe(const ConvexMesh& mesh, const WalkResult& hit,
-                                              const Vec3& tip, const Vec3& d, double length,
-                                              LoadedContact& c) {
+  [[gnu::always_inline]] static void describe(const stimuli::ConvexMesh& mesh,
+                                              const WalkResult& hit, const Vec3& tip, const Vec3& d,
+                                              double length, LoadedContact& c) {
     const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
     c.contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
     c.place = hit.place;
@@ -113,7 +113,7 @@ struct SegmentProbe {
     bool on_left = false;
     if (edge) {
       // Of its two faces the one that the probe is nearer to parallel with.
-      const Edge& e = mesh.edges()[hit.facet.index];
+      const stimuli::Edge& e = mesh.edges()[hit.facet.index];
       const double left = glm::dot(mesh.facets()[e.left].normal, d);
       const double right = glm::dot(mesh.facets()[e.right].normal, d);
       on_left = std::abs(left) <= std::abs(right);
@@ -137,4 +137,4 @@ struct SegmentProbe {
   }
 };
 
-}  // namespace palpate::tick
+}  // namespace palpate::rendering::tick

@@ -6,7 +6,7 @@
 
 #include "rendering/support_map.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 /// The point of a simplex (1 to 4 corners) nearest the origin; keeps only the corners that carry
@@ -88,14 +88,15 @@ Nearest nearest_to_origin(const Simplex& s) {
 
 }  // namespace
 
-std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std::uint32_t start) {
+std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
+                             std::uint32_t start) {
   std::uint32_t best = start;
   double height = glm::dot(direction, mesh.vertices()[best]);
   for (bool climbing = true; climbing;) {
     climbing = false;
     const std::uint32_t from = best;
     for (std::uint32_t i = mesh.fan_first()[from]; i < mesh.fan_first()[from + 1]; ++i) {
-      const Edge& edge = mesh.edges()[mesh.fan_edges()[i]];
+      const stimuli::Edge& edge = mesh.edges()[mesh.fan_edges()[i]];
       const std::uint32_t neighbour = edge.v0 == from ? edge.v1 : edge.v0;
       const double h = glm::dot(direction, mesh.vertices()[neighbour]);
       if (h > height) {
@@ -108,7 +109,7 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
   return best;
 }
 
-void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
+void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
                            const SupportMap* map) {
   constexpr int kIterations = 40;
@@ -149,4 +150,4 @@ void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& 
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

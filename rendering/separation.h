@@ -6,7 +6,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 class SupportMap;
 
@@ -23,7 +23,8 @@ struct SeparatingPlane {
 };
 
 /// The vertex farthest along `direction`, climbed to from `start`. Exact on a convex mesh.
-std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std::uint32_t start);
+std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
+                             std::uint32_t start);
 
 /// Looks for a plane between the mesh and the segment, starting from `plane.normal` (any direction
 /// where there is none) and the vertex `support`; both are updated. Gilbert, Johnson & Keerthi
@@ -31,8 +32,8 @@ std::uint32_t support_vertex(const ConvexMesh& mesh, const Vec3& direction, std:
 /// whether one was found. \param tolerance  m; a probe that is no deeper than this is at the
 /// surface: the plane it touches counts, although it does not separate strictly \param map  of the
 /// mesh, or null: where to begin to climb
-void find_separating_plane(const ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
+void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
                            const SupportMap* map = nullptr);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

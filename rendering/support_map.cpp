@@ -6,7 +6,7 @@
 
 #include "rendering/separation.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 /// The cell of coordinate c in [-1, 1].
@@ -16,7 +16,8 @@ int cell_of(double c, int resolution) {
 
 }  // namespace
 
-SupportMap::SupportMap(const ConvexMesh& mesh, std::size_t climbed, double vertices_per_cell) {
+SupportMap::SupportMap(const stimuli::ConvexMesh& mesh, std::size_t climbed,
+                       double vertices_per_cell) {
   const std::size_t vertices = mesh.vertices().size();
   if (vertices <= climbed) return;
   const double cells = static_cast<double>(vertices) / (6 * vertices_per_cell);
@@ -53,4 +54,4 @@ std::uint32_t SupportMap::near_support(const Vec3& direction) const {
   return cells_[static_cast<std::size_t>(cell)];
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

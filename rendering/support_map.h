@@ -7,7 +7,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// A cube of directions with the farthest vertex of each cell's middle, so that a climb takes a few
 /// steps whatever the number of vertices. Meshes that are climbed in few steps anyway have none.
@@ -17,7 +17,7 @@ class SupportMap {
 
   /// \param climbed            so few vertices get no map
   /// \param vertices_per_cell  on average; fewer make a finer map
-  explicit SupportMap(const ConvexMesh& mesh, std::size_t climbed = kClimbed,
+  explicit SupportMap(const stimuli::ConvexMesh& mesh, std::size_t climbed = kClimbed,
                       double vertices_per_cell = 8);
 
   bool empty() const { return cells_.empty(); }
@@ -29,4 +29,4 @@ class SupportMap {
   std::vector<std::uint32_t> cells_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

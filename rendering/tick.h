@@ -10,7 +10,7 @@
 #include "rendering/force.h"
 #include "rendering/renderer.h"
 
-namespace palpate::tick {
+namespace palpate::rendering::tick {
 
 // Farther off (m) than any device or hand: a reading beyond it is a fault, like NaN, and sums of
 // squares below it are exact enough to separate objects.
@@ -19,19 +19,20 @@ constexpr double kFarthest = 1e6;
 inline bool plausible(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
 template <class Probe>
-WalkResult walk(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip, const Vec3& d) {
+WalkResult walk(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+                const Vec3& d) {
   if constexpr (Probe::kSegment) return walk_segment(mesh, start, tip, d);
   return walk_point(mesh, start, tip);
 }
 
 template <class Probe>
-WalkResult nearest_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
+WalkResult nearest_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
   if constexpr (Probe::kSegment) return nearest_facet_segment(mesh, tip, d);
   return nearest_facet_point(mesh, tip);
 }
 
 template <class Probe>
-WalkResult same_facet(const ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+WalkResult same_facet(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
                       const Vec3& d) {
   if constexpr (Probe::kSegment) return same_facet_segment(mesh, start, tip, d);
   return same_facet_point(mesh, start, tip);
@@ -55,7 +56,7 @@ LineProbe to_local(const ScenePart& part, const LineProbe& probe, const Vec3& sh
 template <class Probe>
 MinkowskiFacet facet_near(const ScenePart& part, MinkowskiFacet known, const LineProbe& probe) {
   using Kind = MinkowskiFacet::Kind;
-  const ConvexMesh& mesh = *part.mesh;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   const SupportMap* const map = part.trees->support_map();
   if (map == nullptr) return known;
   const Vec3 d = probe.tail - probe.tip, to_tip = probe.tip - mesh.centre();
@@ -80,7 +81,7 @@ inline void leave(PartState& state, const WalkResult& left, const LineProbe& pro
 }
 
 template <class Probe>
-WalkResult holding_facet(const ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+WalkResult holding_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
                          const Vec3& shift) {
   if constexpr (Probe::kSegment) return holding_facet_segment(mesh, tip, d, shift);
   return holding_facet_point(mesh, tip, shift);
@@ -104,7 +105,7 @@ template <class Probe>
 /// Looks for a plane between the part and the probe, with no history; state.plane says whether
 /// there is one.
 inline void separate(const ScenePart& part, PartState& state, const LineProbe& probe) {
-  const ConvexMesh& mesh = *part.mesh;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
                         part.trees->support_map());
   const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
@@ -118,7 +119,7 @@ template <class Probe>
 WalkResult meet(const ScenePart& part, PartState& state, const LineProbe* before,
                 const LineProbe& probe) {
   using Kind = MinkowskiFacet::Kind;
-  const ConvexMesh& mesh = *part.mesh;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   const Vec3 d = probe.tail - probe.tip;
   LineProbe from = probe;
   FirstContact first;
@@ -182,7 +183,7 @@ template <class Probe>
                                                const LineProbe* before, const Vec3& tip,
                                                const Vec3& d, std::uint32_t& faults) {
   using Kind = MinkowskiFacet::Kind;
-  const ConvexMesh& mesh = *part.mesh;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   const bool held = state.facet.kind != Kind::none;
   // In free space the plane of an earlier tick mostly still stands between them. Written so that
   // the result is built in place: a copy of it costs as much as a dot product or five.
@@ -265,4 +266,4 @@ struct Tick {
   }
 };
 
-}  // namespace palpate::tick
+}  // namespace palpate::rendering::tick

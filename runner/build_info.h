@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Compiler and flags, for the record: "g++ 12.2.0, Release, -march=native".
 inline std::string build_description() {
@@ -14,4 +14,4 @@ inline std::string build_description() {
   return compiler + ", " PALPATE_BUILD;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

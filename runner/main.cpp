@@ -27,24 +27,26 @@ struct Command {
 
 constexpr Command kCommands[] = {
     {"accuracy", "error of the renderers against run time; which tessellation to choose",
-     palpate::accuracy_command},
+     palpate::runner::accuracy_command},
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
-     palpate::analyze_command},
-    {"bench", "what a tick of the renderers costs on this machine", palpate::bench_command},
+     palpate::runner::analyze_command},
+    {"bench", "what a tick of the renderers costs on this machine", palpate::runner::bench_command},
     {"devices", "what is connected, its limits; whether this machine keeps time; calibration",
-     palpate::devices_command},
-    {"export", "the trials of a database as files for others", palpate::export_command},
-    {"forget", "remove a participant who has withdrawn", palpate::forget_command},
-    {"merge", "stations' databases into one", palpate::merge_command},
-    {"plan", "how many participants and trials find a wanted effect", palpate::plan_command},
-    {"render", "forces along a recorded path, offline", palpate::render_command},
-    {"replay", "a stored trial through a renderer again", palpate::replay_command},
-    {"run", "a live session with a person and a device", palpate::run_command},
-    {"schedule", "the order of trials that a participant will get", palpate::schedule_command},
-    {"simulate", "the whole study with simulated participants", palpate::simulate_command},
+     palpate::runner::devices_command},
+    {"export", "the trials of a database as files for others", palpate::runner::export_command},
+    {"forget", "remove a participant who has withdrawn", palpate::runner::forget_command},
+    {"merge", "stations' databases into one", palpate::runner::merge_command},
+    {"plan", "how many participants and trials find a wanted effect",
+     palpate::runner::plan_command},
+    {"render", "forces along a recorded path, offline", palpate::runner::render_command},
+    {"replay", "a stored trial through a renderer again", palpate::runner::replay_command},
+    {"run", "a live session with a person and a device", palpate::runner::run_command},
+    {"schedule", "the order of trials that a participant will get",
+     palpate::runner::schedule_command},
+    {"simulate", "the whole study with simulated participants", palpate::runner::simulate_command},
     {"stability", "at what stiffness a loop of hand, device and renderer buzzes",
-     palpate::stability_command},
-    {"validate", "check a protocol and list all its faults", palpate::validate_command},
+     palpate::runner::stability_command},
+    {"validate", "check a protocol and list all its faults", palpate::runner::validate_command},
 };
 
 void print_help(std::ostream& out) {
@@ -86,7 +88,7 @@ int run(int argc, char** argv) {
   for (const auto& command : kCommands) {
     if (words[0] == command.name) return command.run({words.begin() + 1, words.end()});
   }
-  throw palpate::UsageError("no command '" + words[0] + "'; 'palpate --help' lists them");
+  throw palpate::runner::UsageError("no command '" + words[0] + "'; 'palpate --help' lists them");
 }
 
 }  // namespace
@@ -99,20 +101,20 @@ int main(int argc, char** argv) {
     if (!std::cout)
       throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
-  } catch (const palpate::UsageError& error) {
-    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
+  } catch (const palpate::runner::UsageError& error) {
+    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
     return 2;
-  } catch (const palpate::InputError& error) {
-    std::cerr << palpate::printable_lines(error.what()) << "\n";
+  } catch (const palpate::protocols::InputError& error) {
+    std::cerr << palpate::stimuli::printable_lines(error.what()) << "\n";
     return 2;
-  } catch (const palpate::MeshError& error) {
-    std::cerr << palpate::printable_lines(error.what()) << "\n";
+  } catch (const palpate::stimuli::MeshError& error) {
+    std::cerr << palpate::stimuli::printable_lines(error.what()) << "\n";
     return 2;
-  } catch (const palpate::StoreRefused& error) {
-    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
+  } catch (const palpate::data::StoreRefused& error) {
+    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const std::exception& error) {
-    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
+    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
     return 1;
   }
 }

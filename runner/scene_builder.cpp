@@ -6,7 +6,7 @@
 
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Pose compose(const Pose& outer, const Pose& inner) {
@@ -15,7 +15,7 @@ Pose compose(const Pose& outer, const Pose& inner) {
 }
 
 /// Equal keys, equal meshes.
-std::string shape_key(const ObjectSpec& spec, bool side_contact) {
+std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
   std::string key = std::to_string(static_cast<int>(spec.shape)) + (side_contact ? "s" : "p");
   for (const double value : {spec.radius, spec.height, spec.edge}) {
     char text[32];
@@ -27,57 +27,59 @@ std::string shape_key(const ObjectSpec& spec, bool side_contact) {
 
 }  // namespace
 
-const Renderer& renderer_for(RendererKind kind) {
-  return kind == RendererKind::ray ? ray_renderer() : point_renderer();
+const rendering::Renderer& renderer_for(protocols::RendererKind kind) {
+  return kind == protocols::RendererKind::ray ? rendering::ray_renderer()
+                                              : rendering::point_renderer();
 }
 
-SceneBuilder::Prepared SceneBuilder::prepare(const ObjectSpec& spec, bool side_contact) {
+SceneBuilder::Prepared SceneBuilder::prepare(const stimuli::ObjectSpec& spec, bool side_contact) {
   Prepared& prepared = prepared_[shape_key(spec, side_contact)];
   if (!prepared.mesh) {
-    prepared.mesh = std::make_shared<const ConvexMesh>(polygons_of(spec));
-    prepared.trees = std::make_shared<const ContactTrees>(*prepared.mesh, side_contact);
+    prepared.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::polygons_of(spec));
+    prepared.trees = std::make_shared<const rendering::ContactTrees>(*prepared.mesh, side_contact);
   }
   return prepared;
 }
 
-void SceneBuilder::place(const ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
-                         std::vector<SceneObject>& out) {
+void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, int object,
+                         bool side_contact, std::vector<rendering::SceneObject>& out) {
   const Pose pose = compose(parent, spec.pose);
-  if (spec.shape == ShapeKind::compound) {
-    for (const ObjectSpec& part : spec.parts) place(part, pose, object, side_contact, out);
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    for (const stimuli::ObjectSpec& part : spec.parts) place(part, pose, object, side_contact, out);
     return;
   }
   const Prepared prepared = prepare(spec, side_contact);
   out.push_back({prepared.mesh, pose, spec.material, object, prepared.trees});
 }
 
-Scene SceneBuilder::build(const std::vector<ObjectSpec>& objects, bool side_contact) {
-  std::vector<SceneObject> parts;
+rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
+                                     bool side_contact) {
+  std::vector<rendering::SceneObject> parts;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
       place(objects[i], Pose{}, static_cast<int>(i), side_contact, parts);
-    } catch (const MeshError& error) {
+    } catch (const stimuli::MeshError& error) {
       std::string where = "/objects/" + std::to_string(i);
       if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
       std::vector<std::string> faults;
       for (const auto& fault : error.faults()) {
         faults.push_back(std::string(where).append(": ").append(fault));
       }
-      throw MeshError(std::move(faults));
+      throw stimuli::MeshError(std::move(faults));
     }
   }
-  return Scene(std::move(parts), side_contact);
+  return rendering::Scene(std::move(parts), side_contact);
 }
 
-StimulusLibrary::StimulusLibrary(const Protocol& protocol) {
+StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol) {
   SceneBuilder builder;
-  for (const StimulusSpec& stimulus : protocol.stimuli) {
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     double reach = 0;
     for (const bool sides : {false, true}) {
-      std::vector<SceneObject> objects;
+      std::vector<rendering::SceneObject> objects;
       try {
-        const Scene scene = builder.build({stimulus.object}, sides);
-        for (const ScenePart& part : scene.parts()) {
+        const rendering::Scene scene = builder.build({stimulus.object}, sides);
+        for (const rendering::ScenePart& part : scene.parts()) {
           objects.push_back({part.mesh,
                              {part.position, glm::quat_cast(part.to_world)},
                              part.material,
@@ -85,8 +87,8 @@ StimulusLibrary::StimulusLibrary(const Protocol& protocol) {
                              part.trees});
           reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
         }
-      } catch (const MeshError& error) {
-        throw MeshError({"stimulus '" + stimulus.name + "': " + error.what()});
+      } catch (const stimuli::MeshError& error) {
+        throw stimuli::MeshError({"stimulus '" + stimulus.name + "': " + error.what()});
       }
       (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
     }
@@ -94,12 +96,13 @@ StimulusLibrary::StimulusLibrary(const Protocol& protocol) {
   }
 }
 
-Scene StimulusLibrary::scene(const Trial& trial) const {
+rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
   const bool sides = renderer_for(trial.renderer).side_contact();
-  std::vector<SceneObject> objects = (sides ? with_sides_ : without_sides_)[trial.stimulus];
-  for (SceneObject& object : objects)
+  std::vector<rendering::SceneObject> objects =
+      (sides ? with_sides_ : without_sides_)[trial.stimulus];
+  for (rendering::SceneObject& object : objects)
     object.pose = compose({Vec3(0), trial.orientation}, object.pose);
-  return Scene(std::move(objects), sides);
+  return rendering::Scene(std::move(objects), sides);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,24 +11,24 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 
-namespace palpate {
+namespace palpate::runner {
 
-const Renderer& renderer_for(RendererKind kind);
+const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 
 /// Places the convex parts of objects; equal shapes share one mesh and its trees.
 class SceneBuilder {
  public:
   /// \throws MeshError where a shape is no convex mesh, with the place as a JSON pointer.
-  Scene build(const std::vector<ObjectSpec>& objects, bool side_contact);
+  rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact);
 
  private:
   struct Prepared {
-    std::shared_ptr<const ConvexMesh> mesh;
-    std::shared_ptr<const ContactTrees> trees;
+    std::shared_ptr<const stimuli::ConvexMesh> mesh;
+    std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  Prepared prepare(const ObjectSpec& spec, bool side_contact);
-  void place(const ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
-             std::vector<SceneObject>& out);
+  Prepared prepare(const stimuli::ObjectSpec& spec, bool side_contact);
+  void place(const stimuli::ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
+             std::vector<rendering::SceneObject>& out);
 
   std::map<std::string, Prepared> prepared_;
 };
@@ -37,16 +37,16 @@ class SceneBuilder {
 class StimulusLibrary {
  public:
   /// \throws MeshError naming the stimulus.
-  explicit StimulusLibrary(const Protocol& protocol);
+  explicit StimulusLibrary(const protocols::Protocol& protocol);
 
   /// The trial's stimulus in the trial's orientation, about the origin of the workspace.
-  Scene scene(const Trial& trial) const;
+  rendering::Scene scene(const protocols::Trial& trial) const;
   /// Radius about the origin that holds the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
 
  private:
-  std::vector<std::vector<SceneObject>> with_sides_, without_sides_;  ///< by stimulus
+  std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
   std::vector<double> reaches_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -14,7 +14,7 @@
 #include "stimuli/half_edges.h"
 #include "stimuli/polygon.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -307,4 +307,4 @@ ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   faults.throw_if_any();
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -11,7 +11,7 @@
 #include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// What a mesh is made from: corners and faces as index loops, counter-clockwise seen from outside.
 struct PolygonSoup {
@@ -102,4 +102,4 @@ class ConvexMesh {
   double radius_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

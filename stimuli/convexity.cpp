@@ -8,7 +8,7 @@
 
 #include "stimuli/fold.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -176,4 +176,4 @@ void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vert
   for (Index v = 0; v < mesh.vertices().size(); ++v) checker.check_vertex(v);
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -6,7 +6,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_faults.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Reports where a closed, connected mesh is not the surface of a convex body. It is one when it is
 /// convex at every edge, round every vertex and in every facet (van Heijenoort 1952): it must wind
@@ -17,4 +17,4 @@ namespace palpate {
 void check_convexity(const ConvexMesh& mesh, const std::vector<std::uint32_t>& soup_vertex,
                      double error, MeshFaults& faults);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -9,7 +9,7 @@
 
 #include "stimuli/polygon.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = HalfEdges::Index;
@@ -211,4 +211,4 @@ std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceS
   return region_of;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_faults.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// What the merging needs to know of a face.
 struct FaceShape {
@@ -37,4 +37,4 @@ std::vector<HalfEdges::Index> single_regions(const HalfEdges& mesh,
                                              const std::vector<FaceShape>& shapes,
                                              HalfEdges::Index& count);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

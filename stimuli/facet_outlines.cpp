@@ -1,6 +1,6 @@
 #include "stimuli/facet_outlines.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = HalfEdges::Index;
@@ -101,4 +101,4 @@ FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<Index>& re
   return Outliner(mesh, region_of, region_count).outlines(faults);
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_faults.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Region r has the sides first[r] .. first[r + 1], counter-clockwise seen from outside. A side may
 /// run along several half-edges; the vertices between them are no corners.
@@ -29,4 +29,4 @@ struct FacetOutlines {
 FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<HalfEdges::Index>& region_of,
                              HalfEdges::Index region_count, MeshFaults& faults);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

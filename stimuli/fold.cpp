@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 Reach::Reach(const Vec3& side) : along_(glm::normalize(side)), length_(glm::length(side)) {}
 
@@ -28,4 +28,4 @@ double fold(const Vec3& normal, const Vec3& normal_across, const Vec3& side, con
   return std::copysign(folded, sine);
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

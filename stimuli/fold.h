@@ -2,7 +2,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// How a polygon lies against one of its sides.
 class Reach {
@@ -30,4 +30,4 @@ double fold(const Vec3& normal, const Vec3& normal_across, const Vec3& side, con
             const Reach& reach_across, double error);
 inline constexpr double kCoplanar = 4;
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -249,4 +249,4 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
   return result;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -4,7 +4,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// The convex hull of points that are known to `error` only.
 struct GridHull {
@@ -18,4 +18,4 @@ struct GridHull {
 /// exactly.
 GridHull grid_hull(const std::vector<Vec3>& points, double error);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

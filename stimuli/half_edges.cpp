@@ -11,7 +11,7 @@
 #include "stimuli/pair_map.h"
 #include "stimuli/weld.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = HalfEdges::Index;
@@ -245,4 +245,4 @@ HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults) {
   return mesh;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -9,7 +9,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_faults.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Half-edge h runs from corner origin[h] to origin[next(h)], counter-clockwise round face[h].
 struct HalfEdges {
@@ -42,4 +42,4 @@ struct HalfEdges {
 /// unusable.
 HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 [[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
@@ -66,4 +66,4 @@ std::string read_whole(const std::string& path, std::uintmax_t most_bytes) {
   return text;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

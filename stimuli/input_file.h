@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 class InputFile {
  public:
@@ -33,4 +33,4 @@ class InputFile {
 /// All of it. \throws as InputFile.
 std::string read_whole(const std::string& path, std::uintmax_t most_bytes);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include <new>
 #include <vector>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Below the size of one large page it allocates as usual. Asking is all it does: a kernel that
 /// has none to give hands out small ones, with nothing but speed lost.
@@ -41,4 +41,4 @@ struct LargePageAllocator {
 template <class T>
 using LargeArray = std::vector<T, LargePageAllocator<T>>;
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

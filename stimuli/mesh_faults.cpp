@@ -2,7 +2,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 std::string joined(const std::vector<std::string>& lines) {
@@ -42,4 +42,4 @@ void MeshFaults::throw_if_any() const {
   if (!empty()) throw MeshError(messages());
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Gathers what is wrong with a mesh: the first few faults of each kind in full, then a count.
 class MeshFaults {
@@ -34,4 +34,4 @@ class MeshFaults {
   std::vector<Kind> kinds_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -7,7 +7,7 @@
 
 #include "stimuli/mesh_text.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 31U;
@@ -76,4 +76,4 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
   return soup;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

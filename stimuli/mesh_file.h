@@ -4,7 +4,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Reads a Wavefront .obj (v, f; other statements ignored; negative and v/vt/vn indices) or an .stl
 /// (ASCII or binary). Units are metres as they stand. Convexity is checked by ConvexMesh, not here.
@@ -18,4 +18,4 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes);
 /// large.
 std::string mesh_file_bytes(const std::string& path);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -5,7 +5,7 @@
 
 #include "stimuli/mesh_text.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -120,4 +120,4 @@ PolygonSoup read_obj(std::string_view text, FileFaults& faults) {
   return ObjReader(text, faults).read();
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

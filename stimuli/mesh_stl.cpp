@@ -7,7 +7,7 @@
 
 #include "stimuli/mesh_text.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 constexpr std::size_t kHeader = 84;    // 80 bytes of anything, the number of triangles
@@ -190,4 +190,4 @@ PolygonSoup read_stl(std::string_view bytes, FileFaults& faults) {
   return soup;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

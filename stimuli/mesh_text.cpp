@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 constexpr std::size_t kShownFaults = 20;
@@ -105,4 +105,4 @@ double NumberPrecision::coordinate_error() const {
   return std::min(error, 1e-4 * largest_);
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

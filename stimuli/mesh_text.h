@@ -10,7 +10,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Faults of one file, each "file: place: expected ..., found ...".
 class FileFaults {
@@ -58,4 +58,4 @@ class NumberPrecision {
 PolygonSoup read_obj(std::string_view text, FileFaults& faults);
 PolygonSoup read_stl(std::string_view bytes, FileFaults& faults);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

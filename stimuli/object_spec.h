@@ -9,7 +9,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 enum class ShapeKind { sphere, cone, cylinder, cube, mesh, compound };
 
@@ -49,4 +49,4 @@ struct ObjectSpec {
   Material material;
 };
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 struct DiscPoint {
@@ -31,4 +31,4 @@ Quat uniform_rotation(Random& random) {
   return {sign * first.x, sign * first.y, sign * (second.x * scale), sign * (second.y * scale)};
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

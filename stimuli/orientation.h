@@ -3,11 +3,11 @@
 #include "stimuli/random.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Uniformly distributed rotation: Marsaglia (1972), "Choosing a point from the surface of a
 /// sphere", by rejection; needs only + x / and sqrt, so it is the same on every compiler.
 /// Returned as a unit quaternion with w >= 0.
 Quat uniform_rotation(Random& random);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Open addressing with linear probing; keys are unordered pairs. Grows by itself.
 class PairMap {
@@ -69,4 +69,4 @@ class PairMap {
   unsigned shift_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

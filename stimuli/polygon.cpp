@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 Vec3 farthest_from(const Vec3& place, std::span<const Vec3> corners) {
@@ -47,4 +47,4 @@ PolygonPlane plane_of(std::span<const Vec3> corners) {
   return plane;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -4,7 +4,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Of a plane polygon, counter-clockwise seen from outside.
 struct PolygonPlane {
@@ -17,4 +17,4 @@ struct PolygonPlane {
 /// As exact as the corners allow, for polygons a million times longer than wide as well.
 PolygonPlane plane_of(std::span<const Vec3> corners);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

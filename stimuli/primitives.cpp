@@ -10,7 +10,7 @@
 #include "stimuli/mesh_file.h"
 #include "stimuli/pair_map.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -176,4 +176,4 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
   throw std::invalid_argument("a compound has no polygons of its own: ask for those of its parts");
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -5,7 +5,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 PolygonSoup icosphere(double radius, int subdivisions);        ///< 20 * 4^subdivisions triangles
 PolygonSoup cone(double radius, double height, int segments);  ///< axis +z, apex at +height/2
@@ -17,4 +17,4 @@ PolygonSoup cube(double edge);                                     ///< centred
 /// compound.
 PolygonSoup polygons_of(const ObjectSpec& spec);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 struct Character {
@@ -95,4 +95,4 @@ std::string printable(std::string_view text, std::size_t max_bytes) {
 
 std::string printable_lines(std::string_view text) { return shown(text, std::string::npos, true); }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate {
+namespace palpate::stimuli {
 
 /// Whether all is well-formed UTF-8 that is shown as it stands: no control characters (C0, DEL,
 /// C1), nothing that turns the direction of what follows, no separators of lines, no
@@ -23,4 +23,4 @@ std::string printable(std::string_view text, std::size_t max_bytes);
 /// The same for a text of several lines: line feeds stay.
 std::string printable_lines(std::string_view text);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

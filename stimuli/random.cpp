@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 // Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators"; constants of
@@ -68,4 +68,4 @@ double Random::normal() {
   return x * scale;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -9,7 +9,7 @@
 
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 struct ShapeNeeds {
   const char* name;                                   ///< in files
@@ -46,4 +46,4 @@ inline constexpr auto kShapes = [] {
   return all;
 }();
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 double sign_of(double value) { return value < 0 ? -1 : 1; }
@@ -131,4 +131,4 @@ SurfaceDistance signed_distance(const ConvexMesh& mesh, const Vec3& point) {
   return nearest;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

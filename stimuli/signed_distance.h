@@ -4,7 +4,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 
 struct SurfaceDistance {
   double distance = 0;  ///< m; negative inside
@@ -23,4 +23,4 @@ SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point);
 /// (within 1e-12 of the size) that of the facet whose plane is the most in front.
 SurfaceDistance signed_distance(const ConvexMesh& mesh, const Vec3& point);
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

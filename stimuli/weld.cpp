@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
@@ -67,4 +67,4 @@ std::vector<Index> weld(const std::vector<Vec3>& points, double tolerance) {
   return kept;
 }
 
-}  // namespace palpate
+}  // namespace palpate::stimuli

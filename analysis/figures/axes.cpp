@@ -5,7 +5,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -60,4 +60,4 @@ void draw_interval(Svg& svg, const Axes& axes, double x, double low, double high
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

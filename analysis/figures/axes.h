@@ -5,7 +5,7 @@
 
 #include "analysis/figures/svg.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 constexpr std::string_view kInk = "#1f2328", kSoft = "#59636e", kGrid = "#e3e6ea";
 
@@ -28,4 +28,4 @@ void draw_grid(Svg& svg, const Axes& axes);
 void draw_interval(Svg& svg, const Axes& axes, double x, double low, double high,
                    std::string_view colour);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

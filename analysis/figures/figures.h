@@ -10,7 +10,7 @@
 #include "analysis/input/study_record.h"
 #include "analysis/statistics/analysis.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// What a colour stands for; each theme has its own value. Those from `third` on are of further
 /// renderers.
@@ -118,4 +118,4 @@ constexpr std::size_t kShownRenderers = 6;
 /// Participants who get a line of their own.
 constexpr std::size_t kShownPeople = 200;
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -10,7 +10,7 @@
 #include "analysis/figures/svg.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -43,9 +43,10 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
       const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
       const double share = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
       const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
-      const std::string text = name + ": " + printable(table.shapes[s], 40) + " answered as " +
-                               printable(answers[a], 40) + " " + counted(n, "time", "times") +
-                               " of " + std::to_string(total) + " (" + percent_text(n, total) + ")";
+      const std::string text = name + ": " + stimuli::printable(table.shapes[s], 40) +
+                               " answered as " + stimuli::printable(answers[a], 40) + " " +
+                               counted(n, "time", "times") + " of " + std::to_string(total) + " (" +
+                               percent_text(n, total) + ")";
       panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
                                       n ? 0.08 + 0.9 * share : 0.03, text));
       if (n == 0) continue;
@@ -145,7 +146,7 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
   for (std::size_t s = 0; s < shapes; ++s) {
     const SpeedAccuracy& both = comparison.speed_accuracy[s];
     if (!both.percent_change_time || !both.accuracy_change) continue;
-    const std::string name = printable(names[s], 40);
+    const std::string name = stimuli::printable(names[s], 40);
     const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
     std::string text =
         (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " + fixed(x, 1) + " %";
@@ -180,7 +181,7 @@ Figure confusion_of(const Analysis& analysis) {
     for (std::size_t s = 0; s < shapes; ++s) {
       const AccuracyCell& cell = analysis.description.accuracy[r][s];
       figure.description += short_name(analysis.table.renderers[r]) + ", " +
-                            printable(analysis.table.shapes[s], 40) + ": " +
+                            stimuli::printable(analysis.table.shapes[s], 40) + ": " +
                             percent_text(cell.n_correct, cell.n_trials) + " correct. ";
     }
   }
@@ -267,7 +268,8 @@ Figure exclusions_of(const Analysis& analysis) {
     const Exclusions& lost = analysis.exclusions[r];
     const std::string renderer = short_name(analysis.table.renderers[r]);
     const Role role = look_of(analysis, analysis.table.renderers[r]).role;
-    figure.legend.push_back({printable(analysis.table.renderers[r], 200), role, Shape::square});
+    figure.legend.push_back(
+        {stimuli::printable(analysis.table.renderers[r], 200), role, Shape::square});
     for (std::size_t g = 0; g < kGroups; ++g) {
       const std::size_t count =
           kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;
@@ -294,4 +296,4 @@ Figure exclusions_of(const Analysis& analysis) {
   return figure;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

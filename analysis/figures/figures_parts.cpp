@@ -8,7 +8,7 @@
 #include "analysis/statistics/wording.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 const char* to_string(Role role) {
   constexpr const char* kNames[kRoles] = {"page",   "ink",   "soft", "grid",  "point",
@@ -91,13 +91,13 @@ Look look_of(const Analysis& analysis, std::string_view renderer) {
   return kLooks.back();
 }
 
-std::string short_name(const std::string& renderer) { return printable(renderer, 40); }
+std::string short_name(const std::string& renderer) { return stimuli::printable(renderer, 40); }
 
 void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown) {
   for (std::size_t r = 0; r < shown; ++r) {
     const std::string& renderer = analysis.table.renderers[r];
     const Look look = look_of(analysis, renderer);
-    figure.legend.push_back({printable(renderer, 200), look.role, look.shape});
+    figure.legend.push_back({stimuli::printable(renderer, 200), look.role, look.shape});
   }
 }
 
@@ -128,7 +128,8 @@ Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::
   Panel panel;
   constexpr std::size_t kLongest = 24;  // bytes: two names above a narrow panel
   if (!alone) {
-    panel.title = printable(pair.renderer, kLongest) + " − " + printable(pair.reference, kLongest);
+    panel.title = stimuli::printable(pair.renderer, kLongest) + " − " +
+                  stimuli::printable(pair.reference, kLongest);
   }
   panel.width = std::max(alone ? kWide : kHalfWide, slot * static_cast<double>(shapes));
   return panel;
@@ -146,7 +147,7 @@ FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, 
   axis.grid = false;
   axis.names = true;
   for (std::size_t i = 0; i < shown; ++i) {
-    axis.ticks.push_back({static_cast<double>(i) + 0.5, printable(names[i], 160)});
+    axis.ticks.push_back({static_cast<double>(i) + 0.5, stimuli::printable(names[i], 160)});
   }
   return axis;
 }
@@ -290,4 +291,4 @@ std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& rec
   return figures;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,7 +8,7 @@
 
 #include "analysis/figures/figures.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Width of a panel that stands alone, and of one of several comparisons, px.
 constexpr double kWide = 850, kHalfWide = 370;
@@ -70,4 +70,4 @@ Figure learning_of(const Analysis& analysis);
 Figure order_of(const Analysis& analysis);
 Figure servo_of(const Analysis& analysis, const ReportRecord& record);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

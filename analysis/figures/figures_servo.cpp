@@ -7,7 +7,7 @@
 #include "analysis/figures/figures_parts.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -44,7 +44,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
   const double room = std::max(highest, 1.0);
   for (const ServoQuality& servo : record.servo) {
     Panel panel;
-    panel.title = printable(servo.renderer, 40);
+    panel.title = stimuli::printable(servo.renderer, 40);
     panel.x = seconds_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
     panel.x.grid = false;
     panel.y = linear_axis(0, room, "trials (%)");
@@ -59,7 +59,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
           fixed(std::pow(10, edge(b)), 2) + " to " + fixed(std::pow(10, edge(b + 1)), 2) +
               " ms: " + counted(n, "trial", "trials") + " (" + fixed(percent, 1) + " %)"));
     }
-    figure.description += printable(servo.renderer, 40) + ": " +
+    figure.description += stimuli::printable(servo.renderer, 40) + ": " +
                           std::to_string(servo.missed_ticks) + " of " +
                           std::to_string(servo.ticks) + " ticks missed, longest period " +
                           fixed(1000 * servo.longest_period, 3) + " ms. ";
@@ -84,4 +84,4 @@ std::string servo_sentence(const Analysis& analysis, const ReportRecord& record)
   return text;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

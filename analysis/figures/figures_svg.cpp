@@ -9,7 +9,7 @@
 #include "analysis/figures/svg.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -310,4 +310,4 @@ std::string figure_svg(const Figure& figure, const Palette& palette, Stands stan
   return Drawing(figure, palette, stands).document();
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 
 #include "analysis/figures/figures.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Colours by role: what SVG and CSS read.
 using Palette = std::array<std::string, kRoles>;
@@ -26,4 +26,4 @@ enum class Stands { alone, in_page };
 /// saves the drawing, but not shown.
 std::string figure_svg(const Figure& figure, const Palette& palette, Stands stands = Stands::alone);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 #include "analysis/figures/svg.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -236,7 +236,7 @@ Figure times_of(const Analysis& analysis) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       const TimeOutCell& outs = analysis.time_outs.cells[r][s];
       const std::string name =
-          printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
+          stimuli::printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
       const Look look = look_of(analysis, table.renderers[r]);
       const Stand stand = stand_of(analysis, r, renderers, s, widest);
       if (outs.highest_limit) add_time_outs(panel, outs, look, stand, room, name);
@@ -275,4 +275,4 @@ Figure times_of(const Analysis& analysis) {
   return figure;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 #include "analysis/figures/vega_marks.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -238,4 +238,4 @@ Json vega_spec(const Figure& figure) {
   return spec;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,11 +8,11 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
-constexpr std::string_view kFont =
+constexpr std::string_view kFonts =
     "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
 /// Two decimals, never an exponent, a plain minus: what SVG reads.
@@ -144,7 +144,7 @@ std::string Svg::document(double width, double height, std::string_view title,
   return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + size +
          " style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
          "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
-         "-description\" font-family=\"" + std::string(kFont) + "\">\n<title id=\"" + name +
+         "-description\" font-family=\"" + std::string(kFonts) + "\">\n<title id=\"" + name +
          "-title\">" + escaped(title) + "</title>\n<desc id=\"" + name + "-description\">" +
          escaped(description) + "</desc>\n" + body_ + "</svg>\n";
 }
@@ -173,7 +173,7 @@ double text_width(std::string_view text, double size, bool bold) {
 }
 
 std::string fitting(std::string_view text, double width, double size) {
-  std::size_t columns = palpate::width(text);
+  std::size_t columns = analysis::width(text);
   while (columns > 1 && text_width(shortened(text, columns), size) > width) --columns;
   return shortened(text, columns);
 }
@@ -183,4 +183,4 @@ std::vector<std::string> lines_of(std::string_view text, double width, double si
                  [&](std::string_view line) { return text_width(line, size, bold) <= width; });
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

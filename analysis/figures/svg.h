@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Writes the few elements that our figures need. Lengths in px, y down; text is escaped here.
 class Svg {
@@ -68,4 +68,4 @@ std::string fitting(std::string_view text, double width, double size);
 std::vector<std::string> lines_of(std::string_view text, double width, double size,
                                   bool bold = false);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

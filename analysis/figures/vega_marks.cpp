@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace palpate::vega {
+namespace palpate::analysis::vega {
 
 namespace {
 
@@ -204,4 +204,4 @@ void add_marks(Json& group, const Panel& panel) {
   add_points(group, panel, Kind::text, "texts");
 }
 
-}  // namespace palpate::vega
+}  // namespace palpate::analysis::vega

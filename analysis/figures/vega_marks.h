@@ -7,7 +7,7 @@
 
 #include "analysis/figures/figures.h"
 
-namespace palpate::vega {
+namespace palpate::analysis::vega {
 
 using Json = nlohmann::ordered_json;
 
@@ -30,4 +30,4 @@ std::string shape_name(Shape shape);
 /// The panel's marks with their data, into the panel's group.
 void add_marks(Json& group, const Panel& panel);
 
-}  // namespace palpate::vega
+}  // namespace palpate::analysis::vega

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -23,7 +23,8 @@ const char* find(const char* from, const char* to, char what) {
 
 }  // namespace
 
-CsvReader::CsvReader(const std::string& path) : file_(std::make_unique<InputFile>(path, kMaxFile)) {
+CsvReader::CsvReader(const std::string& path)
+    : file_(std::make_unique<stimuli::InputFile>(path, kMaxFile)) {
   buffer_.resize(CsvReader::kMaxRecord + kBlock);
   fill();
   if (end_ >= 3 && std::memcmp(buffer_.data(), "\xEF\xBB\xBF", 3) == 0) begin_ = 3;
@@ -172,4 +173,4 @@ CsvReader::Quoted CsvReader::split_quoted() {
   return Quoted::complete;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -10,7 +10,7 @@
 
 #include "stimuli/input_file.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Reads records one after the other. Tolerates a byte order mark, LF or CRLF, a missing last
 /// newline and empty lines; quoted fields may hold commas, quotes and newlines.
@@ -41,7 +41,7 @@ class CsvReader {
   Quoted split_quoted();
   bool end_with(std::string fault);
 
-  std::unique_ptr<InputFile> file_;
+  std::unique_ptr<stimuli::InputFile> file_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< unread bytes of buffer_
   bool at_end_ = false, stopped_ = false;
@@ -51,4 +51,4 @@ class CsvReader {
   std::size_t line_ = 0, next_line_ = 1;
 };
 
-}  // namespace palpate
+}  // namespace palpate::analysis

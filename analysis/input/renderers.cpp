@@ -1,6 +1,6 @@
 #include "analysis/input/renderers.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 std::vector<RendererPair> renderer_pairs(const std::vector<std::string>& renderers) {
   if (renderers.empty()) return {};
@@ -23,4 +23,4 @@ std::string difference_name(const RendererPair& pair) {
   return pair.renderer + " − " + pair.reference;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// A renderer against the reference; every difference is `renderer` minus `reference`.
 struct RendererPair {
@@ -29,4 +29,4 @@ std::string the(const std::string& renderer);
 /// "ray − point"
 std::string difference_name(const RendererPair& pair);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -14,7 +14,7 @@ void remember(const std::string& value, std::vector<std::string>& known) {
   if (!value.empty() && std::ranges::find(known, value) == known.end()) known.push_back(value);
 }
 
-ProtocolText protocol_text(const ProtocolInfo& info) {
+ProtocolText protocol_text(const data::ProtocolInfo& info) {
   ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
   const auto json = nlohmann::json::parse(info.text, nullptr, false);
   if (!json.is_object()) return protocol;
@@ -27,7 +27,7 @@ ProtocolText protocol_text(const ProtocolInfo& info) {
   return protocol;
 }
 
-void add_trial(const TrialRecord& record, ServoQuality& servo) {
+void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
   ++servo.n_trials;
   servo.n_with_missed += record.missed_ticks > 0 ? 1 : 0;
   servo.n_with_faults += record.faults != 0 ? 1 : 0;
@@ -46,20 +46,20 @@ void add_trial(const TrialRecord& record, ServoQuality& servo) {
 }  // namespace
 
 ReportRecord read_report_record(const std::string& database) {
-  Store store = Store::open(database, Store::Mode::read_only);
+  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
   ReportRecord record;
-  for (const ProtocolInfo& protocol : store.protocols()) {
+  for (const data::ProtocolInfo& protocol : store.protocols()) {
     record.protocols.push_back(protocol_text(protocol));
-    for (const Participant& person : store.participants(protocol.sha256)) {
+    for (const data::Participant& person : store.participants(protocol.sha256)) {
       if (person.seed) record.seeds.push_back(person.code + ": " + std::to_string(*person.seed));
     }
   }
-  for (const StoredRun& run : store.runs()) {
+  for (const data::StoredRun& run : store.runs()) {
     remember(run.info.device, record.devices);
     remember(run.info.build, record.builds);
     remember(run.info.response_device, record.response_devices);
   }
-  store.for_each_trial([&](const StoredTrial& trial) {
+  store.for_each_trial([&](const data::StoredTrial& trial) {
     if (trial.record.practice) return;
     auto servo = std::ranges::find(record.servo, trial.record.renderer, &ServoQuality::renderer);
     if (servo == record.servo.end()) {
@@ -73,4 +73,4 @@ ReportRecord read_report_record(const std::string& database) {
   return record;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

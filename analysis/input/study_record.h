@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Of all completed trials with one renderer, practice left out.
 struct ServoQuality {
@@ -42,4 +42,4 @@ struct ReportRecord {
 /// \throws what Store::open throws
 ReportRecord read_report_record(const std::string& database);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -10,7 +10,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -207,4 +207,4 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   return table;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -13,7 +13,7 @@
 
 #include "analysis/input/trials.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Keeps each distinct name once and numbers them in order of first appearance.
 class Interner {
@@ -80,4 +80,4 @@ class TrialTableBuilder {
   std::size_t n_practice_ = 0, n_simulated_ = 0, n_contradicting_ = 0, n_late_answers_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::analysis

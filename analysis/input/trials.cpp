@@ -14,7 +14,7 @@
 #include "data/files/spreadsheet_text.h"
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -65,12 +65,12 @@ class Faults {
           {file_, "further lines",
            "and " + std::to_string(count_ - kMaxFaults) + " more faults of these kinds"});
     }
-    throw InputError(std::move(faults_));
+    throw protocols::InputError(std::move(faults_));
   }
 
  private:
   std::string file_;
-  std::vector<Fault> faults_;
+  std::vector<protocols::Fault> faults_;
   std::size_t count_ = 0;
 };
 
@@ -136,16 +136,16 @@ class CsvTrials {
     ok_ = false;
     // Formats only what will be listed: a million bad rows must not cost a million strings.
     if (faults_.count() >= kMaxFaults) return faults_.add({}, {});
-    faults_.add(
-        line(*reader_) + ", column " + std::string(kColumns[column]),
-        "expected " + std::string(expected) + "; found '" + printable(field(column), 40) + "'");
+    faults_.add(line(*reader_) + ", column " + std::string(kColumns[column]),
+                "expected " + std::string(expected) + "; found '" +
+                    stimuli::printable(field(column), 40) + "'");
   }
 
   /// A name as it was before an export guarded it from spreadsheets.
   std::string_view name(Column column, const Interner& known) {
-    const std::string_view text = unguarded(field(column));
+    const std::string_view text = data::unguarded(field(column));
     if (known.holds(text)) return text;
-    if (text.empty() || text.size() > kMaxName || !is_plain_utf8(text)) {
+    if (text.empty() || text.size() > kMaxName || !stimuli::is_plain_utf8(text)) {
       fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");
     }
     if (text == kNoResponse) {
@@ -253,7 +253,7 @@ class CsvTrials {
   /// Provenance is shown, not checked: an odd value is made printable, and a few are enough.
   static void remember(std::string_view text, std::vector<std::string>& known) {
     if (text.empty() || (!known.empty() && known.back() == text)) return;
-    const std::string shown = printable(text, 80);
+    const std::string shown = stimuli::printable(text, 80);
     if (known.size() < 8 && std::find(known.begin(), known.end(), shown) == known.end()) {
       known.push_back(shown);
     }
@@ -290,4 +290,4 @@ class CsvTrials {
 
 TrialTable read_trials_csv(const std::string& path) { return CsvTrials(path).read(); }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// One completed trial that is not practice. Names are kept once, in TrialTable.
 struct TrialRow {
@@ -61,4 +61,4 @@ TrialTable read_trials_store(const std::string& path);
 /// Faults that are listed one by one before they are only counted.
 constexpr std::size_t kMaxFaults = 50;
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -11,7 +11,7 @@
 #include "data/store/store.h"
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -38,20 +38,20 @@ void note(const std::string& value, std::vector<std::string>& known) {
 }  // namespace
 
 TrialTable read_trials_store(const std::string& path) {
-  Store store = Store::open(path, Store::Mode::read_only);
+  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   Provenance provenance;
   provenance.source = path;
   std::vector<std::string> listed, protocol_names, observers;
-  for (const ProtocolInfo& protocol : store.protocols()) {
+  for (const data::ProtocolInfo& protocol : store.protocols()) {
     for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
   }
   TrialTableBuilder builder;
-  store.for_each_trial([&](const StoredTrial& trial) {
-    const TrialRecord& record = trial.record;
+  store.for_each_trial([&](const data::StoredTrial& trial) {
+    const data::TrialRecord& record = trial.record;
     if (record.renderer != "point" && record.renderer != "ray") {
-      throw InputError({{path, "participant " + trial.participant.code,
-                         "expected the renderer 'point' or 'ray'; found '" +
-                             printable(record.renderer, 40) + "'"}});
+      throw protocols::InputError({{path, "participant " + trial.participant.code,
+                                    "expected the renderer 'point' or 'ray'; found '" +
+                                        stimuli::printable(record.renderer, 40) + "'"}});
     }
     RawTrial raw;
     raw.participant = trial.participant.code;
@@ -82,8 +82,8 @@ TrialTable read_trials_store(const std::string& path) {
   try {
     return builder.finish(std::move(provenance), listed);
   } catch (const std::runtime_error& error) {
-    throw InputError({{path, "trials", error.what()}});
+    throw protocols::InputError({{path, "trials", error.what()}});
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -303,4 +303,4 @@ Json practice_json(const Analysis& analysis) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,7 +8,7 @@
 
 #include "analysis/statistics/analysis.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 using Json = nlohmann::ordered_json;
 
@@ -39,4 +39,4 @@ void put_pair_practice(Json& out, const PairPractice& practice, const RendererPa
 /// Learning with each renderer, and the first comparison.
 Json practice_json(const Analysis& analysis);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 #include "analysis/statistics/wording.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -249,4 +249,4 @@ Table renderer_order_table(const Analysis& analysis) {
   return table;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -13,7 +13,7 @@
 #include "analysis/statistics/plan.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -53,7 +53,7 @@ std::size_t trials_each(const Plan& plan, std::size_t trials) {
 
 void put_line(std::string& out, const std::string& text, const std::string& indent = "") {
   const auto fits = [&](std::string_view line) { return indent.size() + width(line) <= 100; };
-  for (const std::string& line : wrapped(printable(text), fits)) {
+  for (const std::string& line : wrapped(stimuli::printable(text), fits)) {
     out += indent;
     out += shortened(line, 100 - indent.size());
     out += "\n";
@@ -63,8 +63,8 @@ void put_line(std::string& out, const std::string& text, const std::string& inde
 constexpr std::size_t kNameColumns = 14, kFigureColumns = 12, kWidestShape = 24;
 
 std::string column_name(const Plan& plan, std::size_t shape) {
-  return "  " +
-         pad_left(shortened(printable(plan.model.shapes[shape]), kWidestShape), kFigureColumns - 2);
+  return "  " + pad_left(shortened(stimuli::printable(plan.model.shapes[shape]), kWidestShape),
+                         kFigureColumns - 2);
 }
 
 /// The columns of these shapes.
@@ -300,4 +300,4 @@ std::string plan_svg(const Plan& plan) {
   return svg.document(kWidth, kHeight, title, description);
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -30,7 +30,7 @@ endfunction()
 set(assets "${CMAKE_CURRENT_BINARY_DIR}/report_assets.cpp")
 set(draft "${assets}.draft")
 file(WRITE "${draft}" "// Made by report_assets.cmake when the build is configured.\n"
-     "#include \"analysis/report/report_assets.h\"\n\nnamespace palpate {\n\n")
+     "#include \"analysis/report/report_assets.h\"\n\nnamespace palpate::analysis {\n\n")
 palpate_text_function("${draft}" report_style "${CMAKE_CURRENT_SOURCE_DIR}/report/report.css")
 palpate_text_function("${draft}" report_script "${CMAKE_CURRENT_SOURCE_DIR}/report/report.js")
 palpate_text_function("${draft}" vega_notice "${CMAKE_CURRENT_SOURCE_DIR}/report/report_vega_notice.txt")
@@ -42,5 +42,5 @@ foreach(name IN LISTS vega_modules)
   string(APPEND entries "{\"vega-${name}\", ${function}()}, ")
 endforeach()
 file(APPEND "${draft}" "}  // namespace\n\n"
-     "std::vector<ScriptModule> vega_modules() { return {${entries}}; }\n\n}  // namespace palpate\n")
+     "std::vector<ScriptModule> vega_modules() { return {${entries}}; }\n\n}  // namespace palpate::analysis\n")
 configure_file("${draft}" "${assets}" COPYONLY)  # an equal one is left as it is

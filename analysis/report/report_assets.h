@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct ScriptModule {
   std::string_view name, text;
@@ -16,4 +16,4 @@ std::string_view vega_notice();  ///< Vega's copyright and licence
 /// Vega's modules in the order of their use; empty where the build found none.
 std::vector<ScriptModule> vega_modules();
 
-}  // namespace palpate
+}  // namespace palpate::analysis

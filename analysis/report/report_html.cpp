@@ -18,7 +18,7 @@
 #include "analysis/statistics/wording.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -100,7 +100,8 @@ class Page {
   void put_header(std::string& out) const {
     out += "<header>\n";
     const std::string study = study_name();
-    if (!study.empty()) out += "<p class=\"study\">" + escaped(printable(study, 400)) + "</p>\n";
+    if (!study.empty())
+      out += "<p class=\"study\">" + escaped(stimuli::printable(study, 400)) + "</p>\n";
     const Counts& counts = analysis_.description.counts;
     out += "<h1>" + escaped_sentence(answer(analysis_)) + "</h1>\n<p class=\"lead\">" +
            counted(counts.n_participants, "participant", "participants") + ", " +
@@ -113,7 +114,8 @@ class Page {
       constexpr std::size_t kMost = 100;
       const std::size_t n = std::min(analysis_.warnings.size(), kMost);
       for (std::size_t i = 0; i < n; ++i) {
-        out += "<li>" + escaped_sentence(printable(analysis_.warnings[i], 4000)) + "</li>\n";
+        out +=
+            "<li>" + escaped_sentence(stimuli::printable(analysis_.warnings[i], 4000)) + "</li>\n";
       }
       if (n < analysis_.warnings.size()) {
         out += "<li>and " + std::to_string(analysis_.warnings.size() - n) + " more</li>\n";
@@ -170,7 +172,7 @@ class Page {
     const auto& people = analysis_.table.participants;
     const std::size_t n = std::min(people.size(), kShownPeople);
     for (std::size_t p = 0; p < n; ++p) {
-      const std::string code = escaped(printable(people[p], 40));
+      const std::string code = escaped(stimuli::printable(people[p], 40));
       body_ += "<option value=\"" + code + "\">" + code + "</option>";
     }
     body_ += "</select></label>\n";
@@ -289,7 +291,7 @@ class Page {
     }
     for (const ProtocolText& protocol : record_.protocols) {
       body_ += "<details class=\"long\">\n<summary>Protocol “" +
-               escaped(printable(protocol.name, 200)) +
+               escaped(stimuli::printable(protocol.name, 200)) +
                "” as it was used</summary>\n<pre tabindex=\"0\">" + protocol_lines(protocol.text) +
                "</pre>\n</details>\n";
     }
@@ -346,4 +348,4 @@ std::string report_html(const Analysis& analysis, const ReportRecord& record) {
   return Page(analysis, record).html();
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 
 #include "analysis/report/inference_json.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -193,4 +193,4 @@ std::string report_json(const Analysis& analysis) {
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -7,7 +7,7 @@
 
 #include "analysis/report/tables.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Escaped text with each number kept on one line with its percent sign.
 std::string escaped_sentence(std::string_view text);
@@ -29,4 +29,4 @@ std::string inside_script(std::string_view json);
 /// program was built without.
 std::string vega_script();
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -113,4 +113,4 @@ void Reasons::put(std::vector<std::string>& notes) const {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

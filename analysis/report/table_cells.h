@@ -9,7 +9,7 @@
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 inline constexpr const char* kMissing = "–";
 
@@ -53,4 +53,4 @@ class Reasons {
   std::vector<std::pair<std::string, std::vector<std::string>>> reasons_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 #include "analysis/statistics/wording.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 Table reduction_table(const Analysis& analysis) {
   const bool paper_too = compares_as_paper(analysis);
@@ -220,4 +220,4 @@ std::vector<Table> all_tables(const Analysis& analysis) {
   return tables;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -7,7 +7,7 @@
 
 #include "analysis/statistics/analysis.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct Table {
   std::string caption;  ///< says so where the data is simulated
@@ -45,4 +45,4 @@ Table provenance_table(const Analysis& analysis);
 /// All of them in the order of display.
 std::vector<Table> all_tables(const Analysis& analysis);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

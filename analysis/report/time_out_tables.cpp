@@ -7,7 +7,7 @@
 #include "analysis/statistics/wording.h"
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -79,4 +79,4 @@ Table time_outs_table(const Analysis& analysis) {
   return table;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -7,7 +7,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -246,4 +246,4 @@ std::string simulated_label(Simulated simulated) {
   return {};
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -14,7 +14,7 @@
 #include "analysis/statistics/practice.h"
 #include "analysis/statistics/time_outs.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct AnalysisSettings {
   double too_fast = 0.2;      ///< s, > 0; correct answers before it are left out of the times
@@ -47,4 +47,4 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
 /// "SIMULATED PARTICIPANTS", "PARTLY SIMULATED PARTICIPANTS", or empty.
 std::string simulated_label(Simulated simulated);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -215,4 +215,4 @@ RmAnova rm_anova(const People& people) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

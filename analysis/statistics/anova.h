@@ -9,7 +9,7 @@
 
 #include "analysis/statistics/describe.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Departure from sphericity of one effect's contrasts, and what corrects for it.
 struct Sphericity {
@@ -44,4 +44,4 @@ struct RmAnova {
 /// On the participants who have a time in every cell. Any numbers of renderers and shapes.
 RmAnova rm_anova(const People& people);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 #include "analysis/statistics/paired.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -76,7 +76,7 @@ std::optional<double> bca_coverage(std::size_t pairs) {
   return kCoverage[pairs - 2];
 }
 
-Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
+Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
                          std::size_t resamples) {
   Bootstrap out;
   const TTest spread = t_test(differences);  // the same cases leave nothing to resample
@@ -95,4 +95,4 @@ Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
   return bca_interval(differences, means);
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -304,4 +304,4 @@ std::vector<CensoredEstimate> censored_by_shape(const Description& description,
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

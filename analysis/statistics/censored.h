@@ -12,7 +12,7 @@
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/time_outs.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Of one shape: log T = participant + log_ratio [with the renderer] + residual_sd N(0, 1), by
 /// maximum likelihood; correct answers as the times use them, time-outs censored at their limit,
@@ -37,4 +37,4 @@ std::vector<CensoredEstimate> censored_by_shape(const Description& description,
                                                 const TimeOuts& time_outs,
                                                 const RendererPair& pair);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
                                           const TimeOuts& time_outs, std::uint64_t seed) {
@@ -23,4 +23,4 @@ std::vector<Comparison> compare_renderers(const TrialTable& table, const Descrip
   return all;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

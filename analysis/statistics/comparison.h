@@ -12,7 +12,7 @@
 #include "analysis/statistics/speed_accuracy.h"
 #include "analysis/statistics/time_outs.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct Comparison {
   RendererPair pair;
@@ -26,4 +26,4 @@ struct Comparison {
 std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
                                           const TimeOuts& time_outs, std::uint64_t seed);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -164,4 +164,4 @@ Description describe(const TrialTable& table, double too_fast) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -11,7 +11,7 @@
 
 #include "analysis/input/trials.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct Counts {
   std::size_t n_participants = 0, n_trials = 0, n_correct = 0, n_timeouts = 0;
@@ -66,4 +66,4 @@ std::optional<double> standard_deviation(const std::vector<double>& values);
 /// The middle, of an even count the mean of the middle two; reorders. \param values not empty
 double median(std::vector<double>& values);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

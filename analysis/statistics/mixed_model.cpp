@@ -9,7 +9,7 @@
 #include "analysis/statistics/reml.h"
 #include "analysis/statistics/reml_data.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -271,4 +271,4 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

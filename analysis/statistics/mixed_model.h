@@ -9,7 +9,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// One coefficient or contrast with Satterthwaite's degrees of freedom. Natural log of seconds.
 struct ModelEstimate {
@@ -51,4 +51,4 @@ struct MixedModel {
 MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -10,7 +10,7 @@
 
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -139,7 +139,7 @@ void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed) {
   // Streams of their own: threads change nothing but the time it takes.
   const auto work = [&] {
     for (std::size_t i = next++; i < tests.size(); i = next++) {
-      Random random(seed, {i});
+      stimuli::Random random(seed, {i});
       tests[i]->bootstrap = bootstrap_mean(tests[i]->differences, random);
       tests[i]->bootstrap.seed = seed;
     }
@@ -163,4 +163,4 @@ void adjust_all(const std::vector<PairedShape*>& tests) {
   for (std::size_t i = 0; i < tests.size(); ++i) tests[i]->t_test.p_holm = adjusted[i];
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

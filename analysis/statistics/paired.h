@@ -13,9 +13,11 @@
 #include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
 
-namespace palpate {
-
+namespace palpate::stimuli {
 class Random;
+}
+
+namespace palpate::analysis {
 
 /// Ends of a 95 % interval. Of log ratios, or of the percent reductions they stand for.
 struct Interval {
@@ -69,7 +71,7 @@ constexpr std::size_t kResamples = 9999;
 /// where it comes close, and below 2.
 std::optional<double> bca_coverage(std::size_t pairs);
 /// BCa interval of the mean (Efron 1987) from `resamples` draws of all participants.
-Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
+Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
                          std::size_t resamples = kResamples);
 /// The part of it after the draws. \param means of the resamples; reorders
 Bootstrap bca_interval(const std::vector<double>& differences, std::vector<double>& means);
@@ -104,4 +106,4 @@ void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed);
 /// Holm's adjustment over all of them.
 void adjust_all(const std::vector<PairedShape*>& tests);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -122,4 +122,4 @@ Pilot read_pilot(const Analysis& analysis) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -7,7 +7,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/power.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 struct Pilot {
   RendererPair pair;      ///< that it is a pilot of: the study's first comparison
@@ -24,4 +24,4 @@ struct Pilot {
 /// is that within the cells.
 Pilot read_pilot(const Analysis& analysis);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

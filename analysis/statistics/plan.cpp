@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -64,4 +64,4 @@ Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string>
   return plan;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 
 #include "analysis/statistics/power.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 enum class Goal { all, any };  ///< find every shape with an effect, or at least one
 
@@ -55,4 +55,4 @@ std::string plan_json(const Plan& plan);
 /// Power over participants, a line for each number of trials.
 std::string plan_svg(const Plan& plan);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

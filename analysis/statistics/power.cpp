@@ -12,7 +12,7 @@
 #include "analysis/statistics/paired.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -34,7 +34,7 @@ class UsedTrials {
       up_to_.push_back(sum);
     }
   }
-  std::size_t operator()(Random& random) const {
+  std::size_t operator()(stimuli::Random& random) const {
     if (up_to_.empty()) return n_;
     const auto found = std::upper_bound(up_to_.begin(), up_to_.end(), random.unit());
     return std::min(n_, static_cast<std::size_t>(found - up_to_.begin()));
@@ -46,7 +46,7 @@ class UsedTrials {
 };
 
 /// Gamma of the given shape >= 0.5 and scale 1 (Marsaglia & Tsang 2000).
-double gamma_draw(double shape, Random& random) {
+double gamma_draw(double shape, stimuli::Random& random) {
   if (shape < 1) return gamma_draw(shape + 1, random) * std::pow(1 - random.unit(), 1 / shape);
   const double d = shape - 1.0 / 3, c = 1 / std::sqrt(9 * d);
   for (;;) {
@@ -59,7 +59,7 @@ double gamma_draw(double shape, Random& random) {
 
 /// Draws the cells of a study: means and squares are all that the tests look at.
 void draw_study(const StudyModel& model, const UsedTrials& used_trials, bool squares,
-                Random& random, People& people) {
+                stimuli::Random& random, People& people) {
   const std::size_t n_people = people[0][0].size();
   const double other = std::sqrt(std::max(0.0, 1 - model.correlation * model.correlation));
   for (std::size_t p = 0; p < n_people; ++p) {
@@ -151,7 +151,7 @@ Power simulate_power(const StudyModel& model, const StudyDesign& design,
       if (begin >= settings.studies) return;
       const std::size_t end = std::min(begin + kChunk, settings.studies);
       for (std::size_t study = begin; study < end; ++study) {
-        Random random(settings.seed, {design.participants, design.trials, study});
+        stimuli::Random random(settings.seed, {design.participants, design.trials, study});
         draw_study(model, used_trials, settings.test == StudyTest::model, random, people);
         if (settings.test == StudyTest::model) {
           test_model(people, model.shapes, verdicts);
@@ -184,4 +184,4 @@ Power simulate_power(const StudyModel& model, const StudyDesign& design,
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

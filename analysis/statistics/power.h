@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// What studies are drawn from. Natural log of seconds; standard deviations >= 0.
 struct StudyModel {
@@ -57,4 +57,4 @@ struct Power {
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

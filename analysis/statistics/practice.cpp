@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -281,4 +281,4 @@ Practice practice_effects(const TrialTable& table, const Description& descriptio
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

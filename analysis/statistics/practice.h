@@ -12,7 +12,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// A participant's trials with a renderer are cut, in order, into so many parts of equal length.
 constexpr std::size_t kLearningBins = 8;
@@ -76,4 +76,4 @@ struct Practice {
 /// \param too_fast s, as in describe()
 Practice practice_effects(const TrialTable& table, const Description& description, double too_fast);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <numbers>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -182,4 +182,4 @@ RemlPoint reml_point(const RemlData& data, const MatrixXd& coding, const VectorX
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -11,7 +11,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// A participant's means at the levels that there are trials of.
 struct RemlGroup {
@@ -61,4 +61,4 @@ struct RemlOptimum {
 /// Newton's method with the Hessian made positive and a line search, from several starts.
 RemlOptimum reml_optimum(const RemlData& data, const Eigen::MatrixXd& coding);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -228,4 +228,4 @@ ModelData::ModelData(const People& people, const ModelCells& cells) {
   least_square = data.yy;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -8,7 +8,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/reml.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// The non-empty cells are the columns of X: any coding of renderer * shape spans the same.
 struct ModelCells {
@@ -65,4 +65,4 @@ class ModelData {
   Eigen::VectorXd counts_, centre_;  ///< by cell: trials; what was subtracted from y
 };
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 
 #include "analysis/statistics/reml.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -187,4 +187,4 @@ RemlOptimum reml_optimum(const RemlData& data, const MatrixXd& coding) {
   return best;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -55,4 +55,4 @@ std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Descrip
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

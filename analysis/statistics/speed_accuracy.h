@@ -10,7 +10,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Change of accuracy beside the change of time, renderer minus reference. Shares, 0 to 1.
 struct SpeedAccuracy {
@@ -28,4 +28,4 @@ std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Descrip
                                           const RendererPair& pair,
                                           const std::vector<PairedShape>& shapes);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 #include <map>
 #include <utility>
 
-namespace palpate {
+namespace palpate::analysis {
 
 bool TimeOutGroup::has_limit() const { return std::isfinite(limit) && limit > 0; }
 
@@ -60,4 +60,4 @@ TimeOuts time_outs(const TrialTable& table, const Description& description) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -10,7 +10,7 @@
 #include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// Time-outs of one participant in one cell that share a limit.
 struct TimeOutGroup {
@@ -38,4 +38,4 @@ struct TimeOuts {
 
 TimeOuts time_outs(const TrialTable& table, const Description& description);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

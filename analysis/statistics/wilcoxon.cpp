@@ -5,7 +5,7 @@
 
 #include "analysis/statistics/paired.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -89,4 +89,4 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
   return test;
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 namespace {
 
@@ -91,9 +91,9 @@ std::string answer(const Analysis& analysis) {
 
 std::string with_renderer(const Analysis& analysis, const std::string& joint) {
   const RendererPair& pair = analysis.comparisons.front().pair;
-  const std::string reference = the(printable(pair.reference, kLongestInPhrase));
+  const std::string reference = the(stimuli::printable(pair.reference, kLongestInPhrase));
   if (analysis.comparisons.size() > 1) return joint + " " + reference;
-  const std::string with = "with " + the(printable(pair.renderer, kLongestInPhrase));
+  const std::string with = "with " + the(stimuli::printable(pair.renderer, kLongestInPhrase));
   return pair.is_ray_minus_point() ? with : with + " " + joint + " " + reference;
 }
 
@@ -113,4 +113,4 @@ bool compares_as_paper(const Analysis& analysis) {
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -5,7 +5,7 @@
 
 #include "analysis/statistics/analysis.h"
 
-namespace palpate {
+namespace palpate::analysis {
 
 /// The answer to the paper's question: for which shapes a renderer is faster than the reference,
 /// slower, neither (Holm-adjusted p < 0.05 of the paired t-tests), or why that cannot be said. A
@@ -23,4 +23,4 @@ std::string paper_reduction(const RendererPair& pair, const std::string& shape);
 /// Whether the paper compared what one of the study's comparisons does, with one of its shapes.
 bool compares_as_paper(const Analysis& analysis);
 
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -2,7 +2,7 @@
 
 #include "data/export/table_fields.h"
 
-namespace palpate {
+namespace palpate::data {
 
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
                             ExportedPeople& people, ProgressCounter& counter) {
@@ -20,4 +20,4 @@ std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& cloc
   return rows;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -7,10 +7,10 @@
 #include "data/store/export_log.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Writes all attempts that were cut off, RFC 4180 with a header. \return rows
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
                             ExportedPeople& people, ProgressCounter& counter);
 
-}  // namespace palpate
+}  // namespace palpate::data

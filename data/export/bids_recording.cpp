@@ -7,7 +7,7 @@
 #include "data/export/table_fields.h"
 #include "data/files/utc.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr double kLongestGap = 60;  // s
@@ -135,4 +135,4 @@ std::optional<nlohmann::ordered_json> BidsRecording::finish(
   return json;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -9,7 +9,7 @@
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Gzipped rows without a header, one a servo period from the first sample to the last: recordings
 /// of BIDS have no gaps, so periods between trials, and those whose tick was missed, are rows of
@@ -46,4 +46,4 @@ class BidsRecording {
   nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

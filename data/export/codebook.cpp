@@ -5,7 +5,7 @@
 #include "data/export/table_row.h"
 #include "data/files/spreadsheet_text.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 void describe_table(const char* table, std::span<const Column> columns, const ProtocolFacts& facts,
@@ -39,4 +39,4 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
   describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

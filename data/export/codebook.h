@@ -6,10 +6,10 @@
 #include "data/export/export.h"
 #include "data/files/text_sink.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, then one for
 /// each value or bit that stands for something.
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::data

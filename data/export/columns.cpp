@@ -1,6 +1,6 @@
 #include "data/export/columns.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 const Column kParticipant{"participant_id", "Pseudonym of the participant"};
@@ -188,4 +188,4 @@ std::span<const Column> sample_columns() {
   return all;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

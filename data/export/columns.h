@@ -9,7 +9,7 @@
 
 #include "data/export/export.h"
 
-namespace palpate {
+namespace palpate::data {
 
 struct Column {
   const char* name;
@@ -24,4 +24,4 @@ std::span<const Column> trial_columns(Times times);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
 
-}  // namespace palpate
+}  // namespace palpate::data

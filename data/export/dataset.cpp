@@ -7,7 +7,7 @@
 #include "data/files/spreadsheet_text.h"
 #include "data/files/text_sink.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 bool is_alphanumeric(char c) {
@@ -160,4 +160,4 @@ std::string json_text(const nlohmann::ordered_json& json) {
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

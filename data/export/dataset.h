@@ -12,7 +12,7 @@
 #include "data/files/draft_folder.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// How a protocol is named in the files of a dataset.
 struct StudyLabel {
@@ -73,4 +73,4 @@ inline constexpr const char* kGuardSentence =
 /// JSON as the text of a file. Bytes that are no UTF-8 are replaced.
 std::string json_text(const nlohmann::ordered_json& json);
 
-}  // namespace palpate
+}  // namespace palpate::data

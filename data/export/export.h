@@ -8,7 +8,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 struct StimulusFacts {
   std::string name;
@@ -72,4 +72,4 @@ class ProgressCounter {
   std::int64_t trials_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

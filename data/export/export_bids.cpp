@@ -11,7 +11,7 @@
 #include "data/files/text_sink.h"
 #include "data/files/utc.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -274,4 +274,4 @@ ExportDone export_bids(Store& store, const std::string& path, const ExportSettin
   return export_dataset<BidsWriter>(store, path, settings, "bids");
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -5,7 +5,7 @@
 #include "data/export/export.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Writes the completed trials as a BIDS dataset (behaviour, https://bids.neuroimaging.io):
 ///
@@ -29,4 +29,4 @@ namespace palpate {
 /// does not fit a TSV file; StoreError: it could not be written.
 ExportDone export_bids(Store& store, const std::string& path, const ExportSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -5,7 +5,7 @@
 
 #include "data/files/utc.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr std::int64_t kYear1900 = -2'208'988'800'000'000'000;  // ns since 1970
@@ -50,4 +50,4 @@ std::int64_t ExportClock::since_first(const Participant& person, std::int64_t un
   return first == firsts_.end() ? 0 : difference(unix_ns, first->second);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

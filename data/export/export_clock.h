@@ -9,7 +9,7 @@
 #include "data/export/export.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 class ExportClock {
  public:
@@ -32,4 +32,4 @@ class ExportClock {
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

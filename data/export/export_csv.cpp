@@ -14,7 +14,7 @@
 #include "data/files/text_sink.h"
 #include "data/store/export_log.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -91,4 +91,4 @@ ExportDone export_csv(Store& store, const std::string& path, const ExportSetting
   return done;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -5,7 +5,7 @@
 #include "data/export/export.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
 /// in the same folder. UTF-8, no BOM, RFC 4180 (lines end in CRLF, fields quoted only where
@@ -24,4 +24,4 @@ inline ExportDone export_csv(Store& store, const std::string& path, bool force) 
   return export_csv(store, path, ExportSettings{.force = force});
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

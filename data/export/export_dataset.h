@@ -11,7 +11,7 @@
 #include "data/store/export_log.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// All trials, then the attempts that were cut off, then what describes them. The folder appears
 /// whole, or not at all, and the database knows of it.
@@ -50,4 +50,4 @@ ExportDone export_dataset(Store& store, const std::string& path, const ExportSet
   return done;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

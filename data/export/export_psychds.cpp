@@ -11,7 +11,7 @@
 #include "data/export/table_fields.h"
 #include "data/files/text_sink.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -202,4 +202,4 @@ ExportDone export_psychds(Store& store, const std::string& path, const ExportSet
   return export_dataset<PsychDsWriter>(store, path, settings, "psych-ds");
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

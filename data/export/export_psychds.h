@@ -5,7 +5,7 @@
 #include "data/export/export.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Writes the completed trials as a Psych-DS dataset (https://psych-ds.github.io):
 ///
@@ -23,4 +23,4 @@ namespace palpate {
 /// StoreError: it could not be written.
 ExportDone export_psychds(Store& store, const std::string& path, const ExportSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr std::int64_t kLongestLoss = 600'000;  // slots: ten minutes at 1 kHz
@@ -33,4 +33,4 @@ std::int64_t SampleSlots::next() {
   return slot_ += static_cast<std::int64_t>(step);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

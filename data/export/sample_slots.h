@@ -5,7 +5,7 @@
 
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Goes through the samples of one trial. A slot is a period of the servo; every tick was due at
 /// the begin of one, and a slot whose tick was missed or is not on record stays empty.
@@ -26,4 +26,4 @@ class SampleSlots {
   std::int64_t slot_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -1,6 +1,6 @@
 #include "data/export/table_fields.h"
 
-namespace palpate {
+namespace palpate::data {
 
 void put_trial(TableRow& row, const StoredTrial& trial, const ExportClock& clock) {
   row << trial.participant.code;
@@ -49,4 +49,4 @@ void put_sample(TableRow& row, const SampleRecord& sample) {
       << static_cast<double>(sample.compute_ns) / 1e9;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

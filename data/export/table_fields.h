@@ -5,7 +5,7 @@
 #include "data/export/table_row.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// trial_columns()
 void put_trial(TableRow& row, const StoredTrial& trial, const ExportClock& clock);
@@ -17,4 +17,4 @@ void put_attempt(TableRow& row, const StoredTrial& attempt, const ExportClock& c
 /// device senses or shows; the database has all digits.
 void put_sample(TableRow& row, const SampleRecord& sample);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -5,7 +5,7 @@
 #include "data/files/spreadsheet_text.h"
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 bool quotes_needed(std::string_view text) {
@@ -76,4 +76,4 @@ const std::string& TableRow::end() {
   return row_;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

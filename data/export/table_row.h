@@ -11,7 +11,7 @@
 
 #include "data/export/columns.h"
 
-namespace palpate {
+namespace palpate::data {
 
 enum class TableStyle {
   csv,  ///< RFC 4180: fields quoted where needed, CRLF; a missing value is an empty field
@@ -55,4 +55,4 @@ class TableRow {
   bool ended_ = true;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -2,7 +2,7 @@
 
 #include <nettle/sha2.h>
 
-namespace palpate {
+namespace palpate::data {
 
 Checksum checksum(const void* bytes, std::size_t size) {
   sha256_ctx context;
@@ -25,4 +25,4 @@ std::string checksum_hex(std::string_view bytes) {
   return to_hex(checksum(bytes.data(), bytes.size()));
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -17,7 +17,7 @@
 
 #include "data/errors.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -251,4 +251,4 @@ void give_names(std::deque<DraftFile>& drafts, bool replace) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate {
+namespace palpate::data {
 
 /// ".NAME.palpate-" beside the target: how the names of all drafts for it begin; six letters
 /// follow.
@@ -64,4 +64,4 @@ bool name_new_file(const std::string& draft, const std::string& path);
 /// All of them or none. They have been synced.
 void give_names(std::deque<DraftFile>& drafts, bool replace);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -16,7 +16,7 @@
 #include "data/errors.h"
 #include "data/files/draft_file.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ void require_replaceable(const std::string& target, bool force,
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

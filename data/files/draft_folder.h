@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 /// Draft folders lie beside their target, ".NAME.palpate-XXXXXX", private. One that a killed
 /// program left behind is removed by the next draft for the same target.
@@ -37,4 +37,4 @@ class DraftFolder {
 void require_replaceable(const std::string& target, bool force,
                          const std::function<bool(const std::string&)>& ours);
 
-}  // namespace palpate
+}  // namespace palpate::data

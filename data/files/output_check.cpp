@@ -14,7 +14,7 @@
 #include "data/errors.h"
 #include "data/files/draft_file.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -157,4 +157,4 @@ std::string why_not_to_write(const std::string& path, bool force, const TakenFil
   return "";
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::data {
 
 /// "-wal", "-shm", "-journal": what SQLite keeps beside a database.
 const std::vector<std::string>& database_companions();
@@ -41,4 +41,4 @@ class TakenFiles {
 /// \param force a file that is there may be replaced; never a database or what is taken
 std::string why_not_to_write(const std::string& path, bool force, const TakenFiles& taken = {});
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -13,7 +13,7 @@
 #include "data/errors.h"
 #include "data/files/output_check.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 std::string octal(mode_t mode) {
@@ -94,4 +94,4 @@ std::string exposure_of(const std::string& database) {
   return "";
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 /// SQLite's files beside a database (log, index, journal), where there are any, are regular, belong
 /// to us, to root or to the database's owner, and are open to nobody to whom the database is not:
@@ -14,4 +14,4 @@ void require_private_companions(const std::string& file);
 /// Why others could get at a database or put files beside it, in a sentence; "" where they cannot.
 std::string exposure_of(const std::string& database);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-namespace palpate {
+namespace palpate::data {
 
 namespace spreadsheet {
 constexpr bool runs(std::string_view text) {
@@ -30,4 +30,4 @@ constexpr std::string_view unguarded(std::string_view text) {
   return guarded ? text.substr(1) : text;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -11,7 +11,7 @@
 
 #include "data/errors.h"
 
-namespace palpate {
+namespace palpate::data {
 
 FileSink::FileSink(const std::string& path)
     : FileSink(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600), path) {}
@@ -86,4 +86,4 @@ void GzipSink::deflate_some(std::string_view text, int flush) {
   } while (z.avail_out == 0);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

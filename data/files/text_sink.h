@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate {
+namespace palpate::data {
 
 class TextSink {
  public:
@@ -52,4 +52,4 @@ class GzipSink : public TextSink {
   std::unique_ptr<Stream> stream_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

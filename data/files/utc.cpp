@@ -4,7 +4,7 @@
 #include <chrono>
 #include <limits>
 
-namespace palpate {
+namespace palpate::data {
 
 std::string format_utc(std::int64_t unix_ns) {
   using namespace std::chrono;
@@ -42,4 +42,4 @@ std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns) {
   return sum;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

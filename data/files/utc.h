@@ -5,7 +5,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// "2024-05-01T09:30:00.123456Z": ISO 8601 in UTC, cut (not rounded) to microseconds.
 /// \param unix_ns since 1970-01-01T00:00:00Z; any value, also before.
@@ -15,4 +15,4 @@ std::string format_utc(std::int64_t unix_ns);
 /// range stay at its end: the values may come from a damaged file.
 std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -18,7 +18,7 @@
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -133,4 +133,4 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
   return done;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -7,7 +7,7 @@
 
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// A participant of a station who has withdrawn at some station.
 struct LeftOut {
@@ -49,4 +49,4 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
              const std::function<void(std::int64_t, std::int64_t)>& progress = {},
              NumberClash clash = NumberClash::refuse);
 
-}  // namespace palpate
+}  // namespace palpate::data

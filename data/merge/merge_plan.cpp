@@ -9,7 +9,7 @@
 #include "data/store/checks.h"
 #include "data/store/protocol_rows.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 struct FoundParticipant {
@@ -294,4 +294,4 @@ MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash) {
   return Planner().plan(stations, clash);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -12,7 +12,7 @@
 #include "data/merge/station.h"
 #include "data/store/tombstones.h"
 
-namespace palpate {
+namespace palpate::data {
 
 struct PlannedSession {
   Station* station = nullptr;  ///< that it is copied from
@@ -44,4 +44,4 @@ struct MergePlan {
 /// \throws StoreRefused with every conflict, a line each.
 MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 /// "number, observer_sha256": the columns of a table that are no keys.
@@ -186,4 +186,4 @@ void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 /// The rows of one table that belong to the session with id ?1.
 struct SessionRows {
@@ -34,4 +34,4 @@ bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& d
 void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
                   std::int64_t participant);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -11,7 +11,7 @@
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ void Station::require_unchanged() const {
   throw StoreError(path_ + ": was written to while it was read; start again when that has ended");
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

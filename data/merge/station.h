@@ -10,7 +10,7 @@
 #include "data/store/store_impl.h"
 #include "data/store/store_lock.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// A station's database as it would be if a writer opened it now: of this schema, its log played
 /// in, what a dead process left running marked. Where that is not so, a private copy is; the file
@@ -43,4 +43,4 @@ class Station {
   std::optional<SQLite::Database> db_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

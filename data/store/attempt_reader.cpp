@@ -16,7 +16,7 @@
 #include "data/store/store_impl.h"
 #include "data/store/store_rows.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 /// What no trial of ours holds, and no export could hold. Thrown as damage. With Row, which takes
@@ -354,4 +354,4 @@ void read_attempts(SQLite::Database& db, const std::string& path, int version,
   Reader(db, path, version, filter, visit).read();
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

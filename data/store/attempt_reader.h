@@ -12,7 +12,7 @@
 
 #include "data/store/store.h"
 
-namespace palpate {
+namespace palpate::data {
 
 enum class AttemptState { running, completed, cut_off };
 
@@ -35,4 +35,4 @@ void read_attempts(SQLite::Database& db, const std::string& path, int version,
                    const AttemptFilter& filter,
                    const std::function<void(const StoredTrial&)>& visit);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -7,7 +7,7 @@
 #include "data/errors.h"
 #include "data/files/checksum.h"
 
-namespace palpate {
+namespace palpate::data {
 // Table 3-7 of the Unicode standard.
 bool is_clean_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
@@ -122,4 +122,4 @@ void check_outcome(Checks& checks, const TrialRecord& record) {
                 "a time-out has no response and is not correct");
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

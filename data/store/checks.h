@@ -8,7 +8,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Gathers every fault of what is to be stored.
 class Checks {
@@ -37,4 +37,4 @@ void check_plan(Checks& checks, const TrialRecord& record, int session);
 /// The rest, known when it is over.
 void check_outcome(Checks& checks, const TrialRecord& record);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -14,7 +14,7 @@
 #include "data/store/schema.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr int kBusyMs = 5000;
@@ -130,4 +130,4 @@ std::string ExportedPeople::record(const std::string& database, const std::strin
   return "";
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -7,7 +7,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 struct ExportRecord {
   std::string path;    ///< as recorded_path() has it
@@ -47,4 +47,4 @@ class ExportedPeople {
   bool any_simulated_ = false, any_real_ = false;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

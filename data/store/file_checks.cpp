@@ -8,7 +8,7 @@
 #include "data/errors.h"
 #include "data/store/schema.h"
 
-namespace palpate {
+namespace palpate::data {
 
 void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later) {
   for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
@@ -75,4 +75,4 @@ void require_whole_pages(const std::string& file) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 /// SQLite's name for a file that nobody writes to: no locks, no log.
 std::string immutable_uri(const std::string& file);
@@ -25,4 +25,4 @@ void require_whole_pages(const std::string& file);
 /// \throws SQLite::Exception, StoreRefused.
 void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later = false);
 
-}  // namespace palpate
+}  // namespace palpate::data

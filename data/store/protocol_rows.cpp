@@ -5,7 +5,7 @@
 #include "data/files/checksum.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr int kFilesSince = 3;  // schema version
@@ -137,4 +137,4 @@ void require_sound_protocols(SQLite::Database& db, const std::string& path, int 
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

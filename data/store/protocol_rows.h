@@ -10,7 +10,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// The id of a protocol; none where it is not there. \throws StoreRefused: its text or a file
 /// differs from what is stored.
@@ -33,4 +33,4 @@ std::string files_checksum(SQLite::Database& db, std::int64_t protocol_id);
 /// \param version  of the schema. \throws StoreRefused.
 void require_sound_protocols(SQLite::Database& db, const std::string& path, int version);
 
-}  // namespace palpate
+}  // namespace palpate::data

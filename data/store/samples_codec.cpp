@@ -9,7 +9,7 @@
 
 #include "data/errors.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr std::size_t bytes_a_sample(int packing) {
@@ -230,4 +230,4 @@ std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std
   return samples;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

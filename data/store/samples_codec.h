@@ -7,7 +7,7 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Packing 3: the fields of SampleRecord in order of declaration, each as a column of `count`
 /// values (vectors as three columns); a value is its bit pattern minus the one before it (modulo
@@ -27,4 +27,4 @@ std::string pack_samples(const std::vector<SampleRecord>& samples);
 std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count,
                                          int packing = kSamplesPacking);
 
-}  // namespace palpate
+}  // namespace palpate::data

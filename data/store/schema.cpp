@@ -16,7 +16,7 @@
 #include "data/store/seal_writer.h"
 #include "data/store/sqlite_errors.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 void set_version(SQLite::Database& db, int version) {
@@ -123,4 +123,4 @@ std::string migrate(SQLite::Database& db, const std::string& path, int from, int
   return copy;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 inline constexpr int kSchemaVersion = 3;
 inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", in every file of ours
@@ -52,4 +52,4 @@ void require_our_schema(SQLite::Database& db, const std::string& path, int versi
 std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
                     std::span<const Migration> steps);
 
-}  // namespace palpate
+}  // namespace palpate::data

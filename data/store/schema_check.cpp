@@ -9,7 +9,7 @@
 #include "data/errors.h"
 #include "data/store/schema.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 /// Without comments, every run of white space as one space; text in quotes as it is.
@@ -70,4 +70,4 @@ void require_our_schema(SQLite::Database& db, const std::string& path, int versi
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

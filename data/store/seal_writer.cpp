@@ -7,7 +7,7 @@
 #include "data/store/store_impl.h"
 #include "data/store/store_rows.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr int kVersion = 3;  // of the schema: rows are sealed as it has them
@@ -159,4 +159,4 @@ void SealWriter::all_as_found() {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

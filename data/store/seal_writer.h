@@ -10,7 +10,7 @@
 
 #include "data/store/seals.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Each call reads a row back as it is stored, and seals it as the next of its session. To be
 /// called within the transaction that wrote the row; when that fails, or sessions are removed, call
@@ -37,4 +37,4 @@ class SealWriter {
   std::map<std::int64_t, Link> last_;  // by session
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

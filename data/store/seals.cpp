@@ -6,7 +6,7 @@
 
 #include "data/store/store_rows.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 Checksum finish_sum(sha256_ctx& context) {
@@ -125,4 +125,4 @@ void ChainCheck::finish() const {
   fail(waiting_.begin()->second.name, ": follows on rows that are gone");
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

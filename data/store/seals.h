@@ -32,7 +32,7 @@
 #include "data/files/checksum.h"
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// The values of a row, as they are sealed.
 class SealedValues {
@@ -144,4 +144,4 @@ class ChainCheck {
   std::map<std::int64_t, Waiting> waiting_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

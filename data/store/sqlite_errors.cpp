@@ -4,7 +4,7 @@
 
 #include "data/errors.h"
 
-namespace palpate {
+namespace palpate::data {
 
 void raise_store_error(const std::string& path, const SQLite::Exception& error) {
   const std::string detail = std::string(" (SQLite: ") + error.what() + ")";
@@ -40,4 +40,4 @@ void raise_store_error(const std::string& path, const SQLite::Exception& error) 
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

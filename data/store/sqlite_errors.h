@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace palpate {
+namespace palpate::data {
 
 /// Throws the StoreRefused or StoreError that `error` amounts to.
 [[noreturn]] void raise_store_error(const std::string& path, const SQLite::Exception& error);
@@ -21,4 +21,4 @@ decltype(auto) guarded(const std::string& path, Work&& work) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

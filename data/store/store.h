@@ -24,7 +24,7 @@
 #include "data/record.h"
 #include "data/store/export_log.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// A run under way: one process's part of one session.
 struct Run {
@@ -216,4 +216,4 @@ class Store {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -13,7 +13,7 @@
 #include "data/store/tombstones.h"
 #include "data/store/traces.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -240,4 +240,4 @@ void Store::Impl::clear_traces() {
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -21,7 +21,7 @@
 #include "data/store/store.h"
 #include "data/store/store_lock.h"
 
-namespace palpate {
+namespace palpate::data {
 
 /// Which file a path leads to; {0, 0}: none.
 struct FileIdentity {
@@ -206,4 +206,4 @@ RunEnd run_end_of(const std::string& text);
 void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
                           const std::string& reason);
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -12,7 +12,7 @@
 
 #include "data/errors.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr std::string_view kMark = "palpate ";  // and the process's number
@@ -130,4 +130,4 @@ WriterLock::~WriterLock() {
   ::close(descriptor_);
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 /// Advisory lock on `path`.palpate-lock, held until destruction or the death of the process. The
 /// file names the holder's process and is removed with the lock; one that a killed program left is
@@ -23,4 +23,4 @@ class WriterLock {
   int descriptor_ = -1;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -17,7 +17,7 @@
 #include "data/store/sqlite_errors.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";
@@ -212,4 +212,4 @@ Store Store::open(const std::string& path, Mode mode) {
   return Store(std::move(impl));
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

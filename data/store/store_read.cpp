@@ -8,7 +8,7 @@
 #include "data/store/store_impl.h"
 #include "data/store/store_rows.h"
 
-namespace palpate {
+namespace palpate::data {
 
 SessionProgress Store::progress(const Participant& participant, int session) {
   return guarded(impl_->path, [&] {
@@ -230,4 +230,4 @@ std::map<std::string, std::int64_t, std::less<>> Store::first_onsets() {
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-namespace palpate {
+namespace palpate::data {
 
 std::string Row::column_name() const {
   return columns_ != nullptr ? (*columns_)[static_cast<std::size_t>(index_)].getName()
@@ -102,4 +102,4 @@ void read_outcome(Row& row, TrialRecord& record) {
       record.started_inside >> record.max_force;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

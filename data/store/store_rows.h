@@ -8,7 +8,7 @@
 #include "data/record.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 
 // Aliases: pr protocols, pa participants, s sessions, r runs, a attempts.
 std::string person_columns(int version);  ///< of the schema
@@ -48,4 +48,4 @@ inline constexpr const char* kFromProtocolDown =
     " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
     "ON s.participant_id = pa.id ";
 
-}  // namespace palpate
+}  // namespace palpate::data

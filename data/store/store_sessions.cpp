@@ -9,7 +9,7 @@
 #include "data/store/store_impl.h"
 #include "data/store/tombstones.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 constexpr std::array<const char*, 6> kRunEnds = {"running", "done",      "paused",
@@ -274,4 +274,4 @@ void Store::end_run(const Run& run, RunEnd reason, std::int64_t ended_ns) {
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

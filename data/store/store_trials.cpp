@@ -4,7 +4,7 @@
 #include "data/store/samples_codec.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 std::string trial_name(const TrialRecord& record) {
@@ -183,4 +183,4 @@ void Store::record_simulated(const Run& run, const std::vector<TrialRecord>& rec
   });
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

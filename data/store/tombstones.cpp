@@ -13,7 +13,7 @@
 #include "data/files/checksum.h"
 #include "data/store/store_impl.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 // yescrypt with this cost takes some 5 ms. A hash that asks for another cost is not ours: a made-up
@@ -147,4 +147,4 @@ std::vector<Tombstones::Tombstone> Tombstones::all() const {
   return all;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

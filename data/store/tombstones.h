@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::data {
 
 /// The tombstones of one or more databases. A tombstone is a salted hash that is slow to make
 /// (yescrypt), of the code keyed with a secret (HMAC-SHA256): nobody finds a short code by trying
@@ -47,4 +47,4 @@ class Tombstones {
   std::map<Key, std::vector<std::string>> by_key_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::data

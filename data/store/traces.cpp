@@ -12,7 +12,7 @@
 #include "data/store/checks.h"
 #include "data/store/file_checks.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;
@@ -95,4 +95,4 @@ std::vector<std::string> find_traces(const std::string& database, const std::str
   return found;
 }
 
-}  // namespace palpate
+}  // namespace palpate::data

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::data {
 
 /// Files and folders beside the database and beside its exports that hold `code`: copies and other
 /// databases of palpate, and texts (tables, reports, figures) that name it, in their name or
@@ -16,4 +16,4 @@ std::vector<std::string> find_traces(const std::string& database, const std::str
 /// Whether `text` says `code` as a word of its own.
 bool mentions(const std::string& text, const std::string& code);
 
-}  // namespace palpate
+}  // namespace palpate::data

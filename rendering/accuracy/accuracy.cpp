@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 ErrorSpread spread(std::vector<double> errors) {
@@ -75,4 +75,4 @@ ErrorSummary ErrorTally::summary() const {
   return s;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -6,7 +6,7 @@
 #include "rendering/accuracy/methods.h"
 #include "rendering/accuracy/ways_out.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// Sizes of one kind of error over the ticks on which it is defined.
 struct ErrorSpread {
@@ -45,4 +45,4 @@ class ErrorTally {
   std::vector<double> depth_, normal_, point_, force_, torque_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -8,7 +8,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 constexpr double kTick = 1e-3;      // s
@@ -20,9 +20,9 @@ constexpr double kPlaced = 1e-9;    // m; how exactly the depth is kept
 
 class Hand {
  public:
-  Hand(const ObjectSpec& shape, const HandPathSettings& settings)
+  Hand(const stimuli::ObjectSpec& shape, const HandPathSettings& settings)
       : shape_(shape), settings_(settings), random_(settings.seed) {
-    const Quat turn = uniform_rotation(random_);
+    const Quat turn = stimuli::uniform_rotation(random_);
     out_ = turn * Vec3(0, 0, 1);
     heading_ = level_ = turn * Vec3(1, 0, 0);
     for (double& phase : phase_) phase = 2 * std::numbers::pi * random_.unit();
@@ -77,9 +77,9 @@ class Hand {
     return !ways.empty() && ways.front().depth > depth;
   }
 
-  const ObjectSpec& shape_;
+  const stimuli::ObjectSpec& shape_;
   const HandPathSettings& settings_;
-  Random random_;
+  stimuli::Random random_;
   Vec3 out_, heading_;
   Vec3 level_;  // carried along without turning about out_
   double phase_[4] = {};
@@ -89,7 +89,7 @@ class Hand {
 
 }  // namespace
 
-HandPath hand_path(const ObjectSpec& primitive, const HandPathSettings& settings) {
+HandPath hand_path(const stimuli::ObjectSpec& primitive, const HandPathSettings& settings) {
   HandPath path;
   Hand hand(primitive, settings);
   const double distance = hand.distance_for(hand.wanted_depth());
@@ -105,4 +105,4 @@ HandPath hand_path(const ObjectSpec& primitive, const HandPathSettings& settings
   return path;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

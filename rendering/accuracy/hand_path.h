@@ -7,7 +7,7 @@
 #include "rendering/probe.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// A path in the shape's frame, a pose a tick of 1 ms. The first `approach` poses come in from the
 /// outside; then the probe is in contact with the analytic shape.
@@ -32,6 +32,6 @@ struct HandPathSettings {
 /// seed: so tip and side touch, at faces, edges and rims. It is pressed so that the exact least
 /// depth runs between `shallow` and `deep` (period 0.7 s), to 1 nm. It comes in along the first
 /// direction at the same speed from 3 mm outside. The same for every tessellation.
-HandPath hand_path(const ObjectSpec& primitive, const HandPathSettings& settings);
+HandPath hand_path(const stimuli::ObjectSpec& primitive, const HandPathSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -12,7 +12,7 @@
 #include "rendering/separation.h"
 #include "rendering/verification/reference.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using Kind = MinkowskiFacet::Kind;
@@ -26,11 +26,12 @@ Answer answer_of(const WalkResult& hit, const LineProbe& probe) {
 /// The product: a whole tick of a renderer, force and torque included.
 class WholeTick final : public Method {
  public:
-  WholeTick(const ConvexMesh& mesh, bool segment)
+  WholeTick(const stimuli::ConvexMesh& mesh, bool segment)
       : renderer_(segment ? ray_renderer() : point_renderer()),
-        scene_({{std::shared_ptr<const ConvexMesh>(&mesh, [](const ConvexMesh*) {}), Pose{},
-                 Material{}, 0, nullptr}},
-               segment),
+        scene_(
+            {{std::shared_ptr<const stimuli::ConvexMesh>(&mesh, [](const stimuli::ConvexMesh*) {}),
+              Pose{}, stimuli::Material{}, 0, nullptr}},
+            segment),
         state_(scene_.initial_state()) {}
 
   Answer tick(const LineProbe& probe) override {
@@ -45,18 +46,18 @@ class WholeTick final : public Method {
 };
 
 struct ProductWalk {
-  explicit ProductWalk(const ConvexMesh& m) : mesh(m) {}
+  explicit ProductWalk(const stimuli::ConvexMesh& m) : mesh(m) {}
   WalkResult walk(MinkowskiFacet start, const Vec3& tip, const Vec3& d) const {
     return d == Vec3() ? walk_point(mesh, start, tip) : walk_segment(mesh, start, tip, d);
   }
-  const ConvexMesh& mesh;
+  const stimuli::ConvexMesh& mesh;
 };
 
 /// The walk alone, from the facet of the last tick; entries by first contact.
 template <class Walk>
 class WarmWalk final : public Method {
  public:
-  WarmWalk(const ConvexMesh& mesh, bool segment)
+  WarmWalk(const stimuli::ConvexMesh& mesh, bool segment)
       : mesh_(mesh), walk_(mesh), trees_(mesh, segment), tolerance_(1e-12 * mesh.size()) {}
 
   Answer tick(const LineProbe& probe) override {
@@ -82,7 +83,7 @@ class WarmWalk final : public Method {
   }
 
  private:
-  const ConvexMesh& mesh_;
+  const stimuli::ConvexMesh& mesh_;
   Walk walk_;
   ContactTrees trees_;
   double tolerance_;
@@ -96,7 +97,7 @@ class WarmWalk final : public Method {
 /// The walk from the same facet at every tick.
 class ColdWalk final : public Method {
  public:
-  ColdWalk(const ConvexMesh& mesh, bool) : walk_(mesh) {}
+  ColdWalk(const stimuli::ConvexMesh& mesh, bool) : walk_(mesh) {}
   Answer tick(const LineProbe& probe) override {
     return answer_of(walk_.walk({Kind::face, false, 0}, probe.tip, probe.tail - probe.tip), probe);
   }
@@ -107,7 +108,7 @@ class ColdWalk final : public Method {
 
 class FullScan final : public Method {
  public:
-  FullScan(const ConvexMesh& mesh, bool) : mesh_(mesh) {}
+  FullScan(const stimuli::ConvexMesh& mesh, bool) : mesh_(mesh) {}
   Answer tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
     return answer_of(d == Vec3() ? nearest_facet_point(mesh_, probe.tip)
@@ -116,13 +117,13 @@ class FullScan final : public Method {
   }
 
  private:
-  const ConvexMesh& mesh_;
+  const stimuli::ConvexMesh& mesh_;
 };
 
 /// Brute force: the yardstick of the tests, timed. It tells no contact point.
 class BruteForce final : public Method {
  public:
-  BruteForce(const ConvexMesh& mesh, bool) : mesh_(mesh) {}
+  BruteForce(const stimuli::ConvexMesh& mesh, bool) : mesh_(mesh) {}
   Answer tick(const LineProbe& probe) override {
     const ReferenceDepth reference = reference_depth(mesh_, probe);
     if (reference.depth < 0) return {};
@@ -131,13 +132,13 @@ class BruteForce final : public Method {
   }
 
  private:
-  const ConvexMesh& mesh_;
+  const stimuli::ConvexMesh& mesh_;
 };
 
 template <std::size_t kIndex>
 class PeerMethod final : public Method {
  public:
-  PeerMethod(const ConvexMesh& mesh, bool) : peer_(peer_libraries()[kIndex].make(mesh)) {}
+  PeerMethod(const stimuli::ConvexMesh& mesh, bool) : peer_(peer_libraries()[kIndex].make(mesh)) {}
   Answer tick(const LineProbe& probe) override {
     const PeerContact contact = peer_->contact(probe);
     return {!(contact.depth < 0), contact.depth, contact.normal, contact.point};
@@ -148,7 +149,7 @@ class PeerMethod final : public Method {
 };
 
 template <class M>
-std::unique_ptr<Method> make(const ConvexMesh& mesh, bool segment) {
+std::unique_ptr<Method> make(const stimuli::ConvexMesh& mesh, bool segment) {
   return std::make_unique<M>(mesh, segment);
 }
 
@@ -166,8 +167,8 @@ std::vector<MethodKind> accuracy_methods() {
        make<FullScan>},
       {"brute-force", "the reference of the tests", false, false, make<BruteForce>},
   };
-  constexpr std::unique_ptr<Method> (*kMakePeer[])(const ConvexMesh&, bool) = {make<PeerMethod<0>>,
-                                                                               make<PeerMethod<1>>};
+  constexpr std::unique_ptr<Method> (*kMakePeer[])(const stimuli::ConvexMesh&, bool) = {
+      make<PeerMethod<0>>, make<PeerMethod<1>>};
   const auto libraries = peer_libraries();
   for (std::size_t i = 0; i < libraries.size(); ++i) {
     if (!libraries[i].make) continue;
@@ -179,4 +180,4 @@ std::vector<MethodKind> accuracy_methods() {
   return methods;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

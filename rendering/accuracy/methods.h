@@ -10,7 +10,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// What a tick came to. Frame of the object.
 struct Answer {
@@ -32,11 +32,11 @@ struct MethodKind {
   std::string description;    ///< a line for a legend
   bool remembers = false;     ///< needs every tick of a path in order
   bool follows_side = false;  ///< a god-object: keeps to the way out that it came in by
-  std::unique_ptr<Method> (*make)(const ConvexMesh& mesh, bool segment) = nullptr;
+  std::unique_ptr<Method> (*make)(const stimuli::ConvexMesh& mesh, bool segment) = nullptr;
 };
 
 /// All methods of this build. The mesh must outlive what they make. \param segment  false: the
 /// probe is its tip
 std::vector<MethodKind> accuracy_methods();
 
-}  // namespace palpate
+}  // namespace palpate::rendering

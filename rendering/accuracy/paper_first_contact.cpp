@@ -9,7 +9,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 constexpr double kTick = 1e-3;     // s
@@ -39,7 +39,9 @@ LineProbe between(const LineProbe& a, const LineProbe& b, double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
 }
 
-Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
 
 /// A stylus on a straight way, turning steadily.
 struct Way {
@@ -55,11 +57,11 @@ struct Way {
   }
 };
 
-bool inside(const ConvexMesh& mesh, const LineProbe& probe) {
+bool inside(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   return reference_depth(mesh, probe).depth > kDeepest * mesh.size();
 }
 
-bool comes_in(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
+bool comes_in(const stimuli::ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
   for (int i = 1; i <= kFine; ++i) {
     if (inside(mesh, between(before, after, i / static_cast<double>(kFine)))) return true;
   }
@@ -67,7 +69,7 @@ bool comes_in(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& 
 }
 
 /// The first tick that ends after the probe has come in, from a way that starts off the object.
-std::optional<int> entry_tick(const ConvexMesh& mesh, const Way& way, int ticks) {
+std::optional<int> entry_tick(const stimuli::ConvexMesh& mesh, const Way& way, int ticks) {
   for (int tick = 1; tick <= ticks; ++tick) {
     const LineProbe before = way.at(tick - 1), after = way.at(tick);
     // Too far apart to touch within the tick: not worth a hundred looks.
@@ -81,9 +83,9 @@ std::optional<int> entry_tick(const ConvexMesh& mesh, const Way& way, int ticks)
 
 }  // namespace
 
-bool crosses_polygon(const ConvexMesh& mesh, std::uint32_t index, const Vec3& before,
+bool crosses_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& before,
                      const Vec3& after) {
-  const Facet& facet = mesh.facets()[index];
+  const stimuli::Facet& facet = mesh.facets()[index];
   const double d1 = glm::dot(facet.normal, before) - facet.offset;
   const double d2 = glm::dot(facet.normal, after) - facet.offset;
   if (d1 * d2 > 0 || d1 == d2) return false;
@@ -94,9 +96,9 @@ bool crosses_polygon(const ConvexMesh& mesh, std::uint32_t index, const Vec3& be
   return true;
 }
 
-bool crosses_edge(const ConvexMesh& mesh, std::uint32_t index, const LineProbe& before,
+bool crosses_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const LineProbe& before,
                   const LineProbe& after) {
-  const Edge& edge = mesh.edges()[index];
+  const stimuli::Edge& edge = mesh.edges()[index];
   const Vec3& c = edge.from;
   const Vec3 e = edge.to - c;
   const Nearest n0 = nearest(c, e, before), n1 = nearest(c, e, after);
@@ -105,7 +107,8 @@ bool crosses_edge(const ConvexMesh& mesh, std::uint32_t index, const LineProbe& 
          no_end(n0.on_probe) && no_end(n1.on_probe);
 }
 
-bool paper_first_contact(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
+bool paper_first_contact(const stimuli::ConvexMesh& mesh, const LineProbe& before,
+                         const LineProbe& after) {
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) {
     if (crosses_polygon(mesh, i, before.tip, after.tip)) return true;
     if (crosses_polygon(mesh, i, before.tail, after.tail)) return true;
@@ -116,12 +119,12 @@ bool paper_first_contact(const ConvexMesh& mesh, const LineProbe& before, const 
   return false;
 }
 
-FirstContactLoss first_contact_loss(const ConvexMesh& mesh, double speed, double turning,
+FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double speed, double turning,
                                     int entries, std::uint64_t seed) {
   FirstContactLoss loss;
   loss.speed = speed;
   loss.turning = turning;
-  Random random(seed);
+  stimuli::Random random(seed);
   const ContactTrees trees(mesh, true);
   const double step = speed * kTick, tolerance = 1e-12 * mesh.size();
   constexpr int kBefore = 5;  // ticks in free space, about
@@ -177,4 +180,4 @@ FirstContactLoss first_contact_loss(const ConvexMesh& mesh, double speed, double
   return loss;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

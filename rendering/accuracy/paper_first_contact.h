@@ -7,22 +7,23 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// Ho, Basdogan & Srinivasan 2000, appendix 7, to the letter: the straight way of a point crosses
 /// the facet's polygon, from either side.
-bool crosses_polygon(const ConvexMesh& mesh, std::uint32_t facet, const Vec3& before,
+bool crosses_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t facet, const Vec3& before,
                      const Vec3& after);
 
 /// Appendix 8, to the letter: with D the vector of nearest distance from the edge to the probe (6),
 /// the probe has crossed the edge between the ticks when (1) D before and D after point against
 /// each other, (2) the nearest points are no ends of the edge, and (3, 4) no ends of the probe.
 /// "For this method to be valid, the translation and rotation [...] should be very small."
-bool crosses_edge(const ConvexMesh& mesh, std::uint32_t edge, const LineProbe& before,
+bool crosses_edge(const stimuli::ConvexMesh& mesh, std::uint32_t edge, const LineProbe& before,
                   const LineProbe& after);
 
 /// Section 4(a): either end crosses a polygon, or the probe an edge. All are tried.
-bool paper_first_contact(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after);
+bool paper_first_contact(const stimuli::ConvexMesh& mesh, const LineProbe& before,
+                         const LineProbe& after);
 
 /// What first contacts come to at one speed of the hand.
 struct FirstContactLoss {
@@ -40,7 +41,7 @@ struct FirstContactLoss {
 /// The tick in which it comes in is known by brute force at a hundredth of the tick (deeper than
 /// 1e-9 of the size at the end of the tick or at one of the steps). Tries whose way misses the
 /// object are drawn again.
-FirstContactLoss first_contact_loss(const ConvexMesh& mesh, double speed, double turning,
+FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double speed, double turning,
                                     int entries, std::uint64_t seed);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

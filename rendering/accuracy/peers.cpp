@@ -4,7 +4,7 @@
 
 #include "rendering/accuracy/peers_hull.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 #ifdef PALPATE_BULLET_VERSION
@@ -33,4 +33,4 @@ std::span<const PeerLibrary> peer_libraries() {
   return kLibraries;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,7 +9,7 @@
 #include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// A library's answer. Mesh frame.
 struct PeerContact {
@@ -30,7 +30,7 @@ class Peer {
 };
 
 /// The mesh must outlive the peer.
-using MakePeer = std::unique_ptr<Peer> (*)(const ConvexMesh& mesh);
+using MakePeer = std::unique_ptr<Peer> (*)(const stimuli::ConvexMesh& mesh);
 
 struct PeerLibrary {
   const char* name;     ///< "bullet", "fcl"
@@ -42,4 +42,4 @@ struct PeerLibrary {
 /// All that are known, those absent from this build included.
 std::span<const PeerLibrary> peer_libraries();
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -8,7 +8,7 @@
 
 #include "rendering/accuracy/peers_hull.h"
 
-namespace palpate::peers {
+namespace palpate::rendering::peers {
 namespace {
 
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -40,7 +40,7 @@ class Shape final : public btConvexInternalShape {
 
 class Bullet final : public Peer {
  public:
-  explicit Bullet(const ConvexMesh& mesh) : hull_(Hull(mesh)), segment_(Segment{}) {}
+  explicit Bullet(const stimuli::ConvexMesh& mesh) : hull_(Hull(mesh)), segment_(Segment{}) {}
 
   PeerContact contact(const LineProbe& probe) override {
     const Scale& scale = hull_.body.scale();
@@ -71,6 +71,8 @@ class Bullet final : public Peer {
 
 }  // namespace
 
-std::unique_ptr<Peer> make_bullet(const ConvexMesh& mesh) { return std::make_unique<Bullet>(mesh); }
+std::unique_ptr<Peer> make_bullet(const stimuli::ConvexMesh& mesh) {
+  return std::make_unique<Bullet>(mesh);
+}
 
-}  // namespace palpate::peers
+}  // namespace palpate::rendering::peers

@@ -18,7 +18,7 @@
 
 #include "rendering/accuracy/peers_hull.h"
 
-namespace palpate::peers {
+namespace palpate::rendering::peers {
 namespace {
 
 constexpr int kMaxSupports = 20000;  // its EPA has no limit of its own
@@ -48,7 +48,7 @@ void first_direction(const void* body, const void*, ccd_vec3_t* out) {
 
 class Fcl final : public Peer {
  public:
-  explicit Fcl(const ConvexMesh& mesh) : body_{Hull(mesh), Vec3(1, 0, 0)} {
+  explicit Fcl(const stimuli::ConvexMesh& mesh) : body_{Hull(mesh), Vec3(1, 0, 0)} {
     CCD_INIT(&settings_);
     settings_.support1 = support_hull;
     settings_.support2 = support_segment;
@@ -84,6 +84,8 @@ class Fcl final : public Peer {
 
 }  // namespace
 
-std::unique_ptr<Peer> make_fcl(const ConvexMesh& mesh) { return std::make_unique<Fcl>(mesh); }
+std::unique_ptr<Peer> make_fcl(const stimuli::ConvexMesh& mesh) {
+  return std::make_unique<Fcl>(mesh);
+}
 
-}  // namespace palpate::peers
+}  // namespace palpate::rendering::peers

@@ -10,11 +10,11 @@
 #include "rendering/separation.h"
 #include "rendering/support_map.h"
 
-namespace palpate::peers {
+namespace palpate::rendering::peers {
 
 /// Mesh frame to coordinates in which the object has radius 1 about the origin.
 struct Scale {
-  explicit Scale(const ConvexMesh& mesh) : centre(mesh.centre()), radius(mesh.radius()) {}
+  explicit Scale(const stimuli::ConvexMesh& mesh) : centre(mesh.centre()), radius(mesh.radius()) {}
   Vec3 to_unit(const Vec3& p) const { return (p - centre) / radius; }
   Vec3 from_unit(const Vec3& p) const { return centre + radius * p; }
 
@@ -27,7 +27,7 @@ struct Scale {
 /// witness points.
 class Hull {
  public:
-  explicit Hull(const ConvexMesh& mesh) : mesh_(mesh), scale_(mesh), map_(mesh, 0, 1) {}
+  explicit Hull(const stimuli::ConvexMesh& mesh) : mesh_(mesh), scale_(mesh), map_(mesh, 0, 1) {}
   const Scale& scale() const { return scale_; }
   Vec3 support(const Vec3& direction) const {
     // Libraries may ask for no direction at all.
@@ -37,7 +37,7 @@ class Hull {
   }
 
  private:
-  const ConvexMesh& mesh_;
+  const stimuli::ConvexMesh& mesh_;
   Scale scale_;
   SupportMap map_;
 };
@@ -49,7 +49,7 @@ struct Segment {
   }
 };
 
-std::unique_ptr<Peer> make_bullet(const ConvexMesh& mesh);
-std::unique_ptr<Peer> make_fcl(const ConvexMesh& mesh);
+std::unique_ptr<Peer> make_bullet(const stimuli::ConvexMesh& mesh);
+std::unique_ptr<Peer> make_fcl(const stimuli::ConvexMesh& mesh);
 
-}  // namespace palpate::peers
+}  // namespace palpate::rendering::peers

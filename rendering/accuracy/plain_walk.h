@@ -12,24 +12,24 @@
 #include "rendering/facet_walk.h"
 #include "stimuli/convex_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 template <class Real>
 class PlainWalk {
  public:
   using Vector = glm::vec<3, Real>;
 
-  explicit PlainWalk(const ConvexMesh& mesh) : size_(static_cast<Real>(mesh.size())) {
+  explicit PlainWalk(const stimuli::ConvexMesh& mesh) : size_(static_cast<Real>(mesh.size())) {
     for (const Vec3& v : mesh.vertices()) vertices_.push_back(Vector(v));
-    for (const Facet& f : mesh.facets()) {
+    for (const stimuli::Facet& f : mesh.facets()) {
       facets_.push_back(
           {Vector(f.normal), static_cast<Real>(f.offset), f.first_side, f.side_count});
     }
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-      const Facet& facet = mesh.facets()[f];
+      const stimuli::Facet& facet = mesh.facets()[f];
       for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-        const Side& s = mesh.sides()[i];
-        const Edge& edge = mesh.edges()[s.edge];
+        const stimuli::Side& s = mesh.sides()[i];
+        const stimuli::Edge& edge = mesh.edges()[s.edge];
         sides_.resize(mesh.sides().size());
         sides_[i] = {Vector(s.inward), static_cast<Real>(s.offset), s.edge, s.across,
                      edge.left == f ? edge.v0 : edge.v1};
@@ -93,7 +93,7 @@ class PlainWalk {
   }
 
   bool edge(std::uint32_t index, const Vector& tip, const Vector& d, At& at) const {
-    const Edge& e = edges_[index];
+    const stimuli::Edge& e = edges_[index];
     const bool left = ahead(e.left, d);
     if (left == ahead(e.right, d)) return false;
     const Vector line = vertices_[e.v1] - vertices_[e.v0], w = tip - vertices_[e.v0];
@@ -113,7 +113,7 @@ class PlainWalk {
     if (start.kind != Kind::edge) return face(start.index, tip, d);
     At at;
     if (edge(start.index, tip, d, at)) return at;
-    const Edge& e = edges_[start.index];
+    const stimuli::Edge& e = edges_[start.index];
     const bool both = ahead(e.left, d) && ahead(e.right, d);
     return face(start.left_ahead != both ? e.left : e.right, tip, d);
   }
@@ -155,7 +155,7 @@ class PlainWalk {
       if (!edge(side->edge, tip, d, next)) next = face(side->across, tip, d);
       return true;
     }
-    const Edge& e = edges_[at.facet.index];
+    const stimuli::Edge& e = edges_[at.facet.index];
     if (at.place < 0 || at.place > 1) {
       next = face((at.place < 0) == at.facet.left_ahead ? e.left : e.right, tip, d);
       return true;
@@ -176,8 +176,8 @@ class PlainWalk {
   std::vector<Vector> vertices_;
   std::vector<PlainFacet> facets_;
   std::vector<PlainSide> sides_;
-  std::vector<Edge> edges_;
+  std::vector<stimuli::Edge> edges_;
   std::vector<std::uint32_t> fan_first_, fan_edges_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

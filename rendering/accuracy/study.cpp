@@ -10,15 +10,15 @@
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 constexpr double kPi = 3.14159265358979324;
 
-std::vector<ShapeKind> analytic_shapes() {
-  std::vector<ShapeKind> all;
-  for (const ShapeKind shape : kShapes) {
-    if (needs_of(shape).analytic) all.push_back(shape);
+std::vector<stimuli::ShapeKind> analytic_shapes() {
+  std::vector<stimuli::ShapeKind> all;
+  for (const stimuli::ShapeKind shape : stimuli::kShapes) {
+    if (stimuli::needs_of(shape).analytic) all.push_back(shape);
   }
   return all;
 }
@@ -30,7 +30,7 @@ struct Course {
   std::vector<std::vector<WayOut>> of_polyhedron;  ///< every `stride`-th tick in contact
 };
 
-std::vector<Course> courses(const ObjectSpec& shape, const AccuracySettings& settings,
+std::vector<Course> courses(const stimuli::ObjectSpec& shape, const AccuracySettings& settings,
                             bool segment) {
   std::vector<Course> all;
   for (int i = 1; i <= settings.paths; ++i) {
@@ -50,7 +50,7 @@ std::vector<Course> courses(const ObjectSpec& shape, const AccuracySettings& set
 /// One method over all courses.
 class Run {
  public:
-  Run(const MethodKind& kind, const ConvexMesh& mesh, bool segment, std::size_t stride,
+  Run(const MethodKind& kind, const stimuli::ConvexMesh& mesh, bool segment, std::size_t stride,
       const std::function<double()>& now)
       : kind_(kind), mesh_(mesh), segment_(segment), stride_(stride), now_(now) {}
 
@@ -104,7 +104,7 @@ class Run {
   }
 
   const MethodKind& kind_;
-  const ConvexMesh& mesh_;
+  const stimuli::ConvexMesh& mesh_;
   bool segment_;
   std::size_t stride_;
   const std::function<double()>& now_;
@@ -121,34 +121,35 @@ bool meets(const AccuracyRow& row, const Demand& demand) {
 
 }  // namespace
 
-int triangles_of(const ObjectSpec& spec) {
+int triangles_of(const stimuli::ObjectSpec& spec) {
   switch (spec.shape) {
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       return 20 << (2 * spec.subdivisions);
-    case ShapeKind::cone:
+    case stimuli::ShapeKind::cone:
       return 2 * spec.segments - 2;
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       return 4 * spec.segments - 4;
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       return 12;
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;
   }
   throw std::invalid_argument("triangles_of: a mesh or compound is no analytic primitive");
 }
 
-std::vector<ObjectSpec> tessellations(ShapeKind shape, int most_triangles) {
-  std::vector<ObjectSpec> all;
+std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int most_triangles) {
+  std::vector<stimuli::ObjectSpec> all;
   for (int level = 0; level <= 8; ++level) {
-    ObjectSpec spec;
+    stimuli::ObjectSpec spec;
     spec.shape = shape;
     spec.subdivisions = level;
     // Steps of 2 where labs choose, then of 4.
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));
     if (triangles_of(spec) > most_triangles && !all.empty()) break;
     all.push_back(spec);
-    if (!needs_of(shape).subdivisions && !needs_of(shape).segments) break;  // nothing to refine
+    if (!stimuli::needs_of(shape).subdivisions && !stimuli::needs_of(shape).segments)
+      break;  // nothing to refine
   }
   return all;
 }
@@ -158,21 +159,23 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
                                         const std::function<void(double)>& progress) {
   const std::vector<MethodKind> methods = accuracy_methods();
   // Finer tessellations take longer, though less than in proportion.
-  const auto weight = [](const ObjectSpec& spec) { return 100 + std::sqrt(triangles_of(spec)); };
-  const std::vector<ShapeKind> shapes = analytic_shapes();
+  const auto weight = [](const stimuli::ObjectSpec& spec) {
+    return 100 + std::sqrt(triangles_of(spec));
+  };
+  const std::vector<stimuli::ShapeKind> shapes = analytic_shapes();
   double work = 0, done = 0;
-  for (const ShapeKind shape : shapes) {
-    for (const ObjectSpec& spec : tessellations(shape, settings.most_triangles)) {
+  for (const stimuli::ShapeKind shape : shapes) {
+    for (const stimuli::ObjectSpec& spec : tessellations(shape, settings.most_triangles)) {
       work += 2 * weight(spec) * static_cast<double>(methods.size());
     }
   }
   std::vector<AccuracyRow> rows;
-  for (const ShapeKind shape : shapes) {
+  for (const stimuli::ShapeKind shape : shapes) {
     const auto specs = tessellations(shape, settings.most_triangles);
     for (const bool segment : {true, false}) {
       std::vector<Course> all = courses(specs.front(), settings, segment);
-      for (const ObjectSpec& spec : specs) {
-        const ConvexMesh mesh(polygons_of(spec));
+      for (const stimuli::ObjectSpec& spec : specs) {
+        const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
         const double visits = static_cast<double>(mesh.facets().size() + mesh.edges().size()) *
                               settings.contact_ticks * settings.paths;
         const auto stride = static_cast<std::size_t>(std::ceil(visits / settings.visits));
@@ -188,12 +191,12 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
           Run run(kind, mesh, segment, stride, now);
           for (const Course& course : all) run.over(course, settings.timings);
           AccuracyRow row;
-          row.shape = needs_of(shape).name;
+          row.shape = stimuli::needs_of(shape).name;
           row.triangles = triangles_of(spec);
           row.facets = mesh.facets().size();
           row.edges = mesh.edges().size();
-          row.subdivisions = needs_of(shape).subdivisions ? spec.subdivisions : 0;
-          row.segments = needs_of(shape).segments ? spec.segments : 0;
+          row.subdivisions = stimuli::needs_of(shape).subdivisions ? spec.subdivisions : 0;
+          row.segments = stimuli::needs_of(shape).segments ? spec.segments : 0;
           row.probe = segment ? "ray" : "point";
           row.method = kind.name;
           run.report(row);
@@ -219,4 +222,4 @@ int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape
   return first == all.end() ? 0 : *first;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

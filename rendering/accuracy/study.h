@@ -9,7 +9,7 @@
 #include "rendering/accuracy/accuracy.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 struct AccuracySettings {
   int paths = 4;             ///< for each shape and probe; seeds 1, 2, ...
@@ -37,8 +37,8 @@ struct AccuracyRow {
 };
 
 /// The tessellations of one shape, coarse to fine; default sizes (30 mm, 60 mm).
-std::vector<ObjectSpec> tessellations(ShapeKind shape, int most_triangles);
-int triangles_of(const ObjectSpec& spec);
+std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int most_triangles);
+int triangles_of(const stimuli::ObjectSpec& spec);
 
 /// Runs it all. \param now  a clock, ns \param progress  called with the share done before each row
 std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
@@ -58,4 +58,4 @@ constexpr double kNoDemand = 1e9;
 int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
                   const Demand& demand);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

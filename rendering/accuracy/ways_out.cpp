@@ -10,7 +10,7 @@
 #include "rendering/accuracy/ways_out_round.h"
 #include "rendering/accuracy/ways_out_search.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace ways {
 namespace {
 
@@ -74,28 +74,28 @@ void out_of_cube(Search& s) {
 }
 
 /// At most 0 inside the shape, above 0 outside; convex. Not a distance past rims and edges.
-double outside_by(const ObjectSpec& s, const Vec3& p) {
+double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
   const double out = std::hypot(p.x, p.y);
   switch (s.shape) {
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       return glm::length(p) - s.radius;
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) - s.edge / 2;
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       return std::max(out - s.radius, std::abs(p.z) - s.height / 2);
-    case ShapeKind::cone: {
+    case stimuli::ShapeKind::cone: {
       const Vec3 side = cone_normal(s, Vec3(1, 0, 0));
       return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
     }
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;
   }
   throw std::invalid_argument("ways_out: a mesh or compound is no analytic primitive");
 }
 
 /// Some point of the probe is within the shape: the least of a convex function by thirds.
-bool overlaps(const ObjectSpec& shape, const LineProbe& probe) {
+bool overlaps(const stimuli::ObjectSpec& shape, const LineProbe& probe) {
   const auto at = [&](double t) {
     return outside_by(shape, probe.tip + t * (probe.tail - probe.tip));
   };
@@ -110,50 +110,50 @@ bool overlaps(const ObjectSpec& shape, const LineProbe& probe) {
 }  // namespace
 }  // namespace ways
 
-double support(const ObjectSpec& primitive, const Vec3& n) {
+double support(const stimuli::ObjectSpec& primitive, const Vec3& n) {
   const double out = primitive.radius * std::hypot(n.x, n.y), up = primitive.height / 2 * n.z;
   switch (primitive.shape) {
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       return primitive.radius * glm::length(n);
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       return primitive.edge / 2 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       return out + std::abs(up);
-    case ShapeKind::cone:
+    case stimuli::ShapeKind::cone:
       return std::max(up, out - up);
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;
   }
   throw std::invalid_argument("support: a mesh or compound is no analytic primitive");
 }
 
-double depth_along(const ObjectSpec& primitive, const LineProbe& probe, const Vec3& n) {
+double depth_along(const stimuli::ObjectSpec& primitive, const LineProbe& probe, const Vec3& n) {
   return support(primitive, n) - std::min(glm::dot(n, probe.tip), glm::dot(n, probe.tail));
 }
 
-std::vector<WayOut> ways_out(const ObjectSpec& primitive, const LineProbe& probe) {
+std::vector<WayOut> ways_out(const stimuli::ObjectSpec& primitive, const LineProbe& probe) {
   support(primitive, Vec3());  // refuses what is no primitive
   if (!ways::overlaps(primitive, probe)) return {};
   ways::Search s(primitive, probe);
   switch (primitive.shape) {
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       ways::out_of_sphere(s);
       break;
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       ways::out_of_cube(s);
       break;
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       ways::out_of_cylinder(s);
       break;
-    case ShapeKind::cone:
+    case stimuli::ShapeKind::cone:
       ways::out_of_cone(s);
       break;
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;  // refused above
   }
   return s.sorted();
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

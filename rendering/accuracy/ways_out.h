@@ -15,7 +15,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// Frame of the object.
 struct WayOut {
@@ -33,17 +33,17 @@ struct WayOut {
 /// are not used), least first; empty when the probe is not inside. Where an axis or centre leaves a
 /// whole ring of ways out equal, one of them. tip == tail is a point.
 /// \throws std::invalid_argument for a mesh or compound.
-std::vector<WayOut> ways_out(const ObjectSpec& primitive, const LineProbe& probe);
+std::vector<WayOut> ways_out(const stimuli::ObjectSpec& primitive, const LineProbe& probe);
 
 /// The same of a polyhedron, by visiting all facets and edges; only those with a normal within
 /// `angle` (rad) of `towards`.
-std::vector<WayOut> ways_out(const ConvexMesh& mesh, const LineProbe& probe, const Vec3& towards,
-                             double angle);
+std::vector<WayOut> ways_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
+                             const Vec3& towards, double angle);
 
 /// Support function of the analytic shape: the farthest it reaches along n, m; |n| need not be 1.
-double support(const ObjectSpec& primitive, const Vec3& n);
+double support(const stimuli::ObjectSpec& primitive, const Vec3& n);
 
 /// phi of the analytic shape, m; n unit.
-double depth_along(const ObjectSpec& primitive, const LineProbe& probe, const Vec3& n);
+double depth_along(const stimuli::ObjectSpec& primitive, const LineProbe& probe, const Vec3& n);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

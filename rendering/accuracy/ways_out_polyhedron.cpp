@@ -8,20 +8,20 @@
 
 #include "rendering/accuracy/ways_out_search.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
-std::vector<WayOut> ways_out(const ConvexMesh& mesh, const LineProbe& probe, const Vec3& towards,
-                             double angle) {
+std::vector<WayOut> ways_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
+                             const Vec3& towards, double angle) {
   const double least_cosine = angle < std::numbers::pi ? std::cos(angle) : -2;
   const double slack = 1e-12 * mesh.size();
   const Vec3 d = probe.tail - probe.tip;
   const double length = glm::length(d);
   const Vec3 u = length > 0 ? d / length : Vec3();
-  const auto flatness = [&](const Facet& facet) {
+  const auto flatness = [&](const stimuli::Facet& facet) {
     return length > 0 ? ways::angle_to_plane(u, facet.normal) : ways::kRight;
   };
   std::vector<WayOut> found;
-  for (const Facet& facet : mesh.facets()) {
+  for (const stimuli::Facet& facet : mesh.facets()) {
     if (glm::dot(facet.normal, towards) < least_cosine) continue;
     const bool tail = glm::dot(facet.normal, d) < 0;
     const Vec3& end = tail ? probe.tail : probe.tip;
@@ -30,13 +30,13 @@ std::vector<WayOut> ways_out(const ConvexMesh& mesh, const LineProbe& probe, con
     const Vec3 foot = end + depth * facet.normal;
     bool over = true;
     for (std::uint32_t i = 0; over && i < facet.side_count; ++i) {
-      const Side& side = mesh.sides()[facet.first_side + i];
+      const stimuli::Side& side = mesh.sides()[facet.first_side + i];
       over = glm::dot(side.inward, foot) >= side.offset - slack;
     }
     if (over) found.push_back({facet.normal, depth, tail ? 1.0 : 0.0, flatness(facet)});
   }
-  for (const Edge& edge : mesh.edges()) {
-    const Facet &left = mesh.facets()[edge.left], &right = mesh.facets()[edge.right];
+  for (const stimuli::Edge& edge : mesh.edges()) {
+    const stimuli::Facet &left = mesh.facets()[edge.left], &right = mesh.facets()[edge.right];
     const double left_slope = glm::dot(left.normal, d), right_slope = glm::dot(right.normal, d);
     if ((left_slope >= 0) == (right_slope >= 0)) continue;
     // At right angles to the probe, between the normals of the edge's two faces.
@@ -63,4 +63,4 @@ std::vector<WayOut> ways_out(const ConvexMesh& mesh, const LineProbe& probe, con
   return found;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

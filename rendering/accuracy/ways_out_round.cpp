@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-namespace palpate::ways {
+namespace palpate::rendering::ways {
 namespace {
 
 Vec3 radial(const Vec3& p) {
@@ -17,7 +17,7 @@ Vec3 radial(const Vec3& p) {
 }
 
 /// Down the cone's side from the apex to the rim; not normalised.
-Vec3 cone_generator(const ObjectSpec& cone, const Vec3& out) {
+Vec3 cone_generator(const stimuli::ObjectSpec& cone, const Vec3& out) {
   return {cone.radius * out.x, cone.radius * out.y, -cone.height};
 }
 
@@ -75,8 +75,9 @@ void cross_rim(Search& s, double z, Belongs belongs) {
       if (belongs(n)) {
         const Vec3 x = touched(n);
         const double place = glm::dot(x - s.probe.tip, s.d) / (s.length * s.length);
-        const Vec3 line =
-            s.shape.shape == ShapeKind::cone ? cone_generator(s.shape, radial(n)) : Vec3(0, 0, 1);
+        const Vec3 line = s.shape.shape == stimuli::ShapeKind::cone
+                              ? cone_generator(s.shape, radial(n))
+                              : Vec3(0, 0, 1);
         s.side(n, glm::dot(n, x - s.probe.tip), place,
                std::min(angle_to_plane(s.u, Vec3(0, 0, 1)), angle_to_line(s.u, line)));
       }
@@ -87,7 +88,7 @@ void cross_rim(Search& s, double z, Belongs belongs) {
 
 }  // namespace
 
-Vec3 cone_normal(const ObjectSpec& cone, const Vec3& out) {
+Vec3 cone_normal(const stimuli::ObjectSpec& cone, const Vec3& out) {
   return glm::normalize(Vec3(cone.height * out.x, cone.height * out.y, cone.radius));
 }
 
@@ -145,4 +146,4 @@ void out_of_cone(Search& s) {
   });
 }
 
-}  // namespace palpate::ways
+}  // namespace palpate::rendering::ways

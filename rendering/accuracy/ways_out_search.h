@@ -10,7 +10,7 @@
 
 #include "rendering/accuracy/ways_out.h"
 
-namespace palpate::ways {
+namespace palpate::rendering::ways {
 
 inline constexpr double kRight = std::numbers::pi / 2;
 
@@ -33,7 +33,7 @@ inline void sort_by_depth(std::vector<WayOut>& found) {
 /// Collects the ways out of one pose.
 class Search {
  public:
-  Search(const ObjectSpec& object, const LineProbe& pose)
+  Search(const stimuli::ObjectSpec& object, const LineProbe& pose)
       : shape(object), probe(pose), d(pose.tail - pose.tip), length(glm::length(d)) {
     if (length > 0) u = d / length;
   }
@@ -58,7 +58,7 @@ class Search {
     return std::move(found_);
   }
 
-  const ObjectSpec& shape;
+  const stimuli::ObjectSpec& shape;
   const LineProbe& probe;
   Vec3 d, u;
   double length;
@@ -70,4 +70,4 @@ class Search {
   std::vector<WayOut> found_;
 };
 
-}  // namespace palpate::ways
+}  // namespace palpate::rendering::ways

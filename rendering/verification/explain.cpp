@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 std::string counted(std::size_t count, const std::string& one, const std::string& many) {
@@ -20,7 +20,7 @@ struct MeshTally {
 template <class Has, class Count>
 MeshTally tally(const Scene& scene, Has has, Count count) {
   MeshTally result;
-  std::set<const ConvexMesh*> seen;
+  std::set<const stimuli::ConvexMesh*> seen;
   for (const ScenePart& part : scene.parts()) {
     if (!seen.insert(part.mesh.get()).second) continue;
     ++result.meshes;
@@ -42,9 +42,9 @@ Stage structure(std::string name, const MeshTally& t, const std::string& things,
 }
 
 void add_structures(const Scene& scene, const Renderer& renderer, std::vector<Stage>& stages) {
-  const auto facets = [](const ConvexMesh& m) { return m.facets().size(); };
-  const auto edges = [](const ConvexMesh& m) { return m.edges().size(); };
-  const auto vertices = [](const ConvexMesh& m) { return m.vertices().size(); };
+  const auto facets = [](const stimuli::ConvexMesh& m) { return m.facets().size(); };
+  const auto edges = [](const stimuli::ConvexMesh& m) { return m.edges().size(); };
+  const auto vertices = [](const stimuli::ConvexMesh& m) { return m.vertices().size(); };
   stages.push_back(
       structure("tree of polygons",
                 tally(
@@ -155,4 +155,4 @@ std::vector<Stage> explain(const Scene& scene, const Renderer& renderer) {
   return stages;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,7 +9,7 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// When a stage runs.
 enum class StageTime { once, tick, free, entry, contact };
@@ -44,4 +44,4 @@ inline constexpr const char* kTickInFreeSpace = "whole tick in free space";
 /// Building trees is not rehearsed. Empty for a scene without parts.
 std::vector<Rehearsal> rehearse(const Scene& scene, const Renderer& renderer);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -2,7 +2,7 @@
 
 #include "rendering/verification/extreme_watch.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 std::span<const ExtremeCase> extreme_cases() {
   using namespace extremes;
@@ -43,4 +43,4 @@ std::span<const ExtremeCase> extreme_cases() {
   return kCases;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

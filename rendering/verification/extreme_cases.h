@@ -7,7 +7,7 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 struct ExtremeResult {
   bool passed = false;
@@ -29,4 +29,4 @@ struct ExtremeCase {
 /// them to build the mesh).
 std::span<const ExtremeCase> extreme_cases();
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -10,7 +10,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::extremes {
+namespace palpate::rendering::extremes {
 namespace {
 
 constexpr double kStylus = 0.12;                   // m
@@ -47,8 +47,8 @@ struct Lap {
 /// One object, its material, and the hand that goes round.
 class Track {
  public:
-  Track(const Renderer& renderer, const std::shared_ptr<const ConvexMesh>& mesh,
-        const Material& material)
+  Track(const Renderer& renderer, const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
+        const stimuli::Material& material)
       : renderer_(renderer),
         stiffness_(material.stiffness),
         scene_({{mesh, {}, material, 0, nullptr}}, renderer.side_contact()),
@@ -116,22 +116,25 @@ class Track {
   double power_ = 0;  ///< J for each radian of the cycle, at the last tick
 };
 
-Vec3 direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+Vec3 direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
 
-LineProbe small(Random& random, double most) {
+LineProbe small(stimuli::Random& random, double most) {
   return {most * random.unit() * direction(random), most * random.unit() * direction(random)};
 }
 
-const std::shared_ptr<const ConvexMesh>& shape(std::uint64_t index) {
-  static const std::array kShapes = {std::make_shared<const ConvexMesh>(icosphere(0.03, 2)),
-                                     std::make_shared<const ConvexMesh>(cone(0.03, 0.06, 32)),
-                                     std::make_shared<const ConvexMesh>(cylinder(0.03, 0.06, 32)),
-                                     std::make_shared<const ConvexMesh>(cube(0.06))};
+const std::shared_ptr<const stimuli::ConvexMesh>& shape(std::uint64_t index) {
+  static const std::array kShapes = {
+      std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.03, 2)),
+      std::make_shared<const stimuli::ConvexMesh>(stimuli::cone(0.03, 0.06, 32)),
+      std::make_shared<const stimuli::ConvexMesh>(stimuli::cylinder(0.03, 0.06, 32)),
+      std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06))};
   return kShapes[index % kShapes.size()];
 }
 
 /// A stylus in any pose pressed into a shape, and a small way round.
-Cycle cycle_anywhere(Random& random, Track& track) {
+Cycle cycle_anywhere(stimuli::Random& random, Track& track) {
   const Vec3 out = direction(random), d = kStylus * direction(random);
   const double share = random.unit();
   Cycle cycle;
@@ -142,7 +145,7 @@ Cycle cycle_anywhere(Random& random, Track& track) {
 }
 
 /// A stylus nearly flat on the top of the cube, that rocks through the blend.
-Cycle cycle_over_a_flat(Random& random, Track& track) {
+Cycle cycle_over_a_flat(stimuli::Random& random, Track& track) {
   const double turn = 2 * std::numbers::pi * random.unit();
   // As long as it is, its ends are past the face; a short one's are over it.
   const double length = random.unit() < 0.5 ? kStylus : 0.3 * kStylus;
@@ -160,8 +163,8 @@ Cycle cycle_over_a_flat(Random& random, Track& track) {
   return cycle;
 }
 
-Material springy() {
-  Material material;
+stimuli::Material springy() {
+  stimuli::Material material;
   material.stiffness = 800;
   return material;
 }
@@ -183,7 +186,7 @@ void count(ExtremeResult& result, const Lap& lap) {
 ExtremeResult closed_paths(const Renderer& renderer) {
   Several all;
   for (std::uint64_t round = 0; round < 400; ++round) {
-    Random random(round, {21});
+    stimuli::Random random(round, {21});
     Track track(renderer, shape(round), springy());
     const Cycle cycle = cycle_anywhere(random, track);
     track.lap(cycle, 400);  // the first begins with a jump
@@ -204,8 +207,8 @@ namespace {
 
 /// The second lap of a cycle over a material with friction, damping or both.
 Lap lossy_lap(const Renderer& renderer, std::uint64_t round, int ticks) {
-  Random random(round, {22});
-  Material material = springy();
+  stimuli::Random random(round, {22});
+  stimuli::Material material = springy();
   if (round % 3 != 0) material.damping = 3 * random.unit();
   if (round % 3 != 1) {
     material.friction_static = 0.05 + random.unit();
@@ -243,7 +246,7 @@ ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
   Several all;
   const auto block = shape(3);
   for (std::uint64_t round = 0; round < 400; ++round) {
-    Random random(round, {23});
+    stimuli::Random random(round, {23});
     Track track(renderer, block, springy());
     const Cycle cycle = cycle_over_a_flat(random, track);
     track.lap(cycle, 4000);  // the first begins with a jump
@@ -263,4 +266,4 @@ ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
   return all.result();
 }
 
-}  // namespace palpate::extremes
+}  // namespace palpate::rendering::extremes

@@ -11,14 +11,16 @@
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::extremes {
+namespace palpate::rendering::extremes {
 namespace {
 
 constexpr double kStylus = 0.12;  // m
 
-MeshPointer solid(const PolygonSoup& soup) { return std::make_shared<const ConvexMesh>(soup); }
+MeshPointer solid(const stimuli::PolygonSoup& soup) {
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
+}
 
-double between(Random& random, double low, double high) {
+double between(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
@@ -26,7 +28,9 @@ LineProbe moved(const LineProbe& probe, const Vec3& by) {
   return {probe.tip + by, probe.tail + by};
 }
 
-Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
 
 /// 0, or so little that rounding may take it for 0, or a little more.
 constexpr double kNextToNothing[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3};
@@ -35,10 +39,10 @@ constexpr double kNextToNothing[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 
 
 ExtremeResult thin_plate(const Renderer& renderer) {
   constexpr double kThickness = 1e-4, kEdge = 0.1, kStep = 0.005;  // m; 5 m/s at 1 kHz
-  const MeshPointer plate = solid(stretched(cube(kEdge), {1, 1, kThickness / kEdge}));
+  const MeshPointer plate = solid(stretched(stimuli::cube(kEdge), {1, 1, kThickness / kEdge}));
   Several all;
   for (std::uint64_t round = 0; round < 2000; ++round) {
-    Random random(round, {1});
+    stimuli::Random random(round, {1});
     Watch watch(renderer, plate);
     const double side = round % 2 ? 1 : -1;
     Vec3 direction = random_direction(random);
@@ -67,9 +71,9 @@ ExtremeResult thin_plate(const Renderer& renderer) {
 }
 
 ExtremeResult parallel_edge(const Renderer& renderer) {
-  const MeshPointer box = solid(cube(0.06));
+  const MeshPointer box = solid(stimuli::cube(0.06));
   Several all;
-  Random random(2);
+  stimuli::Random random(2);
   for (const double tilt : kNextToNothing) {
     for (const double beside : kNextToNothing) {
       for (int round = 0; round < 12; ++round) {
@@ -96,10 +100,10 @@ ExtremeResult parallel_edge(const Renderer& renderer) {
 }
 
 ExtremeResult through_vertices(const Renderer& renderer) {
-  const MeshPointer shapes[] = {solid(cube(0.06)), solid(icosphere(0.03, 1)),
-                                solid(cone(0.03, 0.06, 16))};
+  const MeshPointer shapes[] = {solid(stimuli::cube(0.06)), solid(stimuli::icosphere(0.03, 1)),
+                                solid(stimuli::cone(0.03, 0.06, 16))};
   Several all;
-  Random random(4);
+  stimuli::Random random(4);
   for (const MeshPointer& mesh : shapes) {
     for (const Vec3& vertex : mesh->vertices()) {
       for (const double beside : {0.0, 1e-16, 1e-12, 1e-9}) {
@@ -121,9 +125,9 @@ ExtremeResult through_vertices(const Renderer& renderer) {
 
 ExtremeResult zero_length(const Renderer& renderer) {
   // A probe without length is a point: the point renderer's force, none of it on device 2.
-  const MeshPointer mesh = solid(icosphere(0.03, 2));
+  const MeshPointer mesh = solid(stimuli::icosphere(0.03, 2));
   Watch watch(renderer, mesh), point(point_renderer(), mesh);
-  Random random(6);
+  stimuli::Random random(6);
   double worst = 0;
   for (const LineProbe& probe : random_path(random, PathKind::smooth, *mesh, 0, false, 3000)) {
     const Rendering r = watch.audited(probe), p = point.audited(probe);
@@ -141,11 +145,11 @@ ExtremeResult zero_length(const Renderer& renderer) {
 ExtremeResult tiny_length(const Renderer& renderer) {
   // Lengths below the rounding of coordinates show at the mesh's origin alone: meshes of which the
   // surface passes there.
-  const PolygonSoup shapes[] = {icosphere(0.03, 1), cube(0.06)};
+  const stimuli::PolygonSoup shapes[] = {stimuli::icosphere(0.03, 1), stimuli::cube(0.06)};
   Several all;
-  for (const PolygonSoup& shape : shapes) {
+  for (const stimuli::PolygonSoup& shape : shapes) {
     for (int i = 0; i < 8; ++i) {
-      Random random(static_cast<std::uint64_t>(i), {8});
+      stimuli::Random random(static_cast<std::uint64_t>(i), {8});
       // The origin is at a corner, or somewhere inside.
       const Vec3 corner = shape.vertices[random.below(shape.vertices.size())];
       const Vec3 to = i < 2 ? -corner : -between(random, 0, 0.9) * corner;
@@ -170,10 +174,10 @@ ExtremeResult tiny_length(const Renderer& renderer) {
 }
 
 ExtremeResult starts_inside(const Renderer& renderer) {
-  const MeshPointer mesh = solid(cone(0.03, 0.06, 32));
+  const MeshPointer mesh = solid(stimuli::cone(0.03, 0.06, 32));
   Several all;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    Random random(seed, {9});
+    stimuli::Random random(seed, {9});
     Watch watch(renderer, mesh);
     const Vec3 inside = Vec3(0, 0, -0.01) + 0.005 * random.unit() * random_direction(random);
     const Vec3 u = random_direction(random);
@@ -203,12 +207,12 @@ ExtremeResult starts_inside(const Renderer& renderer) {
 
 ExtremeResult teleports(const Renderer& renderer) {
   Several all;
-  const MeshPointer shapes[] = {solid(cube(0.06)), solid(icosphere(0.03, 2)),
-                                solid(cylinder(0.03, 0.06, 64)),
-                                solid(stretched(cube(0.1), {1, 1, 1e-3}))};
+  const MeshPointer shapes[] = {solid(stimuli::cube(0.06)), solid(stimuli::icosphere(0.03, 2)),
+                                solid(stimuli::cylinder(0.03, 0.06, 64)),
+                                solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}))};
   for (const MeshPointer& mesh : shapes) {
     for (std::uint64_t seed = 0; seed < 10; ++seed) {
-      Random random(seed, {10});
+      stimuli::Random random(seed, {10});
       Watch watch(renderer, mesh);
       watch.audited({Vec3(0, 0, 1), Vec3(0, 0, 1 + kStylus)});
       for (int i = 0; i < 200; ++i) {
@@ -230,7 +234,7 @@ ExtremeResult bad_poses(const Renderer& renderer) {
   // is felt as if nothing had been.
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  const MeshPointer mesh = solid(stretched(cube(0.1), {1, 1, 1e-3}));
+  const MeshPointer mesh = solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}));
   Watch watch(renderer, mesh);
   double worst = 0;
   for (const double height : {0.01, -0.0001, -0.01}) {
@@ -258,4 +262,4 @@ ExtremeResult bad_poses(const Renderer& renderer) {
   return result;
 }
 
-}  // namespace palpate::extremes
+}  // namespace palpate::rendering::extremes

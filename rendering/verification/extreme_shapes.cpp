@@ -9,22 +9,24 @@
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::extremes {
+namespace palpate::rendering::extremes {
 namespace {
 
 constexpr std::size_t kTicks = 300;  // a path
 constexpr double kStylus = 0.12;     // m
 
-MeshPointer solid(const PolygonSoup& soup) { return std::make_shared<const ConvexMesh>(soup); }
+MeshPointer solid(const stimuli::PolygonSoup& soup) {
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
+}
 
 Pose some_pose(const Vec3& position) {
-  Random random(3);
-  return {position, uniform_rotation(random)};
+  stimuli::Random random(3);
+  return {position, stimuli::uniform_rotation(random)};
 }
 
 /// Every face with corners of its own, each followed by faces without area.
-PolygonSoup with_duplicates(const PolygonSoup& soup) {
-  PolygonSoup out;
+stimuli::PolygonSoup with_duplicates(const stimuli::PolygonSoup& soup) {
+  stimuli::PolygonSoup out;
   for (const auto& face : soup.faces) {
     std::vector<std::uint32_t> own;
     for (const std::uint32_t v : face) {
@@ -40,10 +42,10 @@ PolygonSoup with_duplicates(const PolygonSoup& soup) {
 }
 
 /// A disc whose upper side is a cone that rises by `angle` (rad) only.
-PolygonSoup nearly_flat_cone(double angle, int segments) {
-  PolygonSoup soup = cylinder(0.05, 0.02, segments);
+stimuli::PolygonSoup nearly_flat_cone(double angle, int segments) {
+  stimuli::PolygonSoup soup = stimuli::cylinder(0.05, 0.02, segments);
   const double top = 0.01;
-  PolygonSoup out;
+  stimuli::PolygonSoup out;
   out.vertices = soup.vertices;
   const auto apex = static_cast<std::uint32_t>(out.vertices.size());
   out.vertices.emplace_back(0, 0, top + 0.05 * std::tan(angle));
@@ -69,7 +71,7 @@ ExtremeResult paths_over(const Renderer& renderer, const MeshPointer& mesh, cons
   std::uint64_t stream = 0;
   for (const double length : lengths) {
     for (int kind = 0; kind < kPathKinds; ++kind) {
-      Random random(17, {++stream});
+      stimuli::Random random(17, {++stream});
       Watch watch(renderer, mesh, pose);
       for (const LineProbe& probe : random_path(random, static_cast<PathKind>(kind), *mesh, length,
                                                 renderer.side_contact(), ticks)) {
@@ -83,8 +85,8 @@ ExtremeResult paths_over(const Renderer& renderer, const MeshPointer& mesh, cons
 
 ExtremeResult sliver(const Renderer& renderer) {
   // A blade, and a tetrahedron of which every face is a sliver: 1 to 1,000,000.
-  const MeshPointer blade = solid(stretched(cube(0.1), {1, 1e-6, 1}));
-  PolygonSoup wedge;
+  const MeshPointer blade = solid(stretched(stimuli::cube(0.1), {1, 1e-6, 1}));
+  stimuli::PolygonSoup wedge;
   wedge.vertices = {{-0.05, 0, 0}, {0.05, 0, 0}, {0, -5e-8, 1e-7}, {0, 5e-8, 1e-7}};
   wedge.faces = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
   Several all;
@@ -94,7 +96,7 @@ ExtremeResult sliver(const Renderer& renderer) {
 }
 
 ExtremeResult needle(const Renderer& renderer) {
-  return paths_over(renderer, solid(stretched(cylinder(0.05, 0.1, 12), {1e-5, 1e-5, 1})),
+  return paths_over(renderer, solid(stretched(stimuli::cylinder(0.05, 0.1, 12), {1e-5, 1e-5, 1})),
                     some_pose({0, 0.2, 0}), {0, 0.01, kStylus}, kTicks);
 }
 
@@ -107,35 +109,36 @@ ExtremeResult nearly_coplanar(const Renderer& renderer) {
 }
 
 ExtremeResult duplicate_vertices(const Renderer& renderer) {
-  const PolygonSoup shapes[] = {cube(0.06), icosphere(0.03, 2), cone(0.03, 0.06, 32)};
+  const stimuli::PolygonSoup shapes[] = {stimuli::cube(0.06), stimuli::icosphere(0.03, 2),
+                                         stimuli::cone(0.03, 0.06, 32)};
   Several all;
-  for (const PolygonSoup& soup : shapes) {
+  for (const stimuli::PolygonSoup& soup : shapes) {
     all.add(paths_over(renderer, solid(with_duplicates(soup)), {}, {kStylus}, kTicks));
   }
   return all.result();
 }
 
 ExtremeResult small_object(const Renderer& renderer) {
-  return paths_over(renderer, solid(icosphere(5e-5, 2)), some_pose({0.05, 0, 0.02}),
+  return paths_over(renderer, solid(stimuli::icosphere(5e-5, 2)), some_pose({0.05, 0, 0.02}),
                     {0, 1e-4, kStylus}, kTicks);
 }
 
 ExtremeResult large_object(const Renderer& renderer) {
-  return paths_over(renderer, solid(icosphere(50, 3)), {}, {0, kStylus, 300}, kTicks);
+  return paths_over(renderer, solid(stimuli::icosphere(50, 3)), {}, {0, kStylus, 300}, kTicks);
 }
 
 ExtremeResult far_object(const Renderer& renderer) {
-  return paths_over(renderer, solid(cone(0.03, 0.06, 64)), some_pose({1000, 0, 0}), {0, kStylus},
-                    kTicks);
+  return paths_over(renderer, solid(stimuli::cone(0.03, 0.06, 64)), some_pose({1000, 0, 0}),
+                    {0, kStylus}, kTicks);
 }
 
 ExtremeResult million_triangles(const Renderer& renderer) {
   // 1,310,720 triangles; their edges are 0.1 mm long in the mean.
-  const MeshPointer mesh = solid(icosphere(0.0216, 8));
+  const MeshPointer mesh = solid(stimuli::icosphere(0.0216, 8));
   Watch watch(renderer, mesh);
-  Random random(5);
+  stimuli::Random random(5);
   // The reference looks at every triangle: few ticks, from free space to sliding at 0.1 m/s.
-  const Vec3 axis = uniform_rotation(random) * Vec3(0, 0, 1);
+  const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
   const Vec3 across = glm::normalize(glm::cross(axis, Vec3(1, 0, 0)));
   for (int i = 0; i < 60; ++i) {
     const double turn = 1e-4 * i / 0.0216, depth = i < 2 ? -0.005 : 0.001 * std::sin(0.2 * i);
@@ -147,4 +150,4 @@ ExtremeResult million_triangles(const Renderer& renderer) {
   return watch.result();
 }
 
-}  // namespace palpate::extremes
+}  // namespace palpate::rendering::extremes

@@ -13,9 +13,9 @@
 #include "rendering/verification/random_paths.h"
 #include "rendering/verification/tick_audit.h"
 
-namespace palpate::extremes {
+namespace palpate::rendering::extremes {
 
-using MeshPointer = std::shared_ptr<const ConvexMesh>;
+using MeshPointer = std::shared_ptr<const stimuli::ConvexMesh>;
 
 inline constexpr double kShare = 1e-9;  // of the object's size: errors of lengths up to it are none
 inline constexpr const char* kLengthError = "worst error of a length, sizes of the object";
@@ -27,10 +27,10 @@ class Watch {
       : renderer_(renderer),
         mesh_(std::move(mesh)),
         pose_(pose),
-        scene_({{mesh_, pose, Material{}, 0, nullptr}}, renderer.side_contact()),
+        scene_({{mesh_, pose, stimuli::Material{}, 0, nullptr}}, renderer.side_contact()),
         state_(scene_.initial_state()) {}
 
-  const ConvexMesh& mesh() const { return *mesh_; }
+  const stimuli::ConvexMesh& mesh() const { return *mesh_; }
   const Renderer& renderer() const { return renderer_; }
 
   LineProbe to_world(const LineProbe& p) const {
@@ -135,4 +135,4 @@ ExtremeResult closed_paths(const Renderer& renderer);
 ExtremeResult closed_paths_lossy(const Renderer& renderer);
 ExtremeResult closed_paths_in_the_blend(const Renderer& renderer);
 
-}  // namespace palpate::extremes
+}  // namespace palpate::rendering::extremes

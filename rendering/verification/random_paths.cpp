@@ -9,19 +9,21 @@
 #include "rendering/verification/reference.h"
 #include "stimuli/orientation.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
-double between(Random& random, double low, double high) {
+double between(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
 /// 10 to a random power.
-double magnitude(Random& random, double low_power, double high_power) {
+double magnitude(stimuli::Random& random, double low_power, double high_power) {
   return std::pow(10, between(random, low_power, high_power));
 }
 
-Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
 
 Vec3 unit_or_x(const Vec3& v) {
   const double length = glm::length(v);
@@ -31,7 +33,7 @@ Vec3 unit_or_x(const Vec3& v) {
 /// A smooth random function within [-1, 1].
 class Wave {
  public:
-  explicit Wave(Random& random) {
+  explicit Wave(stimuli::Random& random) {
     for (std::size_t i = 0; i < rates_.size(); ++i) {
       rates_[i] = between(random, 0.3, 1) * static_cast<double>(i + 1);
       phases_[i] = between(random, 0, 2 * std::numbers::pi);
@@ -48,15 +50,15 @@ class Wave {
 };
 
 struct Wave3 {
-  explicit Wave3(Random& random) : x(random), y(random), z(random) {}
+  explicit Wave3(stimuli::Random& random) : x(random), y(random), z(random) {}
   Vec3 operator()(double at) const { return {x(at), y(at), z(at)}; }
   Wave x, y, z;
 };
 
 /// The path under way.
 struct Way {
-  Random& random;
-  const ConvexMesh& mesh;
+  stimuli::Random& random;
+  const stimuli::ConvexMesh& mesh;
   double length;
   bool side;
   std::size_t ticks;
@@ -171,7 +173,7 @@ struct Way {
     const double size = mesh.size();
     const auto pick = [&](const auto& items) { return items[random.below(items.size())]; };
     while (!full()) {
-      const Edge edge = pick(mesh.edges());
+      const stimuli::Edge edge = pick(mesh.edges());
       const Vec3 &v0 = edge.from, &v1 = edge.to;
       const Vec3 along = glm::normalize(v1 - v0);
       const Vec3 normal = mesh.facets()[edge.left].normal;
@@ -211,8 +213,9 @@ const char* to_string(PathKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-std::vector<LineProbe> random_path(Random& random, PathKind kind, const ConvexMesh& mesh,
-                                   double length, bool side, std::size_t ticks) {
+std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
+                                   const stimuli::ConvexMesh& mesh, double length, bool side,
+                                   std::size_t ticks) {
   Way way{random, mesh, length, side, ticks, {}};
   way.path.reserve(ticks + 1);
   const double far = 3 * mesh.size() + length;
@@ -241,4 +244,4 @@ std::vector<LineProbe> random_path(Random& random, PathKind kind, const ConvexMe
   return std::move(way.path);
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -7,7 +7,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 enum class PathKind {
   smooth,   ///< a hand that wanders in and out, 1e-4 to 0.03 sizes a tick
@@ -24,7 +24,8 @@ const char* to_string(PathKind kind);
 /// Starts far outside (its first pose); 1 kHz.
 /// \param length  m, of the probe
 /// \param side    false: it is the tip that is led over the surface
-std::vector<LineProbe> random_path(Random& random, PathKind kind, const ConvexMesh& mesh,
-                                   double length, bool side, std::size_t ticks);
+std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
+                                   const stimuli::ConvexMesh& mesh, double length, bool side,
+                                   std::size_t ticks);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -10,7 +10,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using Index = std::uint32_t;
@@ -22,7 +22,7 @@ struct Plane {
 
 /// A convex solid that can be cut. planes[i] is that of soup.faces[i].
 struct Block {
-  PolygonSoup soup;
+  stimuli::PolygonSoup soup;
   std::vector<Plane> planes;
 
   /// Takes away what is above the plane. Corners on it count as below, so the plane must not go
@@ -42,7 +42,7 @@ struct Block {
       return at->second;
     };
     std::map<Index, Index> rim;  // round the cut, against the way round the faces that are left
-    PolygonSoup left;
+    stimuli::PolygonSoup left;
     std::vector<Plane> planes_left;
     for (std::size_t f = 0; f < soup.faces.size(); ++f) {
       std::vector<Index> face;
@@ -72,8 +72,8 @@ struct Block {
   }
 
   /// Drops the corners that no face uses.
-  PolygonSoup tidy() const {
-    PolygonSoup out;
+  stimuli::PolygonSoup tidy() const {
+    stimuli::PolygonSoup out;
     std::map<Index, Index> number;
     for (const auto& face : soup.faces) {
       auto& numbered = out.faces.emplace_back();
@@ -87,14 +87,16 @@ struct Block {
   }
 };
 
-Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
+Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
 
-double between(Random& random, double low, double high) {
+double between(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
-Block random_block(Random& random, int cuts) {
-  Block block{cube(1), {}};
+Block random_block(stimuli::Random& random, int cuts) {
+  Block block{stimuli::cube(1), {}};
   for (const auto& face : block.soup.faces) {
     Vec3 middle;
     for (const Index v : face) middle += block.soup.vertices[v];
@@ -106,7 +108,7 @@ Block random_block(Random& random, int cuts) {
   return block;
 }
 
-PolygonSoup some_soup(Random& random) {
+stimuli::PolygonSoup some_soup(stimuli::Random& random) {
   const auto count = [&](std::uint64_t low, std::uint64_t high) {
     return static_cast<int>(low + random.below(high - low + 1));
   };
@@ -118,23 +120,25 @@ PolygonSoup some_soup(Random& random) {
     case 3:
       return polar_of_cut_cube(random, count(0, 30));
     case 4:
-      return icosphere(0.5, count(0, 2));
+      return stimuli::icosphere(0.5, count(0, 2));
     case 5:
-      return cone(0.5, between(random, 0.1, 2), count(3, 64));
+      return stimuli::cone(0.5, between(random, 0.1, 2), count(3, 64));
     case 6:
-      return cylinder(0.5, between(random, 0.1, 2), count(3, 64));
+      return stimuli::cylinder(0.5, between(random, 0.1, 2), count(3, 64));
     default:
-      return cube(1);
+      return stimuli::cube(1);
   }
 }
 
 }  // namespace
 
-PolygonSoup cut_cube(Random& random, int cuts) { return random_block(random, cuts).tidy(); }
+stimuli::PolygonSoup cut_cube(stimuli::Random& random, int cuts) {
+  return random_block(random, cuts).tidy();
+}
 
-PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
+stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts) {
   const Block block = random_block(random, cuts);
-  PolygonSoup polar;
+  stimuli::PolygonSoup polar;
   std::map<Index, std::vector<Index>> faces_at;
   for (Index f = 0; f < block.planes.size(); ++f) {
     polar.vertices.push_back(block.planes[f].normal * (0.25 / block.planes[f].offset));
@@ -152,19 +156,20 @@ PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
   return polar;
 }
 
-PolygonSoup stretched(PolygonSoup soup, const Vec3& factors) {
+stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors) {
   for (Vec3& v : soup.vertices) v *= factors;
   return soup;
 }
 
-PolygonSoup turned_and_moved(PolygonSoup soup, const Quat& turn, double scale, const Vec3& to) {
+stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& turn, double scale,
+                                      const Vec3& to) {
   for (Vec3& v : soup.vertices) v = scale * (turn * v) + to;
   return soup;
 }
 
-ConvexMesh random_solid(Random& random) {
+stimuli::ConvexMesh random_solid(stimuli::Random& random) {
   for (;;) {
-    PolygonSoup soup = some_soup(random);
+    stimuli::PolygonSoup soup = some_soup(random);
     if (random.below(2) == 0) {
       Vec3 factors(1, 1, 1);
       factors[static_cast<int>(random.below(3))] = std::pow(10, -4 * random.unit());
@@ -172,15 +177,15 @@ ConvexMesh random_solid(Random& random) {
       soup = stretched(std::move(soup), factors);
     }
     const double scale = 1e-4 * std::pow(1e6, random.unit());
-    const Quat turn = random.below(4) == 0 ? Quat(1, 0, 0, 0) : uniform_rotation(random);
+    const Quat turn = random.below(4) == 0 ? Quat(1, 0, 0, 0) : stimuli::uniform_rotation(random);
     const Vec3 to =
         static_cast<double>(random.below(2)) * scale * random.unit() * random_direction(random);
     try {
-      return ConvexMesh(turned_and_moved(std::move(soup), turn, scale, to));
-    } catch (const MeshError&) {
+      return stimuli::ConvexMesh(turned_and_moved(std::move(soup), turn, scale, to));
+    } catch (const stimuli::MeshError&) {
       // Cut and stretched too finely to be told from a flat one: another.
     }
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

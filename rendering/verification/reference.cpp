@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-namespace palpate {
+namespace palpate::rendering {
 
 namespace {
 
@@ -44,10 +44,10 @@ double segment_distance(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Ve
 }
 
 // The part of the segment that lies in every half-space of the mesh is not empty.
-bool overlaps(const ConvexMesh& mesh, const LineProbe& probe) {
+bool overlaps(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   double enters = 0;
   double leaves = 1;
-  for (const Facet& facet : mesh.facets()) {
+  for (const stimuli::Facet& facet : mesh.facets()) {
     const double tip_height = glm::dot(facet.normal, probe.tip) - facet.offset;
     const double tail_height = glm::dot(facet.normal, probe.tail) - facet.offset;
     if (tip_height > 0 && tail_height > 0) return false;
@@ -57,9 +57,10 @@ bool overlaps(const ConvexMesh& mesh, const LineProbe& probe) {
   return enters <= leaves;
 }
 
-bool projects_into(const ConvexMesh& mesh, const Facet& facet, const Vec3& point) {
+bool projects_into(const stimuli::ConvexMesh& mesh, const stimuli::Facet& facet,
+                   const Vec3& point) {
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const Side& side = mesh.sides()[i];
+    const stimuli::Side& side = mesh.sides()[i];
     if (glm::dot(side.inward, point) < side.offset) return false;
   }
   return true;
@@ -72,9 +73,9 @@ LineProbe between(const LineProbe& before, const LineProbe& after, double time) 
 
 }  // namespace
 
-ReferenceDepth reference_depth(const ConvexMesh& mesh, const LineProbe& probe) {
+ReferenceDepth reference_depth(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   ReferenceDepth least{std::numeric_limits<double>::infinity(), Vec3()};
-  for (const Facet& facet : mesh.facets()) {
+  for (const stimuli::Facet& facet : mesh.facets()) {
     const double deeper_end =
         std::min(glm::dot(facet.normal, probe.tip), glm::dot(facet.normal, probe.tail));
     const double depth = facet.offset - deeper_end;
@@ -82,7 +83,7 @@ ReferenceDepth reference_depth(const ConvexMesh& mesh, const LineProbe& probe) {
     if (depth < 0) return least;
   }
   const Vec3 d = probe.tail - probe.tip;
-  for (const Edge& edge : mesh.edges()) {
+  for (const stimuli::Edge& edge : mesh.edges()) {
     const Vec3& left = mesh.facets()[edge.left].normal;
     const Vec3& right = mesh.facets()[edge.right].normal;
     const double left_slope = glm::dot(left, d);
@@ -101,15 +102,15 @@ ReferenceDepth reference_depth(const ConvexMesh& mesh, const LineProbe& probe) {
   return least;
 }
 
-double reference_gap(const ConvexMesh& mesh, const LineProbe& probe) {
+double reference_gap(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   if (overlaps(mesh, probe)) return 0;
   // Two disjoint convex bodies are nearest at an edge and an edge (their ends included) or at an
   // end of the probe and the inside of a facet.
   double gap = std::numeric_limits<double>::infinity();
-  for (const Edge& edge : mesh.edges()) {
+  for (const stimuli::Edge& edge : mesh.edges()) {
     gap = std::min(gap, segment_distance(probe.tip, probe.tail, edge.from, edge.to));
   }
-  for (const Facet& facet : mesh.facets()) {
+  for (const stimuli::Facet& facet : mesh.facets()) {
     for (const Vec3& end : {probe.tip, probe.tail}) {
       const double height = glm::dot(facet.normal, end) - facet.offset;
       if (height >= 0 && height < gap && projects_into(mesh, facet, end)) gap = height;
@@ -118,8 +119,9 @@ double reference_gap(const ConvexMesh& mesh, const LineProbe& probe) {
   return gap;
 }
 
-std::optional<double> reference_first_contact(const ConvexMesh& mesh, const LineProbe& before,
-                                              const LineProbe& after, int steps) {
+std::optional<double> reference_first_contact(const stimuli::ConvexMesh& mesh,
+                                              const LineProbe& before, const LineProbe& after,
+                                              int steps) {
   const auto penetrates = [&](double time) {
     return reference_depth(mesh, between(before, after, time)).depth > kTouchingDepth * mesh.size();
   };
@@ -137,4 +139,4 @@ std::optional<double> reference_first_contact(const ConvexMesh& mesh, const Line
   return std::nullopt;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

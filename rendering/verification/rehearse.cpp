@@ -9,7 +9,7 @@
 #include "rendering/verification/explain.h"
 #include "rendering/verification/stroking_hand.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using Kind = MinkowskiFacet::Kind;
@@ -244,4 +244,4 @@ std::vector<Rehearsal> rehearse(const Scene& scene, const Renderer& renderer) {
   return Stages<tick::PointProbe>(scene, renderer).all();
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

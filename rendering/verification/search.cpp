@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace palpate {
+namespace palpate::rendering {
 
 SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
   walks += other.walks;
@@ -42,4 +42,4 @@ SearchCounts search(std::uint64_t ticks, std::uint64_t seed) {
   return search_walks(seed, 0, (ticks + kTicksPerWalk - 1) / kTicksPerWalk);
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

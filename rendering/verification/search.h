@@ -9,7 +9,7 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// Ticks of one walk: one object, one probe, one path.
 inline constexpr std::uint64_t kTicksPerWalk = 500;
@@ -73,4 +73,4 @@ SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uin
 /// At least `ticks` ticks, from walk 0 on.
 SearchCounts search(std::uint64_t ticks, std::uint64_t seed);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

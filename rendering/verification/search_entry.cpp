@@ -5,25 +5,26 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-namespace palpate {
+namespace palpate::rendering {
 
-bool plane_between(const ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
-  return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const Facet& facet) {
+bool plane_between(const stimuli::ConvexMesh& mesh, const LineProbe& before,
+                   const LineProbe& after) {
+  return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const stimuli::Facet& facet) {
     return std::min({glm::dot(facet.normal, before.tip), glm::dot(facet.normal, before.tail),
                      glm::dot(facet.normal, after.tip), glm::dot(facet.normal, after.tail)}) >
            facet.offset;
   });
 }
 
-std::optional<ReferenceDepth> facet_of_sum(const ConvexMesh& mesh, bool is_edge, std::uint32_t i,
-                                           const LineProbe& probe) {
+std::optional<ReferenceDepth> facet_of_sum(const stimuli::ConvexMesh& mesh, bool is_edge,
+                                           std::uint32_t i, const LineProbe& probe) {
   if (!is_edge) {
-    const Facet& facet = mesh.facets()[i];
+    const stimuli::Facet& facet = mesh.facets()[i];
     return ReferenceDepth{facet.offset - std::min(glm::dot(facet.normal, probe.tip),
                                                   glm::dot(facet.normal, probe.tail)),
                           facet.normal};
   }
-  const Edge& edge = mesh.edges()[i];
+  const stimuli::Edge& edge = mesh.edges()[i];
   const Vec3 &left = mesh.facets()[edge.left].normal, &right = mesh.facets()[edge.right].normal;
   const Vec3 d = probe.tail - probe.tip;
   const double left_slope = glm::dot(left, d), right_slope = glm::dot(right, d);
@@ -32,7 +33,7 @@ std::optional<ReferenceDepth> facet_of_sum(const ConvexMesh& mesh, bool is_edge,
   return ReferenceDepth{glm::dot(normal, edge.from - probe.tip), normal};
 }
 
-std::optional<MinkowskiEntry> entry_at(const ConvexMesh& mesh, const LineProbe& probe) {
+std::optional<MinkowskiEntry> entry_at(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   std::optional<MinkowskiEntry> best;
   double least = std::numeric_limits<double>::infinity(), second = least;
   const auto look = [&](bool is_edge, std::uint32_t i) {
@@ -52,4 +53,4 @@ std::optional<MinkowskiEntry> entry_at(const ConvexMesh& mesh, const LineProbe& 
   return best;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

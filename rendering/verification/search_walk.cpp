@@ -19,7 +19,7 @@
 #include "rendering/verification/tick_audit.h"
 #include "stimuli/orientation.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 constexpr int kFineSteps = 100;      // of a tick, by brute force
@@ -40,11 +40,11 @@ class Walk {
   Walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk)
       : renderer_(renderer),
         random_(seed, {walk}),
-        mesh_(std::make_shared<const ConvexMesh>(random_solid(random_))),
+        mesh_(std::make_shared<const stimuli::ConvexMesh>(random_solid(random_))),
         pose_(random_pose()),
         length_(random_length()),
         kind_(static_cast<PathKind>(random_.below(kPathKinds))),
-        scene_({{mesh_, pose_, Material{}, 0, nullptr}}, renderer.side_contact()),
+        scene_({{mesh_, pose_, stimuli::Material{}, 0, nullptr}}, renderer.side_contact()),
         state_(scene_.initial_state()) {
     counts_.walks = 1;
     fault_.seed = seed;
@@ -62,7 +62,8 @@ class Walk {
   Pose random_pose() {
     if (random_.below(2)) return {};
     const double reach = random_.below(2) ? 1 : 10 * mesh_->size();
-    return {reach * (uniform_rotation(random_) * Vec3(0, 0, 1)), uniform_rotation(random_)};
+    return {reach * (stimuli::uniform_rotation(random_) * Vec3(0, 0, 1)),
+            stimuli::uniform_rotation(random_)};
   }
 
   double random_length() {
@@ -209,8 +210,8 @@ class Walk {
   }
 
   const Renderer& renderer_;
-  Random random_;
-  std::shared_ptr<const ConvexMesh> mesh_;
+  stimuli::Random random_;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh_;
   Pose pose_;
   double length_;
   PathKind kind_;
@@ -229,4 +230,4 @@ SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint
   return Walk(renderer, seed, walk).run();
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,7 +9,7 @@
 #include "rendering/probe.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 struct StrokeSettings {
   Vec3 centre;                ///< m, of the object's bounding sphere
@@ -60,11 +60,11 @@ class StrokingHand {
   double wave(double period) const { return std::sin(2 * std::numbers::pi * tick_ / period); }
 
   StrokeSettings settings_;
-  Random random_;
+  stimuli::Random random_;
   Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
   double radius_;
   double touched_radius_ = 0;
   double tick_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::rendering

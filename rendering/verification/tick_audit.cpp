@@ -6,7 +6,7 @@
 
 #include "rendering/verification/reference.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 bool finite(const Vec3& v) {
@@ -46,7 +46,7 @@ LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LinePro
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
                      const Rendering& r, double share) {
   const ScenePart& part = scene.parts()[0];
-  const ConvexMesh& mesh = *part.mesh;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   TickAudit audit;
   audit.tolerance =
       share * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
@@ -68,4 +68,4 @@ TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LinePro
   return audit;
 }
 
-}  // namespace palpate
+}  // namespace palpate::rendering

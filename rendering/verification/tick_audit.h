@@ -4,7 +4,7 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::rendering {
 
 /// What the renderer could feel, in the frame of the part's mesh: for a point the tip alone.
 LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe);
@@ -35,4 +35,4 @@ struct TickAudit {
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
                      const Rendering& rendering, double share = 1e-9);
 
-}  // namespace palpate
+}  // namespace palpate::rendering

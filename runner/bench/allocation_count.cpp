@@ -13,12 +13,12 @@ namespace {
 thread_local std::uint64_t count = 0;
 }  // namespace
 
-namespace palpate {
+namespace palpate::runner {
 
 std::uint64_t allocations() { return count; }
 bool counts_allocations() { return PALPATE_COUNT_ALLOCATIONS; }
 
-}  // namespace palpate
+}  // namespace palpate::runner
 
 #if PALPATE_COUNT_ALLOCATIONS
 

@@ -13,7 +13,7 @@
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kRadius = 0.03;    // m
@@ -128,10 +128,11 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
 void feel(ServoThread& servo, double rate, std::size_t wanted, const std::function<bool()>& wait,
           ServoTiming& out, std::vector<std::int64_t>& compute,
           std::vector<std::int64_t>& warm_up) {
-  const Scene scene({{std::make_shared<const ConvexMesh>(icosphere(kRadius, 3)), Pose{}, Material{},
-                      0, nullptr}});
+  const rendering::Scene scene(
+      {{std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, 3)), Pose{},
+        stimuli::Material{}, 0, nullptr}});
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
-  servo.prepare(scene, ray_renderer(), {2 * kRadius, kHomeRest, 0.005});
+  servo.prepare(scene, rendering::ray_renderer(), {2 * kRadius, kHomeRest, 0.005});
   auto shown = std::chrono::steady_clock::now();
   int run = 0;
   bool tripped = false;
@@ -241,4 +242,4 @@ std::string ServoTiming::sentence() const {
   return text + (rights.missing.empty() ? "" : " " + rights.missing);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -9,7 +9,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct TimingSettings {
   double rate = 1000;   ///< Hz
@@ -49,4 +49,4 @@ struct ServoTiming {
 /// renderer. \param wait  called every so often by the thread that only waits; true: stop early
 ServoTiming measure_servo(const TimingSettings& settings, const std::function<bool()>& wait = {});
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kRadius = 0.03;  // m
@@ -37,11 +37,12 @@ class Timer {
   }
 
   /// Runs one tick; what it took is kept when `state` is the wanted one.
-  Rendering tick(const Renderer& renderer, const Scene& scene, RenderState& state,
-                 const LineProbe& probe, bool touching_wanted) {
+  rendering::Rendering tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
+                            rendering::RenderState& state, const rendering::LineProbe& probe,
+                            bool touching_wanted) {
     const std::uint64_t allocated = allocations();
     const std::uint64_t start = begin_count();
-    Rendering rendering = renderer.tick(scene, state, probe, kTick);
+    rendering::Rendering rendering = renderer.tick(scene, state, probe, kTick);
     const std::uint64_t count = end_count() - start;
     allocations_ += allocations() - allocated;
     if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
@@ -82,12 +83,12 @@ class Timer {
 /// slides; for the ray the contact wanders between the tip and 40 mm along the side.
 class Hand {
  public:
-  Hand(const Renderer& renderer, bool touching)
+  Hand(const rendering::Renderer& renderer, bool touching)
       : side_contact_(renderer.side_contact()), sign_(touching ? 1 : -1) {}
 
   /// How far out the path runs follows what was felt, so that it keeps to the surface on any mesh:
   /// `depth` m deep (the last tick's; 0 in free space).
-  LineProbe next(double depth) {
+  rendering::LineProbe next(double depth) {
     const double turn = 0.02 * random_.normal();
     heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(normal_, heading_);
     normal_ = glm::normalize(normal_ + kSpeed * kTick / kRadius * heading_);
@@ -105,7 +106,7 @@ class Hand {
   }
 
  private:
-  Random random_{1};
+  stimuli::Random random_{1};
   bool side_contact_;
   double sign_;
   Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
@@ -116,14 +117,14 @@ class Hand {
 struct Bench {
   std::string name;
   std::size_t triangles;
-  Scene scene;       ///< with side contact
-  double target_ns;  ///< in contact
+  rendering::Scene scene;  ///< with side contact
+  double target_ns;        ///< in contact
 };
 
 /// m; how deep the tip or side is by the sphere about it, negative outside: to hover by.
-double depth_below(const Scene& scene, const LineProbe& probe) {
+double depth_below(const rendering::Scene& scene, const rendering::LineProbe& probe) {
   double gap = HUGE_VAL;
-  const ScenePart& part = scene.parts()[0];
+  const rendering::ScenePart& part = scene.parts()[0];
   const Vec3 d = probe.tail - probe.tip;
   const double place =
       std::clamp(glm::dot(part.sphere_centre - probe.tip, d) / glm::dot(d, d), 0.0, 1.0);
@@ -131,8 +132,9 @@ double depth_below(const Scene& scene, const LineProbe& probe) {
   return -gap;
 }
 
-TickCost touching(Timer& timer, const Renderer& renderer, const Bench& bench, std::size_t ticks) {
-  RenderState state = bench.scene.initial_state();
+TickCost touching(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+                  std::size_t ticks) {
+  rendering::RenderState state = bench.scene.initial_state();
   Hand hand(renderer, true);
   double depth = 0;
   for (int i = 0; i < kWarm; ++i)
@@ -142,12 +144,13 @@ TickCost touching(Timer& timer, const Renderer& renderer, const Bench& bench, st
   return timer.take();
 }
 
-TickCost hovering(Timer& timer, const Renderer& renderer, const Bench& bench, std::size_t ticks) {
-  RenderState state = bench.scene.initial_state();
+TickCost hovering(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+                  std::size_t ticks) {
+  rendering::RenderState state = bench.scene.initial_state();
   Hand hand(renderer, false);
   double depth = -kRadius;
   for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i) {
-    const LineProbe probe = hand.next(depth);
+    const rendering::LineProbe probe = hand.next(depth);
     if (i < kWarm) {
       renderer.tick(bench.scene, state, probe, kTick);
     } else {
@@ -160,15 +163,15 @@ TickCost hovering(Timer& timer, const Renderer& renderer, const Bench& bench, st
 
 /// From a random side and 10 mm off, drifting a little along the surface; every second ray with its
 /// side first.
-TickCost meeting(Timer& timer, const Renderer& renderer, const Bench& bench,
+TickCost meeting(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
                  std::size_t approaches) {
-  Random random(2);
+  stimuli::Random random(2);
   const auto any = [&] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };
   // Some pass by.
   for (std::size_t i = 0; i < 4 * approaches && timer.ticks() < approaches; ++i) {
-    RenderState state = bench.scene.initial_state();
+    rendering::RenderState state = bench.scene.initial_state();
     const Vec3 out = any(), level = glm::normalize(glm::cross(out, any()));
     const bool side = i % 2 == 0 && renderer.side_contact();
     const Vec3 axis = side ? level : glm::normalize(out + 0.3 * level);
@@ -185,19 +188,19 @@ TickCost meeting(Timer& timer, const Renderer& renderer, const Bench& bench,
   return timer.take();
 }
 
-Scene one(const std::shared_ptr<const ConvexMesh>& mesh) {
-  SceneObject object;
+rendering::Scene one(const std::shared_ptr<const stimuli::ConvexMesh>& mesh) {
+  rendering::SceneObject object;
   object.mesh = mesh;
-  return Scene({object});
+  return rendering::Scene({object});
 }
 
 /// A thousand spheres; the first at the origin, the others a grid about it, 0.3 m apart.
-Scene thousand(const std::shared_ptr<const ConvexMesh>& mesh) {
-  const auto trees = std::make_shared<const ContactTrees>(*mesh, true);
-  std::vector<SceneObject> objects;
+rendering::Scene thousand(const std::shared_ptr<const stimuli::ConvexMesh>& mesh) {
+  const auto trees = std::make_shared<const rendering::ContactTrees>(*mesh, true);
+  std::vector<rendering::SceneObject> objects;
   objects.reserve(1000);
   for (int i = 0; i < 1000; ++i) {
-    SceneObject object;
+    rendering::SceneObject object;
     object.mesh = mesh;
     object.trees = trees;
     object.object = i;
@@ -205,24 +208,24 @@ Scene thousand(const std::shared_ptr<const ConvexMesh>& mesh) {
     object.pose.position = 0.3 * Vec3(k % 10 - 5, k / 10 % 10 - 5, k / 100 - 5);
     objects.push_back(std::move(object));
   }
-  return Scene(std::move(objects));
+  return rendering::Scene(std::move(objects));
 }
 
 std::vector<Bench> benches() {
   std::vector<Bench> all;
-  const auto add = [&](std::string name, const PolygonSoup& soup) {
-    auto mesh = std::make_shared<const ConvexMesh>(soup);
+  const auto add = [&](std::string name, const stimuli::PolygonSoup& soup) {
+    auto mesh = std::make_shared<const stimuli::ConvexMesh>(soup);
     all.push_back({std::move(name), soup.faces.size(), one(mesh), kContactTarget});
     return mesh;
   };
-  std::shared_ptr<const ConvexMesh> ball;
+  std::shared_ptr<const stimuli::ConvexMesh> ball;
   for (const int subdivisions : {0, 3, 5, 7}) {
-    const auto mesh = add("icosphere", icosphere(kRadius, subdivisions));
+    const auto mesh = add("icosphere", stimuli::icosphere(kRadius, subdivisions));
     if (subdivisions == 3) ball = mesh;
   }
-  add("cube", cube(2 * kRadius));
-  add("cone", cone(kRadius, 2 * kRadius, 64));
-  add("cylinder", cylinder(kRadius, 2 * kRadius, 64));
+  add("cube", stimuli::cube(2 * kRadius));
+  add("cone", stimuli::cone(kRadius, 2 * kRadius, 64));
+  add("cylinder", stimuli::cylinder(kRadius, 2 * kRadius, 64));
   all.push_back({"icosphere, 1000 of them", 1280, thousand(ball), kThousandTarget});
   return all;
 }
@@ -235,7 +238,8 @@ std::vector<TickCost> measure_tick_costs(
   const std::vector<Bench> all = benches();
   std::vector<TickCost> rows;
   for (const Bench& bench : all) {
-    for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
+    for (const rendering::Renderer* renderer :
+         {&rendering::point_renderer(), &rendering::ray_renderer()}) {
       const auto keep = [&](TickCost cost, const char* state, double target_ns) {
         cost.mesh = bench.name;
         cost.triangles = bench.triangles;
@@ -254,4 +258,4 @@ std::vector<TickCost> measure_tick_costs(
   return rows;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// One row: a scene, a renderer and a state of touch. Every tick is timed alone; the cost of
 /// reading the time is in all figures and stands beside as `empty_loop_ns`.
@@ -38,4 +38,4 @@ std::vector<TickCost> measure_tick_costs(
     const TickCostSettings& settings,
     const std::function<void(std::size_t, std::size_t)>& done = {});
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -16,15 +16,15 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 namespace {
 
-TrialTable read_trials(const std::string& database, const std::string& csv) {
-  if (!csv.empty()) return read_trials_csv(csv);
+analysis::TrialTable read_trials(const std::string& database, const std::string& csv) {
+  if (!csv.empty()) return analysis::read_trials_csv(csv);
   try {
-    return read_trials_store(database);
-  } catch (const StoreRefused& error) {
+    return analysis::read_trials_store(database);
+  } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the file named is bad input: status 2
   }
 }
@@ -50,7 +50,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "      data: participant_id, session, block, trial, renderer, shape, response, correct and\n"
       "      response_time are enough)";
   std::string database, csv, json, report, figures;
-  AnalysisSettings settings;
+  analysis::AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("db", po::value(&database)->value_name("FILE"), "the study's database");
@@ -73,21 +73,23 @@ int analyze_command(const std::vector<std::string>& args) {
   }
   Outputs outputs(*values, {"json", "report"}, {"db", "csv"}, "figures");
 
-  const Analysis analysis = analyze(read_trials(database, csv), settings, PALPATE_VERSION);
-  ReportRecord record;
+  const analysis::Analysis analysis =
+      analysis::analyze(read_trials(database, csv), settings, PALPATE_VERSION);
+  analysis::ReportRecord record;
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
-    record = read_report_record(database);
+    record = analysis::read_report_record(database);
   }
   if (outputs.wanted("figures")) {
-    for (const Figure& figure : figures_of(analysis, record)) {
-      outputs.put_into_folder(figure.id + ".svg", figure_svg(figure, light_palette()));
+    for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
+      outputs.put_into_folder(figure.id + ".svg",
+                              analysis::figure_svg(figure, analysis::light_palette()));
     }
   }
-  if (outputs.wanted("json")) outputs.put("json", report_json(analysis));
-  if (outputs.wanted("report")) outputs.put("report", report_html(analysis, record));
+  if (outputs.wanted("json")) outputs.put("json", analysis::report_json(analysis));
+  if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
   outputs.write();
-  std::cout << report_text(analysis);
+  std::cout << analysis::report_text(analysis);
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

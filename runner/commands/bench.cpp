@@ -12,7 +12,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
@@ -141,4 +141,4 @@ int bench_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -16,7 +16,7 @@
 #include "runner/servo/servo_fault.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
@@ -24,10 +24,10 @@ namespace po = boost::program_options;
 /// Shows how far the export is, and ends it when that was asked for.
 class Progress {
  public:
-  Progress(Store& store, const std::atomic<bool>& stop_asked)
+  Progress(data::Store& store, const std::atomic<bool>& stop_asked)
       : stop_asked_(stop_asked), line_("export") {
     if (!line_.on_terminal()) return;  // counting a million takes a while
-    const StoreCounts counts = store.counts();
+    const data::StoreCounts counts = store.counts();
     all_ = static_cast<double>(counts.completed + counts.cut_off);
   }
 
@@ -44,16 +44,18 @@ class Progress {
 
 /// Reads what is needed and no more: the text is a record, and exports must work years after the
 /// protocol's rules have changed.
-ProtocolFacts facts_of(const ProtocolInfo& info) {
+data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
   const auto json = nlohmann::ordered_json::parse(info.text, nullptr, false);
-  if (!json.is_object()) throw StoreRefused("the text of protocol " + info.name + " is damaged");
-  ProtocolFacts facts{.servo_rate = Protocol{}.servo_rate};
+  if (!json.is_object())
+    throw data::StoreRefused("the text of protocol " + info.name + " is damaged");
+  data::ProtocolFacts facts{.servo_rate = protocols::Protocol{}.servo_rate};
   if (json.contains("title") && json["title"].is_string()) facts.title = json["title"];
   if (json.contains("servo") && json["servo"].is_object() && json["servo"].contains("rate_hz") &&
       json["servo"]["rate_hz"].is_number()) {
     facts.servo_rate = json["servo"]["rate_hz"];
   }
-  if (!(facts.servo_rate > 0)) throw StoreRefused("protocol " + info.name + " has no servo rate");
+  if (!(facts.servo_rate > 0))
+    throw data::StoreRefused("protocol " + info.name + " has no servo rate");
   if (!json.contains("stimuli") || !json["stimuli"].is_array()) return facts;
   for (const auto& stimulus : json["stimuli"]) {
     if (!stimulus.is_object() || !stimulus.contains("name") || !stimulus["name"].is_string())
@@ -65,27 +67,27 @@ ProtocolFacts facts_of(const ProtocolInfo& info) {
   return facts;
 }
 
-std::vector<FaultMeaning> fault_bits() {
-  std::vector<FaultMeaning> all;
+std::vector<data::FaultMeaning> fault_bits() {
+  std::vector<data::FaultMeaning> all;
   all.reserve(std::size(kFaultBits));
-  for (const FaultBit& fault : kFaultBits) {
+  for (const rendering::FaultBit& fault : kFaultBits) {
     all.push_back({fault.bit, std::string(fault.name) + ": " + fault.meaning});
   }
   return all;
 }
 
-Times times_of(const std::string& word, const std::string& format, const std::string& usage) {
-  if (word == "absolute") return Times::absolute;
-  if (word == "relative") return Times::relative;
-  if (word.empty()) return format == "csv" ? Times::absolute : Times::relative;
+data::Times times_of(const std::string& word, const std::string& format, const std::string& usage) {
+  if (word == "absolute") return data::Times::absolute;
+  if (word == "relative") return data::Times::relative;
+  if (word.empty()) return format == "csv" ? data::Times::absolute : data::Times::relative;
   throw UsageError("no times '" + word + "'; there are: absolute, relative\nUsage: " + usage);
 }
 
-ExportDone export_as(const std::string& format, Store& store, const std::string& out,
-                     const ExportSettings& settings) {
-  if (format == "bids") return export_bids(store, out, settings);
-  if (format == "psych-ds") return export_psychds(store, out, settings);
-  return export_csv(store, out, settings);
+data::ExportDone export_as(const std::string& format, data::Store& store, const std::string& out,
+                           const data::ExportSettings& settings) {
+  if (format == "bids") return data::export_bids(store, out, settings);
+  if (format == "psych-ds") return data::export_psychds(store, out, settings);
+  return data::export_csv(store, out, settings);
 }
 
 }  // namespace
@@ -131,42 +133,42 @@ int export_command(const std::vector<std::string>& args) {
     throw UsageError("no format '" + format +
                      "'; there are: csv, bids, psych-ds\nUsage: " + line.usage);
   }
-  const Times told = times_of(times, format, line.usage);
+  const data::Times told = times_of(times, format, line.usage);
   if (!codebook.empty() && format != "csv") {
     throw UsageError("--codebook is for csv; " + format + " describes its columns in JSON files");
   }
   try {
-    Store store = Store::open(database, Store::Mode::read_only);
+    data::Store store = data::Store::open(database, data::Store::Mode::read_only);
     warn_of_exposure(database);
-    ExportSettings settings;
+    data::ExportSettings settings;
     settings.force = (*values)["force"].as<bool>();
     settings.program_version = PALPATE_VERSION;
     settings.facts = facts_of;
     settings.times = told;
     settings.codebook = codebook;
     settings.fault_bits = fault_bits();
-    ExportDone done;
+    data::ExportDone done;
     {
       Progress progress(store, watch_stop_signals());
       settings.progress = [&](std::int64_t trials) { progress.show(trials); };
       done = export_as(format, store, out, settings);
     }
-    std::cerr << printable(out) << ": " << done.trials << " trials";
+    std::cerr << stimuli::printable(out) << ": " << done.trials << " trials";
     if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
     std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
     if (!done.attempts_path.empty()) {
-      std::cerr << printable(done.attempts_path) << ": " << done.attempts
+      std::cerr << stimuli::printable(done.attempts_path) << ": " << done.attempts
                 << " attempts that were cut off\n";
     }
-    if (!codebook.empty()) std::cerr << printable(codebook) << ": what the columns mean\n";
+    if (!codebook.empty()) std::cerr << stimuli::printable(codebook) << ": what the columns mean\n";
     if (!done.not_recorded.empty()) {
       std::cerr << "warning: 'palpate forget' will not list this export: "
-                << printable(done.not_recorded) << "\n";
+                << stimuli::printable(done.not_recorded) << "\n";
     }
-  } catch (const StoreRefused& error) {
+  } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2
   }
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,20 +10,21 @@
 #include "runner/commands/shared/command.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
 
 /// \param database whose folder the paths are relative to
-void list_exports(const Holdings& holdings, const std::string& database, std::ostream& out) {
+void list_exports(const data::Holdings& holdings, const std::string& database, std::ostream& out) {
   if (holdings.exports.empty()) return;
   out << "These exports hold the participant; delete them and their copies, or export again:\n";
-  for (const ExportRecord& one : holdings.exports) {
+  for (const data::ExportRecord& one : holdings.exports) {
     std::error_code error;
-    const std::string place = place_of_record(database, one.path);
+    const std::string place = data::place_of_record(database, one.path);
     const std::string path = place.empty() ? one.path : place;
-    out << "  " << printable(path) << " (" << one.format << ", " << format_utc(one.made_utc_ns)
+    out << "  " << stimuli::printable(path) << " (" << one.format << ", "
+        << data::format_utc(one.made_utc_ns)
         << (place.empty() || std::filesystem::exists(path, error) ? ")" : "; not there any more)")
         << "\n";
   }
@@ -66,28 +67,29 @@ int forget_command(const std::vector<std::string>& args) {
   }
   if (!std::filesystem::exists(database)) throw UsageError(database + ": there is no such file");
 
-  Store store = Store::open(database, Store::Mode::write_or_create);
+  data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
   warn_of_exposure(database);
-  const Holdings holdings = store.holdings(code);
+  const data::Holdings holdings = store.holdings(code);
   if (holdings.protocols == 0 && !holdings.withdrawn_before) {
     throw UsageError(database + ": there is no participant " + code + " here");
   }
   if (holdings.protocols > 0) {
-    std::cout << printable(code) << ": " << holdings.sessions << " sessions, " << holdings.trials
-              << " trials and " << holdings.cut_off << " attempts that were cut off\n";
+    std::cout << stimuli::printable(code) << ": " << holdings.sessions << " sessions, "
+              << holdings.trials << " trials and " << holdings.cut_off
+              << " attempts that were cut off\n";
   } else {
-    std::cout << printable(code) << " has withdrawn before; what may be left is cleared\n";
+    std::cout << stimuli::printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
   list_exports(holdings, database, std::cout);
   if (!holdings.elsewhere.empty()) {
     std::cout << "These lie beside the database or its exports and name " << code
               << "; they are not changed: delete them, or give the command for each database:\n";
     for (const std::string& path : holdings.elsewhere) {
-      std::cout << "  " << printable(path) << "\n";
+      std::cout << "  " << stimuli::printable(path) << "\n";
     }
   }
   if (holdings.mentions > 0) {
-    std::cout << "Notes on other participants that say " << printable(code) << ": "
+    std::cout << "Notes on other participants that say " << stimuli::printable(code) << ": "
               << holdings.mentions << "; they are left as they are\n";
   }
   std::cout << std::flush;
@@ -95,15 +97,16 @@ int forget_command(const std::vector<std::string>& args) {
     std::cerr << "nothing was removed\n";
     return 1;
   }
-  const Withdrawal done = store.forget(code);
-  std::cout << "Removed from " << printable(database) << "\n";
+  const data::Withdrawal done = store.forget(code);
+  std::cout << "Removed from " << stimuli::printable(database) << "\n";
   for (const std::string& backup : done.backups_removed)
-    std::cout << "Deleted " << printable(backup) << "\n";
+    std::cout << "Deleted " << stimuli::printable(backup) << "\n";
   for (const std::string& backup : done.backups_left) {
-    std::cerr << printable(backup) << ": could not be read or deleted; delete it, it may hold "
-              << printable(code) << "\n";
+    std::cerr << stimuli::printable(backup)
+              << ": could not be read or deleted; delete it, it may hold "
+              << stimuli::printable(code) << "\n";
   }
   return done.backups_left.empty() ? 0 : 1;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -12,7 +12,7 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace po = boost::program_options;
 
 int merge_command(const std::vector<std::string>& args) {
@@ -52,32 +52,34 @@ int merge_command(const std::vector<std::string>& args) {
   const std::atomic<bool>& stop_asked = watch_stop_signals();
   try {
     ProgressLine progress("sessions");
-    const Merged done = merge(
+    const data::Merged done = data::merge(
         out, inputs,
         [&](std::int64_t session, std::int64_t all) {
           if (stop_asked) throw std::runtime_error("stopped; nothing was written");
           progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
         },
-        (*values)["renumber"].as<bool>() ? NumberClash::renumber : NumberClash::refuse);
+        (*values)["renumber"].as<bool>() ? data::NumberClash::renumber : data::NumberClash::refuse);
     progress.clear();
     warn_of_exposure(out);
-    std::cout << printable(out) << ": " << done.counts.participants << " participants, "
+    std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";
-    for (const Renumbered& one : done.renumbered) {
-      std::cout << one.code << " (" << printable(one.path) << ") has number " << one.to
+    for (const data::Renumbered& one : done.renumbered) {
+      std::cout << one.code << " (" << stimuli::printable(one.path) << ") has number " << one.to
                 << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
                 << one.code << " keep the order of number " << one.from << "\n";
     }
-    for (const LeftOut& one : done.left_out) {
-      std::cerr << printable(one.code) << " has withdrawn and is left out, but is still in "
-                << printable(one.path) << "; remove with: palpate forget --db '"
-                << printable(one.path) << "' --participant " << printable(one.code) << "\n";
+    for (const data::LeftOut& one : done.left_out) {
+      std::cerr << stimuli::printable(one.code)
+                << " has withdrawn and is left out, but is still in "
+                << stimuli::printable(one.path) << "; remove with: palpate forget --db '"
+                << stimuli::printable(one.path) << "' --participant "
+                << stimuli::printable(one.code) << "\n";
     }
-  } catch (const StoreRefused& error) {
+  } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2
   }
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

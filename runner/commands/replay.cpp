@@ -17,16 +17,16 @@
 #include "runner/session/device_check.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-TrialName trial_name(const std::string& text) {
+data::TrialName trial_name(const std::string& text) {
   const auto bad = [] {
     return UsageError("--trial: expected CODE/SESSION/TRIAL, e.g. P03/1/12, the numbers from 1");
   };
-  TrialName name;
+  data::TrialName name;
   std::istringstream parts(text);
   std::string session, trial;
   if (!std::getline(parts, name.code, '/') || !std::getline(parts, session, '/') ||
@@ -45,13 +45,14 @@ TrialName trial_name(const std::string& text) {
 }
 
 /// The completed attempt, of the protocol that was named where there are several.
-StoredTrial find_trial(Store& store, const TrialName& name, const std::string& protocol) {
+data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
+                             const std::string& protocol) {
   const std::string shown =
       name.code + "/" + std::to_string(name.session) + "/" + std::to_string(name.trial);
-  std::optional<StoredTrial> found;
+  std::optional<data::StoredTrial> found;
   bool cut_off = false;
   std::string protocols;
-  for (StoredTrial& trial : store.attempts(name)) {
+  for (data::StoredTrial& trial : store.attempts(name)) {
     if (!protocol.empty() && trial.protocol_name != protocol) continue;
     if (!trial.cut_off_reason.empty()) {
       cut_off = true;
@@ -80,25 +81,28 @@ StoredTrial find_trial(Store& store, const TrialName& name, const std::string& p
 
 /// Scales the materials down to what the device of the trial's run could show. True: there were
 /// any.
-bool limit_as_recorded(Protocol& protocol, Store& store, const StoredTrial& trial) {
-  for (const StoredNote& note : store.notes()) {
-    const ClockStamp &noted = note.run_clock, &shown = trial.run.clock;
+bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
+                       const data::StoredTrial& trial) {
+  for (const data::StoredNote& note : store.notes()) {
+    const data::ClockStamp &noted = note.run_clock, &shown = trial.run.clock;
     if (note.participant.id != trial.participant.id || note.session != trial.record.session ||
         noted.utc_ns != shown.utc_ns || noted.monotonic_ns != shown.monotonic_ns) {
       continue;
     }
     try {
       // A simulated session that was gone on with has the same event again.
-      if (palpate::limit_as_recorded(protocol, note.text)) return true;
+      if (runner::limit_as_recorded(protocol, note.text)) return true;
     } catch (const std::invalid_argument& error) {
-      throw StoreRefused(store.path() + ": " + error.what());
+      throw data::StoreRefused(store.path() + ": " + error.what());
     }
   }
   return false;
 }
 
-RendererKind kind_of(const std::string& renderer) {
-  return renderer == to_string(RendererKind::ray) ? RendererKind::ray : RendererKind::point;
+protocols::RendererKind kind_of(const std::string& renderer) {
+  return renderer == protocols::to_string(protocols::RendererKind::ray)
+             ? protocols::RendererKind::ray
+             : protocols::RendererKind::point;
 }
 
 double length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
@@ -135,16 +139,18 @@ void put(std::string& out, double value) {
 }
 
 /// \param rows  whether to keep a row for each tick
-Outcome replay_stored(const Protocol& protocol, const TrialRecord& record, bool compare,
-                      bool rows) {
+Outcome replay_stored(const protocols::Protocol& protocol, const data::TrialRecord& record,
+                      bool compare, bool rows) {
   Outcome outcome;
-  const RendererKind kind = kind_of(record.renderer);
-  const RendererKind other = kind == RendererKind::ray ? RendererKind::point : RendererKind::ray;
+  const protocols::RendererKind kind = kind_of(record.renderer);
+  const protocols::RendererKind other = kind == protocols::RendererKind::ray
+                                            ? protocols::RendererKind::point
+                                            : protocols::RendererKind::ray;
   std::vector<Vec3> forces;  // as recorded
   std::vector<std::string> lines;
   double time = 0;
-  outcome.recorded.renderer = to_string(kind);
-  replay(protocol, record, kind, [&](const SampleRecord& was, const Sample& is) {
+  outcome.recorded.renderer = protocols::to_string(kind);
+  replay(protocol, record, kind, [&](const data::SampleRecord& was, const Sample& is) {
     if (outcome.ticks > 0) time += static_cast<double>(is.period_ns) * 1e-9;
     if (was.period_ns <= 0) outcome.periods_known = false;
     ++outcome.ticks;
@@ -169,12 +175,12 @@ Outcome replay_stored(const Protocol& protocol, const TrialRecord& record, bool 
     lines.push_back(std::move(line));
   });
   if (compare) {
-    outcome.other.renderer = to_string(other);
+    outcome.other.renderer = protocols::to_string(other);
     std::size_t at = 0;
     time = 0;
-    replay(protocol, record, other, [&](const SampleRecord&, const Sample& is) {
+    replay(protocol, record, other, [&](const data::SampleRecord&, const Sample& is) {
       if (at > 0) time += static_cast<double>(is.period_ns) * 1e-9;
-      const Rendering& r = is.rendering;
+      const rendering::Rendering& r = is.rendering;
       outcome.other.add(time, glm::length(r.force), r.deepest.depth, static_cast<int>(r.contacts));
       const double apart = glm::length(r.force - forces[at]);
       outcome.difference_square_sum += apart * apart;
@@ -261,28 +267,28 @@ int replay_command(const std::vector<std::string>& args) {
   const auto values = line.parse(args);
   if (!values) return 0;
   Outputs outputs(*values, {"out", "json"}, {"db"});
-  const TrialName name = trial_name(trial);
-  Store store = Store::open(db, Store::Mode::read_only);
-  const StoredTrial stored = find_trial(store, name, protocol_name);
-  const TrialRecord& record = stored.record;
+  const data::TrialName name = trial_name(trial);
+  data::Store store = data::Store::open(db, data::Store::Mode::read_only);
+  const data::StoredTrial stored = find_trial(store, name, protocol_name);
+  const data::TrialRecord& record = stored.record;
   // Where a run was shown with another text, it differs in words only.
   std::string text;
-  for (const ProtocolInfo& info : store.protocols()) {
+  for (const data::ProtocolInfo& info : store.protocols()) {
     if (info.sha256 == stored.protocol_sha256) text = info.text;
   }
-  StoredFiles files;
-  for (ProtocolFile& file : store.files(stored.protocol_sha256)) {
+  protocols::StoredFiles files;
+  for (data::ProtocolFile& file : store.files(stored.protocol_sha256)) {
     files.emplace(file.name, std::move(file.bytes));
   }
-  Protocol protocol = parse_protocol_text(
+  protocols::Protocol protocol = protocols::parse_protocol_text(
       text, (std::filesystem::path(folder) / (stored.protocol_name + ".json")).string(), files);
   const auto& stimuli = protocol.stimuli;
-  for (const StimulusSpec& stimulus : stimuli) outputs.keep(stimulus.object);
+  for (const protocols::StimulusSpec& stimulus : stimuli) outputs.keep(stimulus.object);
   if (std::none_of(stimuli.begin(), stimuli.end(),
                    [&](const auto& stimulus) { return stimulus.name == record.shape; })) {
-    throw StoreRefused(db + ": trial " + trial + " shows '" + record.shape +
-                       "', which its protocol " + stored.protocol_name +
-                       " does not have; expected one of its stimuli");
+    throw data::StoreRefused(db + ": trial " + trial + " shows '" + record.shape +
+                             "', which its protocol " + stored.protocol_name +
+                             " does not have; expected one of its stimuli");
   }
   const bool limited = limit_as_recorded(protocol, store, stored);
   const bool compare = values->count("compare") > 0;
@@ -311,13 +317,14 @@ int replay_command(const std::vector<std::string>& args) {
     outputs.put("json", result.dump(1) + "\n");
   }
   outputs.write();
-  std::cout << (stored.participant.simulated ? "SIMULATED " : "") << "trial " << printable(trial)
-            << " of " << printable(stored.protocol_name) << ": " << printable(record.shape) << ", "
-            << printable(record.renderer) << ", ";
+  std::cout << (stored.participant.simulated ? "SIMULATED " : "") << "trial "
+            << stimuli::printable(trial) << " of " << stimuli::printable(stored.protocol_name)
+            << ": " << stimuli::printable(record.shape) << ", "
+            << stimuli::printable(record.renderer) << ", ";
   if (record.timed_out) {
     std::cout << "no answer";
   } else {
-    std::cout << "answered " << printable(record.response);
+    std::cout << "answered " << stimuli::printable(record.response);
   }
   char time[40];
   std::snprintf(time, sizeof time, " after %.3f s", record.response_time);
@@ -331,8 +338,8 @@ int replay_command(const std::vector<std::string>& args) {
     std::cout << "Rendered again: " << outcome.ticks - outcome.equal << " of " << outcome.ticks
               << " ticks differ from the record, the first is tick "
               << outcome.first_difference.value_or(0) << ". Recorded with palpate "
-              << printable(stored.run.program_version) << ", replayed with " << PALPATE_VERSION
-              << ".\n";
+              << stimuli::printable(stored.run.program_version) << ", replayed with "
+              << PALPATE_VERSION << ".\n";
     if (!outcome.periods_known) {
       std::cout << "The record does not hold the ticks' periods, on which damping depends.\n";
     }
@@ -349,4 +356,4 @@ int replay_command(const std::vector<std::string>& args) {
   return equal ? 0 : 1;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

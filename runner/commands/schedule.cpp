@@ -11,7 +11,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
@@ -22,32 +22,34 @@ std::string exact(double value) {
   return text.data();
 }
 
-const std::string& shape_of(const Protocol& protocol, const Trial& trial) {
+const std::string& shape_of(const protocols::Protocol& protocol, const protocols::Trial& trial) {
   return protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
 }
 
 // Names are letters, digits and '-', so that no field needs quotes.
-void print_csv(const Protocol& protocol, const std::vector<Trial>& trials, int participant) {
+void print_csv(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
+               int participant) {
   std::cout << "participant_id,session,block,trial,renderer,shape,orientation_w,orientation_x,"
                "orientation_y,orientation_z,practice,protocol_sha256,program_version\r\n";
-  for (const Trial& trial : trials) {
+  for (const protocols::Trial& trial : trials) {
     const Quat& q = trial.orientation;
     std::cout << participant << ',' << trial.session << ',' << trial.block << ',' << trial.trial
-              << ',' << to_string(trial.renderer) << ',' << shape_of(protocol, trial) << ','
-              << exact(q.w) << ',' << exact(q.x) << ',' << exact(q.y) << ',' << exact(q.z) << ','
-              << (trial.practice ? 1 : 0) << ',' << protocol.sha256 << ',' << PALPATE_VERSION
+              << ',' << protocols::to_string(trial.renderer) << ',' << shape_of(protocol, trial)
+              << ',' << exact(q.w) << ',' << exact(q.x) << ',' << exact(q.y) << ',' << exact(q.z)
+              << ',' << (trial.practice ? 1 : 0) << ',' << protocol.sha256 << ',' << PALPATE_VERSION
               << "\r\n";
   }
 }
 
-void print_json(const Protocol& protocol, const std::vector<Trial>& trials, int participant) {
+void print_json(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
+                int participant) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const Trial& trial : trials) {
+  for (const protocols::Trial& trial : trials) {
     const Quat& q = trial.orientation;
     rows.push_back({{"session", trial.session},
                     {"block", trial.block},
                     {"trial", trial.trial},
-                    {"renderer", to_string(trial.renderer)},
+                    {"renderer", protocols::to_string(trial.renderer)},
                     {"shape", shape_of(protocol, trial)},
                     {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
                     {"practice", trial.practice}});
@@ -60,20 +62,20 @@ void print_json(const Protocol& protocol, const std::vector<Trial>& trials, int 
   std::cout << document.dump(1) << "\n";
 }
 
-void print_table(const Protocol& protocol, const std::vector<Trial>& trials) {
+void print_table(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials) {
   std::size_t width = 5;
-  for (const StimulusSpec& stimulus : protocol.stimuli) {
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     width = std::max(width, stimulus.name.size());
   }
   const auto shape_width = static_cast<int>(width);
   std::cout << "session  block  trial  renderer  " << std::left << std::setw(shape_width) << "shape"
             << "  orientation (w x y z)\n";
   std::cout << std::fixed << std::setprecision(3);
-  for (const Trial& trial : trials) {
+  for (const protocols::Trial& trial : trials) {
     const Quat& q = trial.orientation;
     std::cout << std::right << std::setw(7) << trial.session << std::setw(7) << trial.block
               << std::setw(7) << trial.trial << "  " << std::left << std::setw(8)
-              << to_string(trial.renderer) << "  " << std::setw(shape_width)
+              << protocols::to_string(trial.renderer) << "  " << std::setw(shape_width)
               << shape_of(protocol, trial) << std::right;
     for (const double part : {q.w, q.x, q.y, q.z}) std::cout << std::setw(8) << part;
     std::cout << (trial.practice ? "  practice\n" : "\n");
@@ -105,8 +107,9 @@ int schedule_command(const std::vector<std::string>& args) {
     throw UsageError("--format: expected table, csv or json, found '" + format + "'");
   }
 
-  const Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
-  const std::vector<Trial> trials = schedule(protocol, participant);
+  const protocols::Protocol protocol =
+      protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  const std::vector<protocols::Trial> trials = protocols::schedule(protocol, participant);
   if (format == "csv") {
     print_csv(protocol, trials, participant);
   } else if (format == "json") {
@@ -117,4 +120,4 @@ int schedule_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

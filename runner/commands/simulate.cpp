@@ -13,7 +13,7 @@
 #include "runner/session/simulated_study.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
@@ -61,13 +61,14 @@ int simulate_command(const std::vector<std::string>& args) {
     throw UsageError("--participants: 1 to 100000 was expected");
   if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: 1 to 1024 was expected");
 
-  Protocol protocol = parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  protocols::Protocol protocol =
+      protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
   const SimulatedSettings settings = load_simulated_settings(settings_patch);
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
                                protocol.stylus.grip, 1 / protocol.servo_rate);
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
   for (const LimitedMaterial& one : limited)
-    std::fprintf(stderr, "%s\n", printable(one.text).c_str());
+    std::fprintf(stderr, "%s\n", stimuli::printable(one.text).c_str());
   // Before the database is made: what is refused leaves nothing behind.
   std::string reasons;
   for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), settings))
@@ -76,7 +77,8 @@ int simulate_command(const std::vector<std::string>& args) {
   StudyPlan plan{participants, seed, jobs, ""};
   if (!limited.empty())
     plan.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
-  Store store = Store::open((*values)["db"].as<std::string>(), Store::Mode::write_or_create);
+  data::Store store =
+      data::Store::open((*values)["db"].as<std::string>(), data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
   const auto start = std::chrono::steady_clock::now();
   ProgressLine progress_line("trials");
@@ -89,7 +91,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const double elapsed = seconds_since(start);
   std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),
               static_cast<long long>(progress.recorded), static_cast<long long>(progress.expected),
-              printable(store.path()).c_str());
+              stimuli::printable(store.path()).c_str());
   std::printf("settings version %d, sha256 %.12s...; seed %llu\n", settings.version,
               settings.sha256.c_str(), static_cast<unsigned long long>(seed));
   if (progress.this_run > 0) {
@@ -104,4 +106,4 @@ int simulate_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -15,24 +15,24 @@
 #include "stimuli/primitives.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kTypicalTrial = 10;  // s; about what the paper's participants took, and a bit
 
 /// Builds every mesh of an object, as a session would, and adds what is wrong with them.
-void check_meshes(const ObjectSpec& object, const std::string& place, const std::string& file,
-                  std::vector<Fault>& faults) {
-  if (object.shape == ShapeKind::compound) {
+void check_meshes(const stimuli::ObjectSpec& object, const std::string& place,
+                  const std::string& file, std::vector<protocols::Fault>& faults) {
+  if (object.shape == stimuli::ShapeKind::compound) {
     for (std::size_t i = 0; i < object.parts.size(); ++i) {
       check_meshes(object.parts[i], place + "/parts/" + std::to_string(i), file, faults);
     }
     return;
   }
-  const std::string where = object.shape == ShapeKind::mesh ? place + "/file" : place;
+  const std::string where = object.shape == stimuli::ShapeKind::mesh ? place + "/file" : place;
   try {
-    const ConvexMesh mesh(polygons_of(object));
-  } catch (const MeshError& error) {
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(object));
+  } catch (const stimuli::MeshError& error) {
     for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
   } catch (const std::runtime_error& error) {
     faults.push_back({file, where, error.what()});
@@ -57,26 +57,28 @@ std::string minutes(double seconds) {
 }
 
 /// A line, or nothing.
-std::string masking(const Protocol& protocol) {
+std::string masking(const protocols::Protocol& protocol) {
   if (!protocol.masking_noise) return "";
   std::ostringstream out;
-  out << "  noise       " << to_string(protocol.masking_noise->kind) << ", "
+  out << "  noise       " << protocols::to_string(protocol.masking_noise->kind) << ", "
       << protocol.masking_noise->level_db << " dB re full scale, through headphones\n";
   return out.str();
 }
 
-void print_summary(const Protocol& protocol, std::ostream& out) {
-  const std::vector<Trial> trials = schedule(protocol, 1);
-  const long long counted = main_trials(protocol);
+void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
+  const std::vector<protocols::Trial> trials = protocols::schedule(protocol, 1);
+  const long long counted = protocols::main_trials(protocol);
   const int sessions = protocol.sessions.count;
   std::vector<std::string> renderers, stimuli;
-  for (const RendererKind kind : protocol.renderers) renderers.emplace_back(to_string(kind));
-  for (const StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
+  for (const protocols::RendererKind kind : protocol.renderers)
+    renderers.emplace_back(protocols::to_string(kind));
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
   const double rest = protocol.home.rest;
   const auto n = static_cast<double>(trials.size());
 
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + stimuli::printable(protocol.title))
+      << "\n"
       << "  renderers   " << list(renderers) << " ("
       << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
       << "  stimuli     " << list(stimuli) << "\n"
@@ -95,13 +97,14 @@ void print_verdict(const std::string& what, const std::vector<std::string>& misf
                    const std::vector<LimitedMaterial>& limited, std::ostream& out) {
   out << "    " << std::left << std::setw(12) << what
       << (misfits.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
-  for (const std::string& misfit : misfits) out << "      " << printable(misfit) << "\n";
+  for (const std::string& misfit : misfits) out << "      " << stimuli::printable(misfit) << "\n";
   if (!misfits.empty()) return;
-  for (const LimitedMaterial& one : limited) out << "      " << printable(one.text) << "\n";
+  for (const LimitedMaterial& one : limited)
+    out << "      " << stimuli::printable(one.text) << "\n";
 }
 
 /// For which devices, and for simulation; all that is in the way.
-void print_fitness(const Protocol& protocol, std::ostream& out) {
+void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
   DeviceOrder order;
   order.rate = protocol.servo_rate;
   order.stylus_length = protocol.stylus.length;
@@ -110,14 +113,14 @@ void print_fitness(const Protocol& protocol, std::ostream& out) {
   out << "  can be shown by (run --device NAME)\n";
   for (const DeviceKind& kind : device_kinds()) {
     const DeviceCapabilities can = nominal_capabilities(kind, order);
-    Protocol shown = protocol;
+    protocols::Protocol shown = protocol;
     const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
     print_verdict(kind.name, misfits(shown, library, can), limited, out);
   }
   const SimulatedSettings settings = load_simulated_settings("");
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
                                protocol.stylus.grip, 1 / protocol.servo_rate);
-  Protocol shown = protocol;
+  protocols::Protocol shown = protocol;
   const std::vector<LimitedMaterial> limited = limit_materials(shown, stylus.capabilities());
   out << "  can be tried with simulated participants\n";
   print_verdict("simulate", simulation_faults(shown, library, settings), limited, out);
@@ -137,15 +140,15 @@ int validate_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   const auto file = (*values)["PROTOCOL.json"].as<std::string>();
 
-  const Protocol protocol = parse_protocol(file);
-  std::vector<Fault> faults;
+  const protocols::Protocol protocol = protocols::parse_protocol(file);
+  std::vector<protocols::Fault> faults;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, faults);
   }
-  if (!faults.empty()) throw InputError(faults);
+  if (!faults.empty()) throw protocols::InputError(faults);
   print_summary(protocol, std::cout);
   print_fitness(protocol, std::cout);
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

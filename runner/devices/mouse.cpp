@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kReach = 0.25;       // m; the tip goes no further from the centre, on any axis
@@ -72,4 +72,4 @@ DeviceReading MouseStylus::read() noexcept {
   return {now_, 0, false};
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

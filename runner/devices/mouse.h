@@ -5,7 +5,7 @@
 #include "runner/servo/device.h"
 #include "runner/servo/triple_buffer.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Where the pointer wants the stylus. Belongs to the thread of the window. Frame: the view's, x to
 /// the right, y up, z towards the viewer.
@@ -20,7 +20,7 @@ struct MouseHand {
   /// \param right, up  rad, of the tail about the tip
   void turn(double right, double up);
   Vec3 axis() const;  ///< unit, tip to tail
-  LineProbe stylus() const { return {tip, tip + length * axis()}; }
+  rendering::LineProbe stylus() const { return {tip, tip + length * axis()}; }
 };
 
 /// The device. aim() by the window's thread, the rest by the servo's; neither waits for the other.
@@ -31,7 +31,7 @@ class MouseStylus final : public Device {
 
   /// Where the stylus starts: above and before the workspace, outside of any home zone's radius.
   MouseHand resting_hand() const;
-  void aim(const LineProbe& target) noexcept { target_.write(target); }
+  void aim(const rendering::LineProbe& target) noexcept { target_.write(target); }
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override;
@@ -40,8 +40,8 @@ class MouseStylus final : public Device {
  private:
   double length_, follow_, longest_step_;
   DeviceCapabilities capabilities_;
-  TripleBuffer<LineProbe> target_;
-  LineProbe wanted_, now_;
+  TripleBuffer<rendering::LineProbe> target_;
+  rendering::LineProbe wanted_, now_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 #include "runner/devices/mouse.h"
 #include "runner/devices/stroking.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 std::vector<ConnectedDevice> always_there() { return {{}}; }
@@ -61,4 +61,4 @@ const DeviceKind& device_kind(const std::string& name) {
   throw std::invalid_argument("no device '" + name + "'; there are: " + known);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What a session asks of a device.
 struct DeviceOrder {
@@ -45,4 +45,4 @@ DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceOrde
 /// \throws std::invalid_argument naming those there are
 const DeviceKind& device_kind(const std::string& name);
 
-}  // namespace palpate
+}  // namespace palpate::runner

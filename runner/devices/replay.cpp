@@ -3,14 +3,14 @@
 #include <cmath>
 #include <limits>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
 }  // namespace
 
-ReplayDevice::ReplayDevice(std::span<const SampleRecord> samples, double rate)
+ReplayDevice::ReplayDevice(std::span<const data::SampleRecord> samples, double rate)
     : samples_(samples), nominal_ns_(std::llround(1e9 / rate)), now_ns_(nominal_ns_) {
   capabilities_.name = "replay";
   capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
@@ -25,7 +25,7 @@ DeviceReading ReplayDevice::read() noexcept {
     reading.lost = true;
     return reading;
   }
-  const SampleRecord& sample = samples_[next_++];
+  const data::SampleRecord& sample = samples_[next_++];
   reading.stylus = {vec(sample.tip), vec(sample.tail)};
   reading.buttons = sample.buttons;
   return reading;
@@ -41,4 +41,4 @@ void ReplayDevice::wait_until(std::int64_t when_ns) noexcept {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include "data/record.h"
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The device and the clock of a recording in one: each tick comes a recorded period after the last
 /// and finds the stylus where it then was. With its readings in the virtual frame: the servo needs
@@ -14,7 +14,7 @@ namespace palpate {
 class ReplayDevice final : public Device, public Clock {
  public:
   /// \param rate  Hz, for samples whose period is not on record
-  ReplayDevice(std::span<const SampleRecord> samples, double rate);
+  ReplayDevice(std::span<const data::SampleRecord> samples, double rate);
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override;
@@ -24,10 +24,10 @@ class ReplayDevice final : public Device, public Clock {
   void wait_until(std::int64_t when_ns) noexcept override;
 
  private:
-  std::span<const SampleRecord> samples_;
+  std::span<const data::SampleRecord> samples_;
   std::size_t next_ = 0;
   std::int64_t nominal_ns_, now_ns_;
   DeviceCapabilities capabilities_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// What a second of readings was like.
@@ -41,7 +41,7 @@ Readings read_for_a_second(Device& device, double rate) {
       last.reset();
       continue;
     }
-    const LineProbe& stylus = reading.stylus;
+    const rendering::LineProbe& stylus = reading.stylus;
     if (!finite(stylus.tip) || !finite(stylus.tail)) {
       ++out.not_finite;
       continue;
@@ -89,4 +89,4 @@ std::vector<SelfTestResult> self_test(Device& device, double rate) {
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct SelfTestResult {
   std::string what;
@@ -18,4 +18,4 @@ struct SelfTestResult {
 /// above the device's own
 std::vector<SelfTestResult> self_test(Device& device, double rate);
 
-}  // namespace palpate
+}  // namespace palpate::runner

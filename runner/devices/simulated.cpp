@@ -3,7 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Vec3 round_to(const Vec3& v, double step) {
@@ -122,4 +122,4 @@ void SimulatedStylus::write(const Vec3& device1, const Vec3& device2) noexcept {
   torque_ = glm::cross(axis_, (length_ - grip_) * device2 - grip_ * device1);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

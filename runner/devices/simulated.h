@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Each end of the stylus is held by one device.
 struct SimulatedDeviceSettings {
@@ -79,4 +79,4 @@ class SimulatedStylus final : public Device {
   Vec3 force_, torque_;        ///< N; N m about the grip, held over the tick
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace palpate {
+namespace palpate::runner {
 
 StrokingStylus::StrokingStylus(double length, double grip, double rate,
                                const StrokeSettings& settings)
@@ -29,4 +29,4 @@ DeviceReading StrokingStylus::read() noexcept {
   return stylus_.read();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

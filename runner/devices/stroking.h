@@ -4,7 +4,7 @@
 
 #include "runner/devices/simulated.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct StrokeSettings {
   double distance = 0.1;  ///< m, from the centre of the workspace, at rest
@@ -32,4 +32,4 @@ class StrokingStylus final : public Device {
   SimulatedStylus stylus_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

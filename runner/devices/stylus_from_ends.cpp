@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::size_t kLeastPoints = 4;
@@ -66,7 +66,7 @@ RigidFit fit_rigid(std::span<const PairedPoint> points) {
 }
 
 bool StylusFromEnds::update(const Vec3& tip, const Vec3& tail) noexcept {
-  const LineProbe seen{tip, tail_in_tip_.orientation * tail + tail_in_tip_.position};
+  const rendering::LineProbe seen{tip, tail_in_tip_.orientation * tail + tail_in_tip_.position};
   stretch_ = glm::length(seen.tail - seen.tip) - length_;
   if (std::abs(stretch_) <= tolerance_) {  // false for NaN
     stylus_ = seen;
@@ -81,4 +81,4 @@ Vec3 StylusFromEnds::to_tail_frame(const Vec3& force) const {
   return glm::conjugate(tail_in_tip_.orientation) * force;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

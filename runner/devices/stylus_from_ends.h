@@ -8,7 +8,7 @@
 #include "rendering/probe.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The same place seen by two devices, each in its own frame, m.
 struct PairedPoint {
@@ -45,7 +45,7 @@ class StylusFromEnds {
   ///                   has let go, a joint has slipped, or a device has lost its place.
   bool update(const Vec3& tip, const Vec3& tail) noexcept;
   /// The last one whose length was right, in the tip device's frame.
-  const LineProbe& stylus() const { return stylus_; }
+  const rendering::LineProbe& stylus() const { return stylus_; }
   double length() const { return length_; }
   double stretch() const { return stretch_; }  ///< m, of the last update; longer: positive
   /// A force on the tail, in the tip's frame, as the tail's device must show it.
@@ -56,9 +56,9 @@ class StylusFromEnds {
  private:
   Pose tail_in_tip_;
   double length_, tolerance_;
-  LineProbe stylus_;
+  rendering::LineProbe stylus_;
   double stretch_ = 0;
   int wrong_ = kMaxWrong;  // nothing right has been seen yet
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr float kDistance = 0.62F;           // m; shows a device's workspace with room around
@@ -52,4 +52,4 @@ glm::vec3 Camera::under(const glm::vec2& pixel, const glm::vec3& depth_of) const
   return {glm::inverse(view) * seen};
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

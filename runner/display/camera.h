@@ -4,7 +4,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// From where the console looks at the workspace. Points in the virtual frame, m; pixels of the
 /// view from its upper left corner.
@@ -26,4 +26,4 @@ class Camera {
   float yaw_ = 0.5F, pitch_ = 0.4F;  ///< rad
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

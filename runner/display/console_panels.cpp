@@ -9,7 +9,7 @@
 
 #include "runner/servo/sample.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 const ImVec4 kQuiet{0.60F, 0.64F, 0.69F, 1};
@@ -359,4 +359,4 @@ void draw_health(const ConsoleState& state, bool brief) {
   ImGui::EndTable();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 
 #include "runner/display/console_view.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 void style_console(float scale);
 
@@ -51,4 +51,4 @@ std::string words_of_forces(const ConsoleState& state);
 /// "1 h 05 min", "3 min 20 s"
 std::string in_words(double seconds);
 
-}  // namespace palpate
+}  // namespace palpate::runner

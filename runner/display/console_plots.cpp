@@ -7,7 +7,7 @@
 
 #include "runner/display/console_panels.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr ImU32 kQuietInk = IM_COL32(153, 163, 176, 255);
@@ -119,4 +119,4 @@ void draw_scores(const std::vector<ShapeScore>& scores, float width, float heigh
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -9,7 +9,7 @@
 
 #include "runner/display/console_panels.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kForceSpan = 10;  // s, shown in the plot
@@ -219,4 +219,4 @@ void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

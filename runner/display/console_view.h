@@ -11,7 +11,7 @@
 #include "runner/display/scene_view.h"
 #include "runner/display/window.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A force as it was at a time.
 struct ForcePoint {
@@ -72,4 +72,4 @@ class ConsoleView {
   int frames_to_scroll_ = 0;  ///< to the newest message
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

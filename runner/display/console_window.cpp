@@ -14,7 +14,7 @@
 #include "runner/display/key_names.h"
 #include "runner/display/lost_display.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr float kLetters = 16, kTitleLetters = 28;  // px at scale 1
@@ -185,4 +185,4 @@ void ConsoleWindow::draw() {
   glfwSwapBuffers(window_);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

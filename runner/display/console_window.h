@@ -9,7 +9,7 @@
 struct GLFWwindow;
 struct ImGuiContext;
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The experimenter's window. Made and drawn by the display's thread.
 class ConsoleWindow final : public ExperimenterConsole {
@@ -57,4 +57,4 @@ class ConsoleWindow final : public ExperimenterConsole {
   Inbox<ConsoleCommand> commands_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

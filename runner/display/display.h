@@ -12,7 +12,7 @@
 #include "runner/servo/servo.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct ConsoleCommand {
   enum class Kind {
@@ -102,7 +102,7 @@ struct ConsoleState {
   std::vector<std::string> messages;  ///< newest last: faults, notes, what was done
   std::size_t older_messages = 0;     ///< that were left out before the first
   Sample sample;                      ///< the servo's newest
-  std::shared_ptr<const std::vector<ObjectSpec>>
+  std::shared_ptr<const std::vector<stimuli::ObjectSpec>>
       objects;                                ///< of the trial under way, virtual frame
   std::uint64_t ticks = 0, missed_ticks = 0;  ///< of this session
   std::int64_t longest_period_ns = 0;
@@ -117,4 +117,4 @@ class ExperimenterConsole {
   virtual std::string name_of(ConsoleCommand::Kind kind) const = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,11 +4,11 @@
 #include "runner/display/console_panels.h"
 #include "runner/servo/servo_fault.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 std::string fault_words(std::uint32_t faults) {
   std::string out;
-  for (const FaultBit& fault : kFaultBits) {
+  for (const rendering::FaultBit& fault : kFaultBits) {
     if ((faults & fault.bit) == 0) continue;
     if (!out.empty()) out += ", ";
     out += fault.words;
@@ -104,4 +104,4 @@ std::string in_words(double seconds) {
   return std::to_string(all / 3600) + " h " + two(all % 3600 / 60) + " min";
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

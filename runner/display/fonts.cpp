@@ -7,7 +7,7 @@
 #include <memory>
 #include <set>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 template <auto destroy>
@@ -112,4 +112,4 @@ std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts) {
   return choices;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A font file and the letters to take from it.
 struct FontChoice {
@@ -17,4 +17,4 @@ struct FontChoice {
 /// (UTF-8) need beyond it. Empty where fontconfig knows no TrueType font at all.
 std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 const char* special(int key) {
@@ -81,4 +81,4 @@ std::string meant(const std::vector<std::string>& names,
   return names.empty() ? std::string() : names.front();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What a key of the keyboard may be called in a protocol, the likeliest first: what its layout
 /// writes on it, then what stands at its place on a US keyboard (so that the row of digits answers
@@ -22,4 +22,4 @@ const char* emergency_key(int key);
 /// On the numeric pad, which belongs to the participant.
 bool on_keypad(int key);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,7 +11,7 @@
 extern "C" Display* glfwGetX11Display();
 extern "C" Window glfwGetX11Window(GLFWwindow* window);
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// Under which Xlib keeps our windows.
@@ -69,4 +69,4 @@ bool display_lost() {
   return poll(&connection, 1, 0) > 0 && (connection.revents & (POLLHUP | POLLERR)) != 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,7 +2,7 @@
 
 struct GLFWwindow;
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The display's connection broke.
 class LostDisplay {};
@@ -23,4 +23,4 @@ bool is_gone(GLFWwindow* window);
 /// Asks for nothing and waits for nothing: whether the connection is known to be broken.
 bool display_lost();
 
-}  // namespace palpate
+}  // namespace palpate::runner

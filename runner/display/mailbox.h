@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The newest value; older ones that nobody took are dropped.
 template <class T>
@@ -53,4 +53,4 @@ class Inbox {
   std::vector<T> values_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kParticipantsShare = 0.4;  // of a monitor's width that both windows are on
@@ -107,4 +107,4 @@ GLFWwindow* make_window(const std::string& title, const Place& place) {
   return window;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

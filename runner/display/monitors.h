@@ -7,7 +7,7 @@
 struct GLFWmonitor;
 struct GLFWwindow;
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Where a window goes, px of the desktop.
 struct Place {
@@ -32,4 +32,4 @@ GLFWwindow* make_window(const std::string& title, const Place& place);
 /// What GLFW says of its latest failure.
 std::string glfw_reason();
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -1,6 +1,6 @@
 #include "runner/display/window.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 std::unique_ptr<DisplayLoop> make_windows(const WindowSettings&) {
   throw DisplayError("this palpate was built without windows");
@@ -8,4 +8,4 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings&) {
 
 std::string missing_letters(const std::vector<std::string>&) { return {}; }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 
 #include "runner/display/page_parts.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kSmallestUnit = 14;  // px, at scale 1
@@ -154,4 +154,4 @@ std::uint32_t ground_colour() {
   return 0xff000000U | level(kGround.red) << 16 | level(kGround.green) << 8 | level(kGround.blue);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "runner/display/display.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct Image {
   int width = 0, height = 0;
@@ -30,4 +30,4 @@ int screens_of(const Page& page, int width, int height, double ui_scale = 1);
 /// A flat image in the page's ground colour: between pages, and before the first.
 std::uint32_t ground_colour();
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kCapHeight = 2.3, kRowHeight = 5.2;  // units
@@ -146,4 +146,4 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include "runner/display/display.h"
 #include "runner/display/page_words.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 inline constexpr double kLetters = 1.4;  ///< units: of a text to read
 
@@ -36,4 +36,4 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
 double text_width(double width, double unit);
 std::string clock_words(int seconds);  ///< "0:25"
 
-}  // namespace palpate
+}  // namespace palpate::runner

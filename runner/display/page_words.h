@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 struct Colour {
   double red, green, blue;
@@ -56,4 +56,4 @@ class Words {
   Layout layout_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

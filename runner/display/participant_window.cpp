@@ -9,7 +9,7 @@
 #include "runner/display/key_names.h"
 #include "runner/display/lost_display.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place& place,
                                      double ui_scale)
@@ -94,4 +94,4 @@ void ParticipantWindow::paint(int width, int height) {
   stale_ = false;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -9,7 +9,7 @@
 
 struct GLFWwindow;
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The participant's window. Made, drawn and fed with keys by the display's thread.
 class ParticipantWindow final : public ParticipantScreen {
@@ -58,4 +58,4 @@ class ParticipantWindow final : public ParticipantScreen {
   std::atomic<bool> open_{true};
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

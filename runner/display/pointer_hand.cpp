@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kNotch = 0.001;        // m
@@ -69,4 +69,4 @@ void PointerHand::step(const PointerMotion& pointer, const Camera& camera,
   device_.aim(hand_.stylus());
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 #include "runner/display/camera.h"
 #include "runner/servo/servo.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What the pointer did over the console's view since the last frame. Pixels of the view.
 struct PointerMotion {
@@ -43,4 +43,4 @@ class PointerHand {
   double off_ = 0;    ///< m, of the plane beside the object, from the centre to the viewer
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

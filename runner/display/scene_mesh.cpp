@@ -5,12 +5,12 @@
 
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kSides = 24;
 
-void add(const PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
+void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
   const auto placed = [&](std::uint32_t corner) {
     return pose.orientation * soup.vertices[corner] + pose.position;
   };
@@ -27,13 +27,13 @@ void add(const PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
   }
 }
 
-void add(const ObjectSpec& spec, const Pose& parent, DrawnMesh& out) {
+void add(const stimuli::ObjectSpec& spec, const Pose& parent, DrawnMesh& out) {
   const Pose pose{parent.orientation * spec.pose.position + parent.position,
                   parent.orientation * spec.pose.orientation};
-  if (spec.shape == ShapeKind::compound) {
-    for (const ObjectSpec& part : spec.parts) add(part, pose, out);
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    for (const stimuli::ObjectSpec& part : spec.parts) add(part, pose, out);
   } else {
-    add(polygons_of(spec), pose, out);
+    add(stimuli::polygons_of(spec), pose, out);
   }
 }
 
@@ -44,9 +44,9 @@ glm::vec3 on_rim(int corner) {
 
 }  // namespace
 
-DrawnMesh drawn(const std::vector<ObjectSpec>& objects) {
+DrawnMesh drawn(const std::vector<stimuli::ObjectSpec>& objects) {
   DrawnMesh out;
-  for (const ObjectSpec& object : objects) add(object, Pose(), out);
+  for (const stimuli::ObjectSpec& object : objects) add(object, Pose(), out);
   return out;
 }
 
@@ -83,9 +83,9 @@ DrawnMesh unit_cone() {
 
 DrawnMesh unit_ball() {
   DrawnMesh out;
-  add(icosphere(1, 3), Pose(), out);
+  add(stimuli::icosphere(1, 3), Pose(), out);
   for (DrawnCorner& corner : out) corner.normal = corner.position;  // smooth
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct DrawnCorner {
   glm::vec3 position;  ///< m
@@ -16,10 +16,10 @@ struct DrawnCorner {
 using DrawnMesh = std::vector<DrawnCorner>;  ///< three corners a triangle
 
 /// Compounds with all their parts. \throws MeshError, std::runtime_error where a file is no mesh
-DrawnMesh drawn(const std::vector<ObjectSpec>& objects);
+DrawnMesh drawn(const std::vector<stimuli::ObjectSpec>& objects);
 
 DrawnMesh unit_cylinder();  ///< radius 1, from z = 0 to z = 1, without ends
 DrawnMesh unit_cone();      ///< radius 1 at z = 0, apex at z = 1
 DrawnMesh unit_ball();      ///< radius 1
 
-}  // namespace palpate
+}  // namespace palpate::runner

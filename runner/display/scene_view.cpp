@@ -12,7 +12,7 @@
 
 #include "runner/display/window.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kSamples =
@@ -196,12 +196,12 @@ void SceneView::draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4&
 }
 
 void SceneView::draw_stylus(const Sample& sample) const {
-  const LineProbe& hand = sample.probe;
+  const rendering::LineProbe& hand = sample.probe;
   if (!finite(hand.tip) || !finite(hand.tail)) return;
   const bool touching = sample.rendering.contacts > 0 && finite(sample.rendering.ideal.tip) &&
                         finite(sample.rendering.ideal.tail);
   // What the hand feels against: the stylus on the surface. Where the hand is: inside it.
-  const LineProbe& seen = touching ? sample.rendering.ideal : hand;
+  const rendering::LineProbe& seen = touching ? sample.rendering.ideal : hand;
   const auto ball = [&](const Vec3& at, double radius, const glm::vec4& colour) {
     draw_shape(ball_,
                glm::scale(glm::translate(glm::mat4(1), glm::vec3(at)),
@@ -298,4 +298,4 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
   return texture_;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 #include "runner/display/scene_mesh.h"
 #include "runner/servo/sample.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Needs a current OpenGL 3.3 context, also to be destroyed.
 class SceneView {
@@ -23,7 +23,7 @@ class SceneView {
   SceneView& operator=(const SceneView&) = delete;
   ~SceneView();
 
-  using Objects = std::shared_ptr<const std::vector<ObjectSpec>>;
+  using Objects = std::shared_ptr<const std::vector<stimuli::ObjectSpec>>;
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
   unsigned draw(const Objects& objects, const Sample& sample, const Camera& camera, int width,
                 int height);
@@ -57,4 +57,4 @@ class SceneView {
   unsigned samples_frame_ = 0, samples_colour_ = 0, samples_depth_ = 0, frame_ = 0, texture_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

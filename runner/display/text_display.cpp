@@ -19,7 +19,7 @@
 #include "runner/display/text_input.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using std::chrono::steady_clock;
@@ -118,7 +118,7 @@ class TextScreen final : public ParticipantScreen {
       text = words_of(page);
     }
     if (page.reply != before.reply && !page.reply.empty())
-      text += (text.empty() ? "" : "\n") + printable(page.reply);
+      text += (text.empty() ? "" : "\n") + stimuli::printable(page.reply);
     if (text.empty()) return;
     out_.add({STDOUT_FILENO, text + "\n"});
     bell_.ring();
@@ -133,7 +133,7 @@ class TextScreen final : public ParticipantScreen {
   static constexpr Page::Kind kRead = Page::Kind::text;
 
   static std::string words_of(const Page& page) {
-    std::string text = printable_lines(page.text);
+    std::string text = stimuli::printable_lines(page.text);
     if (page.kind == Page::Kind::neutral && !page.go) return text;
     if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
     if (page.done > 0 && page.kind != Page::Kind::feedback)
@@ -142,9 +142,9 @@ class TextScreen final : public ParticipantScreen {
     if (page.kind != Page::Kind::neutral) return text;
     for (const auto& [key, answer] : page.keys) {
       text += text.empty() ? "" : "   ";
-      text += printable(key);
+      text += stimuli::printable(key);
       text += ' ';
-      text += printable(answer);
+      text += stimuli::printable(answer);
     }
     return text;
   }
@@ -166,7 +166,7 @@ class TextConsole final : public ExperimenterConsole {
     for (heard_ = std::max(heard_, state.older_messages);
          heard_ < state.older_messages + state.messages.size(); ++heard_) {
       text += "* ";
-      text += printable_lines(state.messages[heard_ - state.older_messages]);
+      text += stimuli::printable_lines(state.messages[heard_ - state.older_messages]);
       text += '\n';
     }
     if (state.checklist.instruction != instruction_) {
@@ -196,7 +196,8 @@ class TextConsole final : public ExperimenterConsole {
     std::size_t due = 0;
     while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
     std::string text = "* step " + std::to_string(due + 1) + " of " +
-                       std::to_string(list.steps.size()) + ": " + printable(list.instruction);
+                       std::to_string(list.steps.size()) + ": " +
+                       stimuli::printable(list.instruction);
     std::string choices;
     for (const auto& [kind, meaning] : list.choices) {
       choices += choices.empty() ? " (" : "; ";
@@ -216,7 +217,7 @@ class TextConsole final : public ExperimenterConsole {
     if (state.remaining > 60)
       text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
     if (state.missed_ticks > 0) text += ", " + std::to_string(state.missed_ticks) + " ticks missed";
-    if (!state.held_by.empty()) text += ": " + printable(state.held_by);
+    if (!state.held_by.empty()) text += ": " + stimuli::printable(state.held_by);
     return text + "]\n";
   }
 
@@ -264,7 +265,7 @@ class TextDisplay final : public DisplayLoop {
         words.text = wrapped(words.text, columns_of(words.file));
         // A command that is being typed stays in one piece, below what came in between.
         if (terminal_.on() && !input_.line().empty())
-          words.text = "\r\x1b[K" + words.text + printable(input_.line());
+          words.text = "\r\x1b[K" + words.text + stimuli::printable(input_.line());
       }
       pending_.push_back(std::move(words));
     }
@@ -298,7 +299,7 @@ class TextDisplay final : public DisplayLoop {
       take(event);
     }
     if (terminal_.on() && input_.line() != before) {
-      say("\r\x1b[K" + printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
+      say("\r\x1b[K" + stimuli::printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
     }
   }
 
@@ -342,4 +343,4 @@ std::unique_ptr<DisplayLoop> make_text_display(const TextSettings& settings) {
   return std::make_unique<TextDisplay>(settings);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "runner/display/window.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct TextSettings {
   Clock* clock = nullptr;  ///< stamps keys and commands; required; must outlive the display
@@ -21,4 +21,4 @@ struct TextSettings {
 /// is as before once it is destroyed.
 std::unique_ptr<DisplayLoop> make_text_display(const TextSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Kind = ConsoleCommand::Kind;
@@ -180,4 +180,4 @@ std::vector<TextInput::Event> TextInput::feed(std::string_view bytes, std::int64
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,7 +10,7 @@
 
 #include "runner/display/display.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The commands of the text console, a line each.
 const char* text_commands_help();
@@ -42,4 +42,4 @@ class TextInput {
   std::string partial_;  ///< a UTF-8 sequence that has not come whole
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

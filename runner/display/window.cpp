@@ -14,7 +14,7 @@
 #include "runner/display/monitors.h"
 #include "runner/display/participant_window.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kFrame = 1.0 / 60;  // s, from frame to frame of the console
@@ -147,4 +147,4 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings) {
   return std::make_unique<Windows>(settings);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,7 +10,7 @@
 #include "runner/devices/mouse.h"
 #include "runner/display/display.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// No window: none was built in, no display answers, or it is no good. The text tells which.
 class DisplayError : public std::runtime_error {
@@ -55,4 +55,4 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings);
 /// What of the texts no installed font can show: a sentence for the experimenter; empty if all can.
 std::string missing_letters(const std::vector<std::string>& texts);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include "runner/participants/shape_hypotheses.h"
 #include "runner/participants/shape_lines.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 // The search along a line ends when the minimum is pinned down to this length. The distance comes
 // out better, within 30 micrometres: it is interpolated between the slopes at both ends.
@@ -87,4 +87,4 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Vec3 unit_or(const Vec3& v, const Vec3& otherwise) {
@@ -17,13 +17,15 @@ Vec3 any_perpendicular(const Vec3& n) {
   return glm::normalize(glm::cross(n, std::abs(n.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
 }
 
-Vec3 random_perpendicular(Random& random, const Vec3& n) {
+Vec3 random_perpendicular(stimuli::Random& random, const Vec3& n) {
   const double angle = 2 * std::numbers::pi * random.unit();
   const Vec3 a = any_perpendicular(n);
   return std::cos(angle) * a + std::sin(angle) * glm::cross(n, a);
 }
 
-Vec3 normal_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
+Vec3 normal_vector(stimuli::Random& random) {
+  return {random.normal(), random.normal(), random.normal()};
+}
 
 }  // namespace
 
@@ -37,7 +39,7 @@ Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_s
       past_(static_cast<std::size_t>(
           std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
 
-HandTarget Explorer::begin(Random random) {
+HandTarget Explorer::begin(stimuli::Random random) {
   random_ = random;
   std::fill(past_.begin(), past_.end(), Felt{});
   now_ = 0;
@@ -63,7 +65,7 @@ void Explorer::draw_approach() {
   goal_axis_ = glm::normalize(goal_axis_);
 }
 
-HandTarget Explorer::step(const Felt& now, const LineProbe& stylus) {
+HandTarget Explorer::step(const Felt& now, const rendering::LineProbe& stylus) {
   const Felt known = past_[now_];
   past_[now_] = now;
   now_ = (now_ + 1) % past_.size();
@@ -158,11 +160,11 @@ void Explorer::turn_axis() {
   axis_ = glm::normalize(std::cos(step) * axis_ + std::sin(step) * side);
 }
 
-void Explorer::yield_to_force(const LineProbe& stylus) {
+void Explorer::yield_to_force(const rendering::LineProbe& stylus) {
   const Vec3 held = stylus.tip + grip_ * unit_or(stylus.tail - stylus.tip, axis_);
   const Vec3 offset = tip_ + grip_ * axis_ - held;
   const double length = glm::length(offset);
   if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

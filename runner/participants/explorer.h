@@ -8,7 +8,7 @@
 #include "runner/participants/simulated_settings.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What the hand feels at one moment.
 struct Felt {
@@ -24,10 +24,10 @@ class Explorer {
   Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness, double tick);
 
   /// Draws the first approach; the stylus at its start.
-  HandTarget begin(Random random);
+  HandTarget begin(stimuli::Random random);
   /// One tick. `stylus` and `now` are as felt at this tick; contact in `now` is acted on only after
   /// the reaction delay.
-  HandTarget step(const Felt& now, const LineProbe& stylus);
+  HandTarget step(const Felt& now, const rendering::LineProbe& stylus);
 
  private:
   enum class Stage { approach, follow, search, retreat };
@@ -37,13 +37,13 @@ class Explorer {
   Vec3 slide(const Felt& known);
   Vec3 fly_to_start();
   void turn_axis();
-  void yield_to_force(const LineProbe& stylus);
+  void yield_to_force(const rendering::LineProbe& stylus);
 
   SimulatedSettings settings_;
   double grip_, tick_;
   double sink_;        ///< m; how far below the felt surface the hand aims
   double max_offset_;  ///< m; how far the hand's aim may be from where the stylus is
-  Random random_{0};
+  stimuli::Random random_{0};
   std::vector<Felt> past_;  ///< ring: what was felt during the reaction delay
   std::size_t now_ = 0;
   Stage stage_ = Stage::approach;
@@ -53,4 +53,4 @@ class Explorer {
   double left_ = 0;                        ///< s, of this stage
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -15,16 +15,17 @@ constexpr std::int64_t kSteady_ns = 150'000'000;  // at the zone's edge the page
 
 }  // namespace
 
-KeyboardRespondent::KeyboardRespondent(const Protocol& protocol, ParticipantScreen& screen,
-                                       Attendant& attendant, Clock& clock, AnswerBy by)
+KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
+                                       ParticipantScreen& screen, Attendant& attendant,
+                                       Clock& clock, AnswerBy by)
     : protocol_(protocol), screen_(screen), attendant_(attendant), clock_(clock), by_(by) {
   for (const auto& [key, name] : protocol.response.keys) {
-    const auto stimulus =
-        std::find_if(protocol.stimuli.begin(), protocol.stimuli.end(),
-                     [&wanted = name](const StimulusSpec& s) { return s.name == wanted; });
+    const auto stimulus = std::find_if(
+        protocol.stimuli.begin(), protocol.stimuli.end(),
+        [&wanted = name](const protocols::StimulusSpec& s) { return s.name == wanted; });
     stimuli_.push_back(static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
     keys_.emplace_back(by == AnswerBy::keys ? key : "button " + std::to_string(keys_.size() + 1),
-                       answer_label(protocol, name));
+                       protocols::answer_label(protocol, name));
   }
 }
 
@@ -127,7 +128,7 @@ void KeyboardRespondent::feedback(bool correct) {
   wait_until(clock_.now_ns() + kFeedback_ns);
 }
 
-void KeyboardRespondent::begin_trial(const Trial&) {
+void KeyboardRespondent::begin_trial(const protocols::Trial&) {
   Page page;
   page.kind = Page::Kind::neutral;
   page.keys = keys_;
@@ -194,4 +195,4 @@ std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
   return std::nullopt;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

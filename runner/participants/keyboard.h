@@ -11,7 +11,7 @@
 #include "runner/display/display.h"
 #include "runner/participants/respondent.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Looks after everything else while the participant is waited for.
 class Attendant {
@@ -30,13 +30,13 @@ enum class AnswerBy {
 class KeyboardRespondent final : public Respondent {
  public:
   /// All must outlive it. \param clock  what keys are stamped with
-  KeyboardRespondent(const Protocol& protocol, ParticipantScreen& screen, Attendant& attendant,
-                     Clock& clock, AnswerBy by);
+  KeyboardRespondent(const protocols::Protocol& protocol, ParticipantScreen& screen,
+                     Attendant& attendant, Clock& clock, AnswerBy by);
 
   void read(const std::string& text) override;
   void rest(const std::string& text, std::int64_t until_ns) override;
   void feedback(bool correct) override;
-  void begin_trial(const Trial& trial) override;
+  void begin_trial(const protocols::Trial& trial) override;
   std::optional<Answer> step(const Sample& sample) override;
 
   /// A page with nothing to press.
@@ -60,7 +60,7 @@ class KeyboardRespondent final : public Respondent {
   void listen(const Sample& sample);
   std::optional<int> meaning(const std::string& key) const;
 
-  const Protocol& protocol_;
+  const protocols::Protocol& protocol_;
   ParticipantScreen& screen_;
   Attendant& attendant_;
   Clock& clock_;
@@ -77,4 +77,4 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> pending_;  ///< given until the servo's samples have come as far
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace palpate::lane {
+namespace palpate::runner::lane {
 
 inline float max(float a, float b) { return a > b ? a : b; }
 inline float min(float a, float b) { return a < b ? a : b; }
@@ -70,4 +70,4 @@ inline float log_normal_cdf(float x) {
   return x < 0.0f ? lower : upper;
 }
 
-}  // namespace palpate::lane
+}  // namespace palpate::runner::lane

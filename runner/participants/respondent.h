@@ -8,7 +8,7 @@
 #include "protocols/schedule.h"
 #include "runner/servo/servo.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct Answer {
   int stimulus = 0;          ///< index into Protocol::stimuli
@@ -31,10 +31,10 @@ class Respondent {
   /// Whether the last answer was right, where the protocol says so.
   virtual void feedback(bool correct) = 0;
   /// A trial is about to begin; the stylus is to go to the home zone.
-  virtual void begin_trial(const Trial& trial) = 0;
+  virtual void begin_trial(const protocols::Trial& trial) = 0;
   /// Called with what the servo did. The answer, once there is one; never one of before time zero.
   /// \throws TrialCutOff where the trial is to be shown again.
   virtual std::optional<Answer> step(const Sample& sample) = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

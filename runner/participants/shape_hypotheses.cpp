@@ -8,7 +8,7 @@
 
 #include "stimuli/shapes.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kConeAxes = 380;
@@ -64,18 +64,18 @@ std::vector<Mat3> cube_rotations() {
   return rotations;
 }
 
-std::vector<Mat3> distinct_rotations(ShapeKind kind) {
+std::vector<Mat3> distinct_rotations(stimuli::ShapeKind kind) {
   switch (kind) {
-    case ShapeKind::cone:
+    case stimuli::ShapeKind::cone:
       return spiral_axes(kConeAxes, -1);
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       return spiral_axes(kCylinderAxes, 0);
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       return cube_rotations();
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       return {Mat3(1)};
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;  // fault_of has refused them
   }
   return {};
@@ -85,13 +85,13 @@ bool usable(double length) { return std::isfinite(length) && length > 0; }
 
 }  // namespace
 
-std::string ShapeHypotheses::fault_of(const ObjectSpec& stimulus) {
-  const ShapeNeeds needs = needs_of(stimulus.shape);
+std::string ShapeHypotheses::fault_of(const stimuli::ObjectSpec& stimulus) {
+  const stimuli::ShapeNeeds needs = stimuli::needs_of(stimulus.shape);
   if (!needs.analytic) {
     std::string known;
-    for (const ShapeKind shape : kShapes) {
-      if (!needs_of(shape).analytic) continue;
-      known += (known.empty() ? "" : ", ") + std::string(needs_of(shape).name);
+    for (const stimuli::ShapeKind shape : stimuli::kShapes) {
+      if (!stimuli::needs_of(shape).analytic) continue;
+      known += (known.empty() ? "" : ", ") + std::string(stimuli::needs_of(shape).name);
     }
     return std::string("a simulated participant knows ") + known + ", not " + needs.name;
   }
@@ -101,7 +101,7 @@ std::string ShapeHypotheses::fault_of(const ObjectSpec& stimulus) {
   return "";
 }
 
-ShapeHypotheses::ShapeHypotheses(const std::vector<ObjectSpec>& stimuli) {
+ShapeHypotheses::ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli) {
   std::string faults;
   if (stimuli.empty()) faults = "\n  no stimuli: a simulated participant needs at least one";
   for (std::size_t i = 0; i < stimuli.size(); ++i) {
@@ -111,16 +111,16 @@ ShapeHypotheses::ShapeHypotheses(const std::vector<ObjectSpec>& stimuli) {
   if (!faults.empty()) {
     throw std::invalid_argument("these stimuli cannot be simulated:" + faults);
   }
-  for (const ObjectSpec& stimulus : stimuli) append(stimulus);
+  for (const stimuli::ObjectSpec& stimulus : stimuli) append(stimulus);
 }
 
-void ShapeHypotheses::append(const ObjectSpec& stimulus) {
+void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
   const std::vector<Mat3> rotations = distinct_rotations(stimulus.shape);
   Shape shape;
   shape.kind = stimulus.shape;
   shape.radius = static_cast<float>(stimulus.radius);
-  shape.half_size =
-      static_cast<float>((needs_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
+  shape.half_size = static_cast<float>(
+      (stimuli::needs_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
   shape.first = padded_size();
   shape.count = static_cast<int>(rotations.size());
   shapes_.push_back(shape);
@@ -144,4 +144,4 @@ Mat3 ShapeHypotheses::rotation(int hypothesis) const {
   return r;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

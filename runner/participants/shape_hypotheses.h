@@ -9,7 +9,7 @@
 #include "stimuli/object_spec.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads may share one.
 /// Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
@@ -23,7 +23,7 @@ class ShapeHypotheses {
   static constexpr int kBlock = 32;
 
   struct Shape {
-    ShapeKind kind = ShapeKind::sphere;
+    stimuli::ShapeKind kind = stimuli::ShapeKind::sphere;
     float radius = 0;     ///< m; sphere, cone, cylinder
     float half_size = 0;  ///< m; half the height of a cone or cylinder, half the edge of a cube
     int first = 0;        ///< index of its first hypothesis, a multiple of kBlock
@@ -31,12 +31,12 @@ class ShapeHypotheses {
   };
 
   /// Why a simulated participant does not know a stimulus; empty: it does.
-  static std::string fault_of(const ObjectSpec& stimulus);
+  static std::string fault_of(const stimuli::ObjectSpec& stimulus);
 
   /// Shape i is stimulus i in its own frame; poses and materials are ignored.
   /// \throws std::invalid_argument naming every stimulus that is no sphere, cone, cylinder or cube
   /// or has a size that is not positive; also for an empty list.
-  explicit ShapeHypotheses(const std::vector<ObjectSpec>& stimuli);
+  explicit ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli);
 
   const std::vector<Shape>& shapes() const { return shapes_; }
 
@@ -49,10 +49,10 @@ class ShapeHypotheses {
   Mat3 rotation(int hypothesis) const;
 
  private:
-  void append(const ObjectSpec& stimulus);
+  void append(const stimuli::ObjectSpec& stimulus);
 
   std::vector<Shape> shapes_;
   std::array<std::array<std::vector<float>, 3>, 3> axes_;  // axis, component
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -16,7 +16,7 @@
 #include "runner/participants/shape_profiles.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct FloatVec {
   float x, y, z;
@@ -224,4 +224,4 @@ class AxialLine {
   float square_[ShapeHypotheses::kBlock];
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 // The loops over the hypotheses of a block are written for the compiler to vectorise; the build
 // gives this file -fno-math-errno and -fno-trapping-math, which change no value.
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kBlock = ShapeHypotheses::kBlock;
@@ -191,20 +191,20 @@ void ShapeObserver::update(const Percept& percept) {
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
     float* const l = log_posterior_.data();
     switch (shape.kind) {
-      case ShapeKind::cone:
+      case stimuli::ShapeKind::cone:
         update_shape<AxialLine<ConeProfile>>(*hypotheses_, shape, query, settings_, l);
         break;
-      case ShapeKind::cylinder:
+      case stimuli::ShapeKind::cylinder:
         update_shape<AxialLine<CylinderProfile>>(*hypotheses_, shape, query, settings_, l);
         break;
-      case ShapeKind::cube:
+      case stimuli::ShapeKind::cube:
         update_shape<CubeLine>(*hypotheses_, shape, query, settings_, l);
         break;
-      case ShapeKind::sphere:
+      case stimuli::ShapeKind::sphere:
         update_shape<SphereLine>(*hypotheses_, shape, query, settings_, l);
         break;
-      case ShapeKind::mesh:
-      case ShapeKind::compound:
+      case stimuli::ShapeKind::mesh:
+      case stimuli::ShapeKind::compound:
         break;  // ShapeHypotheses refuses them
     }
   }
@@ -242,4 +242,4 @@ void ShapeObserver::find_posterior() {
                            probabilities_.begin());
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -26,7 +26,7 @@
 #include "runner/participants/shape_hypotheses.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct ObserverSettings {
   double contact_sd = 0.003;                                ///< m; of the perceived place
@@ -82,4 +82,4 @@ class ShapeObserver {
   int best_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

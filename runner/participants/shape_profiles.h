@@ -6,7 +6,7 @@
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_hypotheses.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Distances and normals in the half-plane (radius, height) of a solid of revolution.
 struct ProfileVec {
@@ -90,4 +90,4 @@ class ConeProfile {
   ProfileVec normal_, up_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

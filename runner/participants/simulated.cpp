@@ -6,12 +6,13 @@
 
 #include "runner/scene_builder.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
                                            const ShapeHypotheses& hypotheses,
-                                           SimulatedStylus& stylus, const Protocol& protocol,
-                                           std::uint64_t seed, int number)
+                                           SimulatedStylus& stylus,
+                                           const protocols::Protocol& protocol, std::uint64_t seed,
+                                           int number)
     : settings_(own),
       stylus_(stylus),
       wall_stiffness_(protocol.material.stiffness),
@@ -23,11 +24,11 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
       explorer_(own, protocol.stylus.grip * protocol.workspace.scale, wall_stiffness_, period_),
       observer_(hypotheses, own.observer) {}
 
-void SimulatedParticipant::begin_trial(const Trial& trial) {
+void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   const auto stream = [&](std::uint64_t use) {
-    return Random(seed_,
-                  {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
-                   static_cast<std::uint64_t>(trial.trial), use});
+    return stimuli::Random(
+        seed_, {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
+                static_cast<std::uint64_t>(trial.trial), use});
   };
   random_ = stream(1);
   stylus_.reset(in_device(explorer_.begin(stream(2))));
@@ -106,4 +107,4 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const Felt& felt) {
   return percept;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

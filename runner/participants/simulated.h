@@ -8,7 +8,7 @@
 #include "runner/participants/respondent.h"
 #include "runner/participants/shape_observer.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 class SimulatedParticipant final : public Respondent {
  public:
@@ -16,12 +16,12 @@ class SimulatedParticipant final : public Respondent {
   /// all its randomness: each trial draws from a stream of its own, so a trial is the same whatever
   /// ran before it. \param hypotheses, stylus  must outlive it
   SimulatedParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                       SimulatedStylus& stylus, const Protocol& protocol, std::uint64_t seed,
-                       int number);
+                       SimulatedStylus& stylus, const protocols::Protocol& protocol,
+                       std::uint64_t seed, int number);
 
   void read(const std::string&) override {}
   void feedback(bool) override {}  // it does not learn
-  void begin_trial(const Trial& trial) override;
+  void begin_trial(const protocols::Trial& trial) override;
   std::optional<Answer> step(const Sample& sample) override;
 
  private:
@@ -37,7 +37,7 @@ class SimulatedParticipant final : public Respondent {
   WorkspaceMap workspace_;
   Explorer explorer_;
   ShapeObserver observer_;
-  Random random_{0};
+  stimuli::Random random_{0};
   bool ray_ = false;
   Vec3 centre_error_;                ///< m; where the centre is believed to be
   Vec3 force_, torque_;              ///< low-passed: N on the hand, N m about the tip
@@ -46,4 +46,4 @@ class SimulatedParticipant final : public Respondent {
   std::optional<double> answer_at_;  ///< s from time zero
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

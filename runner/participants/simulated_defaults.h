@@ -1,8 +1,8 @@
 #pragma once
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The frozen settings file, embedded by the build.
 extern const char* const kSimulatedDefaults;
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,14 +11,14 @@
 #include "runner/participants/simulated_defaults.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using nlohmann::json;
 
 /// Every key of the patch must stand in the defaults, and be a number there.
 void check_patch(const json& patch, const json& defaults, const std::string& file,
-                 const std::string& place, std::vector<Fault>& faults) {
+                 const std::string& place, std::vector<protocols::Fault>& faults) {
   if (!patch.is_object()) {
     faults.push_back({file, place, "an object was expected"});
     return;
@@ -40,12 +40,12 @@ void check_patch(const json& patch, const json& defaults, const std::string& fil
 
 json with_patch(json settings, const std::string& path) {
   if (path.empty()) return settings;
-  FaultList found(path);
-  const json patch = read_json(read_text_file(path), found);
+  protocols::FaultList found(path);
+  const json patch = protocols::read_json(protocols::read_text_file(path), found);
   found.throw_if_any();
-  std::vector<Fault> faults;
+  std::vector<protocols::Fault> faults;
   check_patch(patch, settings, path, "", faults);
-  if (!faults.empty()) throw InputError(faults);
+  if (!faults.empty()) throw protocols::InputError(faults);
   settings.merge_patch(patch);
   return settings;
 }
@@ -92,7 +92,7 @@ SimulatedSettings read(const json& j) {
   s.between = {between.at("slide_speed_log_sd"), between.at("percept_noise_log_sd"),
                between.at("reaction_delay_log_sd"), between.at("non_decision_log_sd"),
                between.at("threshold_logit_sd")};
-  s.sha256 = sha256_hex(j.dump());
+  s.sha256 = protocols::sha256_hex(j.dump());
   return s;
 }
 
@@ -103,7 +103,7 @@ SimulatedSettings load_simulated_settings(const std::string& patch_path) {
 }
 
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number) {
-  Random random(seed, {static_cast<std::uint64_t>(number)});
+  stimuli::Random random(seed, {static_cast<std::uint64_t>(number)});
   const auto factor = [&random](double log_sd) { return std::exp(log_sd * random.normal()); };
   SimulatedSettings own = settings;
   own.motor.slide_speed *= factor(settings.between.slide_speed);
@@ -121,4 +121,4 @@ SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t se
   return own;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

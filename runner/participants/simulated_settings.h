@@ -7,7 +7,7 @@
 #include "runner/devices/simulated.h"
 #include "runner/participants/shape_observer.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct SimulatedSettings {
   int version = 1;
@@ -55,4 +55,4 @@ SimulatedSettings load_simulated_settings(const std::string& patch_path);
 /// What sets participant `number` of a study apart: its own speed, noise, delay, and threshold.
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number);
 
-}  // namespace palpate
+}  // namespace palpate::runner

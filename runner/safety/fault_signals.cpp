@@ -5,7 +5,7 @@
 #include <ctime>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kAsked[] = {SIGINT, SIGTERM, SIGHUP};
@@ -69,4 +69,4 @@ void FaultSignals::dying(int signal) {
   raise(signal);  // SA_RESETHAND: the usual end, with its core dump
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

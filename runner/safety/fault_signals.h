@@ -6,7 +6,7 @@
 #include "runner/safety/guard.h"
 #include "runner/servo/servo_thread.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// While one of these lives, SIGINT, SIGTERM and SIGHUP command zero force and ask the session to
 /// end (the second one ends the program as usual); SIGABRT (failed assert, exception that nobody
@@ -35,4 +35,4 @@ class FaultSignals {
   std::atomic<int> end_requested_{0};
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -12,7 +12,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kZeroEvery_ns = 1'000'000;  // while the runner is silent
@@ -182,4 +182,4 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
   channel.state.store(GuardState::ended);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

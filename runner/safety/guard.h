@@ -9,7 +9,7 @@
 #include "runner/safety/guard_channel.h"
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct GuardSettings {
   double rate = 1000;  ///< Hz, of the servo
@@ -80,4 +80,4 @@ class GuardedDevice final : public Device {
   std::int64_t answered_ns_ = 0;  ///< when one was answered last
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

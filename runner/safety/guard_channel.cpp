@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <ctime>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
@@ -68,4 +68,4 @@ void futex_wake(const std::atomic<std::uint32_t>& word) noexcept {
   syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

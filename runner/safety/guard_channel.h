@@ -8,7 +8,7 @@
 #include "runner/servo/device.h"
 #include "runner/servo/shared_value.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A DeviceReading in plain numbers.
 struct GuardedReading {
@@ -71,4 +71,4 @@ void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
                 std::int64_t for_ns) noexcept;
 void futex_wake(const std::atomic<std::uint32_t>& word) noexcept;
 
-}  // namespace palpate
+}  // namespace palpate::runner

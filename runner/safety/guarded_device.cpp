@@ -14,7 +14,7 @@
 #include "runner/safety/guard.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kSpin_ns = 20'000;  // before sleeping for the reading
@@ -163,4 +163,4 @@ void GuardedDevice::emergency_zero() noexcept {
   futex_wake(channel_->calls);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

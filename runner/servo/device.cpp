@@ -1,6 +1,6 @@
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 const char* advice(DeviceTrouble trouble) noexcept {
   switch (trouble) {
@@ -31,4 +31,4 @@ const char* advice(DeviceTrouble trouble) noexcept {
   return "";
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

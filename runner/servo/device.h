@@ -7,7 +7,7 @@
 
 #include "rendering/probe.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct DeviceCapabilities {
   std::string name;
@@ -45,7 +45,7 @@ enum class DeviceTrouble : std::uint8_t {
 const char* advice(DeviceTrouble trouble) noexcept;
 
 struct DeviceReading {
-  LineProbe stylus;  ///< m, tip and tail
+  rendering::LineProbe stylus;  ///< m, tip and tail
   std::uint8_t buttons = 0;
   bool lost = false;  ///< no reading: unplugged, homing lost
   DeviceTrouble trouble = DeviceTrouble::none;
@@ -86,4 +86,4 @@ class VirtualClock final : public Clock {
   std::int64_t now_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

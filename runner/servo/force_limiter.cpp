@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 
 DeviceForces ForceLimiter::apply(const Vec3& device1, const Vec3& device2) noexcept {
   // A sum is finite only when each of its terms is.
@@ -41,4 +41,4 @@ void ForceLimiter::trip() noexcept {
   tripped_ = true;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

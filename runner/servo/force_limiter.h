@@ -4,7 +4,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct ForceLimits {
   double max_force = 6;     ///< N, of each device
@@ -40,4 +40,4 @@ class ForceLimiter {
   bool tripped_ = false;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// The part of `motion` along the force, which is all that the damping may touch: a stylus that
@@ -55,4 +55,4 @@ void PassivityController::reset() noexcept {
   excess_ = taken_ = 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

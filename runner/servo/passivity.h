@@ -5,7 +5,7 @@
 #include "runner/servo/force_limiter.h"
 #include "stimuli/vec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct PassivitySettings {
   /// N s/m, of the damping at most; more would be a sampled instability of its own on a light
@@ -50,4 +50,4 @@ class PassivityController {
   double excess_ = 0, taken_ = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

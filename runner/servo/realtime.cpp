@@ -15,7 +15,7 @@
 #include <cstring>
 #include <ctime>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
@@ -109,4 +109,4 @@ RealtimeRights request_realtime(const RealtimeWish& wish) {
   return rights;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

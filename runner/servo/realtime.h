@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// CLOCK_MONOTONIC; waits by absolute time (clock_nanosleep).
 class RealClock final : public Clock {
@@ -46,4 +46,4 @@ class AwakeProcessors {
 /// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.
 RealtimeRights request_realtime(const RealtimeWish& wish);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A queue of fixed size from one thread to one other. Neither ever waits.
 template <class T>
@@ -40,4 +40,4 @@ class Ring {
   alignas(kLine) std::atomic<std::size_t> read_{0};
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 #include "runner/servo/device.h"
 #include "runner/servo/servo_fault.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 enum class Phase : std::uint8_t {
   idle,     ///< no forces
@@ -33,9 +33,9 @@ struct Sample {
   std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
   Phase phase = Phase::idle;
   Waiting waiting = Waiting::nothing;
-  LineProbe probe;        ///< virtual probe, m
-  Rendering rendering;    ///< as rendered
-  Vec3 device1, device2;  ///< N, as commanded after the limits
+  rendering::LineProbe probe;      ///< virtual probe, m
+  rendering::Rendering rendering;  ///< as rendered
+  Vec3 device1, device2;           ///< N, as commanded after the limits
   std::uint8_t buttons = 0;
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;
@@ -62,4 +62,4 @@ struct ServoQuality {
   double max_force = 0;  ///< N, commanded to the hand
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

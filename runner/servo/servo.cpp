@@ -5,10 +5,10 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
-double distance_of_segment(const LineProbe& probe) {  // from the origin, m
+double distance_of_segment(const rendering::LineProbe& probe) {  // from the origin, m
   const Vec3 d = probe.tail - probe.tip;
   const double d2 = glm::dot(d, d);
   const double t = d2 > 0 ? std::clamp(-glm::dot(probe.tip, d) / d2, 0.0, 1.0) : 0;
@@ -29,7 +29,8 @@ Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limit
                1 / rate),
       workspace_(workspace) {}
 
-void Servo::prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) {
+void Servo::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+                    const HomeZone& home) {
   own_ = std::make_unique<Stage>(scene, renderer, home);
   begin(*own_);
   due_ns_ = clock_.now_ns();
@@ -59,7 +60,7 @@ void Servo::clear_fault() noexcept {
   clear_trip();
 }
 
-bool Servo::at_home(const LineProbe& probe) noexcept {
+bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
   const HomeZone& home = stage_->home;
   const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home.stillness;
   if (!still) {
@@ -165,7 +166,7 @@ const Sample& Servo::tick() noexcept {
   sample_.rendering = stage_->renderer->tick(stage_->scene, stage_->state, sample_.probe,
                                              static_cast<double>(sample_.period_ns) * 1e-9);
   sample_.faults |= sample_.rendering.faults;
-  if (sample_.rendering.faults & render_fault::kNonFinite) limiter_.trip();
+  if (sample_.rendering.faults & rendering::render_fault::kNonFinite) limiter_.trip();
   command(sample_.rendering.device1, sample_.rendering.device2);
   ++quality_.ticks;
   quality_.faults |= sample_.faults;
@@ -185,4 +186,4 @@ ServoQuality Servo::stop() noexcept {
   return std::exchange(quality_, {});
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -14,7 +14,7 @@
 #include "runner/servo/sample.h"
 #include "runner/servo/tick_source.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Where the virtual world stands in the device's frame: virtual = scale * (device - centre).
 struct WorkspaceMap {
@@ -27,17 +27,17 @@ struct WorkspaceMap {
 
 /// What one trial puts before the stylus, with the memory that rendering it needs.
 struct Stage {
-  Stage(const Scene& what, const Renderer& how, const HomeZone& where)
+  Stage(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where)
       : scene(what),
         renderer(&how),
         state(scene.initial_state()),
         shadow(scene.initial_state()),
         home(where) {}
 
-  const Scene scene;
-  const Renderer* renderer;
-  RenderState state;   ///< the servo's alone while it has the stage
-  RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
+  const rendering::Scene scene;
+  const rendering::Renderer* renderer;
+  rendering::RenderState state;   ///< the servo's alone while it has the stage
+  rendering::RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
 };
 
@@ -46,7 +46,8 @@ class Servo final : public TickSource {
   Servo(Device& device, Clock& clock, double rate, const ForceLimits& limits,
         const WorkspaceMap& workspace = {});
 
-  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) override;
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const HomeZone& home) override;
   /// Waits for the tick's time, then does one tick. Never throws, allocates, locks or does I/O but
   /// the device's own transfer.
   const Sample& tick() noexcept;
@@ -84,7 +85,7 @@ class Servo final : public TickSource {
   std::int64_t period_ns() const { return period_ns_; }
 
  private:
-  bool at_home(const LineProbe& probe) noexcept;
+  bool at_home(const rendering::LineProbe& probe) noexcept;
   void keep_time() noexcept;
   void warm_up() noexcept;
   void check(const DeviceReading& reading) noexcept;
@@ -114,4 +115,4 @@ class Servo final : public TickSource {
   static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "rendering/render_fault.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Bits of Sample::faults; the renderer's bits are the low ones.
 namespace servo_fault {
@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kStalled = 1024;
 inline constexpr std::uint32_t kOldReading = 2048;
 }  // namespace servo_fault
 
-inline constexpr std::array<FaultBit, 8> kServoFaults = {{
+inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
     {servo_fault::kForceLimited, "force-limited", "force limited",
      "the command was cut in size (6 N, or what the device can) or in change (0.5 N a tick). "
      "Ordinary: where the stylus slips off an edge while it presses, the force falls to zero in "
@@ -47,17 +47,20 @@ inline constexpr std::array<FaultBit, 8> kServoFaults = {{
 
 /// All bits that a sample or a trial may have, lowest first.
 inline constexpr auto kFaultBits = [] {
-  std::array<FaultBit, kRenderFaults.size() + kServoFaults.size()> all{};
-  const auto rest = std::copy(kRenderFaults.begin(), kRenderFaults.end(), all.begin());
+  std::array<rendering::FaultBit, rendering::kRenderFaults.size() + kServoFaults.size()> all{};
+  const auto rest =
+      std::copy(rendering::kRenderFaults.begin(), rendering::kRenderFaults.end(), all.begin());
   std::copy(kServoFaults.begin(), kServoFaults.end(), rest);
   return all;
 }();
 static_assert(std::is_sorted(kFaultBits.begin(), kFaultBits.end(),
-                             [](const FaultBit& a, const FaultBit& b) { return a.bit < b.bit; }));
+                             [](const rendering::FaultBit& a, const rendering::FaultBit& b) {
+                               return a.bit < b.bit;
+                             }));
 
-constexpr const FaultBit& fault_bit(std::uint32_t bit) {
+constexpr const rendering::FaultBit& fault_bit(std::uint32_t bit) {
   return *std::find_if(kFaultBits.begin(), kFaultBits.end(),
-                       [bit](const FaultBit& fault) { return fault.bit == bit; });
+                       [bit](const rendering::FaultBit& fault) { return fault.bit == bit; });
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

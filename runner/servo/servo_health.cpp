@@ -4,7 +4,7 @@
 #include <bit>
 #include <nlohmann/json.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 // One thread writes: a load and a store do, without the locked instruction of an increment.
@@ -111,4 +111,4 @@ std::string to_json_text(const ServoHealth& health, double rate) {
   return json.dump();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

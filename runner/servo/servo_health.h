@@ -11,7 +11,7 @@
 #include "runner/servo/sample.h"
 #include "runner/servo/shared_value.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Counts of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns), from 0
 /// to hours. One thread adds, any may read meanwhile.
@@ -79,4 +79,4 @@ class ServoHealth {
 /// and computing time.
 std::string to_json_text(const ServoHealth& health, double rate);
 
-}  // namespace palpate
+}  // namespace palpate::runner

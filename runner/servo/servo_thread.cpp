@@ -7,7 +7,7 @@
 #include <future>
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using std::chrono::steady_clock;
@@ -80,7 +80,8 @@ void ServoThread::publish(const Sample& sample) noexcept {
   health_.add_lost_sample();
 }
 
-void ServoThread::prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) {
+void ServoThread::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+                          const HomeZone& home) {
   auto stage = std::make_unique<Stage>(scene, renderer, home);
   if (staged_) stop();
   if (!staged_) stages_.clear();
@@ -121,4 +122,4 @@ ServoQuality ServoThread::stop() noexcept {
   return quality_;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

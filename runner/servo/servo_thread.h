@@ -14,7 +14,7 @@
 #include "runner/servo/servo_health.h"
 #include "runner/servo/triple_buffer.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct ServoSettings {
   double rate = 1000;  ///< Hz
@@ -36,7 +36,8 @@ class ServoThread final : public TickSource {
   ServoThread(const ServoThread&) = delete;
   ServoThread& operator=(const ServoThread&) = delete;
 
-  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) override;
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const HomeZone& home) override;
   /// Every sample since prepare, in order. Where the ring overflowed, the first one after the gap
   /// says so (kSamplesLost); where the thread gives nothing for a second, what comes back is its
   /// last sample with kStalled and kTripped.
@@ -88,4 +89,4 @@ class ServoThread final : public TickSource {
   std::jthread thread_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A value that one thread or process writes and others read whole, or not at all: a sequence count
 /// that is odd while it is being written (H.-J. Boehm, "Can seqlocks get along with programming
@@ -42,4 +42,4 @@ class SharedValue {
   std::array<std::atomic<std::uint64_t>, kWords> words_{};
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,7 +2,7 @@
 
 #include "runner/servo/sample.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The servo as a session sees it: in this thread for a simulated participant, in a thread of its
 /// own for a live one.
@@ -10,11 +10,12 @@ class TickSource {
  public:
   virtual ~TickSource() = default;
   /// Puts a scene before the stylus and waits for it in the home zone.
-  virtual void prepare(const Scene& scene, const Renderer& renderer, const HomeZone& home) = 0;
+  virtual void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+                       const HomeZone& home) = 0;
   /// The next tick's sample: every one, in order. Waits for it.
   virtual const Sample& next() noexcept = 0;
   /// Forces off; what the trial was like.
   virtual ServoQuality stop() noexcept = 0;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <cstdint>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The newest value from one thread to one other, older ones dropped. Neither ever waits.
 template <class T>
@@ -31,4 +31,4 @@ class TripleBuffer {
   std::atomic<std::uint8_t> middle_{2};  ///< which lies between them, and whether it is unread
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

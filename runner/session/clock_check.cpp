@@ -4,7 +4,7 @@
 
 #include "data/files/utc.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kSecond = 1e9, kDay = 86400 * kSecond, kYear = 365.25 * kDay;  // ns
@@ -26,7 +26,7 @@ std::string span(double ns) {
 }
 
 std::string day_and_minute(std::int64_t ns) {
-  std::string text = format_utc(ns).substr(0, 16);
+  std::string text = data::format_utc(ns).substr(0, 16);
   text[10] = ' ';
   return text + " UTC";
 }
@@ -59,4 +59,4 @@ std::string clock_doubt(const ClockEvidence& evidence) {
   return "";
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// ns since 1970, UTC.
 struct ClockEvidence {
@@ -17,4 +17,4 @@ struct ClockEvidence {
 /// What speaks against the clock, in words; empty: nothing.
 std::string clock_doubt(const ClockEvidence& evidence);
 
-}  // namespace palpate
+}  // namespace palpate::runner

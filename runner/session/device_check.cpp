@@ -7,7 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -21,9 +21,9 @@ std::string sentence(const Parts&... parts) {
 }
 
 /// The stiffest that the probe can meet in it, N/m.
-double stiffest(const Material& material) {
+double stiffest(const stimuli::Material& material) {
   double out = material.stiffness;
-  for (const Layer& layer : material.layers) out = std::max(out, layer.stiffness);
+  for (const stimuli::Layer& layer : material.layers) out = std::max(out, layer.stiffness);
   return out;
 }
 
@@ -34,19 +34,20 @@ void visit_materials(Object& object, const Visit& visit) {
   for (auto& part : object.parts) visit_materials(part, visit);
 }
 
-void scale_down(Material& material, double share) {
+void scale_down(stimuli::Material& material, double share) {
   material.stiffness *= share;
   material.damping *= share;
-  for (Layer& layer : material.layers) layer.stiffness *= share;
+  for (stimuli::Layer& layer : material.layers) layer.stiffness *= share;
 }
 
 /// \throws std::invalid_argument
-Material& material_of(Protocol& protocol, const std::string& stimulus, int part) {
-  Material* found = nullptr;
-  for (StimulusSpec& candidate : protocol.stimuli) {
+stimuli::Material& material_of(protocols::Protocol& protocol, const std::string& stimulus,
+                               int part) {
+  stimuli::Material* found = nullptr;
+  for (protocols::StimulusSpec& candidate : protocol.stimuli) {
     if (candidate.name != stimulus) continue;
     int at = 0;
-    visit_materials(candidate.object, [&](Material& material) {
+    visit_materials(candidate.object, [&](stimuli::Material& material) {
       if (at++ == part) found = &material;
     });
   }
@@ -58,12 +59,12 @@ Material& material_of(Protocol& protocol, const std::string& stimulus, int part)
 }
 
 /// The device runs no faster than it can, whatever the protocol asks (another misfit).
-double shown_rate(const Protocol& protocol, const DeviceCapabilities& device) {
+double shown_rate(const protocols::Protocol& protocol, const DeviceCapabilities& device) {
   return std::min(protocol.servo_rate, device.max_rate);
 }
 
 /// What the passivity controller would do for a material that cannot be shown whole.
-std::string passivity_advice(const Protocol& protocol, const Material& material,
+std::string passivity_advice(const protocols::Protocol& protocol, const stimuli::Material& material,
                              const DeviceCapabilities& device, const ShowableMaterial& without) {
   if (protocol.passivity_controller) return "";
   const double with =
@@ -78,8 +79,8 @@ std::string passivity_advice(const Protocol& protocol, const Material& material,
 
 }  // namespace
 
-ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
-                          double scale, bool passivity_controller) {
+ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
+                          double rate, double scale, bool passivity_controller) {
   ShowableMaterial out;
   const double stiffness = stiffest(material) * scale, damping = std::abs(material.damping) * scale;
   const auto bound = [&out](double share, const auto&... reason) {
@@ -110,12 +111,14 @@ ShowableMaterial showable(const Material& material, const DeviceCapabilities& de
   return out;
 }
 
-std::vector<LimitedMaterial> limit_materials(Protocol& protocol, const DeviceCapabilities& device) {
+std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
+                                             const DeviceCapabilities& device) {
   std::vector<LimitedMaterial> out;
-  if (protocol.material_limit != MaterialLimit::limit || device.actuated_freedom == 0) return out;
-  for (StimulusSpec& stimulus : protocol.stimuli) {
+  if (protocol.material_limit != protocols::MaterialLimit::limit || device.actuated_freedom == 0)
+    return out;
+  for (protocols::StimulusSpec& stimulus : protocol.stimuli) {
     int part = -1;
-    visit_materials(stimulus.object, [&](Material& material) {
+    visit_materials(stimulus.object, [&](stimuli::Material& material) {
       ++part;
       const ShowableMaterial can =
           showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
@@ -148,12 +151,12 @@ std::string to_json_text(const std::vector<LimitedMaterial>& limited,
       .dump();
 }
 
-bool limit_as_recorded(Protocol& protocol, const std::string& event) {
+bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) {
   const Json json = Json::parse(event, nullptr, false);
   if (!json.is_object() || !json.contains(kLimitedEvent)) return false;
   try {
     for (const Json& one : json.at(kLimitedEvent)) {
-      Material& material =
+      stimuli::Material& material =
           material_of(protocol, one.at("stimulus").get<std::string>(), one.at("part").get<int>());
       if (material.stiffness != one.at("asked_stiffness_n_per_m").get<double>() ||
           material.damping != one.at("asked_damping_ns_per_m").get<double>()) {
@@ -168,18 +171,18 @@ bool limit_as_recorded(Protocol& protocol, const std::string& event) {
   return true;
 }
 
-std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary& library,
-                                 const DeviceCapabilities& device) {
+std::vector<std::string> misfits(const protocols::Protocol& protocol,
+                                 const StimulusLibrary& library, const DeviceCapabilities& device) {
   std::vector<std::string> out;
   const auto add = [&out](const auto&... parts) {
     std::ostringstream text;
     (text << ... << parts);
     out.push_back(text.str());
   };
-  for (const RendererKind kind : protocol.renderers) {
+  for (const protocols::RendererKind kind : protocol.renderers) {
     const int needed = renderer_for(kind).side_contact() ? 5 : 3;
     if (device.sensed_freedom < needed) {
-      add("renderer '", to_string(kind), "' needs a device that senses ", needed,
+      add("renderer '", protocols::to_string(kind), "' needs a device that senses ", needed,
           " degrees of freedom; '", device.name, "' senses ", device.sensed_freedom);
     }
   }
@@ -188,8 +191,8 @@ std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary
         device.max_rate, " Hz");
   }
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    const StimulusSpec& stimulus = protocol.stimuli[i];
-    const auto check_material = [&](const Material& material) {
+    const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
+    const auto check_material = [&](const stimuli::Material& material) {
       const ShowableMaterial can =
           showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
                    protocol.passivity_controller);
@@ -211,4 +214,4 @@ std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

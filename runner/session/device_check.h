@@ -6,11 +6,11 @@
 #include "runner/scene_builder.h"
 #include "runner/servo/device.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Why a protocol cannot be run on a device, one sentence each with what would help; empty: it can.
-std::vector<std::string> misfits(const Protocol& protocol, const StimulusLibrary& library,
-                                 const DeviceCapabilities& device);
+std::vector<std::string> misfits(const protocols::Protocol& protocol,
+                                 const StimulusLibrary& library, const DeviceCapabilities& device);
 
 /// What of a material a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {
@@ -24,8 +24,8 @@ struct ShowableMaterial {
 /// passivity: no hand can make it buzz. The passivity controller makes up for kPassivityExtension
 /// times what the device's own damping does.
 /// \param scale  virtual metres per device metre: the device shows so many times the stiffness
-ShowableMaterial showable(const Material& material, const DeviceCapabilities& device, double rate,
-                          double scale, bool passivity_controller);
+ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
+                          double rate, double scale, bool passivity_controller);
 
 /// `palpate stability` measures far more than this on every scene, as long as a force is written in
 /// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).
@@ -42,7 +42,8 @@ struct LimitedMaterial {
 
 /// Where the protocol asks for limits (servo.material_limit), scales down what the device cannot
 /// show; to be called before its stimuli are made. What was, in order.
-std::vector<LimitedMaterial> limit_materials(Protocol& protocol, const DeviceCapabilities& device);
+std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
+                                             const DeviceCapabilities& device);
 
 /// An event for the session's record, one line of JSON: which materials, as asked and as shown, on
 /// which device and at which rate.
@@ -51,6 +52,6 @@ std::string to_json_text(const std::vector<LimitedMaterial>& limited,
 
 /// Limits the protocol again, to the bit, as an event of to_json_text says; false: it is another
 /// note. \throws std::invalid_argument: it is not of this protocol, or damaged
-bool limit_as_recorded(Protocol& protocol, const std::string& event);
+bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <glm/geometric.hpp>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kRounding = 1e-9;  // N
@@ -64,9 +64,9 @@ class Watcher {
 FeeblePush::FeeblePush(const ForceLimits& limits, bool both_ends)
     : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(both_ends) {}
 
-Rendering FeeblePush::tick(const Scene&, RenderState&, const LineProbe& probe,
-                           double) const noexcept {
-  Rendering out;
+rendering::Rendering FeeblePush::tick(const rendering::Scene&, rendering::RenderState&,
+                                      const rendering::LineProbe& probe, double) const noexcept {
+  rendering::Rendering out;
   out.device1 = Vec3(force_, 0, 0);
   if (both_ends_) out.device2 = out.device1;
   out.force = out.device1 + out.device2;
@@ -75,7 +75,7 @@ Rendering FeeblePush::tick(const Scene&, RenderState&, const LineProbe& probe,
 }
 
 std::string FeeblePush::give(TickSource& servo, const std::function<bool()>& stop) const {
-  const Scene nothing({}, false);
+  const rendering::Scene nothing({}, false);
   constexpr HomeZone kAnywhere{0, 0};
   Watcher watcher(*this);
   std::string fault;
@@ -87,4 +87,4 @@ std::string FeeblePush::give(TickSource& servo, const std::function<bool()>& sto
   return fault.empty() ? watcher.verdict() : fault;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,11 +8,11 @@
 #include "runner/servo/force_limiter.h"
 #include "runner/servo/tick_source.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// To the right, the same wherever the stylus is: a newton, or half of what the limits leave where
 /// that is less.
-class FeeblePush final : public Renderer {
+class FeeblePush final : public rendering::Renderer {
  public:
   static constexpr double kSeconds = 1;
 
@@ -31,8 +31,8 @@ class FeeblePush final : public Renderer {
 
   const char* name() const override { return "push"; }
   bool side_contact() const override { return false; }
-  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
-                 double dt) const noexcept override;
+  rendering::Rendering tick(const rendering::Scene& scene, rendering::RenderState& state,
+                            const rendering::LineProbe& probe, double dt) const noexcept override;
 
  private:
   ForceLimits limits_;
@@ -40,4 +40,4 @@ class FeeblePush final : public Renderer {
   bool both_ends_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 
 #include "runner/session/session.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kNap_ns = 5'000'000;
@@ -86,4 +86,4 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   return trip_reason(sample_.faults, sample_.trouble);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 #include "runner/safety/guard.h"
 #include "runner/servo/servo_thread.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Belongs to the session's thread: it takes the servo's newest samples.
 class LiveForces {
@@ -41,4 +41,4 @@ class LiveForces {
   Sample sample_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kSecond_ns = 1e9;
@@ -42,7 +42,7 @@ const char* word(Session::State state) {
 
 }  // namespace
 
-LiveSession::LiveSession(const Parts& parts, const ClockStamp& stamp, const SessionPlan& plan)
+LiveSession::LiveSession(const Parts& parts, const data::ClockStamp& stamp, const SessionPlan& plan)
     : parts_(parts),
       respondent_(parts.protocol, parts.screen, *this, parts.clock, parts.answer_by),
       session_({parts.protocol, parts.library, parts.servo, parts.clock, respondent_, parts.record,
@@ -53,7 +53,7 @@ LiveSession::LiveSession(const Parts& parts, const ClockStamp& stamp, const Sess
   state_.study = parts.protocol.name;
   state_.participant = marker_.participant = parts.record.participant().code;
   state_.session = marker_.session = parts.record.session();
-  for (const StimulusSpec& stimulus : parts.protocol.stimuli)
+  for (const protocols::StimulusSpec& stimulus : parts.protocol.stimuli)
     state_.scores.push_back({stimulus.name, 0, 0});
 }
 
@@ -61,7 +61,7 @@ LiveSession::Outcome LiveSession::run() {
   Outcome outcome;
   try {
     outcome = go_through();
-  } catch (const StoreError&) {
+  } catch (const data::StoreError&) {
     forces_.off();
     throw;
   }
@@ -69,7 +69,7 @@ LiveSession::Outcome LiveSession::run() {
   outcome.recorded = session_.plan().done();
   outcome.trials = session_.plan().size();
   stop_noise();
-  if (outcome.end == RunEnd::withdrawn) parts_.record.begin();  // whenever it comes
+  if (outcome.end == data::RunEnd::withdrawn) parts_.record.begin();  // whenever it comes
   const std::int64_t now = parts_.clock.now_ns();
   for (const std::string& text : parts_.record.waiting()) {
     if (text.front() != '{') outcome.unkept.push_back(text);
@@ -78,7 +78,8 @@ LiveSession::Outcome LiveSession::run() {
   parts_.record.note(now, to_json_text(parts_.servo.health(), parts_.protocol.servo_rate));
   parts_.record.end(outcome.end, now);
   show_console();
-  if (outcome.end != RunEnd::done) respondent_.show_message("");  // it was not the last object
+  if (outcome.end != data::RunEnd::done)
+    respondent_.show_message("");  // it was not the last object
   return outcome;
 }
 
@@ -89,15 +90,15 @@ LiveSession::Outcome LiveSession::go_through() {
       session_.step();
     } catch (const SessionFault& fault) {
       if (const int signal = parts_.end_requested()) {
-        return {RunEnd::aborted, std::string("signal: ") + strsignal(signal), 0, 0, true};
+        return {data::RunEnd::aborted, std::string("signal: ") + strsignal(signal), 0, 0, true};
       }
       stop_noise();
       if (fault.trouble == DeviceTrouble::guard_lost)
-        return {RunEnd::aborted, fault.reason, 0, 0, true};
+        return {data::RunEnd::aborted, fault.reason, 0, 0, true};
       hold(fault.reason, fault.passed(), fault.trouble);
       say(std::string(fault.what()) + "; " + ways_on());
     } catch (const EndOfSession& end) {
-      if (session_.plan().finished() && end.end != RunEnd::withdrawn) break;
+      if (session_.plan().finished() && end.end != data::RunEnd::withdrawn) break;
       return {end.end, end.what(), 0, 0, end.failed};
     }
   }
@@ -111,7 +112,7 @@ void LiveSession::take_last_words(Outcome& outcome) {
     if (command.kind == ConsoleCommand::Kind::note) note(command.time_ns, command.text);
     if (command.kind != ConsoleCommand::Kind::quit) continue;
     const EndOfSession end = end_by_experimenter(command.text);
-    if (end.end == RunEnd::withdrawn) outcome = {end.end, end.what(), 0, 0, false};
+    if (end.end == data::RunEnd::withdrawn) outcome = {end.end, end.what(), 0, 0, false};
   }
 }
 
@@ -123,7 +124,8 @@ void LiveSession::between_trials() {
   const auto& longest = parts_.protocol.sessions.max_minutes;
   const double elapsed = static_cast<double>(parts_.clock.now_ns() - started_ns_) / kSecond_ns;
   if (longest && elapsed > *longest * 60)
-    throw EndOfSession(RunEnd::paused, "the session has lasted as long as the protocol allows");
+    throw EndOfSession(data::RunEnd::paused,
+                       "the session has lasted as long as the protocol allows");
   respondent_.set_progress(session_.plan().done(), session_.plan().size());
   if (now != Session::State::trial) stop_noise();  // a page to read, and perhaps to talk about
   do {
@@ -136,7 +138,7 @@ void LiveSession::stop_if_due() {
   const bool block_begins = now == Session::State::practice || now == Session::State::block;
   const bool began = session_.plan().done() > 0 || now != Session::State::instruction;
   if (stop_ == Stop::after_trial || (stop_ == Stop::after_block && block_begins && began))
-    throw EndOfSession(RunEnd::paused, "stopped by the experimenter, to be continued");
+    throw EndOfSession(data::RunEnd::paused, "stopped by the experimenter, to be continued");
 }
 
 void LiveSession::wait_while_held() {
@@ -159,7 +161,7 @@ void LiveSession::wait_while_held() {
 
 void LiveSession::attend() {
   if (const int signal = parts_.end_requested())
-    throw EndOfSession(RunEnd::aborted, std::string("signal: ") + strsignal(signal), true);
+    throw EndOfSession(data::RunEnd::aborted, std::string("signal: ") + strsignal(signal), true);
   for (ConsoleCommand& command : parts_.console.commands()) commands_.push_back(std::move(command));
   while (!commands_.empty()) {  // one of them may throw: the rest is obeyed later
     const ConsoleCommand command = std::move(commands_.front());
@@ -169,14 +171,14 @@ void LiveSession::attend() {
   watch_noise();
   watch_device();
   if (!parts_.screen.open())
-    throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
+    throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
   if (parts_.clock.now_ns() - shown_ns_ >= kFrame_ns) show_console();
   end_with_the_guard();
 }
 
 void LiveSession::end_with_the_guard() const {
   if (state_.sample.trouble == DeviceTrouble::guard_lost)
-    throw EndOfSession(RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
+    throw EndOfSession(data::RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
 }
 
 /// In a break no trial would tell of a device that is gone.
@@ -333,7 +335,7 @@ void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   try {
     parts_.record.note(at_ns, text);
     say("note: " + text);
-  } catch (const StoreRefused& refused) {  // empty, or no UTF-8
+  } catch (const data::StoreRefused& refused) {  // empty, or no UTF-8
     say(refused.what());
   }
 }
@@ -367,18 +369,19 @@ void LiveSession::show_console() {
   parts_.console.show(state_);
 }
 
-void LiveSession::began(const Trial& trial) {
-  const StimulusSpec& stimulus = parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
+void LiveSession::began(const protocols::Trial& trial) {
+  const protocols::StimulusSpec& stimulus =
+      parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
   in_trial_ = true;
   feeling_ = false;
   began_ns_ = parts_.clock.now_ns();
-  ObjectSpec object = stimulus.object;
+  stimuli::ObjectSpec object = stimulus.object;
   object.pose = {trial.orientation * object.pose.position,
                  trial.orientation * object.pose.orientation};
-  state_.objects = std::make_shared<const std::vector<ObjectSpec>>(1, std::move(object));
+  state_.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, std::move(object));
   state_.shape = stimulus.name;
   state_.practice = trial.practice;
-  state_.renderer = to_string(trial.renderer);
+  state_.renderer = protocols::to_string(trial.renderer);
   state_.block = marker_.block = trial.block;
   state_.trial = marker_.trial = trial.trial;
   marker_.shape = state_.shape;
@@ -388,7 +391,7 @@ void LiveSession::began(const Trial& trial) {
   show_console();
 }
 
-void LiveSession::onset(const TrialRecord& so_far) {
+void LiveSession::onset(const data::TrialRecord& so_far) {
   feeling_ = true;
   if (parts_.noise != nullptr) parts_.noise->tone();
   marker_.kind = Marker::Kind::trial_start;
@@ -397,13 +400,13 @@ void LiveSession::onset(const TrialRecord& so_far) {
   parts_.markers.send(marker_);
 }
 
-void LiveSession::first_contact(const TrialRecord&, std::int64_t time_ns) {
+void LiveSession::first_contact(const data::TrialRecord&, std::int64_t time_ns) {
   marker_.kind = Marker::Kind::first_contact;
   marker_.time_ns = time_ns;
   parts_.markers.send(marker_);
 }
 
-void LiveSession::answered(const TrialRecord& record) {
+void LiveSession::answered(const data::TrialRecord& record) {
   in_trial_ = false;
   marker_.kind = record.timed_out ? Marker::Kind::time_out : Marker::Kind::response;
   marker_.response = record.response;
@@ -419,7 +422,7 @@ void LiveSession::cut_off(const std::string& reason) {
   say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
 }
 
-void LiveSession::count(const TrialRecord& record) {
+void LiveSession::count(const data::TrialRecord& record) {
   if (record.practice) return;
   for (ShapeScore& score : state_.scores) {
     if (score.shape != record.shape) continue;
@@ -428,7 +431,7 @@ void LiveSession::count(const TrialRecord& record) {
   }
 }
 
-void LiveSession::recorded(const TrialRecord& record) {
+void LiveSession::recorded(const data::TrialRecord& record) {
   state_.answer = record.timed_out ? "none in time"
                                    : record.response + (record.correct ? ", right" : ", wrong");
   count(record);
@@ -441,4 +444,4 @@ void LiveSession::recorded(const TrialRecord& record) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

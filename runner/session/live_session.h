@@ -18,13 +18,13 @@
 #include "runner/session/session_end.h"
 #include "runner/sound/masking_noise.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 class LiveSession final : public Attendant, private SessionEvents {
  public:
   /// All must outlive it.
   struct Parts {
-    const Protocol& protocol;
+    const protocols::Protocol& protocol;
     const StimulusLibrary& library;
     ServoThread& servo;
     GuardedDevice* guard;  ///< may be none
@@ -40,14 +40,14 @@ class LiveSession final : public Attendant, private SessionEvents {
 
   /// What became of it.
   struct Outcome {
-    RunEnd end = RunEnd::done;
+    data::RunEnd end = data::RunEnd::done;
     std::string reason;  ///< empty when done
     std::size_t recorded = 0, trials = 0;
     bool failed = false;                ///< a signal or a fault, not somebody's wish, was the end
     std::vector<std::string> unkept{};  ///< the experimenter's notes, where no run was begun
   };
 
-  LiveSession(const Parts& parts, const ClockStamp& stamp, const SessionPlan& plan);
+  LiveSession(const Parts& parts, const data::ClockStamp& stamp, const SessionPlan& plan);
 
   /// Until the session is over, for good or for today; the run's end is on record, if it has begun.
   /// \throws StoreError: what was not acknowledged is not on record; forces are zero.
@@ -57,7 +57,7 @@ class LiveSession final : public Attendant, private SessionEvents {
   void attend() override;
   void say(const std::string& message);
   /// A trial that is on record, for the accuracy so far.
-  void count(const TrialRecord& record);
+  void count(const data::TrialRecord& record);
 
  private:
   Outcome go_through();
@@ -82,12 +82,12 @@ class LiveSession final : public Attendant, private SessionEvents {
   void note(std::int64_t at_ns, const std::string& text);
   void show_console();
 
-  void began(const Trial& trial) override;
-  void onset(const TrialRecord& so_far) override;
-  void first_contact(const TrialRecord& so_far, std::int64_t time_ns) override;
-  void answered(const TrialRecord& record) override;
+  void began(const protocols::Trial& trial) override;
+  void onset(const data::TrialRecord& so_far) override;
+  void first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) override;
+  void answered(const data::TrialRecord& record) override;
   void cut_off(const std::string& reason) override;
-  void recorded(const TrialRecord& record) override;
+  void recorded(const data::TrialRecord& record) override;
 
   Parts parts_;
   KeyboardRespondent respondent_;
@@ -113,4 +113,4 @@ class LiveSession final : public Attendant, private SessionEvents {
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

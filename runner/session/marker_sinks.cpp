@@ -19,7 +19,7 @@
 #include "runner/servo/realtime.h"
 #include "runner/session/markers.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 class File {
@@ -238,4 +238,4 @@ std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCode
   refuse(name);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

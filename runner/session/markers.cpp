@@ -5,7 +5,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::size_t kMostWaiting = 1000;
@@ -84,4 +84,4 @@ void Markers::work() {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 struct Marker {
   enum class Kind : std::uint8_t {  // the value is what the serial port gets
@@ -75,4 +75,4 @@ class Markers {
   std::jthread thread_;  ///< none where there is no sink
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Those of `known` that `code` may have been meant to be: written otherwise (P01, p01, P1, PO1),
 /// or a letter away (PP01, SUJB01). What differs by digits alone is another participant: P01, P02.
 std::vector<std::string> near_codes(const std::string& code, const std::vector<std::string>& known);
 
-}  // namespace palpate
+}  // namespace palpate::runner

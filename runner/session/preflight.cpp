@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr int kHomedLongEnough = 20;  // samples in a row
@@ -184,4 +184,4 @@ Checklist Preflight::checklist() const {
   return list;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,7 +10,7 @@
 #include "runner/servo/sample.h"
 #include "runner/session/feeble_push.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct PreflightNeeds {
   double reach = 0;  ///< m, virtual frame: how far the tip must go to either side of the centre on
@@ -65,4 +65,4 @@ class Preflight {
   std::vector<Step> left_out_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

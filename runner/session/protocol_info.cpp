@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
-void add_files(const ObjectSpec& spec, std::vector<ProtocolFile>& files) {
-  for (const ObjectSpec& part : spec.parts) add_files(part, files);
+void add_files(const stimuli::ObjectSpec& spec, std::vector<data::ProtocolFile>& files) {
+  for (const stimuli::ObjectSpec& part : spec.parts) add_files(part, files);
   if (!spec.file_bytes) return;
   const bool known = std::any_of(files.begin(), files.end(),
                                  [&](const auto& file) { return file.name == spec.file_name; });
@@ -15,10 +15,11 @@ void add_files(const ObjectSpec& spec, std::vector<ProtocolFile>& files) {
 
 }  // namespace
 
-ProtocolInfo info_of(const Protocol& protocol) {
-  ProtocolInfo info{protocol.name, protocol.source_text, protocol.sha256};
-  for (const StimulusSpec& stimulus : protocol.stimuli) add_files(stimulus.object, info.files);
+data::ProtocolInfo info_of(const protocols::Protocol& protocol) {
+  data::ProtocolInfo info{protocol.name, protocol.source_text, protocol.sha256};
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    add_files(stimulus.object, info.files);
   return info;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

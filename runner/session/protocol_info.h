@@ -3,9 +3,9 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A protocol as the store keeps it: its text, and every file that it names as it was read.
-ProtocolInfo info_of(const Protocol& protocol);
+data::ProtocolInfo info_of(const protocols::Protocol& protocol);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,13 +7,14 @@
 #include "runner/scene_builder.h"
 #include "runner/servo/servo.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::uint32_t kRendererFaults = servo_fault::kForceLimited - 1;  // the low bits
 
-Trial trial_of(const Protocol& protocol, const TrialRecord& recorded, RendererKind renderer) {
-  Trial trial;
+protocols::Trial trial_of(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
+                          protocols::RendererKind renderer) {
+  protocols::Trial trial;
   trial.session = recorded.session;
   trial.block = recorded.block;
   trial.trial = recorded.trial;
@@ -35,8 +36,9 @@ bool equal(const std::array<double, 3>& recorded, const Vec3& again) {
 
 }  // namespace
 
-void replay(const Protocol& protocol, const TrialRecord& recorded, RendererKind renderer,
-            const std::function<void(const SampleRecord&, const Sample&)>& visit) {
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
+            protocols::RendererKind renderer,
+            const std::function<void(const data::SampleRecord&, const Sample&)>& visit) {
   const StimulusLibrary library(protocol);
   ReplayDevice device(recorded.samples, protocol.servo_rate);
   ForceLimits limits;
@@ -46,16 +48,16 @@ void replay(const Protocol& protocol, const TrialRecord& recorded, RendererKind 
   constexpr HomeZone kAnywhere{0, 0};
   servo.prepare(library.scene(trial_of(protocol, recorded, renderer)), renderer_for(renderer),
                 kAnywhere);
-  for (const SampleRecord& sample : recorded.samples) visit(sample, servo.tick());
+  for (const data::SampleRecord& sample : recorded.samples) visit(sample, servo.tick());
   servo.stop();
 }
 
-bool equals_record(const SampleRecord& recorded, const Sample& again) {
-  const Rendering& r = again.rendering;
+bool equals_record(const data::SampleRecord& recorded, const Sample& again) {
+  const rendering::Rendering& r = again.rendering;
   return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
          recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
          recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
          (recorded.faults & kRendererFaults) == (r.faults & kRendererFaults);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 #include "protocols/protocol.h"
 #include "runner/servo/sample.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Puts a recorded trial through the servo and a renderer again.
 /// \param recorded  with samples
@@ -14,12 +14,13 @@ namespace palpate {
 ///                  have shown on the same way
 /// \param visit     each recorded tick and what comes of it now, in order
 /// \throws std::invalid_argument where the protocol has no such stimulus
-void replay(const Protocol& protocol, const TrialRecord& recorded, RendererKind renderer,
-            const std::function<void(const SampleRecord&, const Sample&)>& visit);
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
+            protocols::RendererKind renderer,
+            const std::function<void(const data::SampleRecord&, const Sample&)>& visit);
 
 /// Whether a tick's rendering is what is on record, bit by bit (a zero's sign aside, which the
 /// store does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault
 /// bits.
-bool equals_record(const SampleRecord& recorded, const Sample& again);
+bool equals_record(const data::SampleRecord& recorded, const Sample& again);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,10 +2,11 @@
 
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 
-RunRecord::RunRecord(Store& store, const ProtocolInfo& protocol, const Participant& participant,
-                     const RunInfo& info, const std::optional<ProtocolInfo>& shown_with)
+RunRecord::RunRecord(data::Store& store, const data::ProtocolInfo& protocol,
+                     const data::Participant& participant, const data::RunInfo& info,
+                     const std::optional<data::ProtocolInfo>& shown_with)
     : store_(store),
       protocol_(protocol),
       participant_(participant),
@@ -32,7 +33,7 @@ void RunRecord::note(std::int64_t at_ns, const std::string& text) {
   waiting_.push_back({at_ns, text});
 }
 
-void RunRecord::end(RunEnd how, std::int64_t ended_ns) {
+void RunRecord::end(data::RunEnd how, std::int64_t ended_ns) {
   if (run_) store_.end_run(*run_, how, ended_ns);
 }
 
@@ -42,9 +43,9 @@ std::vector<std::string> RunRecord::waiting() const {
   return texts;
 }
 
-int RunRecord::begin(const TrialRecord& planned, std::int64_t began_ns) {
+int RunRecord::begin(const data::TrialRecord& planned, std::int64_t began_ns) {
   begin();
   return store_.begin_attempt(*run_, planned, began_ns);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

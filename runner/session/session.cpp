@@ -6,7 +6,7 @@
 
 #include "data/files/utc.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kPerSecond_ns = 1e9;
@@ -16,7 +16,7 @@ std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 }  // namespace
 
 bool SessionFault::passed() const {
-  if (faults & (servo_fault::kEmergency | render_fault::kNonFinite)) return false;
+  if (faults & (servo_fault::kEmergency | rendering::render_fault::kNonFinite)) return false;
   if (faults & servo_fault::kDeviceLost)
     return trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded;
   return (faults & (servo_fault::kMissedTicks | servo_fault::kStalled)) != 0;
@@ -25,7 +25,7 @@ bool SessionFault::passed() const {
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   using namespace servo_fault;
   for (const std::uint32_t bit :
-       {kEmergency, kStalled, kDeviceLost, kMissedTicks, render_fault::kNonFinite}) {
+       {kEmergency, kStalled, kDeviceLost, kMissedTicks, rendering::render_fault::kNonFinite}) {
     if ((faults & bit) == 0) continue;
     std::string why = bit == kDeviceLost ? advice(trouble) : "";
     if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
@@ -36,7 +36,7 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   return fault_bit(kTripped).why;
 }
 
-Session::Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp)
+Session::Session(const Parts& parts, SessionPlan plan, const data::ClockStamp& stamp)
     : parts_(parts), plan_(std::move(plan)), stamp_(stamp) {}
 
 Session::State Session::before_trial() const {
@@ -80,12 +80,12 @@ void Session::step() {
   }
 }
 
-TrialRecord Session::planned_record(const Trial& trial) const {
-  TrialRecord record;
+data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
+  data::TrialRecord record;
   record.session = trial.session;
   record.block = trial.block;
   record.trial = trial.trial;
-  record.renderer = to_string(trial.renderer);
+  record.renderer = protocols::to_string(trial.renderer);
   record.shape = parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
   record.practice = trial.practice;
   const Quat& q = trial.orientation;
@@ -126,8 +126,8 @@ std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& 
 }
 
 bool Session::run_trial() {
-  const Trial& trial = plan_.next();
-  const Protocol& protocol = parts_.protocol;
+  const protocols::Trial& trial = plan_.next();
+  const protocols::Protocol& protocol = parts_.protocol;
   record_ = planned_record(trial);
   record_.attempt = parts_.log.begin(record_, parts_.clock.now_ns());
   if (parts_.events != nullptr) parts_.events->began(trial);
@@ -173,7 +173,7 @@ bool Session::run_trial() {
   record_.missed_ticks = quality.missed_ticks;
   record_.longest_period_ns = quality.longest_period_ns;
   record_.faults = quality.faults;
-  record_.started_inside = (quality.faults & render_fault::kStartedInside) != 0;
+  record_.started_inside = (quality.faults & rendering::render_fault::kStartedInside) != 0;
   record_.max_force = quality.max_force;
   if (parts_.events != nullptr) parts_.events->answered(record_);
   return true;
@@ -182,12 +182,12 @@ bool Session::run_trial() {
 void Session::note(const Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
-    record_.onset_utc = format_utc(to_unix_ns(stamp_, sample.time_ns));
+    record_.onset_utc = data::format_utc(data::to_unix_ns(stamp_, sample.time_ns));
     record_.start_tip = values(sample.probe.tip);
     record_.start_tail = values(sample.probe.tail);
     if (parts_.events != nullptr) parts_.events->onset(record_);
   }
-  const Rendering& rendering = sample.rendering;
+  const rendering::Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
     record_.first_contact_time =
         static_cast<double>(sample.time_ns - record_.onset_ns) / kPerSecond_ns;
@@ -196,8 +196,8 @@ void Session::note(const Sample& sample) {
 }
 
 void Session::keep(const Sample& sample) {
-  const Rendering& rendering = sample.rendering;
-  SampleRecord kept;
+  const rendering::Rendering& rendering = sample.rendering;
+  data::SampleRecord kept;
   kept.tick = sample.tick;
   kept.period_ns = sample.period_ns;
   kept.lateness_ns = sample.lateness_ns;
@@ -216,4 +216,4 @@ void Session::keep(const Sample& sample) {
   record_.samples.push_back(kept);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

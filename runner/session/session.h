@@ -13,7 +13,7 @@
 #include "runner/session/session_plan.h"
 #include "runner/session/trial_log.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What was in front of the participant was no trial any more: lost device, forces tripped. The
 /// attempt is on record as cut off, the forces are zero.
@@ -35,14 +35,15 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
 class SessionEvents {
  public:
   virtual ~SessionEvents() = default;
-  virtual void began(const Trial& trial) = 0;
+  virtual void began(const protocols::Trial& trial) = 0;
   /// Time zero.
-  virtual void onset(const TrialRecord& so_far) = 0;
+  virtual void onset(const data::TrialRecord& so_far) = 0;
   /// \param time_ns  session clock
-  virtual void first_contact(const TrialRecord& so_far, std::int64_t time_ns) = 0;
-  virtual void answered(const TrialRecord& record) = 0;  ///< not on record yet; also a time-out
+  virtual void first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) = 0;
+  virtual void answered(
+      const data::TrialRecord& record) = 0;  ///< not on record yet; also a time-out
   virtual void cut_off(const std::string& reason) = 0;
-  virtual void recorded(const TrialRecord& record) = 0;
+  virtual void recorded(const data::TrialRecord& record) = 0;
 };
 
 class Session {
@@ -59,7 +60,7 @@ class Session {
 
   /// All of it must outlive the session.
   struct Parts {
-    const Protocol& protocol;
+    const protocols::Protocol& protocol;
     const StimulusLibrary& library;
     TickSource& servo;
     Clock& clock;
@@ -73,7 +74,7 @@ class Session {
 
   /// \param plan  already fed with what is on record
   /// \param stamp  ties the clock to the calendar
-  Session(const Parts& parts, SessionPlan plan, const ClockStamp& stamp);
+  Session(const Parts& parts, SessionPlan plan, const data::ClockStamp& stamp);
 
   State state() const { return state_; }
   const SessionPlan& plan() const { return plan_; }
@@ -85,7 +86,7 @@ class Session {
 
  private:
   State before_trial() const;
-  TrialRecord planned_record(const Trial& trial) const;
+  data::TrialRecord planned_record(const protocols::Trial& trial) const;
   bool run_trial();  ///< false: it was cut off
   std::optional<Answer> feel_trial(std::uint32_t& faults, DeviceTrouble& trouble);
   void cut_off(const std::string& reason);
@@ -95,9 +96,9 @@ class Session {
 
   Parts parts_;
   SessionPlan plan_;
-  ClockStamp stamp_;
+  data::ClockStamp stamp_;
   State state_ = State::instruction;
-  TrialRecord record_;  ///< of the trial under way
+  data::TrialRecord record_;  ///< of the trial under way
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::array<std::string_view, 5> kWithdrawals = {"withdrawn", "withdraws", "withdraw",
@@ -26,9 +26,10 @@ EndOfSession end_by_experimenter(const std::string& words) {
     end = std::find_if_not(begin, words.end(), is_letter);
     const std::string word(begin, end);
     if (!says_withdrawn(word)) continue;
-    return {RunEnd::withdrawn, "the participant withdrew" + (word == words ? "" : ": " + words)};
+    return {data::RunEnd::withdrawn,
+            "the participant withdrew" + (word == words ? "" : ": " + words)};
   }
-  return {RunEnd::aborted, "ended by the experimenter" + (words.empty() ? "" : ": " + words)};
+  return {data::RunEnd::aborted, "ended by the experimenter" + (words.empty() ? "" : ": " + words)};
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,14 +6,14 @@
 
 #include "data/record.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The end of a session before its last trial; what() says why, for the record.
 class EndOfSession : public std::runtime_error {
  public:
-  EndOfSession(RunEnd how, const std::string& why, bool unwanted = false)
+  EndOfSession(data::RunEnd how, const std::string& why, bool unwanted = false)
       : std::runtime_error(why), end(how), failed(unwanted) {}
-  RunEnd end;
+  data::RunEnd end;
   bool failed;  ///< nobody wished it
 };
 
@@ -21,4 +21,4 @@ class EndOfSession : public std::runtime_error {
 /// lost: any word that says so counts, in any case of letters.
 EndOfSession end_by_experimenter(const std::string& words);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <iterator>
 
-namespace palpate {
+namespace palpate::runner {
 
-SessionPlan::SessionPlan(const Protocol& protocol, int participant_number, int session)
+SessionPlan::SessionPlan(const protocols::Protocol& protocol, int participant_number, int session)
     : protocol_(&protocol), participant_number_(participant_number) {
-  const std::vector<Trial> all = schedule(protocol, participant_number);
+  const std::vector<protocols::Trial> all = protocols::schedule(protocol, participant_number);
   std::copy_if(all.begin(), all.end(), std::back_inserter(trials_),
-               [session](const Trial& trial) { return trial.session == session; });
+               [session](const protocols::Trial& trial) { return trial.session == session; });
   const bool warms_up = session > 1 && protocol.sessions.warm_up_trials > 0;
   if (!trials_.empty()) first_practice_block_ = trials_.front().block + (warms_up ? 1 : 0);
 }
@@ -19,7 +19,7 @@ bool SessionPlan::block_begins() const {
 }
 
 void SessionPlan::answered(bool correct) {
-  const Trial& trial = trials_[next_++];
+  const protocols::Trial& trial = trials_[next_++];
   if (!trial.practice || trial.block < first_practice_block_) return;
   ++shown_;
   correct_ += correct ? 1 : 0;
@@ -34,11 +34,11 @@ void SessionPlan::judge_practice() {
     round_ = 1;
     return;
   }
-  const Trial& last = trials_[next_ - 1];
+  const protocols::Trial& last = trials_[next_ - 1];
   const int session = last.session, block = last.block;
-  std::vector<Trial> again =
-      practice_round(*protocol_, participant_number_, last.renderer, ++round_);
-  for (Trial& trial : again) {
+  std::vector<protocols::Trial> again =
+      protocols::practice_round(*protocol_, participant_number_, last.renderer, ++round_);
+  for (protocols::Trial& trial : again) {
     trial.session = session;
     trial.block = block;
   }
@@ -46,4 +46,4 @@ void SessionPlan::judge_practice() {
   for (std::size_t i = 0; i < trials_.size(); ++i) trials_[i].trial = static_cast<int>(i) + 1;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

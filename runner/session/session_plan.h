@@ -4,16 +4,16 @@
 
 #include "protocols/schedule.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The trials of one session in order, grown by further rounds of practice until the protocol's
 /// criterion is met. Feeding it the answers on record brings it to where a session was interrupted.
 class SessionPlan {
  public:
-  SessionPlan(const Protocol& protocol, int participant_number, int session);
+  SessionPlan(const protocols::Protocol& protocol, int participant_number, int session);
 
   bool finished() const { return next_ == trials_.size(); }
-  const Trial& next() const { return trials_[next_]; }  ///< \pre not finished()
+  const protocols::Trial& next() const { return trials_[next_]; }  ///< \pre not finished()
   std::size_t done() const { return next_; }
   std::size_t size() const { return trials_.size(); }  ///< as far as is known now
   /// The number of its last block.
@@ -26,13 +26,13 @@ class SessionPlan {
  private:
   void judge_practice();
 
-  const Protocol* protocol_;
+  const protocols::Protocol* protocol_;
   int participant_number_;
-  std::vector<Trial> trials_;
+  std::vector<protocols::Trial> trials_;
   std::size_t next_ = 0;
   int first_practice_block_ = 0;  ///< blocks before it are warm-up
   int round_ = 1;                 ///< of the practice under way
   int correct_ = 0, shown_ = 0;   ///< in that round
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -17,7 +17,7 @@
 #include "runner/session/protocol_info.h"
 #include "runner/session/session.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
@@ -25,11 +25,11 @@ constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-0
 
 /// One session of one participant, with what the store already holds of it.
 struct Work {
-  Participant participant;
+  data::Participant participant;
   int session = 1;
   std::vector<bool> answers;  ///< correct or not, of the trials on record
   std::int64_t clock_ns = 0;  ///< where the session's clock stood
-  RunInfo info;
+  data::RunInfo info;
 };
 
 /// From the workers to the thread that owns the store.
@@ -37,7 +37,7 @@ class Queue {
  public:
   explicit Queue(std::size_t room) : room_(room) {}
 
-  void push(std::size_t work, const TrialRecord& record) {
+  void push(std::size_t work, const data::TrialRecord& record) {
     std::unique_lock lock(mutex_);
     drained_.wait(lock, [&] { return records_.size() < room_; });
     records_.emplace_back(work, record);
@@ -50,7 +50,7 @@ class Queue {
     done_.notify_all();
   }
   /// Waits for up to 0.2 s, or until the workers are done or held up; takes what has come.
-  std::deque<std::pair<std::size_t, TrialRecord>> take(int workers, bool& all_done) {
+  std::deque<std::pair<std::size_t, data::TrialRecord>> take(int workers, bool& all_done) {
     std::unique_lock lock(mutex_);
     done_.wait_for(lock, std::chrono::milliseconds(200),
                    [&] { return workers_done_ == workers || records_.size() >= room_; });
@@ -66,7 +66,7 @@ class Queue {
   const std::size_t room_;
   std::mutex mutex_;
   std::condition_variable drained_, done_;
-  std::deque<std::pair<std::size_t, TrialRecord>> records_;
+  std::deque<std::pair<std::size_t, data::TrialRecord>> records_;
   int workers_done_ = 0;
   std::exception_ptr error_;
 };
@@ -74,8 +74,8 @@ class Queue {
 class QueueLog final : public TrialLog {
  public:
   QueueLog(Queue& queue, std::size_t work) : queue_(queue), work_(work) {}
-  int begin(const TrialRecord&, std::int64_t) override { return 1; }
-  void finish(const TrialRecord& record) override { queue_.push(work_, record); }
+  int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
+  void finish(const data::TrialRecord& record) override { queue_.push(work_, record); }
   void cut_off(const std::string& reason) override {
     throw std::logic_error("a simulated trial was cut off: " + reason);
   }
@@ -85,7 +85,7 @@ class QueueLog final : public TrialLog {
   std::size_t work_;
 };
 
-SessionPlan plan_of(const Protocol& protocol, const Work& work) {
+SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
   SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
   for (const bool correct : work.answers) plan.answered(correct);
   return plan;
@@ -93,7 +93,7 @@ SessionPlan plan_of(const Protocol& protocol, const Work& work) {
 
 /// What all workers share, read only.
 struct Shared {
-  const Protocol& protocol;
+  const protocols::Protocol& protocol;
   const SimulatedSettings& settings;
   StimulusLibrary library;
   ShapeHypotheses hypotheses;
@@ -105,7 +105,7 @@ struct Shared {
 };
 
 void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue) {
-  const Protocol& protocol = shared.protocol;
+  const protocols::Protocol& protocol = shared.protocol;
   const SimulatedSettings own =
       individual(shared.settings, shared.seed, work.participant.enrolled_number);
   SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -126,20 +126,21 @@ void run_session(const Shared& shared, const Work& work, std::size_t index, Queu
   }
 }
 
-std::vector<Work> unfinished_work(const Protocol& protocol, Store& store,
+std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Store& store,
                                   const SimulatedSettings& settings, const StudyPlan& plan,
                                   StudyProgress& progress) {
   std::vector<Work> todo;
-  const ProtocolInfo info = info_of(protocol);
+  const data::ProtocolInfo info = info_of(protocol);
   for (int number = 1; number <= plan.participants; ++number) {
-    const Participant participant =
+    const data::Participant participant =
         store.enrol(info, simulated_code(number), number, true, plan.seed);
     for (int session = 1; session <= protocol.sessions.count; ++session) {
       Work work;
       work.participant = participant;
       work.session = session;
-      const SessionProgress before = store.progress(participant, session);
-      for (const TrialRecord& record : before.completed) work.answers.push_back(record.correct);
+      const data::SessionProgress before = store.progress(participant, session);
+      for (const data::TrialRecord& record : before.completed)
+        work.answers.push_back(record.correct);
       work.clock_ns = before.latest_ns;
       const std::int64_t day =
           (number - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
@@ -163,24 +164,26 @@ std::vector<Work> unfinished_work(const Protocol& protocol, Store& store,
 /// The store's side: begins a run with its first record, ends it when its session is complete.
 class Recorder {
  public:
-  Recorder(const Protocol& protocol, Store& store, std::vector<Work>& work, std::string event)
+  Recorder(const protocols::Protocol& protocol, data::Store& store, std::vector<Work>& work,
+           std::string event)
       : store_(store), work_(work), event_(std::move(event)) {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
   }
 
-  void record(std::deque<std::pair<std::size_t, TrialRecord>>&& came, StudyProgress& progress) {
-    std::map<std::size_t, std::vector<TrialRecord>> by_work;
+  void record(std::deque<std::pair<std::size_t, data::TrialRecord>>&& came,
+              StudyProgress& progress) {
+    std::map<std::size_t, std::vector<data::TrialRecord>> by_work;
     for (auto& [index, record] : came) by_work[index].push_back(std::move(record));
     for (auto& [index, records] : by_work) {
       auto run = runs_.find(index);
       if (run == runs_.end()) {
-        const RunInfo& info = work_[index].info;
+        const data::RunInfo& info = work_[index].info;
         run = runs_.emplace(index, store_.begin_run(work_[index].participant, info)).first;
         if (!event_.empty()) store_.add_note(run->second, info.clock.monotonic_ns, event_);
       }
       store_.record_simulated(run->second, records);
       SessionPlan& plan = plans_[index];
-      for (const TrialRecord& record : records) {
+      for (const data::TrialRecord& record : records) {
         const std::size_t size = plan.size();
         plan.answered(record.correct);
         progress.expected += static_cast<std::int64_t>(plan.size() - size);
@@ -191,40 +194,42 @@ class Recorder {
       progress.simulated_seconds += static_cast<double>(records.back().response_ns - clock) * 1e-9;
       clock = records.back().response_ns;
       if (plan.finished()) {
-        store_.end_run(run->second, RunEnd::done, clock);
+        store_.end_run(run->second, data::RunEnd::done, clock);
         runs_.erase(run);
       }
     }
   }
   void pause() {
     for (const auto& [index, run] : runs_)
-      store_.end_run(run, RunEnd::paused, work_[index].clock_ns);
+      store_.end_run(run, data::RunEnd::paused, work_[index].clock_ns);
     runs_.clear();
   }
 
  private:
-  Store& store_;
+  data::Store& store_;
   std::vector<Work>& work_;
   const std::string event_;
   std::vector<SessionPlan> plans_;
-  std::map<std::size_t, Run> runs_;
+  std::map<std::size_t, data::Run> runs_;
 };
 
-std::vector<ObjectSpec> shapes_of(const Protocol& protocol) {
-  std::vector<ObjectSpec> shapes;
-  for (const StimulusSpec& stimulus : protocol.stimuli) shapes.push_back(stimulus.object);
+std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
+  std::vector<stimuli::ObjectSpec> shapes;
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    shapes.push_back(stimulus.object);
   return shapes;
 }
 
 }  // namespace
 
-std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
+                                           const StimulusLibrary& library,
                                            const SimulatedSettings& settings) {
   SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
                          protocol.stylus.grip, 1 / protocol.servo_rate);
   std::vector<std::string> faults = misfits(protocol, library, device.capabilities());
   bool known = true;
-  for (const StimulusSpec& stimulus : protocol.stimuli) {
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
     if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
     known = known && fault.empty();
@@ -244,7 +249,7 @@ std::string simulated_code(int number) {
   return "S" + std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
 }
 
-StudyProgress simulate_study(const Protocol& protocol, Store& store,
+StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& store,
                              const SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
@@ -299,4 +304,4 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
   return progress;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 #include "runner/participants/simulated_settings.h"
 #include "runner/scene_builder.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct StudyPlan {
   int participants = 7;
@@ -30,7 +30,8 @@ struct StudyProgress {
 };
 
 /// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
-std::vector<std::string> simulation_faults(const Protocol& protocol, const StimulusLibrary& library,
+std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
+                                           const StimulusLibrary& library,
                                            const SimulatedSettings& settings);
 
 /// Runs what has no record yet. The same seed gives the same records whatever the number of jobs
@@ -39,7 +40,7 @@ std::vector<std::string> simulation_faults(const Protocol& protocol, const Stimu
 /// set from outside (a signal): the trials under way are finished and recorded \param report called
 /// every 0.2 s or so \throws std::invalid_argument where the simulated device or participant cannot
 /// do the protocol; StoreError
-StudyProgress simulate_study(const Protocol& protocol, Store& store,
+StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& store,
                              const SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report);
@@ -47,4 +48,4 @@ StudyProgress simulate_study(const Protocol& protocol, Store& store,
 /// "S001": the code of simulated participant 1.
 std::string simulated_code(int number);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kPiece = 0.02;  // s, written at a time
@@ -40,8 +40,8 @@ class Tone {
 
 }  // namespace
 
-NoisePlayer::NoisePlayer(const MaskingNoise& noise, std::uint64_t seed, const std::string& device,
-                         Opener open)
+NoisePlayer::NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed,
+                         const std::string& device, Opener open)
     : noise_(noise), seed_(seed), device_(device), open_(std::move(open)), output_(open_(device_)) {
   start();
 }
@@ -118,7 +118,7 @@ void NoisePlayer::play() noexcept {
 
 std::string to_json_text(const NoisePlayer& player) {
   const nlohmann::ordered_json event = {{"masking_noise", "on"},
-                                        {"kind", to_string(player.noise().kind)},
+                                        {"kind", protocols::to_string(player.noise().kind)},
                                         {"level_db", player.noise().level_db},
                                         {"seed", player.seed()},
                                         {"device", player.device()},
@@ -135,4 +135,4 @@ std::string to_json_text(const NoiseReport& report) {
   return event.dump();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

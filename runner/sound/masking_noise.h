@@ -11,7 +11,7 @@
 #include "runner/sound/noise_signal.h"
 #include "runner/sound/sound_output.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What was heard since it was last turned on.
 struct NoiseReport {
@@ -28,7 +28,7 @@ class NoisePlayer {
 
   /// Opens the output and plays silence. \param open  also after it failed: headphones were pulled
   /// \throws SoundError
-  NoisePlayer(const MaskingNoise& noise, std::uint64_t seed, const std::string& device,
+  NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed, const std::string& device,
               Opener open = open_sound);
   /// Fades out.
   ~NoisePlayer();
@@ -45,7 +45,7 @@ class NoisePlayer {
   /// The output has failed since it was turned on.
   bool failed() const { return failed_.load(); }
   NoiseReport report() const;  ///< also after turn_off, until the next turn_on
-  const MaskingNoise& noise() const { return noise_; }
+  const protocols::MaskingNoise& noise() const { return noise_; }
   std::uint64_t seed() const { return seed_; }
   const std::string& device() const { return device_; }
   double rate() const { return output_->rate(); }     ///< Hz
@@ -55,7 +55,7 @@ class NoisePlayer {
   void start();
   void play() noexcept;
 
-  const MaskingNoise noise_;
+  const protocols::MaskingNoise noise_;
   const std::uint64_t seed_;
   const std::string device_;
   const Opener open_;
@@ -76,4 +76,4 @@ class NoisePlayer {
 std::string to_json_text(const NoisePlayer& player);
 std::string to_json_text(const NoiseReport& report);
 
-}  // namespace palpate
+}  // namespace palpate::runner

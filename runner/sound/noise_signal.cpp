@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -15,9 +15,9 @@ double in_z_plane(double frequency, double rate) { return std::exp(-2 * kPi * fr
 
 }  // namespace
 
-NoiseSignal::NoiseSignal(const MaskingNoise& noise, double rate, std::uint64_t seed)
+NoiseSignal::NoiseSignal(const protocols::MaskingNoise& noise, double rate, std::uint64_t seed)
     : random_(seed), fade_step_(1 / (kNoiseFade * rate)) {
-  if (noise.kind == NoiseKind::pink) {
+  if (noise.kind == protocols::NoiseKind::pink) {
     // Half of each octave falls by 6 dB, which makes 3 dB an octave with less than 0.05 dB of
     // ripple; sampling adds half a decibel at a quarter of the rate.
     for (double pole = kLowest; pole < rate / 2; pole *= 2) {
@@ -51,4 +51,4 @@ void NoiseSignal::fill(std::span<double> samples) {
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

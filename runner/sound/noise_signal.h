@@ -8,7 +8,7 @@
 #include "protocols/protocol.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 inline constexpr double kNoiseFade = 0.2;  ///< s, from silence to the full level and back
 
@@ -17,7 +17,7 @@ inline constexpr double kNoiseFade = 0.2;  ///< s, from silence to the full leve
 class NoiseSignal {
  public:
   /// \param rate  Hz
-  NoiseSignal(const MaskingNoise& noise, double rate, std::uint64_t seed);
+  NoiseSignal(const protocols::MaskingNoise& noise, double rate, std::uint64_t seed);
 
   void sound(bool on) { on_ = on; }
   /// Faded out to the last sample.
@@ -33,7 +33,7 @@ class NoiseSignal {
   };
   double filtered(double white);
 
-  Random random_;
+  stimuli::Random random_;
   std::vector<Slope> slopes_;  ///< none: white
   double gain_ = 1;
   double fade_step_;
@@ -41,4 +41,4 @@ class NoiseSignal {
   double loudness_ = 0;  ///< 0 to 1, before it is rounded off to a cosine
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,14 +2,14 @@
 
 #include <cmath>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kClose = 1.002;     // of a boundary, when bisecting
 constexpr double kNoDamping = 1e-6;  // N s/m, as good as none
 
-Material material_of(const LoopCase& loop, double stiffness) {
-  Material material;
+stimuli::Material material_of(const LoopCase& loop, double stiffness) {
+  stimuli::Material material;
   material.stiffness = stiffness;
   material.damping = loop.virtual_damping;
   return material;
@@ -71,4 +71,4 @@ double stiffest_stable(const LoopCase& loop, double damping) {
   return low;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,12 +6,12 @@
 
 #include "runner/stability/closed_loop.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A loop but for the stiffness and the physical damping that are looked for.
 struct LoopCase {
   Situation situation = Situation::wall;
-  RendererKind renderer = RendererKind::point;
+  protocols::RendererKind renderer = protocols::RendererKind::point;
   LoopSettings settings;       ///< damping is not used
   double virtual_damping = 0;  ///< N s/m, of the material
   /// Each end as heavy as makes sampling 60 times faster than its swing on the spring: the case of
@@ -38,4 +38,4 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
 /// N/m, up to 10^7: the stiffest that is stable with this damping of each end, and less are.
 double stiffest_stable(const LoopCase& loop, double damping);
 
-}  // namespace palpate
+}  // namespace palpate::runner

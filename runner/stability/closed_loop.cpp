@@ -11,7 +11,7 @@
 #include "runner/servo/passivity.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kDepth = 1e-3;   // m, at rest
@@ -22,9 +22,10 @@ constexpr int kMostDelay = 16;    // ticks
 
 Quat turned_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
 
-SceneObject object(const PolygonSoup& soup, const Pose& pose, const Material& material, int index) {
-  SceneObject one;
-  one.mesh = std::make_shared<const ConvexMesh>(soup);
+rendering::SceneObject object(const stimuli::PolygonSoup& soup, const Pose& pose,
+                              const stimuli::Material& material, int index) {
+  rendering::SceneObject one;
+  one.mesh = std::make_shared<const stimuli::ConvexMesh>(soup);
   one.pose = pose;
   one.material = material;
   one.object = index;
@@ -32,30 +33,32 @@ SceneObject object(const PolygonSoup& soup, const Pose& pose, const Material& ma
 }
 
 /// A cube of edge 2 h with one edge up, along y, at x and z = 0.
-SceneObject ridge(double h, double x, const Material& material, int index) {
-  return object(cube(2 * h),
+rendering::SceneObject ridge(double h, double x, const stimuli::Material& material, int index) {
+  return object(stimuli::cube(2 * h),
                 {{x, 0, -h * std::numbers::sqrt2}, turned_about_y(std::numbers::pi / 4)}, material,
                 index);
 }
 
-std::vector<SceneObject> objects_of(Situation situation, bool ray, const Material& material) {
+std::vector<rendering::SceneObject> objects_of(Situation situation, bool ray,
+                                               const stimuli::Material& material) {
   constexpr double kHalf = 0.03, kRadius = 0.03, kWall = 0.5;
   switch (situation) {
     case Situation::wall:
-      return {object(cube(2 * kWall), {{0, 0, -kWall}, {1, 0, 0, 0}}, material, 0)};
+      return {object(stimuli::cube(2 * kWall), {{0, 0, -kWall}, {1, 0, 0, 0}}, material, 0)};
     case Situation::edge:
       return {ridge(kHalf, 0, material, 0)};
     case Situation::sphere:
-      return {object(icosphere(kRadius, 4), {{0, 0, -kRadius}, {1, 0, 0, 0}}, material, 0)};
+      return {
+          object(stimuli::icosphere(kRadius, 4), {{0, 0, -kRadius}, {1, 0, 0, 0}}, material, 0)};
     case Situation::two_objects: {
       if (ray) return {ridge(0.01, -0.03, material, 0), ridge(0.01, 0.03, material, 1)};
       // Two walls that lean apart, 45 degrees each way.
-      std::vector<SceneObject> walls;
+      std::vector<rendering::SceneObject> walls;
       for (const double side : {-1.0, 1.0}) {
         const double lean = -side * std::numbers::pi / 4;
         const Vec3 inward(side * std::numbers::sqrt2 / 2, 0, -std::numbers::sqrt2 / 2);
-        walls.push_back(object(cube(2 * kWall), {kWall * inward, turned_about_y(lean)}, material,
-                               side < 0 ? 0 : 1));
+        walls.push_back(object(stimuli::cube(2 * kWall), {kWall * inward, turned_about_y(lean)},
+                               material, side < 0 ? 0 : 1));
       }
       return walls;
     }
@@ -64,7 +67,7 @@ std::vector<SceneObject> objects_of(Situation situation, bool ray, const Materia
 }
 
 /// The stylus at height 0: its lowest point near the origin.
-LineProbe held(Situation situation, bool ray) {
+rendering::LineProbe held(Situation situation, bool ray) {
   if (!ray) {
     const double x = situation == Situation::edge     ? 0.004
                      : situation == Situation::sphere ? 1e-3
@@ -83,7 +86,7 @@ LineProbe held(Situation situation, bool ray) {
   return {tip, tip + d};
 }
 
-LineProbe lowered(const LineProbe& probe, double tip, double tail) {
+rendering::LineProbe lowered(const rendering::LineProbe& probe, double tip, double tail) {
   return {probe.tip - Vec3(0, 0, tip), probe.tail - Vec3(0, 0, tail)};
 }
 
@@ -160,13 +163,14 @@ const char* to_string(Situation situation) {
   return "";
 }
 
-LoopScene::LoopScene(Situation situation, RendererKind kind, const Material& material)
+LoopScene::LoopScene(Situation situation, protocols::RendererKind kind,
+                     const stimuli::Material& material)
     : renderer_(&renderer_for(kind)),
       scene_(objects_of(situation, renderer_->side_contact(), material),
              renderer_->side_contact()) {
-  const LineProbe start = held(situation, renderer_->side_contact());
-  RenderState state = scene_.initial_state();
-  Rendering r;
+  const rendering::LineProbe start = held(situation, renderer_->side_contact());
+  rendering::RenderState state = scene_.initial_state();
+  rendering::Rendering r;
   constexpr double kStep = 1e-6;
   // Down from above until it is deep enough: what lies lower was found by the renderer itself.
   for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
@@ -181,8 +185,8 @@ LoopScene::LoopScene(Situation situation, RendererKind kind, const Material& mat
 }
 
 LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
-  const Renderer& renderer = loop.renderer();
-  RenderState state = loop.scene().initial_state();
+  const rendering::Renderer& renderer = loop.renderer();
+  rendering::RenderState state = loop.scene().initial_state();
   const double tick = 1 / s.rate;
   // In from above, as every contact begins.
   renderer.tick(loop.scene(), state, lowered(loop.rest(), -5e-3, -5e-3), tick);
@@ -203,8 +207,8 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
   LoopOutcome outcome;
   Range early, late;
   for (std::uint64_t i = 0; i < ticks; ++i) {
-    const LineProbe probe = lowered(loop.rest(), -read(tip.z()), -read(tail.z()));
-    const Rendering r = renderer.tick(loop.scene(), state, probe, tick);
+    const rendering::LineProbe probe = lowered(loop.rest(), -read(tip.z()), -read(tail.z()));
+    const rendering::Rendering r = renderer.tick(loop.scene(), state, probe, tick);
     DeviceForces forces{r.device1, r.device2, false};
     if (s.passivity_controller) {
       const DeviceForces damping = controller.damping({probe.tip, probe.tail}, forces);
@@ -235,4 +239,4 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
   return outcome;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

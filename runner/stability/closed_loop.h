@@ -8,7 +8,7 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What the hand does at each end, about where it wants the end to be.
 struct EndImpedance {
@@ -42,20 +42,21 @@ const char* to_string(Situation situation);
 /// A scene and how the stylus rests in it before the loop begins.
 class LoopScene {
  public:
-  LoopScene(Situation situation, RendererKind renderer, const Material& material);
+  LoopScene(Situation situation, protocols::RendererKind renderer,
+            const stimuli::Material& material);
 
-  const Scene& scene() const { return scene_; }
-  const Renderer& renderer() const { return *renderer_; }
-  const LineProbe& rest() const { return rest_; }  ///< 1 mm deep, m
+  const rendering::Scene& scene() const { return scene_; }
+  const rendering::Renderer& renderer() const { return *renderer_; }
+  const rendering::LineProbe& rest() const { return rest_; }  ///< 1 mm deep, m
   /// N along z on each end at rest, and how many objects give it.
   double force_tip() const { return force_tip_; }
   double force_tail() const { return force_tail_; }
   int contacts() const { return contacts_; }
 
  private:
-  const Renderer* renderer_;
-  Scene scene_;
-  LineProbe rest_;
+  const rendering::Renderer* renderer_;
+  rendering::Scene scene_;
+  rendering::LineProbe rest_;
   double force_tip_ = 0, force_tail_ = 0;
   int contacts_ = 0;
 };
@@ -71,4 +72,4 @@ struct LoopOutcome {
 /// tick. Unstable: the motion grows, beyond what a count of the resolution makes.
 LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 #include "runner/devices/simulated.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
@@ -73,7 +73,7 @@ class Reference {
 };
 
 std::vector<double> forces() {
-  Random random(1);
+  stimuli::Random random(1);
   std::vector<double> out;
   out.reserve(kTicks);
   for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);
@@ -150,4 +150,4 @@ std::vector<IntegratorRow> compare_integrators(const std::function<double()>& no
   return rows;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

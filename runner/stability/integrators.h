@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// m x'' = -b x' - k x + F, F held over each tick: what moves in this program.
 struct Oscillator {
@@ -27,4 +27,4 @@ struct IntegratorRow {
 /// \param now_ns  a clock
 std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -22,18 +22,19 @@
 namespace palpate::bench {
 namespace {
 
-using tick::PointProbe;
-using tick::SegmentProbe;
-using Tick = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
+using rendering::tick::PointProbe;
+using rendering::tick::SegmentProbe;
+using Tick = rendering::Rendering (*)(const rendering::Scene&, rendering::RenderState&,
+                                      const rendering::LineProbe&, double) noexcept;
 
 /// A renderer that is one given tick and no other.
-class Only final : public Renderer {
+class Only final : public rendering::Renderer {
  public:
   explicit Only(Tick chosen) : tick_(chosen) {}
   const char* name() const override { return "only"; }
   bool side_contact() const override { return true; }
-  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
-                 double dt) const noexcept override {
+  rendering::Rendering tick(const rendering::Scene& scene, rendering::RenderState& state,
+                            const rendering::LineProbe& probe, double dt) const noexcept override {
     return tick_(scene, state, probe, dt);
   }
 
@@ -43,41 +44,42 @@ class Only final : public Renderer {
 
 /// Two parts or more that are all in reach all the time: no survey.
 template <class Probe>
-Rendering without_survey(const Scene& scene, RenderState& state, const LineProbe& probe,
-                         double) noexcept {
-  tick::Tick<Probe> under_way{scene, state, probe,
-                              Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
-  if (!tick::plausible(probe.tip) || !tick::plausible(probe.tail))
-    return tick::nothing(state.last, render_fault::kNonFinite);
-  tick::touch_listed(under_way);
-  const std::span<LoadedContact> contacts(state.contacts);
-  load(contacts);
+rendering::Rendering without_survey(const rendering::Scene& scene, rendering::RenderState& state,
+                                    const rendering::LineProbe& probe, double) noexcept {
+  rendering::tick::Tick<Probe> under_way{scene, state, probe,
+                                         Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
+  if (!rendering::tick::plausible(probe.tip) || !rendering::tick::plausible(probe.tail))
+    return rendering::tick::nothing(state.last, rendering::render_fault::kNonFinite);
+  rendering::tick::touch_listed(under_way);
+  const std::span<rendering::LoadedContact> contacts(state.contacts);
+  rendering::load(contacts);
   state.last = probe;
   state.has_last = true;
-  if (!contacts.empty()) return tick::add_up<Probe, false>(under_way, contacts);
-  return tick::nothing(probe, under_way.faults);
+  if (!contacts.empty()) return rendering::tick::add_up<Probe, false>(under_way, contacts);
+  return rendering::tick::nothing(probe, under_way.faults);
 }
 
 /// A scene as a trial would make it.
 struct World {
-  PolygonSoup shape = icosphere(0.03, 0);
-  Material material;
-  int near = 1;                               ///< objects side by side, all in reach
-  int far = 0;                                ///< objects that are never in reach
-  std::size_t scanned = ContactTrees::kScan;  ///< so many facets or edges get no tree
+  stimuli::PolygonSoup shape = stimuli::icosphere(0.03, 0);
+  stimuli::Material material;
+  int near = 1;                                          ///< objects side by side, all in reach
+  int far = 0;                                           ///< objects that are never in reach
+  std::size_t scanned = rendering::ContactTrees::kScan;  ///< so many facets or edges get no tree
   bool side_contact = true;
 
-  Scene build() const {
-    const auto mesh = std::make_shared<const ConvexMesh>(shape);
-    const auto trees = std::make_shared<const ContactTrees>(*mesh, side_contact, scanned);
-    std::vector<SceneObject> objects;
+  rendering::Scene build() const {
+    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(shape);
+    const auto trees =
+        std::make_shared<const rendering::ContactTrees>(*mesh, side_contact, scanned);
+    std::vector<rendering::SceneObject> objects;
     for (int i = 0; i < near + far; ++i) {
       Pose pose;
       // Apart from each other: one is touched, the others are near.
       pose.position.x = i < near ? 0.061 * i : 0.15 + 0.07 * i;
       objects.push_back({mesh, pose, material, i, trees});
     }
-    return Scene(std::move(objects), side_contact);
+    return rendering::Scene(std::move(objects), side_contact);
   }
 };
 
@@ -88,20 +90,23 @@ struct Case {
   Tick pipeline = nullptr;  ///< null: the renderer as shipped
 };
 
-const Renderer& shipped(bool ray) { return ray ? ray_renderer() : point_renderer(); }
+const rendering::Renderer& shipped(bool ray) {
+  return ray ? rendering::ray_renderer() : rendering::point_renderer();
+}
 
 /// A hand that strokes the first object and lifts off a third of the time, as the shipped renderer
 /// leads it: so the path is the same for both cases of a pair.
-std::vector<LineProbe> path_over(const Scene& scene, bool ray, std::size_t ticks) {
-  StrokeSettings settings;
+std::vector<rendering::LineProbe> path_over(const rendering::Scene& scene, bool ray,
+                                            std::size_t ticks) {
+  rendering::StrokeSettings settings;
   settings.centre = scene.parts()[0].sphere_centre;
   settings.radius = scene.parts()[0].sphere_radius;
   settings.side = ray;
   settings.lifted = 0.3;
   settings.lift_period = 250;
-  StrokingHand hand(settings);
-  RenderState state = scene.initial_state();
-  std::vector<LineProbe> poses;
+  rendering::StrokingHand hand(settings);
+  rendering::RenderState state = scene.initial_state();
+  std::vector<rendering::LineProbe> poses;
   poses.reserve(ticks);
   double depth = 0;
   for (std::size_t i = 0; i < ticks; ++i) {
@@ -111,8 +116,8 @@ std::vector<LineProbe> path_over(const Scene& scene, bool ray, std::size_t ticks
   return poses;
 }
 
-Material with(double damping, double friction, bool layers) {
-  Material material;
+stimuli::Material with(double damping, double friction, bool layers) {
+  stimuli::Material material;
   material.damping = damping;
   material.friction_static = material.friction_dynamic = friction;
   if (layers) material.layers = {{0.0005, 400}, {0.001, 1200}};
@@ -133,12 +138,13 @@ std::vector<Case> cases() {
     far.near = 2;
     far.far = 1000;
     forced.scanned = 0;
-    large.shape = bare.shape = icosphere(0.03, 4);
+    large.shape = bare.shape = stimuli::icosphere(0.03, 4);
     bare.scanned = SIZE_MAX;
     add("plain", plain);
     add("plain-least", plain, pick(&least_tick<SegmentProbe>, &least_tick<PointProbe>));
     add("plain-alone", plain,
-        pick(&tick::render<SegmentProbe, Needs{}>, &tick::render<PointProbe, Needs{}>));
+        pick(&rendering::tick::render<SegmentProbe, rendering::Needs{}>,
+             &rendering::tick::render<PointProbe, rendering::Needs{}>));
     if (ray) add("torqueless", plain, &least_tick<SegmentProbe, false>);
     add("large", large);
     add("large-bare", bare);
@@ -155,7 +161,7 @@ std::vector<Case> cases() {
     add("friction", rough);
     add("layers", layered);
     // All but one, and a tick in which the one is not even compiled.
-    constexpr Needs kNoDamping{.friction = true, .layers = true},
+    constexpr rendering::Needs kNoDamping{.friction = true, .layers = true},
         kNoFriction{.damping = true, .layers = true}, kNoLayers{.damping = true, .friction = true};
     World no_damping = plain, no_friction = plain, no_layers = plain;
     no_damping.material = with(0, 0.3, true);
@@ -163,27 +169,30 @@ std::vector<Case> cases() {
     no_layers.material = with(2, 0.3, false);
     add("all-but-damping", no_damping);
     add("all-but-damping-least", no_damping,
-        pick(&tick::render<SegmentProbe, kNoDamping>, &tick::render<PointProbe, kNoDamping>));
+        pick(&rendering::tick::render<SegmentProbe, kNoDamping>,
+             &rendering::tick::render<PointProbe, kNoDamping>));
     add("all-but-friction", no_friction);
     add("all-but-friction-least", no_friction,
-        pick(&tick::render<SegmentProbe, kNoFriction>, &tick::render<PointProbe, kNoFriction>));
+        pick(&rendering::tick::render<SegmentProbe, kNoFriction>,
+             &rendering::tick::render<PointProbe, kNoFriction>));
     add("all-but-layers", no_layers);
     add("all-but-layers-least", no_layers,
-        pick(&tick::render<SegmentProbe, kNoLayers>, &tick::render<PointProbe, kNoLayers>));
+        pick(&rendering::tick::render<SegmentProbe, kNoLayers>,
+             &rendering::tick::render<PointProbe, kNoLayers>));
   }
   return all;
 }
 
 double run(const Case& chosen, std::size_t ticks) {
   constexpr std::size_t kApproach = 400;  // ticks until the hand has arrived
-  const Scene scene = chosen.world.build();
+  const rendering::Scene scene = chosen.world.build();
   const auto poses = path_over(scene, chosen.ray, kApproach + ticks);
   const Only only(chosen.pipeline);
-  const Renderer& renderer = chosen.pipeline ? only : shipped(chosen.ray);
-  RenderState state = scene.initial_state();
+  const rendering::Renderer& renderer = chosen.pipeline ? only : shipped(chosen.ray);
+  rendering::RenderState state = scene.initial_state();
   // The trial begins near the first two objects; not all pipelines take a survey later.
-  const LineProbe between{{0.03, 0, 0}, {0.03, 0, 0}};
-  if (scene.needs().several_parts) survey(scene, state, between);
+  const rendering::LineProbe between{{0.03, 0, 0}, {0.03, 0, 0}};
+  if (scene.needs().several_parts) rendering::survey(scene, state, between);
   for (std::size_t i = 0; i < kApproach; ++i) renderer.tick(scene, state, poses[i], 1e-3);
   double total = 0;
   for (std::size_t i = kApproach; i < poses.size(); ++i)

@@ -13,7 +13,8 @@
 namespace palpate::bench {
 
 template <class Probe>
-[[gnu::always_inline]] inline LineProbe in_frame(const ScenePart& part, const LineProbe& probe) {
+[[gnu::always_inline]] inline rendering::LineProbe in_frame(const rendering::ScenePart& part,
+                                                            const rendering::LineProbe& probe) {
   const Vec3 tip = part.local_point(probe.tip);
   return {tip, Probe::kSegment ? part.local_point(probe.tail) : tip};
 }
@@ -21,34 +22,38 @@ template <class Probe>
 /// A part without trees and map that was not in contact at the last tick: its contact now.
 /// \return nothing where the approach alone cannot tell
 template <class Probe>
-std::optional<WalkResult> approached(const ScenePart& part, PartState& memory,
-                                     const LineProbe& from, const LineProbe& to) {
-  using Kind = MinkowskiFacet::Kind;
-  const ConvexMesh& mesh = *part.mesh;
+std::optional<rendering::WalkResult> approached(const rendering::ScenePart& part,
+                                                rendering::PartState& memory,
+                                                const rendering::LineProbe& from,
+                                                const rendering::LineProbe& to) {
+  using Kind = rendering::MinkowskiFacet::Kind;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
   if (memory.blocked || memory.watch.kind == Kind::none) return {};
-  const WalkResult was = tick::walk<Probe>(mesh, memory.watch, from.tip, from.tail - from.tip);
+  const rendering::WalkResult was =
+      rendering::tick::walk<Probe>(mesh, memory.watch, from.tip, from.tail - from.tip);
   if (was.facet.kind != Kind::none) return {};
-  const Approach way = Probe::approach(mesh, was.separates, from, to);
-  if (way.end == Approach::End::separated) {
+  const rendering::Approach way = Probe::approach(mesh, was.separates, from, to);
+  if (way.end == rendering::Approach::End::separated) {
     memory.plane = way.plane;
     memory.watch = way.facet;
-    return WalkResult();
+    return rendering::WalkResult();
   }
-  if (way.end != Approach::End::entered) return {};
-  const WalkResult hit = tick::walk<Probe>(mesh, way.facet, to.tip, to.tail - to.tip);
+  if (way.end != rendering::Approach::End::entered) return {};
+  const rendering::WalkResult hit =
+      rendering::tick::walk<Probe>(mesh, way.facet, to.tip, to.tail - to.tip);
   if (hit.unsure) return {};
   if (hit.facet.kind == Kind::none) {
-    tick::leave(memory, hit, to);
+    rendering::tick::leave(memory, hit, to);
     return hit;
   }
   memory.facet = hit.facet;
   memory.plane.valid = false;
-  fetch_ahead(mesh, memory.facet);
+  rendering::fetch_ahead(mesh, memory.facet);
   return hit;
 }
 
-inline Rendering nothing(const LineProbe& ideal, std::uint32_t faults) {
-  Rendering out;
+inline rendering::Rendering nothing(const rendering::LineProbe& ideal, std::uint32_t faults) {
+  rendering::Rendering out;
   out.ideal = ideal;
   out.faults = faults;
   return out;
@@ -56,14 +61,14 @@ inline Rendering nothing(const LineProbe& ideal, std::uint32_t faults) {
 
 /// The contact of a part that is come upon in this tick; of kind none where there is none.
 template <class Probe>
-WalkResult met(const ScenePart& part, PartState& memory, const RenderState& state,
-               const LineProbe& local) {
+rendering::WalkResult met(const rendering::ScenePart& part, rendering::PartState& memory,
+                          const rendering::RenderState& state, const rendering::LineProbe& local) {
   if (memory.plane.separates(local.tip, local.tail)) return {};
   if (state.has_last) {
     const auto hit = approached<Probe>(part, memory, in_frame<Probe>(part, state.last), local);
     if (hit) return *hit;
   }
-  return tick::meet<Probe>(part, memory, state.has_last ? &state.last : nullptr, local);
+  return rendering::tick::meet<Probe>(part, memory, state.has_last ? &state.last : nullptr, local);
 }
 
 /// One convex part of few facets that is a plain spring, and nothing else in the world: no trees,
@@ -71,23 +76,26 @@ WalkResult met(const ScenePart& part, PartState& memory, const RenderState& stat
 /// device.
 /// \tparam kTorque  whether there are torque and a second device
 template <class Probe, bool kTorque = Probe::kSegment>
-[[gnu::flatten]] Rendering least_tick(const Scene& scene, RenderState& state,
-                                      const LineProbe& probe, double) noexcept {
-  if (!tick::plausible(probe.tip) || !tick::plausible(probe.tail))
-    return nothing(state.last, render_fault::kNonFinite);
-  const ScenePart& part = scene.parts()[0];
-  PartState& memory = state.parts[0];
+[[gnu::flatten]] rendering::Rendering least_tick(const rendering::Scene& scene,
+                                                 rendering::RenderState& state,
+                                                 const rendering::LineProbe& probe,
+                                                 double) noexcept {
+  if (!rendering::tick::plausible(probe.tip) || !rendering::tick::plausible(probe.tail))
+    return nothing(state.last, rendering::render_fault::kNonFinite);
+  const rendering::ScenePart& part = scene.parts()[0];
+  rendering::PartState& memory = state.parts[0];
   const Vec3 tip = part.local_point(probe.tip);
   const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
   std::uint32_t faults = 0;
-  const WalkResult hit = memory.facet.kind != MinkowskiFacet::Kind::none
-                             ? tick::track<Probe>(part, memory, nullptr, tip, d, faults)
-                             : met<Probe>(part, memory, state, {tip, tip + d});
+  const rendering::WalkResult hit =
+      memory.facet.kind != rendering::MinkowskiFacet::Kind::none
+          ? rendering::tick::track<Probe>(part, memory, nullptr, tip, d, faults)
+          : met<Probe>(part, memory, state, {tip, tip + d});
   state.last = probe;
   state.has_last = true;
-  if (hit.facet.kind == MinkowskiFacet::Kind::none)
-    return nothing(probe, faults | (memory.blocked ? render_fault::kStartedInside : 0));
-  LoadedContact c;
+  if (hit.facet.kind == rendering::MinkowskiFacet::Kind::none)
+    return nothing(probe, faults | (memory.blocked ? rendering::render_fault::kStartedInside : 0));
+  rendering::LoadedContact c;
   const double length = Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0;
   Probe::describe(*part.mesh, hit, tip, d, length, c);
   const Vec3 normal = part.world_vector(hit.normal);
@@ -103,7 +111,7 @@ template <class Probe, bool kTorque = Probe::kSegment>
   }
   const Vec3 all = force + torque;
   if (!std::isfinite(all.x + all.y + all.z))
-    return nothing(probe, faults | render_fault::kNonFinite);
+    return nothing(probe, faults | rendering::render_fault::kNonFinite);
   return {.force = force,
           .torque = torque,
           .device1 = force - device2,

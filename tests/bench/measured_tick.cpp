@@ -2,8 +2,8 @@
 
 namespace palpate::bench {
 
-double measured_tick(const Renderer& renderer, const Scene& scene, RenderState& state,
-                     const LineProbe& probe) {
+double measured_tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
+                     rendering::RenderState& state, const rendering::LineProbe& probe) {
   return renderer.tick(scene, state, probe, 1e-3).force.x;
 }
 

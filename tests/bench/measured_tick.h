@@ -5,7 +5,7 @@
 namespace palpate::bench {
 
 /// What callgrind counts in. In a file of its own, where the compiler cannot know the renderer.
-double measured_tick(const Renderer& renderer, const Scene& scene, RenderState& state,
-                     const LineProbe& probe);
+double measured_tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
+                     rendering::RenderState& state, const rendering::LineProbe& probe);
 
 }  // namespace palpate::bench

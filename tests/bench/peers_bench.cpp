@@ -34,20 +34,21 @@ constexpr double kRounding = 1e-12;     // of the size
 constexpr std::size_t kCheckedVisits =
     30'000'000;  // facets that the exact reference looks at, a row
 
-using Path = std::vector<LineProbe>;
+using Path = std::vector<rendering::LineProbe>;
 
 /// In contact some 70 % of the time.
-Path hand_over(const std::shared_ptr<const ConvexMesh>& mesh, bool segment) {
-  const Renderer& renderer = segment ? ray_renderer() : point_renderer();
-  const Scene scene({{mesh, Pose{}, Material{}, 0, nullptr}}, segment);
-  RenderState state = scene.initial_state();
-  StrokeSettings settings;
+Path hand_over(const std::shared_ptr<const stimuli::ConvexMesh>& mesh, bool segment) {
+  const rendering::Renderer& renderer =
+      segment ? rendering::ray_renderer() : rendering::point_renderer();
+  const rendering::Scene scene({{mesh, Pose{}, stimuli::Material{}, 0, nullptr}}, segment);
+  rendering::RenderState state = scene.initial_state();
+  rendering::StrokeSettings settings;
   settings.side = segment;
   settings.lifted = 0.27;
-  StrokingHand hand(settings);
+  rendering::StrokingHand hand(settings);
   Path path(kWarm + kTicks);
   double depth = 0;
-  for (LineProbe& probe : path) {
+  for (rendering::LineProbe& probe : path) {
     probe = hand.next(depth);
     depth = renderer.tick(scene, state, probe, 1e-3).deepest.depth;
     if (!segment) probe.tail = probe.tip;
@@ -72,8 +73,9 @@ double at(std::vector<std::uint64_t>& counts, double share) {
 
 /// Holds answers against the exact least depth. A method that remembers its side may hold a longer
 /// way out, and is then held against that one.
-void check(const ConvexMesh& mesh, const LineProbe& probe, const ReferenceDepth& exact,
-           const Answer& answer, bool follows_side, Row& row) {
+void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
+           const rendering::ReferenceDepth& exact, const rendering::Answer& answer,
+           bool follows_side, Row& row) {
   const double tolerance = kWrong * mesh.size();
   ++row.checked;
   if (std::isnan(answer.depth)) {
@@ -85,7 +87,7 @@ void check(const ConvexMesh& mesh, const LineProbe& probe, const ReferenceDepth&
   double error = std::abs(depth - std::max(0.0, exact.depth));
   if (error > kRounding * mesh.size() && follows_side && answer.touching) {
     const double to_least = error;
-    for (const WayOut& way : ways_out(mesh, probe, answer.normal, 1e-3))
+    for (const rendering::WayOut& way : rendering::ways_out(mesh, probe, answer.normal, 1e-3))
       error = std::min(error, std::abs(depth - way.depth));
     if (error < to_least) ++row.other_side;
   }
@@ -98,33 +100,33 @@ void check(const ConvexMesh& mesh, const LineProbe& probe, const ReferenceDepth&
 /// The exact depths of every so many ticks of a path.
 struct Yardstick {
   std::size_t every = 1;
-  std::map<std::size_t, ReferenceDepth> depths;
+  std::map<std::size_t, rendering::ReferenceDepth> depths;
 
-  Yardstick(const ConvexMesh& mesh, const Path& path) {
+  Yardstick(const stimuli::ConvexMesh& mesh, const Path& path) {
     const std::size_t size = mesh.facets().size() + mesh.edges().size();
     every = std::max<std::size_t>(1, kTicks * size / kCheckedVisits);
     for (std::size_t i = kWarm; i < path.size(); i += every)
-      depths.emplace(i, reference_depth(mesh, path[i]));
+      depths.emplace(i, rendering::reference_depth(mesh, path[i]));
   }
 };
 
-Row run(const MethodKind& kind, const ConvexMesh& mesh, const Path& path, const Yardstick& exact,
-        bool segment, double seconds) {
-  const double ns = nanoseconds_per_count();
+Row run(const rendering::MethodKind& kind, const stimuli::ConvexMesh& mesh, const Path& path,
+        const Yardstick& exact, bool segment, double seconds) {
+  const double ns = runner::nanoseconds_per_count();
   const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
-  const std::unique_ptr<Method> method = kind.make(mesh, segment);
+  const std::unique_ptr<rendering::Method> method = kind.make(mesh, segment);
   Row row;
   row.method = kind.name;
   std::vector<std::uint64_t> counts;
   counts.reserve(kTicks);
-  std::vector<Answer> answers;
+  std::vector<rendering::Answer> answers;
   answers.reserve(kTicks);
   std::uint64_t spent = 0;
   // Who remembers comes in from outside; the others may begin anywhere.
   for (std::size_t i = kind.remembers ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
-    const std::uint64_t start = begin_count();
-    const Answer answer = method->tick(path[i]);
-    const std::uint64_t count = end_count() - start;
+    const std::uint64_t start = runner::begin_count();
+    const rendering::Answer answer = method->tick(path[i]);
+    const std::uint64_t count = runner::end_count() - start;
     if (i < kWarm) continue;
     spent += count;
     counts.push_back(count);
@@ -143,9 +145,9 @@ Row run(const MethodKind& kind, const ConvexMesh& mesh, const Path& path, const 
 }
 
 /// Ours as it is shipped, the plainest that is exact, and the libraries that were found.
-std::vector<MethodKind> compared() {
-  std::vector<MethodKind> kinds;
-  for (MethodKind& kind : accuracy_methods()) {
+std::vector<rendering::MethodKind> compared() {
+  std::vector<rendering::MethodKind> kinds;
+  for (rendering::MethodKind& kind : rendering::accuracy_methods()) {
     if (!kind.name.starts_with("walk") && kind.name != "scan") kinds.push_back(std::move(kind));
   }
   return kinds;
@@ -178,11 +180,12 @@ void compare(bool segment, double seconds) {
               "median", "p99", "worst", "/ours", "p99", "wrong", "lost", "2nd way", "error, m");
   std::map<std::string, std::array<double, 2>> growth;  // median at 1,280 and 327,680
   for (const int level : {0, 3, 5, 7}) {
-    const auto mesh = std::make_shared<const ConvexMesh>(icosphere(kRadius, level));
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, level));
     const Path path = hand_over(mesh, segment);
     const Yardstick exact(*mesh, path);
     std::vector<Row> rows;
-    for (const MethodKind& kind : compared()) {
+    for (const rendering::MethodKind& kind : compared()) {
       rows.push_back(run(kind, *mesh, path, exact, segment, seconds));
       rows.back().triangles = std::size_t{20} << (2 * level);
       if (level == 3) growth[kind.name][0] = rows.back().median_ns;
@@ -209,7 +212,7 @@ int main_with(int argc, char** argv) {
       "Icospheres of 30 mm radius, a hand at 0.1 m/s, 1 to 2 mm deep for 70 %% of the time, the "
       "same "
       "path for all.\nMethods:\n");
-  for (const MethodKind& kind : compared())
+  for (const rendering::MethodKind& kind : compared())
     std::printf("  %-12s %s\n", kind.name.c_str(), kind.description.c_str());
   std::printf(
       "wrong: depth off by more than 1e-6 of the size from the exact one (every facet looked at), "

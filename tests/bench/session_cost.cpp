@@ -28,89 +28,92 @@ std::string protocol_text(bool samples) {
 }
 
 /// The renderer along a stroke, without a device.
-class Stroke final : public TickSource {
+class Stroke final : public runner::TickSource {
  public:
-  Stroke(const Scene& scene, const Renderer& renderer, std::uint32_t ticks) : poses_(ticks + 1) {
-    StrokingHand hand{StrokeSettings{}};
-    RenderState state = scene.initial_state();
+  Stroke(const rendering::Scene& scene, const rendering::Renderer& renderer, std::uint32_t ticks)
+      : poses_(ticks + 1) {
+    rendering::StrokingHand hand{rendering::StrokeSettings{}};
+    rendering::RenderState state = scene.initial_state();
     double depth = 0;
-    for (LineProbe& pose : poses_) {
+    for (rendering::LineProbe& pose : poses_) {
       pose = hand.next(depth);
       depth = renderer.tick(scene, state, pose, 1e-3).deepest.depth;
     }
   }
-  void prepare(const Scene& scene, const Renderer& renderer, const HomeZone&) override {
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const runner::HomeZone&) override {
     scene_ = scene;
     renderer_ = &renderer;
     state_ = scene_->initial_state();
-    sample_.phase = Phase::feeling;
+    sample_.phase = runner::Phase::feeling;
   }
-  const Sample& next() noexcept override {
+  const runner::Sample& next() noexcept override {
     sample_.tick = next_;
     sample_.time_ns += sample_.period_ns = 1'000'000;
     sample_.probe = poses_[next_++];
     sample_.rendering = renderer_->tick(*scene_, state_, sample_.probe, 1e-3);
     return sample_;
   }
-  ServoQuality stop() noexcept override { return {}; }
+  runner::ServoQuality stop() noexcept override { return {}; }
 
  private:
-  std::vector<LineProbe> poses_;
-  std::optional<Scene> scene_;
-  const Renderer* renderer_ = nullptr;
-  RenderState state_;
-  Sample sample_;
+  std::vector<rendering::LineProbe> poses_;
+  std::optional<rendering::Scene> scene_;
+  const rendering::Renderer* renderer_ = nullptr;
+  rendering::RenderState state_;
+  runner::Sample sample_;
   std::uint32_t next_ = 0;
 };
 
 /// Answers after so many ticks.
-class Patient final : public Respondent {
+class Patient final : public runner::Respondent {
  public:
   explicit Patient(std::uint32_t ticks) : ticks_(ticks) {}
   void read(const std::string&) override {}
   void feedback(bool) override {}
-  void begin_trial(const Trial&) override {}
-  std::optional<Answer> step(const Sample& sample) override {
+  void begin_trial(const protocols::Trial&) override {}
+  std::optional<runner::Answer> step(const runner::Sample& sample) override {
     if (sample.tick < ticks_) return std::nullopt;
-    return Answer{0, sample.time_ns};
+    return runner::Answer{0, sample.time_ns};
   }
 
  private:
   std::uint32_t ticks_;
 };
 
-class NoLog final : public TrialLog {
+class NoLog final : public runner::TrialLog {
  public:
-  int begin(const TrialRecord&, std::int64_t) override { return 1; }
-  void finish(const TrialRecord& record) override { kept = record.samples.size(); }
+  int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
+  void finish(const data::TrialRecord& record) override { kept = record.samples.size(); }
   void cut_off(const std::string&) override {}
   std::size_t kept = 0;
 };
 
 }  // namespace
 
-[[gnu::noinline]] void measured_trial(Session& session) { session.step(); }
+[[gnu::noinline]] void measured_trial(runner::Session& session) { session.step(); }
 [[gnu::noinline]] void measured_unlogged_trial(UnloggedTrial& trial) { trial.run(); }
 
 namespace {
 
 std::size_t run(const std::string& which, std::uint32_t ticks) {
-  const Protocol protocol = parse_protocol_text(protocol_text(which == "on"), "one.json");
-  const StimulusLibrary library(protocol);
+  const protocols::Protocol protocol =
+      protocols::parse_protocol_text(protocol_text(which == "on"), "one.json");
+  const runner::StimulusLibrary library(protocol);
   Patient participant(ticks);
-  VirtualClock clock;
+  runner::VirtualClock clock;
   NoLog log;
-  SessionPlan plan(protocol, 1, 1);
-  const Scene scene = library.scene(plan.next());
-  Stroke stroke(scene, ray_renderer(), ticks);
+  runner::SessionPlan plan(protocol, 1, 1);
+  const rendering::Scene scene = library.scene(plan.next());
+  Stroke stroke(scene, rendering::ray_renderer(), ticks);
   if (which == "least") {
-    stroke.prepare(scene, ray_renderer(), {});
+    stroke.prepare(scene, rendering::ray_renderer(), {});
     UnloggedTrial trial(stroke, participant, std::int64_t{100} * 1'000'000'000);
     measured_unlogged_trial(trial);
     return 0;
   }
-  Session session({protocol, library, stroke, clock, participant, log}, plan, {0, 0});
-  while (session.state() != Session::State::trial) session.step();
+  runner::Session session({protocol, library, stroke, clock, participant, log}, plan, {0, 0});
+  while (session.state() != runner::Session::State::trial) session.step();
   measured_trial(session);
   session.step();
   return log.kept;

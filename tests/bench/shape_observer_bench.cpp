@@ -11,23 +11,23 @@
 namespace palpate {
 namespace {
 
-std::vector<ObjectSpec> four_shapes() {
-  std::vector<ObjectSpec> stimuli(4);
-  stimuli[0].shape = ShapeKind::sphere;
-  stimuli[1].shape = ShapeKind::cone;
-  stimuli[2].shape = ShapeKind::cylinder;
-  stimuli[3].shape = ShapeKind::cube;
+std::vector<stimuli::ObjectSpec> four_shapes() {
+  std::vector<stimuli::ObjectSpec> stimuli(4);
+  stimuli[0].shape = stimuli::ShapeKind::sphere;
+  stimuli[1].shape = stimuli::ShapeKind::cone;
+  stimuli[2].shape = stimuli::ShapeKind::cylinder;
+  stimuli[3].shape = stimuli::ShapeKind::cube;
   return stimuli;
 }
 
 /// Touches all over a sphere of the size of the stimuli, the stylus leaning on it.
-std::vector<Percept> percepts(bool ray, bool contact) {
-  Random random(1);
+std::vector<runner::Percept> percepts(bool ray, bool contact) {
+  stimuli::Random random(1);
   const auto direction = [&random] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };
-  std::vector<Percept> made(64);
-  for (Percept& percept : made) {
+  std::vector<runner::Percept> made(64);
+  for (runner::Percept& percept : made) {
     percept.ray = ray;
     percept.contact = contact;
     percept.direction = direction();
@@ -41,9 +41,9 @@ std::vector<Percept> percepts(bool ray, bool contact) {
 }
 
 void update(benchmark::State& state, bool ray, bool contact) {
-  const ShapeHypotheses hypotheses(four_shapes());
-  ShapeObserver observer(hypotheses);
-  const std::vector<Percept> made = percepts(ray, contact);
+  const runner::ShapeHypotheses hypotheses(four_shapes());
+  runner::ShapeObserver observer(hypotheses);
+  const std::vector<runner::Percept> made = percepts(ray, contact);
   std::size_t next = 0;
   for (auto _ : state) {
     observer.update(made[next]);
@@ -58,9 +58,9 @@ BENCHMARK_CAPTURE(update, ray_contact, true, true);
 BENCHMARK_CAPTURE(update, ray_free_space, true, false);
 
 void build_hypotheses(benchmark::State& state) {
-  const std::vector<ObjectSpec> stimuli = four_shapes();
+  const std::vector<stimuli::ObjectSpec> stimuli = four_shapes();
   for (auto _ : state) {
-    ShapeHypotheses hypotheses(stimuli);
+    runner::ShapeHypotheses hypotheses(stimuli);
     benchmark::DoNotOptimize(hypotheses.padded_size());
   }
 }

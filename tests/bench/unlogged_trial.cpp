@@ -10,12 +10,12 @@ constexpr double kSecond_ns = 1e9;
 }  // namespace
 
 void UnloggedTrial::run() {
-  std::optional<Answer> answer;
+  std::optional<runner::Answer> answer;
   std::uint32_t faults = 0;
-  while (!answer && !record_.timed_out && !(faults & servo_fault::kTripped)) {
-    const Sample& sample = servo_.next();
+  while (!answer && !record_.timed_out && !(faults & runner::servo_fault::kTripped)) {
+    const runner::Sample& sample = servo_.next();
     faults = sample.faults;
-    if (sample.phase == Phase::feeling) {
+    if (sample.phase == runner::Phase::feeling) {
       note(sample);
       record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns_;
       record_.response_ns = sample.time_ns;
@@ -24,10 +24,10 @@ void UnloggedTrial::run() {
   }
 }
 
-void UnloggedTrial::note(const Sample& sample) {
+void UnloggedTrial::note(const runner::Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
-    record_.onset_utc = format_utc(sample.time_ns);
+    record_.onset_utc = data::format_utc(sample.time_ns);
     record_.start_tip = {sample.probe.tip.x, sample.probe.tip.y, sample.probe.tip.z};
     record_.start_tail = {sample.probe.tail.x, sample.probe.tail.y, sample.probe.tail.z};
   }

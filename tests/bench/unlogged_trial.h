@@ -9,17 +9,17 @@ namespace palpate::bench {
 /// A trial as Session::run_trial would run it if samples could not be kept: its yardstick.
 class UnloggedTrial {
  public:
-  UnloggedTrial(TickSource& servo, Respondent& participant, std::int64_t limit_ns)
+  UnloggedTrial(runner::TickSource& servo, runner::Respondent& participant, std::int64_t limit_ns)
       : servo_(servo), participant_(participant), limit_ns_(limit_ns) {}
   void run();
 
  private:
-  void note(const Sample& sample);
+  void note(const runner::Sample& sample);
 
-  TickSource& servo_;
-  Respondent& participant_;
+  runner::TickSource& servo_;
+  runner::Respondent& participant_;
   std::int64_t limit_ns_;
-  TrialRecord record_;
+  data::TrialRecord record_;
 };
 
 }  // namespace palpate::bench

@@ -13,7 +13,7 @@
 #include "data/files/checksum.h"
 #include "data/store/store.h"
 
-namespace palpate::testing {
+namespace palpate::data::testing {
 
 class TemporaryFolder {
  public:
@@ -97,4 +97,4 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-}  // namespace palpate::testing
+}  // namespace palpate::data::testing

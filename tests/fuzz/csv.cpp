@@ -9,7 +9,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const palpate::testing::InputFile file("trials.csv");
   try {
-    palpate::read_trials_csv(file.write(data, size));
+    palpate::analysis::read_trials_csv(file.write(data, size));
   } catch (const std::runtime_error&) {
   }
   return 0;

@@ -17,8 +17,8 @@ using namespace palpate;
 
 constexpr const char* kText = "{\"version\": 1}\n";
 
-TrialRecord a_trial(int number) {
-  TrialRecord trial;
+data::TrialRecord a_trial(int number) {
+  data::TrialRecord trial;
   trial.trial = number;
   trial.renderer = "ray";
   trial.shape = "cube";
@@ -42,15 +42,16 @@ std::string sound_database() {
   const std::string path = folder.write(&nothing, 0);
   std::filesystem::remove(path);
   {
-    Store store = Store::open(path, Store::Mode::write_or_create);
-    const Participant participant = store.enrol({"quick", kText, checksum_hex(kText), {}}, "P01");
-    RunInfo info;
+    data::Store store = data::Store::open(path, data::Store::Mode::write_or_create);
+    const data::Participant participant =
+        store.enrol({"quick", kText, data::checksum_hex(kText), {}}, "P01");
+    data::RunInfo info;
     info.clock = {1'700'000'000'000'000'000, 5'000'000'000};
     info.program_version = "0.1.0";
     info.device = "simulated";
-    const Run run = store.begin_run(participant, info);
+    const data::Run run = store.begin_run(participant, info);
     for (int number = 1; number <= 3; ++number) {
-      TrialRecord trial = a_trial(number);
+      data::TrialRecord trial = a_trial(number);
       trial.attempt = store.begin_attempt(run, trial, trial.onset_ns - 1);
       if (number < 3) {
         store.finish_attempt(run, trial);
@@ -59,7 +60,7 @@ std::string sound_database() {
       }
       store.add_note(run, trial.response_ns, "note " + std::to_string(number));
     }
-    store.end_run(run, RunEnd::paused, 30'000'000'000);
+    store.end_run(run, data::RunEnd::paused, 30'000'000'000);
   }
   std::ifstream in(path, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(in), {}};
@@ -68,10 +69,10 @@ std::string sound_database() {
 }
 
 void read_all(const std::string& path) {
-  Store store = Store::open(path, Store::Mode::read_only);
+  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   store.counts();
-  store.for_each_trial([](const StoredTrial&) {}, true);
-  store.for_each_cut_off([](const StoredTrial&) {});
+  store.for_each_trial([](const data::StoredTrial&) {}, true);
+  store.for_each_cut_off([](const data::StoredTrial&) {});
   store.notes();
   store.runs();
 }
@@ -90,7 +91,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string& path = file.write(changed, bytes.size());
   try {
     read_all(path);
-  } catch (const StoreError&) {
+  } catch (const data::StoreError&) {
     if (bytes == sound) throw;
   }
   for (const char* beside : {"-wal", "-shm", "-journal"}) std::filesystem::remove(path + beside);

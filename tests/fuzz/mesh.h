@@ -12,12 +12,13 @@ namespace palpate::testing {
 /// Whatever a mesh file holds: it is refused with the reason, or it can be felt.
 inline void feel_mesh_file(const std::string& path) {
   try {
-    SceneObject object;
-    object.mesh = std::make_shared<const ConvexMesh>(read_mesh_file(path));
-    for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
-      feel(Scene({object}, renderer->side_contact()), *renderer);
+    rendering::SceneObject object;
+    object.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::read_mesh_file(path));
+    for (const rendering::Renderer* renderer :
+         {&rendering::point_renderer(), &rendering::ray_renderer()}) {
+      feel(rendering::Scene({object}, renderer->side_contact()), *renderer);
     }
-  } catch (const MeshError&) {
+  } catch (const stimuli::MeshError&) {
   }
 }
 

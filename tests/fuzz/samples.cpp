@@ -10,15 +10,15 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate;
   if (size < 4) return 0;
-  const int packing = 1 + data[0] % kSamplesPacking;
+  const int packing = 1 + data[0] % data::kSamplesPacking;
   const std::int64_t count = data[1] + 256 * data[2] + 65536 * data[3];
   try {
-    const auto samples = unpack_samples(data + 4, size - 4, count, packing);
+    const auto samples = data::unpack_samples(data + 4, size - 4, count, packing);
     if (static_cast<std::int64_t>(samples.size()) != count) std::abort();
-    const std::string again = pack_samples(samples);
-    const auto back = unpack_samples(again.data(), again.size(), count);
-    if (pack_samples(back) != again) std::abort();
-  } catch (const StoreError&) {
+    const std::string again = data::pack_samples(samples);
+    const auto back = data::unpack_samples(again.data(), again.size(), count);
+    if (data::pack_samples(back) != again) std::abort();
+  } catch (const data::StoreError&) {
   }
   return 0;
 }

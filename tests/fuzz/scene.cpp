@@ -12,7 +12,7 @@
 namespace {
 
 /// Fine tessellations are slow to build and show nothing more.
-bool small(const palpate::ObjectSpec& spec) {
+bool small(const palpate::stimuli::ObjectSpec& spec) {
   return spec.subdivisions <= 3 && spec.segments <= 256 &&
          std::all_of(spec.parts.begin(), spec.parts.end(), small);
 }
@@ -22,16 +22,16 @@ bool small(const palpate::ObjectSpec& spec) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const palpate::testing::InputFile file("scene.json");
   try {
-    const auto objects = palpate::parse_scene(file.write(data, size));
+    const auto objects = palpate::protocols::parse_scene(file.write(data, size));
     if (objects.size() > 50 || !std::all_of(objects.begin(), objects.end(), small)) return 0;
-    palpate::SceneBuilder builder;
-    for (const palpate::Renderer* renderer :
-         {&palpate::point_renderer(), &palpate::ray_renderer()}) {
+    palpate::runner::SceneBuilder builder;
+    for (const palpate::rendering::Renderer* renderer :
+         {&palpate::rendering::point_renderer(), &palpate::rendering::ray_renderer()}) {
       palpate::testing::feel(builder.build(objects, renderer->side_contact()), *renderer);
     }
-  } catch (const palpate::InputError& error) {
+  } catch (const palpate::protocols::InputError& error) {
     if (error.faults().empty()) std::abort();
-  } catch (const palpate::MeshError&) {
+  } catch (const palpate::stimuli::MeshError&) {
   }
   return 0;
 }

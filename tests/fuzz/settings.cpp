@@ -12,7 +12,7 @@
 namespace {
 
 void read_calibration_text(const std::string& text) {
-  using namespace palpate::falcon;
+  using namespace palpate::runner::falcon;
   const Calibration calibration = parse_calibration(text, "calibration.json");
   for (const ForceCalibration& force : calibration.forces) {
     if (!std::isfinite(force.counts_per_torque) || force.counts_per_torque >= 0) std::abort();
@@ -31,11 +31,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const palpate::testing::InputFile file("settings.json");
   try {
     read_calibration_text({reinterpret_cast<const char*>(data), size});
-  } catch (const palpate::InputError&) {
+  } catch (const palpate::protocols::InputError&) {
   }
   try {
-    palpate::load_simulated_settings(file.write(data, size));
-  } catch (const palpate::InputError&) {
+    palpate::runner::load_simulated_settings(file.write(data, size));
+  } catch (const palpate::protocols::InputError&) {
   }
   return 0;
 }

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
@@ -90,4 +90,4 @@ TEST(ProtocolDifference, ALongListIsCut) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::protocols

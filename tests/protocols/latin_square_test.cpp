@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 TEST(LatinSquare, IsBalancedForPositionAndNeighbours) {
@@ -44,4 +44,4 @@ TEST(LatinSquare, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::protocols

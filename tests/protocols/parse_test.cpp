@@ -13,7 +13,7 @@
 #include "stimuli/random.h"
 #include "tests/shared/peak_memory.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,9 +104,9 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(p.renderers, (std::vector{RendererKind::ray, RendererKind::point}));
   EXPECT_EQ(p.renderer_order, RendererOrder::fixed);
   ASSERT_EQ(p.stimuli.size(), 6u);
-  const ObjectSpec& ball = p.stimuli[0].object;
+  const stimuli::ObjectSpec& ball = p.stimuli[0].object;
   EXPECT_EQ(p.stimuli[0].name, "ball");
-  EXPECT_EQ(ball.shape, ShapeKind::sphere);
+  EXPECT_EQ(ball.shape, stimuli::ShapeKind::sphere);
   EXPECT_EQ(ball.radius, 0.02);
   EXPECT_EQ(ball.subdivisions, 3);
   EXPECT_EQ(ball.pose.position, Vec3(0, 0, 0.01));
@@ -118,13 +118,13 @@ TEST(Parse, ReadsEveryKey) {
   ASSERT_EQ(ball.material.layers.size(), 2u);
   EXPECT_EQ(ball.material.layers[1].depth, 0.002);
   EXPECT_EQ(ball.material.layers[1].stiffness, 900);
-  const ObjectSpec& hat = p.stimuli[1].object;
-  EXPECT_EQ(hat.shape, ShapeKind::cone);
+  const stimuli::ObjectSpec& hat = p.stimuli[1].object;
+  EXPECT_EQ(hat.shape, stimuli::ShapeKind::cone);
   EXPECT_EQ(hat.height, 0.03);
   EXPECT_EQ(hat.segments, 32);
   EXPECT_EQ(hat.material.stiffness, 600);
   EXPECT_EQ(hat.material.damping, 0.5);  // the protocol's
-  EXPECT_EQ(p.stimuli[2].object.shape, ShapeKind::cylinder);
+  EXPECT_EQ(p.stimuli[2].object.shape, stimuli::ShapeKind::cylinder);
   EXPECT_EQ(p.stimuli[2].object.material.damping, 2);
   EXPECT_EQ(p.stimuli[2].object.material.friction_static, 0.125);  // one given serves for both
   EXPECT_EQ(p.stimuli[2].object.material.friction_dynamic, 0.125);
@@ -132,7 +132,7 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(p.stimuli[2].object.material.stiffness, 400);
   EXPECT_EQ(p.stimuli[3].object.edge, 0.04);
   EXPECT_EQ(p.stimuli[4].object.file, kFolder + "good/tetrahedron.obj");
-  const ObjectSpec& dumbbell = p.stimuli[5].object;
+  const stimuli::ObjectSpec& dumbbell = p.stimuli[5].object;
   ASSERT_EQ(dumbbell.parts.size(), 2u);
   EXPECT_EQ(dumbbell.parts[0].material.stiffness, 700);  // the compound's
   EXPECT_EQ(dumbbell.parts[1].parts.at(0).material.stiffness, 700);
@@ -193,9 +193,9 @@ TEST(Parse, LeavesDefaultsAlone) {
 }
 
 TEST(Parse, ReadsAScene) {
-  const std::vector<ObjectSpec> objects = parse_scene(kFolder + "good/scene.json");
+  const std::vector<stimuli::ObjectSpec> objects = parse_scene(kFolder + "good/scene.json");
   ASSERT_EQ(objects.size(), 3u);
-  EXPECT_EQ(objects[0].shape, ShapeKind::cube);
+  EXPECT_EQ(objects[0].shape, stimuli::ShapeKind::cube);
   EXPECT_EQ(objects[0].edge, 0.05);
   EXPECT_EQ(objects[1].file, kFolder + "good/tetrahedron.obj");
   EXPECT_EQ(objects[2].parts.size(), 1u);
@@ -294,7 +294,7 @@ TEST(Parse, UnreadableFilesAreInputErrors) {
 TEST(Parse, SurvivesDamage) {
   const std::string good = text_of(kFolder + "good/everything.json");
   const std::string pieces = "{}[]\",:0-1e9.\\\xff\n truenull";
-  Random random(11);
+  stimuli::Random random(11);
   int refused = 0;
   for (int i = 0; i < 3000; ++i) {
     std::string text = good;
@@ -329,11 +329,11 @@ TEST(MeshFiles, AreReadWithTheProtocolAndStoredOnesStandIn) {
   EXPECT_THROW(parse_protocol_text(text, "own.json"), InputError);
   const Protocol kept =
       parse_protocol_text(text, "own.json", {{"no-such-folder/wedge.obj", "v 0 0 0\n"}});
-  const ObjectSpec& object = kept.stimuli.at(0).object;
+  const stimuli::ObjectSpec& object = kept.stimuli.at(0).object;
   EXPECT_EQ(object.file_name, "no-such-folder/wedge.obj");
   ASSERT_TRUE(object.file_bytes);
   EXPECT_EQ(*object.file_bytes, "v 0 0 0\n");
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::protocols

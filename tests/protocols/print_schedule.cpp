@@ -4,7 +4,7 @@
 
 #include "protocols/schedule.h"
 
-using namespace palpate;
+using namespace palpate::protocols;
 
 int main() {
   Protocol protocol;

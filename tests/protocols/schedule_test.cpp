@@ -14,7 +14,7 @@
 #include "protocols/parse.h"
 #include "protocols/sha256.h"
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 Protocol ho2000() { return parse_protocol(PALPATE_SOURCE_DIR "/protocols/ho2000.json"); }
@@ -289,4 +289,4 @@ TEST(Schedule, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::protocols

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
+namespace palpate::protocols {
 namespace {
 
 // NIST, Secure Hash Standard Validation System and the examples of FIPS 180-2.
@@ -27,4 +27,4 @@ TEST(Sha256, PadsAtBlockBorders) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::protocols

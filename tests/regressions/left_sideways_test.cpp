@@ -19,16 +19,20 @@ constexpr double kHalf = 0.03;  // m
 class BesideACube {
  public:
   BesideACube()
-      : scene_({{std::make_shared<const ConvexMesh>(cube(2 * kHalf)), {}, {}, 0, nullptr}}) {
+      : scene_({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(2 * kHalf)),
+                 {},
+                 {},
+                 0,
+                 nullptr}}) {
     state_ = scene_.initial_state();
   }
-  Rendering tick(const Vec3& tip, const Vec3& d) {
-    return ray_renderer().tick(scene_, state_, {tip, tip + d}, 1e-3);
+  rendering::Rendering tick(const Vec3& tip, const Vec3& d) {
+    return rendering::ray_renderer().tick(scene_, state_, {tip, tip + d}, 1e-3);
   }
 
  private:
-  Scene scene_;
-  RenderState state_;
+  rendering::Scene scene_;
+  rendering::RenderState state_;
 };
 
 TEST(LeftSideways, AFlushStylusThatHasLeftIsFree) {
@@ -40,7 +44,7 @@ TEST(LeftSideways, AFlushStylusThatHasLeftIsFree) {
     bench.tick({-0.031, kHalf, kHalf}, d);
     bench.tick({-0.031, kHalf, kHalf - deep}, d);
     for (const double x : {-0.03, -0.029}) bench.tick({x, kHalf, kHalf - deep}, d);
-    const Rendering r = bench.tick({-0.029, kHalf + 0.001, kHalf - deep}, d);
+    const rendering::Rendering r = bench.tick({-0.029, kHalf + 0.001, kHalf - deep}, d);
     EXPECT_EQ(r.contacts, 0) << deep << ": " << r.deepest.depth;
     EXPECT_EQ(r.force, Vec3());
   }
@@ -53,7 +57,7 @@ TEST(LeftSideways, AJumpFarAwayIsFree) {
       BesideACube bench;
       bench.tick(Vec3(0, 0, 1) - 0.5 * d, d);
       bench.tick(Vec3(0.001, 0.002, 0.025) - 0.5 * d, d);
-      const Rendering r = bench.tick(to, d);
+      const rendering::Rendering r = bench.tick(to, d);
       // Straight below the facet that held it, it is held; nowhere else.
       if (r.contacts > 0) {
         EXPECT_LT(std::abs(r.deepest.point.x), kHalf + 1e-9);

@@ -13,12 +13,14 @@ namespace palpate {
 namespace {
 
 TEST(TouchingExactly, IsNoContactYetAndTheNextTickIsTheTop) {
-  const auto mesh = std::make_shared<const ConvexMesh>(cube(0.06));
-  for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
-    const Scene scene({{mesh, Pose{}, Material{}, 0, nullptr}}, renderer->side_contact());
+  const auto mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06));
+  for (const rendering::Renderer* renderer :
+       {&rendering::point_renderer(), &rendering::ray_renderer()}) {
+    const rendering::Scene scene({{mesh, Pose{}, stimuli::Material{}, 0, nullptr}},
+                                 renderer->side_contact());
     for (const double shift : {0.0, 0.01, -0.0299}) {
-      RenderState state = scene.initial_state();
-      Rendering rendering;
+      rendering::RenderState state = scene.initial_state();
+      rendering::Rendering rendering;
       for (const double z : {0.1, 0.0301, 0.03, 0.03, 0.0299}) {
         rendering = renderer->tick(scene, state, {{shift, 0, z}, {shift, 0, z + 0.12}}, 1e-3);
         EXPECT_NEAR(rendering.force.x, 0, 1e-12);

@@ -12,7 +12,7 @@
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::uniform;
@@ -23,8 +23,8 @@ struct Counts {
 };
 
 /// One random motion near the mesh, from wherever a walk finds the probe outside. `turn`: rad.
-void check_motion(const ConvexMesh& mesh, const ContactTrees& trees, Random& random, bool segment,
-                  double way, double turn, Counts& counts) {
+void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
+                  stimuli::Random& random, bool segment, double way, double turn, Counts& counts) {
   const double size = mesh.size();
   const double length = segment ? size * uniform(random, 0.01, 3) : 0;
   const Vec3 near = testing::middle_of(mesh) + 0.6 * size * testing::random_direction(random);
@@ -71,8 +71,8 @@ void check_motion(const ConvexMesh& mesh, const ContactTrees& trees, Random& ran
 Counts check_motions(bool segment, double way, double turn, std::uint64_t stream) {
   Counts counts;
   for (std::uint64_t seed = 0; seed < 1500; ++seed) {
-    Random random(seed, {77, stream});
-    const ConvexMesh mesh = testing::random_convex_mesh(random);
+    stimuli::Random random(seed, {77, stream});
+    const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     const ContactTrees trees(mesh, true);
     for (int i = 0; i < 10; ++i) check_motion(mesh, trees, random, segment, way, turn, counts);
     if (::testing::Test::HasFailure()) {
@@ -105,10 +105,10 @@ TEST(Approach, OfAStylusThatIsWhirledEndsAsLookingEverywhereDoes) {
 }
 
 TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
-  const ConvexMesh mesh(icosphere(0.03, 6));
+  const stimuli::ConvexMesh mesh(stimuli::icosphere(0.03, 6));
   const SupportMap map(mesh);
   ASSERT_FALSE(map.empty());
-  Random random(5);
+  stimuli::Random random(5);
   for (int i = 0; i < 2000; ++i) {
     const Vec3 direction = 3.0 * testing::random_direction(random);
     const Vec3& near = mesh.vertices()[map.near_support(direction)];
@@ -120,8 +120,8 @@ TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
         best);
     EXPECT_GT(glm::dot(near, direction), 3 * 0.03 * std::cos(0.06));  // a cell: some 0.06 rad
   }
-  EXPECT_TRUE(SupportMap(ConvexMesh(cube(0.1))).empty());
+  EXPECT_TRUE(SupportMap(stimuli::ConvexMesh(stimuli::cube(0.1))).empty());
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -7,7 +7,7 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::Bench;
@@ -17,8 +17,8 @@ constexpr double kHalfEdge = 0.025;  // m, half edge of the cube
 constexpr double kDepth = 0.001;     // m
 
 Bench cube_bench(const Renderer& renderer) {
-  return Bench(renderer,
-               std::make_shared<const ConvexMesh>(testing::triangulated(cube(2 * kHalfEdge))));
+  return Bench(renderer, std::make_shared<const stimuli::ConvexMesh>(
+                             testing::triangulated(stimuli::cube(2 * kHalfEdge))));
 }
 
 /// Comes down onto the cube from 10 mm above where it ends.
@@ -197,11 +197,11 @@ TEST(SegmentFace, ContactMovesWithoutJumpsThroughTheBlend) {
 
 /// Where the line of the ideal probe enters and leaves a triangle that it is held at, looked at in
 /// the triangle's plane; from the triangle's corners. Fractions of the probe.
-std::pair<double, double> over_triangle(const ConvexMesh& mesh, const Facet& facet,
-                                        const LineProbe& ideal) {
+std::pair<double, double> over_triangle(const stimuli::ConvexMesh& mesh,
+                                        const stimuli::Facet& facet, const LineProbe& ideal) {
   double enter = 0, leave = 1;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + 3; ++i) {
-    const Edge& edge = mesh.edges()[mesh.sides()[i].edge];
+    const stimuli::Edge& edge = mesh.edges()[mesh.sides()[i].edge];
     const bool with_it = &mesh.facets()[edge.left] == &facet;
     const Vec3 from = with_it ? edge.from : edge.to, to = with_it ? edge.to : edge.from;
     // Area of the triangle that a point spans with the side: positive inside.
@@ -217,7 +217,7 @@ std::pair<double, double> over_triangle(const ConvexMesh& mesh, const Facet& fac
 }
 
 /// The side slides over a sphere of 30 mm, now and then parallel to it within the blend's angle.
-testing::ProbePath along_sphere(Random& random, int ticks) {
+testing::ProbePath along_sphere(stimuli::Random& random, int ticks) {
   const testing::Wave3 place(random), turn(random);
   testing::ProbePath path;
   for (int tick = 0; tick < ticks; ++tick) {
@@ -232,10 +232,11 @@ testing::ProbePath along_sphere(Random& random, int ticks) {
 
 // Along edges and faces of fine meshes, in every direction.
 TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
-  Random random(5);
+  stimuli::Random random(5);
   int from_edges = 0, from_faces = 0;
   for (const int subdivisions : {2, 3, 4, 5}) {
-    const auto mesh = std::make_shared<const ConvexMesh>(icosphere(0.03, subdivisions));
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.03, subdivisions));
     for (int path = 0; path < 8; ++path) {
       Bench bench(ray_renderer(), mesh);
       for (const LineProbe& probe : along_sphere(random, 2000)) {
@@ -246,14 +247,14 @@ TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
         const Vec3 d = r.ideal.tail - r.ideal.tip;
         std::uint32_t face = held.index;
         if (edge) {
-          const Edge& e = mesh->edges()[held.index];
+          const stimuli::Edge& e = mesh->edges()[held.index];
           const auto rise = [&](std::uint32_t f) {
             return std::abs(glm::dot(mesh->facets()[f].normal, d));
           };
           if (std::abs(rise(e.left) - rise(e.right)) < 1e-12 * glm::length(d)) continue;
           face = rise(e.left) < rise(e.right) ? e.left : e.right;
         }
-        const Facet& facet = mesh->facets()[face];
+        const stimuli::Facet& facet = mesh->facets()[face];
         const auto [enter, leave] = over_triangle(*mesh, facet, r.ideal);
         const double theta = std::asin(glm::dot(facet.normal, d) / glm::length(d));
         const double place = (enter + leave) / 2 + theta / kBlendAngle * (enter - leave) / 2;
@@ -268,4 +269,4 @@ TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -21,7 +21,7 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::Bench;
@@ -38,15 +38,15 @@ struct Seen {
   int same = 0, adjacent = 0, farther = 0;
 };
 
-bool adjacent(const ConvexMesh& mesh, MinkowskiFacet a, MinkowskiFacet b) {
+bool adjacent(const stimuli::ConvexMesh& mesh, MinkowskiFacet a, MinkowskiFacet b) {
   using Of = MinkowskiFacet::Kind;
   if (a.kind == Of::edge && b.kind == Of::face) std::swap(a, b);
   if (a.kind == Of::face) {
     if (b.kind == Of::edge) {
-      const Edge& edge = mesh.edges()[b.index];
+      const stimuli::Edge& edge = mesh.edges()[b.index];
       return edge.left == a.index || edge.right == a.index;
     }
-    for (const Edge& edge : mesh.edges()) {
+    for (const stimuli::Edge& edge : mesh.edges()) {
       if ((edge.left == a.index && edge.right == b.index) ||
           (edge.left == b.index && edge.right == a.index)) {
         return true;
@@ -54,12 +54,13 @@ bool adjacent(const ConvexMesh& mesh, MinkowskiFacet a, MinkowskiFacet b) {
     }
     return false;
   }
-  const Edge &e = mesh.edges()[a.index], &f = mesh.edges()[b.index];
+  const stimuli::Edge &e = mesh.edges()[a.index], &f = mesh.edges()[b.index];
   return e.v0 == f.v0 || e.v0 == f.v1 || e.v1 == f.v0 || e.v1 == f.v1;
 }
 
 /// Slides over the mesh and bounds every change of force between ticks in contact.
-void slide_and_bound(const Renderer& renderer, const std::shared_ptr<const ConvexMesh>& mesh,
+void slide_and_bound(const Renderer& renderer,
+                     const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
                      const testing::ProbePath& path, Seen& seen) {
   Bench bench(renderer, mesh);
   Rendering last;
@@ -86,7 +87,7 @@ void slide_and_bound(const Renderer& renderer, const std::shared_ptr<const Conve
           ASSERT_LE(change, kStiffness * m + kRounding) << "tick " << i;
         }
         if (same && facet.kind == MinkowskiFacet::Kind::edge) {
-          const Edge& edge = mesh->edges()[facet.index];
+          const stimuli::Edge& edge = mesh->edges()[facet.index];
           const Vec3 e = mesh->vertices()[edge.v1] - mesh->vertices()[edge.v0];
           const Vec3 d = path[i].tail - path[i].tip, d0 = path[i - 1].tail - path[i - 1].tip;
           const auto sine_to = [&](const Vec3& v) {
@@ -110,10 +111,11 @@ class Continuity : public ::testing::TestWithParam<const Renderer*> {};
 TEST_P(Continuity, OfForceOverFacets) {
   Seen seen;
   for (std::uint64_t seed = 0; seed < 60 && !HasFatalFailure(); ++seed) {
-    Random random(seed, {81});
-    const PolygonSoup soups[] = {cube(0.06), icosphere(0.03, 3), cone(0.03, 0.06, 64),
-                                 cylinder(0.03, 0.06, 64)};
-    const auto mesh = std::make_shared<const ConvexMesh>(soups[seed % 4]);
+    stimuli::Random random(seed, {81});
+    const stimuli::PolygonSoup soups[] = {stimuli::cube(0.06), stimuli::icosphere(0.03, 3),
+                                          stimuli::cone(0.03, 0.06, 64),
+                                          stimuli::cylinder(0.03, 0.06, 64)};
+    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(soups[seed % 4]);
     SCOPED_TRACE("seed " + std::to_string(seed));
     slide_and_bound(
         *GetParam(), mesh,
@@ -144,7 +146,8 @@ TEST(ContinuityOfTorque, ThroughSegmentFaceOnEachSideOfEpsilon) {
                         Rod{-0.01, 0.03}, Rod{-0.04, 0.03}}) {
     const double start = rod.start, length = rod.length;
     for (const double direction : {1.0, -1.0}) {
-      Bench bench(ray_renderer(), std::make_shared<const ConvexMesh>(cube(2 * kHalf)));
+      Bench bench(ray_renderer(),
+                  std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(2 * kHalf)));
       const auto probe_at = [&](double theta) {
         const Vec3 u(std::cos(theta), 0, std::sin(theta));
         // Turned about its middle; the depth of what is over the top is kSunk at theta = 0.
@@ -191,4 +194,4 @@ TEST(ContinuityOfTorque, ThroughSegmentFaceOnEachSideOfEpsilon) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

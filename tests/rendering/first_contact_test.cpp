@@ -5,14 +5,14 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::Bench;
 using testing::uniform;
 
-std::shared_ptr<const ConvexMesh> shared(const PolygonSoup& soup) {
-  return std::make_shared<const ConvexMesh>(soup);
+std::shared_ptr<const stimuli::ConvexMesh> shared(const stimuli::PolygonSoup& soup) {
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
 }
 
 class FirstContact : public ::testing::TestWithParam<const Renderer*> {};
@@ -35,7 +35,7 @@ TEST_P(FirstContact, FasterThanAPlateIsThickHoldsOnTheSideOfEntry) {
 
 TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-    Random random(seed, {11});
+    stimuli::Random random(seed, {11});
     const double size = 2e-4 * std::pow(1e5, random.unit());
     const double thickness = size * std::pow(10, uniform(random, -4, -1));
     const double length = size * uniform(random, 0, 4) * static_cast<double>(random.below(3));
@@ -69,7 +69,7 @@ TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
 
 TEST(FirstContactOfTheSide, AStickIsNotWhippedThroughANeedle) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-    Random random(seed, {12});
+    stimuli::Random random(seed, {12});
     const double size = 2e-4 * std::pow(1e5, random.unit());
     const double width = size * std::pow(10, uniform(random, -4, -1));
     Bench bench(ray_renderer(), shared(testing::needle(size, width)),
@@ -105,7 +105,7 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
     const LineProbe probe = testing::to_world(bench.pose(), local_path[i]);
     const Rendering r = bench.tick(probe);
     const LineProbe felt = bench.felt(probe);
-    const ConvexMesh& mesh = bench.mesh();
+    const stimuli::ConvexMesh& mesh = bench.mesh();
     const double tolerance = 1e-9 * mesh.size() + bench.rounding(probe);
     const auto time =
         was_free ? reference_first_contact(mesh, last, felt, 100) : std::optional<double>();
@@ -121,7 +121,7 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
       // It came in through a face, and at the end of the tick still stands under that face: the
       // ideal probe stays on it.
       const Vec3 entry = reference_depth(mesh, testing::mixed(last, felt, *time)).normal;
-      for (const Facet& facet : mesh.facets()) {
+      for (const stimuli::Facet& facet : mesh.facets()) {
         if (glm::length(facet.normal - entry) > 1e-12) continue;
         const double below =
             facet.offset - std::min(glm::dot(entry, felt.tip), glm::dot(entry, felt.tail));
@@ -140,8 +140,9 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
 TEST_P(FirstContact, AgreesWithTheMotionInAHundredSteps) {
   Tally tally;
   for (std::uint64_t seed = 0; seed < 150 && !HasFatalFailure(); ++seed) {
-    Random random(seed, {13});
-    const auto mesh = std::make_shared<const ConvexMesh>(testing::random_convex_mesh(random));
+    stimuli::Random random(seed, {13});
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * uniform(random, 0, 3) * static_cast<double>(seed % 4);
     const double step = 0.02 * std::pow(500, random.unit());
     const auto path = seed % 3 ? testing::fast_passes(random, *mesh, length, 150, step)
@@ -158,8 +159,9 @@ TEST_P(FirstContact, AgreesWithTheMotionInAHundredSteps) {
 TEST_P(FirstContact, ByTheNearestSideIsAsDeepAsTheReference) {
   int plunges = 0;
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
-    Random random(seed, {14});
-    const auto mesh = std::make_shared<const ConvexMesh>(testing::random_convex_mesh(random));
+    stimuli::Random random(seed, {14});
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * uniform(random, 0, 3);
     const Pose pose = testing::random_pose(random, mesh->size());
     for (const LineProbe& end : testing::jumping_path(random, *mesh, length, 20)) {
@@ -195,4 +197,4 @@ INSTANTIATE_TEST_SUITE_P(Both, FirstContact, ::testing::Values(&point_renderer()
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

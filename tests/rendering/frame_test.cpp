@@ -5,14 +5,14 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::Bench;
 
 /// Follows the path at two places; the forces may differ by `tolerance` of the object's size in
 /// depth, the torques by as much in lever.
-void compare(const Renderer& renderer, const std::shared_ptr<const ConvexMesh>& mesh,
+void compare(const Renderer& renderer, const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
              const testing::ProbePath& path, const Pose& there, double tolerance, int& in_contact) {
   Bench home(renderer, mesh);
   Bench away(renderer, mesh, there);
@@ -43,8 +43,9 @@ class Frames : public ::testing::TestWithParam<const Renderer*> {};
 TEST_P(Frames, NearTheOrigin) {
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 100 && !HasFatalFailure(); ++seed) {
-    Random random(seed, {31});
-    const auto mesh = std::make_shared<const ConvexMesh>(testing::random_convex_mesh(random));
+    stimuli::Random random(seed, {31});
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * testing::uniform(random, 0.2, 3);
     const auto path = seed % 2 ? testing::wandering_path(random, *mesh, length, 300, 0.01)
                                : testing::sliding_path(random, *mesh, length, 200, 0.01, 0.3,
@@ -59,8 +60,8 @@ TEST_P(Frames, NearTheOrigin) {
 TEST_P(Frames, AKilometreAway) {
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 50 && !HasFatalFailure(); ++seed) {
-    Random random(seed, {32});
-    const auto mesh = std::make_shared<const ConvexMesh>(
+    stimuli::Random random(seed, {32});
+    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(
         testing::placed(testing::random_polyhedron(random, 20, Vec3(0.05, 0.04, 0.03)),
                         Quat(1, 0, 0, 0), 1, Vec3()));
     const auto path =
@@ -78,4 +79,4 @@ INSTANTIATE_TEST_SUITE_P(Both, Frames, ::testing::Values(&point_renderer(), &ray
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -12,7 +12,7 @@
 #include "stimuli/random.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::kTick;
@@ -23,13 +23,14 @@ constexpr double kLength = 0.12;  // m, of the stylus
 /// A cube of 0.1 m felt from above.
 class Block {
  public:
-  explicit Block(const Material& material, const Renderer& renderer = point_renderer())
+  explicit Block(const stimuli::Material& material, const Renderer& renderer = point_renderer())
       : renderer_(renderer), scene_({object(material)}), state_(scene_.initial_state()) {
     tick(-0.01);
   }
 
-  static SceneObject object(const Material& material) {
-    auto object = testing::placed_object(std::make_shared<const ConvexMesh>(cube(2 * kTop)));
+  static SceneObject object(const stimuli::Material& material) {
+    auto object = testing::placed_object(
+        std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(2 * kTop)));
     object.material = material;
     return object;
   }
@@ -46,15 +47,15 @@ class Block {
   RenderState state_;
 };
 
-Material frictional(double fixed, double dynamic) {
-  Material material;
+stimuli::Material frictional(double fixed, double dynamic) {
+  stimuli::Material material;
   material.friction_static = fixed;
   material.friction_dynamic = dynamic;
   return material;
 }
 
 TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
-  Material material;
+  stimuli::Material material;
   material.damping = 2;
   Block block(material);
   block.tick(0.001);
@@ -65,7 +66,7 @@ TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
 }
 
 TEST(Material, LayersAddUpTheirSpringsAndForceIsContinuousAcrossThem) {
-  Material material;
+  stimuli::Material material;
   material.stiffness = 200;
   material.layers = {{0.001, 1000}, {0.002, 50}};
   Block block(material);
@@ -144,10 +145,10 @@ TEST(Friction, OfTheSideOfTheStylusTurnsIt) {
 }
 
 TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
-  Random random(11);
+  stimuli::Random random(11);
   const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };
   for (int round = 0; round < 50; ++round) {
-    Material material = frictional(between(0.1, 1), 0);
+    stimuli::Material material = frictional(between(0.1, 1), 0);
     material.friction_dynamic = material.friction_static * between(0, 1);
     if (round % 2 == 0) material.damping = between(0, 3);
     Block block(material);
@@ -197,4 +198,4 @@ TEST(Friction, GoesOnOverASeam) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -6,7 +6,7 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::kTick;
@@ -14,10 +14,10 @@ using testing::placed_object;
 
 constexpr double kSpring = 800;  // N/m
 
-std::shared_ptr<const ConvexMesh> box(const Vec3& low, const Vec3& high) {
-  PolygonSoup soup = cube(1);
+std::shared_ptr<const stimuli::ConvexMesh> box(const Vec3& low, const Vec3& high) {
+  stimuli::PolygonSoup soup = stimuli::cube(1);
   for (Vec3& v : soup.vertices) v = 0.5 * (low + high) + v * (high - low);
-  return std::make_shared<const ConvexMesh>(soup);
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
 }
 
 /// A slab with its top at z = 0, from x = -50 to 50 mm, cut at these places, one object.
@@ -75,7 +75,7 @@ TEST_P(SeveralParts, ManySeamsFeelLikeNone) {
   const Scene whole = slab_cut_at({});
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    Random random(seed, {41});
+    stimuli::Random random(seed, {41});
     const testing::Wave x(random), y(random), z(random);
     RenderState cut_state = cut.initial_state();
     RenderState whole_state = whole.initial_state();
@@ -104,7 +104,7 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
   const Scene together(both), only_left({both[0]}), only_right({placed_object(right, {}, 900, 0)});
   int both_touched = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    Random random(seed, {42});
+    stimuli::Random random(seed, {42});
     const testing::Wave3 place(random), turn(random);
     RenderState state = together.initial_state();
     RenderState left_state = only_left.initial_state();
@@ -144,9 +144,9 @@ TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
   const Scene scene(objects);
   RenderState state = scene.initial_state();
   tick(scene, state, upright(0, -0.01));
-  const std::uint64_t before = allocations();
+  const std::uint64_t before = runner::allocations();
   const Rendering r = tick(scene, state, upright(0, kPressed));
-  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(runner::allocations(), before);
   EXPECT_EQ(r.contacts, kObjects);
   EXPECT_NEAR(r.force.z, kObjects * kSoft * kPressed, 1e-9);
   EXPECT_EQ(r.faults, 0u);
@@ -176,16 +176,17 @@ TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
 TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    Random random(seed, {43});
+    stimuli::Random random(seed, {43});
     std::vector<SceneObject> parts;
     for (std::uint64_t i = 0; i < 2 + seed % 3; ++i) {
-      parts.push_back(placed_object(std::make_shared<const ConvexMesh>(testing::random_polyhedron(
-                                        random, 12, Vec3(0.04, 0.03, 0.02))),
-                                    testing::random_pose(random, 0.025), kSpring, 0));
+      parts.push_back(
+          placed_object(std::make_shared<const stimuli::ConvexMesh>(
+                            testing::random_polyhedron(random, 12, Vec3(0.04, 0.03, 0.02))),
+                        testing::random_pose(random, 0.025), kSpring, 0));
     }
     const Scene scene(parts);
     RenderState state = scene.initial_state();
-    const ConvexMesh around(icosphere(0.05, 1));
+    const stimuli::ConvexMesh around(stimuli::icosphere(0.05, 1));
     tick(scene, state, {Vec3(1, 1, 1), Vec3(1, 1, 1.1)});
     for (const LineProbe& probe : testing::wandering_path(random, around, 0.12, 400, 0.01)) {
       const Rendering r = tick(scene, state, probe);
@@ -222,4 +223,4 @@ INSTANTIATE_TEST_SUITE_P(Both, SeveralParts, ::testing::Values(&point_renderer()
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

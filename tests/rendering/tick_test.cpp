@@ -10,7 +10,7 @@
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::Bench;
@@ -18,8 +18,8 @@ using testing::kTick;
 
 constexpr double kHalf = 0.025;  // m
 
-std::shared_ptr<const ConvexMesh> small_cube() {
-  return std::make_shared<const ConvexMesh>(cube(2 * kHalf));
+std::shared_ptr<const stimuli::ConvexMesh> small_cube() {
+  return std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(2 * kHalf));
 }
 
 bool same_bits(const Rendering& a, const Rendering& b) {
@@ -34,11 +34,11 @@ bool same_bits(const Rendering& a, const Rendering& b) {
 
 class Tick : public ::testing::TestWithParam<const Renderer*> {
  protected:
-  static std::vector<SceneObject> two_objects(Random& random) {
+  static std::vector<SceneObject> two_objects(stimuli::Random& random) {
     std::vector<SceneObject> objects;
     for (int i = 0; i < 2; ++i) {
       objects.push_back(
-          testing::placed_object(std::make_shared<const ConvexMesh>(testing::placed(
+          testing::placed_object(std::make_shared<const stimuli::ConvexMesh>(testing::placed(
                                      testing::random_polyhedron(random, 20, Vec3(0.05, 0.04, 0.03)),
                                      Quat(1, 0, 0, 0), 1, Vec3())),
                                  testing::random_pose(random, 0.05), 800, i));
@@ -46,7 +46,7 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
     return objects;
   }
 
-  static testing::ProbePath some_path(Random& random, const ConvexMesh& mesh) {
+  static testing::ProbePath some_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh) {
     auto path = testing::wandering_path(random, mesh, 0.12, 300, 0.02);
     const auto jumps = testing::jumping_path(random, mesh, 0.12, 100);
     path.insert(path.end(), jumps.begin(), jumps.end());
@@ -55,30 +55,30 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
 };
 
 TEST_P(Tick, AllocatesNothing) {
-  if (!counts_allocations()) GTEST_SKIP() << "sanitizers bring their own operator new";
-  const std::uint64_t probe_count = allocations();
+  if (!runner::counts_allocations()) GTEST_SKIP() << "sanitizers bring their own operator new";
+  const std::uint64_t probe_count = runner::allocations();
   int* volatile kept = new int(1);  // volatile: else the compiler may leave the pair out
   delete kept;
-  ASSERT_EQ(allocations(), probe_count + 1) << "the counter does not count";
+  ASSERT_EQ(runner::allocations(), probe_count + 1) << "the counter does not count";
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    Random random(seed, {21});
+    stimuli::Random random(seed, {21});
     const auto objects = two_objects(random);
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
     RenderState state = scene.initial_state();
-    const std::uint64_t before = allocations();
+    const std::uint64_t before = runner::allocations();
     for (const LineProbe& probe : path) {
       in_contact += GetParam()->tick(scene, state, probe, kTick).contacts > 0;
     }
-    EXPECT_EQ(allocations(), before) << "seed " << seed;
+    EXPECT_EQ(runner::allocations(), before) << "seed " << seed;
   }
   EXPECT_GT(in_contact, 500);
 }
 
 TEST_P(Tick, SamePathSameBits) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    Random random(seed, {22});
+    stimuli::Random random(seed, {22});
     const auto objects = two_objects(random);
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
@@ -192,7 +192,7 @@ TEST_P(Tick, HugeAndTinyPosesStayFiniteAndAreForgotten) {
   const double values[] = {0, 1e-320, 1e-160, 1e-5, 1e5, 1e100, 1e160, 1e308, -1e308};
   const LineProbe above{{0.002, 0.003, kHalf + 0.01}, {0.003, 0.004, kHalf + 0.02}};
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
-    Random random(seed, {23});
+    stimuli::Random random(seed, {23});
     Bench bench(*GetParam(), small_cube());
     for (int i = 0; i < 8; ++i) {
       LineProbe probe;
@@ -229,4 +229,4 @@ INSTANTIATE_TEST_SUITE_P(Both, Tick, ::testing::Values(&point_renderer(), &ray_r
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

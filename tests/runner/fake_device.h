@@ -4,7 +4,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate::testing {
+namespace palpate::runner::testing {
 
 /// Reads what a function of the tick says, keeps what was written last.
 class FakeDevice final : public Device {
@@ -30,4 +30,4 @@ class FakeDevice final : public Device {
   int tick_ = 0;
 };
 
-}  // namespace palpate::testing
+}  // namespace palpate::runner::testing

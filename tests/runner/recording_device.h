@@ -8,7 +8,7 @@
 #include "runner/servo/device.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::testing {
+namespace palpate::runner::testing {
 
 /// What a device was told and when, by the machine's clock; meant for memory shared with its
 /// process.
@@ -57,4 +57,4 @@ class RecordingDevice final : public Device {
   int tick_ = 0;
 };
 
-}  // namespace palpate::testing
+}  // namespace palpate::runner::testing

@@ -16,53 +16,56 @@
 
 namespace palpate::testing {
 
-using ProbePath = std::vector<LineProbe>;
+using ProbePath = std::vector<rendering::LineProbe>;
 
-inline double uniform(Random& random, double low, double high) {
+inline double uniform(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
-inline Vec3 random_direction(Random& random) { return uniform_rotation(random) * Vec3(0, 0, 1); }
-
-inline Pose random_pose(Random& random, double reach) {
-  return {reach * random_direction(random), uniform_rotation(random)};
+inline Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
-inline LineProbe to_world(const Pose& pose, const LineProbe& probe) {
+inline Pose random_pose(stimuli::Random& random, double reach) {
+  return {reach * random_direction(random), stimuli::uniform_rotation(random)};
+}
+
+inline rendering::LineProbe to_world(const Pose& pose, const rendering::LineProbe& probe) {
   return {pose.orientation * probe.tip + pose.position,
           pose.orientation * probe.tail + pose.position};
 }
 
-inline LineProbe to_local(const Pose& pose, const LineProbe& probe) {
+inline rendering::LineProbe to_local(const Pose& pose, const rendering::LineProbe& probe) {
   const Quat back = glm::conjugate(pose.orientation);
   return {back * (probe.tip - pose.position), back * (probe.tail - pose.position)};
 }
 
-inline LineProbe moved(const LineProbe& probe, const Vec3& by) {
+inline rendering::LineProbe moved(const rendering::LineProbe& probe, const Vec3& by) {
   return {probe.tip + by, probe.tail + by};
 }
 
-inline LineProbe mixed(const LineProbe& from, const LineProbe& to, double t) {
+inline rendering::LineProbe mixed(const rendering::LineProbe& from, const rendering::LineProbe& to,
+                                  double t) {
   return {from.tip + t * (to.tip - from.tip), from.tail + t * (to.tail - from.tail)};
 }
 
 /// Mean of the corners: inside, also where the bounding sphere's centre is not.
-inline Vec3 middle_of(const ConvexMesh& mesh) {
+inline Vec3 middle_of(const stimuli::ConvexMesh& mesh) {
   Vec3 sum;
   for (const Vec3& v : mesh.vertices()) sum += v;
   return sum / static_cast<double>(mesh.vertices().size());
 }
 
 /// Depth of the middle: the half thickness, roughly. Small against the size for plates and needles.
-inline double half_thickness(const ConvexMesh& mesh) {
+inline double half_thickness(const stimuli::ConvexMesh& mesh) {
   const Vec3 middle = middle_of(mesh);
-  return reference_depth(mesh, {middle, middle}).depth;
+  return rendering::reference_depth(mesh, {middle, middle}).depth;
 }
 
 /// A smooth random function of the distance travelled, within [-1, 1].
 class Wave {
  public:
-  explicit Wave(Random& random) {
+  explicit Wave(stimuli::Random& random) {
     for (std::size_t i = 0; i < 3; ++i) {
       rate_[i] = uniform(random, 0.3, 1.0) * static_cast<double>(i + 1);
       phase_[i] = uniform(random, 0, 6.28318530717958648);
@@ -80,7 +83,7 @@ class Wave {
 
 class Wave3 {
  public:
-  explicit Wave3(Random& random) : x_(random), y_(random), z_(random) {}
+  explicit Wave3(stimuli::Random& random) : x_(random), y_(random), z_(random) {}
   Vec3 operator()(double travelled) const { return {x_(travelled), y_(travelled), z_(travelled)}; }
 
  private:
@@ -93,13 +96,14 @@ inline Vec3 safe_direction(const Vec3& v) {
 }
 
 /// The probe of this length and direction whose point at `share` of the way to the tail is `at`.
-inline LineProbe probe_at(const Vec3& at, const Vec3& direction, double length, double share) {
+inline rendering::LineProbe probe_at(const Vec3& at, const Vec3& direction, double length,
+                                     double share) {
   return {at - share * length * direction, at + (1 - share) * length * direction};
 }
 
 /// Smooth, in and out at any depth; about `step` sizes a tick.
-inline ProbePath wandering_path(Random& random, const ConvexMesh& mesh, double length, int ticks,
-                                double step) {
+inline ProbePath wandering_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
+                                double length, int ticks, double step) {
   const Wave3 place(random), turn(random);
   const Wave share(random);
   ProbePath path;
@@ -114,8 +118,9 @@ inline ProbePath wandering_path(Random& random, const ConvexMesh& mesh, double l
 /// Starts well outside; then smooth and near the surface all the time: from a little outside to
 /// `press` half thicknesses of depth along the ray from the middle. About `step` sizes a tick.
 /// \param side  false: it is the tip that slides, wherever the rest of the probe is
-inline ProbePath sliding_path(Random& random, const ConvexMesh& mesh, double length, int ticks,
-                              double step, double press = 0.3, bool side = true) {
+inline ProbePath sliding_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
+                              double length, int ticks, double step, double press = 0.3,
+                              bool side = true) {
   const Vec3 middle = middle_of(mesh);
   const double thickness = half_thickness(mesh);
   const double far = 2 * mesh.size() + length;
@@ -131,8 +136,9 @@ inline ProbePath sliding_path(Random& random, const ConvexMesh& mesh, double len
     double outside = far;
     for (int halving = 0; halving < 24; ++halving) {
       const double half = (inside + outside) / 2;
-      const LineProbe probe = probe_at(middle + half * out, direction, side ? length : 0, at_share);
-      (reference_depth(mesh, probe).depth > 0 ? inside : outside) = half;
+      const rendering::LineProbe probe =
+          probe_at(middle + half * out, direction, side ? length : 0, at_share);
+      (rendering::reference_depth(mesh, probe).depth > 0 ? inside : outside) = half;
     }
     const double depth = tick == 0 ? -far : thickness * press * (0.35 + press_wave(travelled));
     path.push_back(probe_at(middle + (inside - depth) * out, direction, length, at_share));
@@ -142,8 +148,8 @@ inline ProbePath sliding_path(Random& random, const ConvexMesh& mesh, double len
 
 /// Straight passes through a point near the object, `step` sizes a tick, turning slowly; then a
 /// jump to the start of the next one.
-inline ProbePath fast_passes(Random& random, const ConvexMesh& mesh, double length, int ticks,
-                             double step) {
+inline ProbePath fast_passes(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
+                             double length, int ticks, double step) {
   ProbePath path;
   while (static_cast<int>(path.size()) < ticks) {
     const Vec3 aim = mesh.centre() + 0.6 * mesh.size() * random.unit() * random_direction(random);
@@ -165,7 +171,8 @@ inline ProbePath fast_passes(Random& random, const ConvexMesh& mesh, double leng
 }
 
 /// Every tick somewhere else, often inside.
-inline ProbePath jumping_path(Random& random, const ConvexMesh& mesh, double length, int ticks) {
+inline ProbePath jumping_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
+                              double length, int ticks) {
   ProbePath path;
   for (int tick = 0; tick < ticks; ++tick) {
     const double reach = random.unit() < 0.5 ? mesh.radius() : 2 * mesh.size() + length;

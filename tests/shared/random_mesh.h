@@ -14,11 +14,11 @@ namespace palpate::testing {
 
 /// Round, long or flat hulls, prisms, needles, plates and the four stimuli, turned at random, from
 /// 0.2 mm to 20 m across, and up to a size away from the mesh frame's origin.
-inline ConvexMesh random_convex_mesh(Random& random) {
-  const auto turned = [&](const PolygonSoup& soup) {
+inline stimuli::ConvexMesh random_convex_mesh(stimuli::Random& random) {
+  const auto turned = [&](const stimuli::PolygonSoup& soup) {
     const double scale = 2e-4 * std::pow(1e5, random.unit());
-    return ConvexMesh(placed(soup, uniform_rotation(random), scale,
-                             scale * random.unit() * random_direction(random)));
+    return stimuli::ConvexMesh(placed(soup, stimuli::uniform_rotation(random), scale,
+                                      scale * random.unit() * random_direction(random)));
   };
   const auto count = [&](int low, int high) {
     return low + static_cast<int>(random.below(static_cast<std::uint64_t>(high - low + 1)));
@@ -39,11 +39,11 @@ inline ConvexMesh random_convex_mesh(Random& random) {
     case 6:
       return turned(plate(1, uniform(random, 0.001, 0.05)));
     case 7:
-      return turned(cone(0.5, uniform(random, 0.1, 2), count(3, 64)));
+      return turned(stimuli::cone(0.5, uniform(random, 0.1, 2), count(3, 64)));
     case 8:
-      return turned(icosphere(0.5, count(0, 2)));
+      return turned(stimuli::icosphere(0.5, count(0, 2)));
     default:
-      return turned(cube(1));
+      return turned(stimuli::cube(1));
   }
 }
 

@@ -20,7 +20,7 @@ namespace palpate::testing {
 /// The hull of points no four of which are coplanar, as outward triangles: starts with a
 /// tetrahedron and adds point by point, replacing the faces that it sees. O(n^2), independent of
 /// ConvexMesh on purpose.
-inline PolygonSoup hull_of(const std::vector<Vec3>& points) {
+inline stimuli::PolygonSoup hull_of(const std::vector<Vec3>& points) {
   using Triangle = std::array<std::uint32_t, 3>;
   const auto above = [&](const Triangle& t, std::uint32_t p) {
     return glm::dot(glm::cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]),
@@ -44,24 +44,25 @@ inline PolygonSoup hull_of(const std::vector<Vec3>& points) {
       if (!seen.contains({b, a})) faces.push_back({a, b, p});
     }
   }
-  PolygonSoup soup;
+  stimuli::PolygonSoup soup;
   soup.vertices = points;
   for (const Triangle& t : faces) soup.faces.push_back({t[0], t[1], t[2]});
   return soup;
 }
 
 /// The hull of `points` random points on an ellipsoid (every point is a corner).
-inline PolygonSoup random_polyhedron(Random& random, int points, const Vec3& semi_axes) {
+inline stimuli::PolygonSoup random_polyhedron(stimuli::Random& random, int points,
+                                              const Vec3& semi_axes) {
   std::vector<Vec3> corners;
   for (int i = 0; i < points; ++i) {
-    corners.push_back(semi_axes * (uniform_rotation(random) * Vec3(0, 0, 1)));
+    corners.push_back(semi_axes * (stimuli::uniform_rotation(random) * Vec3(0, 0, 1)));
   }
   return hull_of(corners);
 }
 
 /// A regular prism about the z axis; side faces are quadrilaterals.
-inline PolygonSoup prism(int sides, double radius, double height) {
-  PolygonSoup soup;
+inline stimuli::PolygonSoup prism(int sides, double radius, double height) {
+  stimuli::PolygonSoup soup;
   const auto n = static_cast<std::uint32_t>(sides);
   std::vector<std::uint32_t> bottom, top;
   for (std::uint32_t k = 0; k < n; ++k) {
@@ -80,16 +81,18 @@ inline PolygonSoup prism(int sides, double radius, double height) {
 }
 
 /// A bar of square section along z: `length` long, `width` from corner to opposite corner.
-inline PolygonSoup needle(double length, double width) { return prism(4, width / 2, length); }
+inline stimuli::PolygonSoup needle(double length, double width) {
+  return prism(4, width / 2, length);
+}
 
 /// A square plate across z.
-inline PolygonSoup plate(double edge, double thickness) {
+inline stimuli::PolygonSoup plate(double edge, double thickness) {
   return prism(4, edge / std::numbers::sqrt2, thickness);
 }
 
 /// Every polygon cut into triangles from its first corner.
-inline PolygonSoup triangulated(const PolygonSoup& soup) {
-  PolygonSoup out;
+inline stimuli::PolygonSoup triangulated(const stimuli::PolygonSoup& soup) {
+  stimuli::PolygonSoup out;
   out.vertices = soup.vertices;
   out.coordinate_error = soup.coordinate_error;
   for (const auto& face : soup.faces) {
@@ -101,7 +104,8 @@ inline PolygonSoup triangulated(const PolygonSoup& soup) {
 }
 
 /// Turned, scaled by `scale` and then moved.
-inline PolygonSoup placed(PolygonSoup soup, const Quat& turn, double scale, const Vec3& to) {
+inline stimuli::PolygonSoup placed(stimuli::PolygonSoup soup, const Quat& turn, double scale,
+                                   const Vec3& to) {
   for (Vec3& vertex : soup.vertices) vertex = scale * (turn * vertex) + to;
   return soup;
 }

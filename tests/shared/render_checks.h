@@ -20,9 +20,10 @@ namespace palpate::testing {
 inline constexpr double kTick = 1e-3;                          // s
 inline constexpr double kBlendAngle = std::numbers::pi / 180;  // rad, epsilon of eq. (2)
 
-inline SceneObject placed_object(std::shared_ptr<const ConvexMesh> mesh, const Pose& pose = {},
-                                 double stiffness = 800, int object = 0) {
-  SceneObject part;
+inline rendering::SceneObject placed_object(std::shared_ptr<const stimuli::ConvexMesh> mesh,
+                                            const Pose& pose = {}, double stiffness = 800,
+                                            int object = 0) {
+  rendering::SceneObject part;
   part.mesh = std::move(mesh);
   part.pose = pose;
   part.material.stiffness = stiffness;
@@ -33,8 +34,8 @@ inline SceneObject placed_object(std::shared_ptr<const ConvexMesh> mesh, const P
 /// A renderer, a scene of one object and the memory between ticks.
 class Bench {
  public:
-  Bench(const Renderer& renderer, std::shared_ptr<const ConvexMesh> mesh, const Pose& pose = {},
-        double stiffness = 800)
+  Bench(const rendering::Renderer& renderer, std::shared_ptr<const stimuli::ConvexMesh> mesh,
+        const Pose& pose = {}, double stiffness = 800)
       : renderer_(renderer),
         mesh_(std::move(mesh)),
         pose_(pose),
@@ -42,33 +43,35 @@ class Bench {
         scene_({placed_object(mesh_, pose, stiffness)}),
         state_(scene_.initial_state()) {}
 
-  Rendering tick(const LineProbe& world) { return renderer_.tick(scene_, state_, world, kTick); }
-
-  /// What the renderer feels of the probe, in the mesh frame: the tip alone, or all of it.
-  LineProbe felt(const LineProbe& world) const {
-    const LineProbe local = to_local(pose_, world);
-    return renderer_.side_contact() ? local : LineProbe{local.tip, local.tip};
+  rendering::Rendering tick(const rendering::LineProbe& world) {
+    return renderer_.tick(scene_, state_, world, kTick);
   }
 
-  const ConvexMesh& mesh() const { return *mesh_; }
+  /// What the renderer feels of the probe, in the mesh frame: the tip alone, or all of it.
+  rendering::LineProbe felt(const rendering::LineProbe& world) const {
+    const rendering::LineProbe local = to_local(pose_, world);
+    return renderer_.side_contact() ? local : rendering::LineProbe{local.tip, local.tip};
+  }
+
+  const stimuli::ConvexMesh& mesh() const { return *mesh_; }
   const Pose& pose() const { return pose_; }
-  const Renderer& renderer() const { return renderer_; }
+  const rendering::Renderer& renderer() const { return renderer_; }
   double stiffness() const { return stiffness_; }
-  RenderState& state() { return state_; }
+  rendering::RenderState& state() { return state_; }
 
   /// Rounding of lengths here, m: of the object, its place and the probe.
-  double rounding(const LineProbe& world) const {
+  double rounding(const rendering::LineProbe& world) const {
     return 1e-15 * (mesh_->size() + glm::length(pose_.position) + glm::length(world.tip) +
                     glm::length(world.tail));
   }
 
  private:
-  const Renderer& renderer_;
-  std::shared_ptr<const ConvexMesh> mesh_;
+  const rendering::Renderer& renderer_;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh_;
   Pose pose_;
   double stiffness_;
-  Scene scene_;
-  RenderState state_;
+  rendering::Scene scene_;
+  rendering::RenderState state_;
 };
 
 inline bool finite(const Vec3& v) {
@@ -76,23 +79,23 @@ inline bool finite(const Vec3& v) {
 }
 
 /// Distance of a point from the surface of the solid, m.
-inline double off_surface(const ConvexMesh& mesh, const Vec3& point) {
-  return std::max(reference_gap(mesh, {point, point}),
-                  std::abs(std::max(0.0, reference_depth(mesh, {point, point}).depth)));
+inline double off_surface(const stimuli::ConvexMesh& mesh, const Vec3& point) {
+  return std::max(rendering::reference_gap(mesh, {point, point}),
+                  std::abs(std::max(0.0, rendering::reference_depth(mesh, {point, point}).depth)));
 }
 
 /// Whether eq. (2) can place a contact at this point: over a facet that is parallel to the probe
 /// within the blend's angle.
-inline bool over_parallel_facet(const ConvexMesh& mesh, const LineProbe& probe, const Vec3& point,
-                                double tolerance) {
+inline bool over_parallel_facet(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
+                                const Vec3& point, double tolerance) {
   const Vec3 u = glm::normalize(probe.tail - probe.tip);
-  for (const Facet& facet : mesh.facets()) {
+  for (const stimuli::Facet& facet : mesh.facets()) {
     if (std::abs(std::asin(glm::dot(facet.normal, u))) > kBlendAngle + 1e-9) continue;
     const double reach = glm::length(probe.tail - probe.tip) * std::sin(kBlendAngle);
     if (std::abs(glm::dot(facet.normal, point) - facet.offset) > reach + tolerance) continue;
     bool over = true;
     for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-      const Side& side = mesh.sides()[i];
+      const stimuli::Side& side = mesh.sides()[i];
       over = over && glm::dot(side.inward, point) >= side.offset - tolerance;
     }
     if (over) return true;
@@ -103,14 +106,14 @@ inline bool over_parallel_facet(const ConvexMesh& mesh, const LineProbe& probe, 
 /// Everything that is wrong with one tick; empty when nothing is. A tick that is free passes only
 /// when the probe does not penetrate (`may_be_blocked`: it may, as it has been inside since the
 /// start).
-inline std::string faults_of_tick(const Bench& bench, const LineProbe& probe, const Rendering& r,
-                                  bool may_be_blocked = false) {
+inline std::string faults_of_tick(const Bench& bench, const rendering::LineProbe& probe,
+                                  const rendering::Rendering& r, bool may_be_blocked = false) {
   std::ostringstream out;
   out.precision(6);
-  const ConvexMesh& mesh = bench.mesh();
+  const stimuli::ConvexMesh& mesh = bench.mesh();
   const double size = mesh.size();
   const double rounding = bench.rounding(probe);
-  const double reference = reference_depth(mesh, bench.felt(probe)).depth;
+  const double reference = rendering::reference_depth(mesh, bench.felt(probe)).depth;
   const auto demand_small = [&](const char* what, double value, double limit) {
     if (!(value <= limit)) out << what << ": " << value << " > " << limit << "; ";
   };
@@ -124,27 +127,28 @@ inline std::string faults_of_tick(const Bench& bench, const LineProbe& probe, co
       out << "force without contact; ";
     }
     if (r.ideal.tip != probe.tip || r.ideal.tail != probe.tail) out << "ideal probe moved; ";
-    if (r.deepest.type != ContactType::none || r.deepest.depth != 0 || r.object != -1) {
+    if (r.deepest.type != rendering::ContactType::none || r.deepest.depth != 0 || r.object != -1) {
       out << "contact described without contact; ";
     }
     if (!may_be_blocked) demand_small("missed: depth", reference, 1e-9 * size + rounding);
     return out.str();
   }
 
-  const Contact& contact = r.deepest;
+  const rendering::Contact& contact = r.deepest;
   const double length = glm::length(probe.tail - probe.tip);
   if (r.contacts != 1 || r.object != 0 || r.faults != 0) {
     out << "contacts " << r.contacts << " object " << r.object << " faults " << r.faults << "; ";
   }
-  if (contact.type == ContactType::none) out << "contact without type; ";
+  if (contact.type == rendering::ContactType::none) out << "contact without type; ";
   if (!(contact.depth >= 0)) out << "negative depth; ";
   demand_small("normal's length", std::abs(glm::length(contact.normal) - 1), 1e-12);
   const Vec3 shift = contact.depth * contact.normal;
   demand_small("ideal tip", glm::length(r.ideal.tip - probe.tip - shift), 1e-12 * size + rounding);
   demand_small("ideal tail", glm::length(r.ideal.tail - probe.tail - shift),
                1e-12 * size + rounding);
-  demand_small("ideal floats", reference_gap(mesh, bench.felt(r.ideal)), 1e-9 * size + rounding);
-  demand_small("ideal penetrates", reference_depth(mesh, bench.felt(r.ideal)).depth,
+  demand_small("ideal floats", rendering::reference_gap(mesh, bench.felt(r.ideal)),
+               1e-9 * size + rounding);
+  demand_small("ideal penetrates", rendering::reference_depth(mesh, bench.felt(r.ideal)).depth,
                1e-9 * size + rounding);
   demand_small("shallower than the reference by", reference - contact.depth,
                1e-12 * size + rounding);
@@ -155,11 +159,11 @@ inline std::string faults_of_tick(const Bench& bench, const LineProbe& probe, co
   demand_small("force off the normal", glm::length(glm::cross(r.force, contact.normal)),
                1e-14 * full);
 
-  const LineProbe ideal = r.ideal;
+  const rendering::LineProbe ideal = r.ideal;
   const double at_tolerance = 1e-12 * (size + length) + rounding;
   if (!bench.renderer().side_contact()) {
     if (r.torque != Vec3()) out << "torque of a point; ";
-    if (contact.type != ContactType::point_polygon) out << "type of a point; ";
+    if (contact.type != rendering::ContactType::point_polygon) out << "type of a point; ";
     demand_small("contact off the tip", glm::length(contact.point - ideal.tip), at_tolerance);
   } else {
     demand_small("torque", glm::length(r.torque - glm::cross(contact.point - probe.tip, r.force)),
@@ -176,7 +180,7 @@ inline std::string faults_of_tick(const Bench& bench, const LineProbe& probe, co
   demand_small("contact off the ideal probe",
                glm::length(contact.point - ideal.tip - contact.along * u), at_tolerance);
   const Vec3 local = bench.felt({contact.point, contact.point}).tip;
-  if (contact.type == ContactType::segment_face) {
+  if (contact.type == rendering::ContactType::segment_face) {
     if (!over_parallel_facet(mesh, to_local(bench.pose(), ideal), local, 1e-9 * size + rounding)) {
       out << "contact off the touching portion; ";
     }
@@ -193,10 +197,10 @@ class PathCheck {
   std::string follow(Bench& bench, const ProbePath& local_path) {
     bool blocked = true;
     for (std::size_t i = 0; i < local_path.size(); ++i) {
-      const LineProbe probe = to_world(bench.pose(), local_path[i]);
-      const Rendering r = bench.tick(probe);
+      const rendering::LineProbe probe = to_world(bench.pose(), local_path[i]);
+      const rendering::Rendering r = bench.tick(probe);
       // Only a probe that was inside from the first tick on may stay without force.
-      blocked = blocked && reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
+      blocked = blocked && rendering::reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
       const std::string faults = faults_of_tick(bench, probe, r, blocked);
       if (!faults.empty()) return "tick " + std::to_string(i) + ": " + faults;
       ++ticks;

@@ -9,7 +9,7 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using testing::placed;
@@ -294,4 +294,4 @@ TEST(ConvexMeshFaults, RandomSoupsNeverCrash) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

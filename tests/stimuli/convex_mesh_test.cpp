@@ -11,10 +11,10 @@
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/mesh_invariants.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
-using testing::expect_convex_mesh;
+using checks::expect_convex_mesh;
 using testing::placed;
 using testing::triangulated;
 
@@ -187,7 +187,7 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
   for (int i = 0; i < 50; ++i) {
     const auto rounded = [&](PolygonSoup soup) {
       soup = placed(triangulated(soup), uniform_rotation(random), 0.06, Vec3(0.1));
-      for (Vec3& vertex : soup.vertices) vertex = testing::single_precision(vertex);
+      for (Vec3& vertex : soup.vertices) vertex = checks::single_precision(vertex);
       soup.coordinate_error = 0.2 * 0x1p-24;
       const ConvexMesh mesh(soup);
       expect_convex_mesh(mesh, 4e-7 * mesh.size());
@@ -207,7 +207,7 @@ TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
     const Quat turn = uniform_rotation(random);
     const PolygonSoup hull = testing::random_polyhedron(random, 5 + i % 30, Vec3(1, flat, thin));
     PolygonSoup soup = placed(cut(hull, i % 4), turn, 0.06, Vec3(0.1));
-    for (Vec3& vertex : soup.vertices) vertex = testing::single_precision(vertex);
+    for (Vec3& vertex : soup.vertices) vertex = checks::single_precision(vertex);
     soup.coordinate_error = 0.2 * 0x1p-24;
     const ConvexMesh mesh(soup);
     ASSERT_LE(mesh.facets().size(), static_cast<std::size_t>(2 * (5 + i % 30) - 4));
@@ -301,7 +301,7 @@ TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {
   EXPECT_GT(near, mesh.edges().size() * 3 / 4);
   for (std::uint32_t f = 0, seen = 0; f < mesh.facets().size(); ++f) {
     for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t corner = testing::corner_of(mesh, f, k);
+      const std::uint32_t corner = checks::corner_of(mesh, f, k);
       EXPECT_LE(corner, seen) << "vertices are numbered as facets first use them";
       seen = std::max(seen, corner + 1);
     }
@@ -328,4 +328,4 @@ TEST(ConvexMesh, BuildsLargeSpheres) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

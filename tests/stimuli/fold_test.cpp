@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 // Two triangles over the side from (0,0,0) to (1,0,0): one in the xy plane on the left with its tip
@@ -39,4 +39,4 @@ TEST(Fold, SharpEdgesAreNoPlaneHoweverLittleIsKnown) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -11,7 +11,7 @@
 #include "stimuli/random.h"
 #include "tests/shared/random_polyhedron.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 double highest_above(const PolygonSoup& soup, const Vec3& point) {
@@ -71,4 +71,4 @@ TEST(GridHull, OfWhatIsNoSolidIsEmpty) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

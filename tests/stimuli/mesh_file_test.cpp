@@ -16,7 +16,7 @@
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/mesh_invariants.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using testing::placed;
@@ -133,7 +133,7 @@ TEST_F(MeshFile, ReadsWhatWasWritten) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec3 written = soup.vertices[soup.faces[f][k]];
       EXPECT_EQ(ascii.vertices[ascii.faces[f][k]], written);
-      EXPECT_EQ(binary.vertices[binary.faces[f][k]], testing::single_precision(written));
+      EXPECT_EQ(binary.vertices[binary.faces[f][k]], checks::single_precision(written));
     }
   }
 }
@@ -320,4 +320,4 @@ TEST_F(MeshFile, DamagedFilesNeverCrash) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -12,7 +12,7 @@
 
 #include "stimuli/convex_mesh.h"
 
-namespace palpate::testing {
+namespace palpate::stimuli::checks {
 
 /// Rounded to single precision. One number at a time through memory: GCC 12 vectorises
 /// Vec3(glm::vec3(v)) at -O2 and then folds the two conversions into none.
@@ -122,4 +122,4 @@ inline void expect_convex_mesh(const ConvexMesh& mesh, double stands_out) {
   ASSERT_GE(farthest, mesh.radius() * (1 - 1e-12));
 }
 
-}  // namespace palpate::testing
+}  // namespace palpate::stimuli::checks

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 TEST(UniformRotation, GivesTheSameBitsOnEveryCompiler) {
@@ -91,4 +91,4 @@ TEST(UniformRotation, HasTheAnglesOfHaarMeasure) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

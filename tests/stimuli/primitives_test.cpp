@@ -10,7 +10,7 @@
 
 #include "stimuli/signed_distance.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 ObjectSpec spec_of(ShapeKind shape) {
@@ -113,4 +113,4 @@ TEST(Primitives, ImpossibleSizesAreRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -5,7 +5,7 @@
 #include <random>
 #include <string>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using namespace std::string_literals;
@@ -78,4 +78,4 @@ TEST(Printable, IsPlainWhateverCameIn) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <set>
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 // Golden values: from a second implementation in another language, itself checked against the
@@ -132,4 +132,4 @@ TEST(Random, ShuffleGivesEveryOrderEquallyOften) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -11,7 +11,7 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 
-namespace palpate {
+namespace palpate::stimuli {
 namespace {
 
 using testing::placed;
@@ -231,4 +231,4 @@ TEST(SignedDistance, OfFinerMeshesTendsToThatOfTheShape) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::stimuli

@@ -16,20 +16,20 @@
 #include "runner/commands/shared/progress_line.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 void study_first_contacts(AccuracyReport& report, int entries) {
   struct Shape {
     const char* name;
-    PolygonSoup soup;
+    stimuli::PolygonSoup soup;
   };
-  const Shape shapes[] = {{"sphere of 1,280 triangles", icosphere(0.03, 3)},
-                          {"cone of 64 segments", cone(0.03, 0.06, 64)},
-                          {"cylinder of 64 segments", cylinder(0.03, 0.06, 64)},
-                          {"cube", cube(0.06)},
+  const Shape shapes[] = {{"sphere of 1,280 triangles", stimuli::icosphere(0.03, 3)},
+                          {"cone of 64 segments", stimuli::cone(0.03, 0.06, 64)},
+                          {"cylinder of 64 segments", stimuli::cylinder(0.03, 0.06, 64)},
+                          {"cube", stimuli::cube(0.06)},
                           {"plate of 60 x 60 x 1 mm", [] {
-                             PolygonSoup plate = cube(0.06);
+                             stimuli::PolygonSoup plate = stimuli::cube(0.06);
                              for (Vec3& v : plate.vertices) v.z /= 60;
                              return plate;
                            }()}};
@@ -38,11 +38,11 @@ void study_first_contacts(AccuracyReport& report, int entries) {
   const double steps = static_cast<double>(std::size(shapes) * std::size(kSpeeds));
   double done = 0;
   for (const Shape& shape : shapes) {
-    const ConvexMesh mesh(shape.soup);
+    const stimuli::ConvexMesh mesh(shape.soup);
     FirstContactStudy study{shape.name, {}};
     for (const double speed : kSpeeds) {
       progress.show(done / steps);
-      study.speeds.push_back(first_contact_loss(mesh, speed, 2, entries, 1));
+      study.speeds.push_back(rendering::first_contact_loss(mesh, speed, 2, entries, 1));
       done += 1;
     }
     report.first_contacts.push_back(std::move(study));
@@ -51,15 +51,16 @@ void study_first_contacts(AccuracyReport& report, int entries) {
 
 /// What one look costs where neither has a tree: 6 facets and 12 edges, a motion that stays off.
 void time_first_contact(AccuracyReport& report) {
-  const ConvexMesh mesh(cube(0.06));
-  const ContactTrees trees(mesh, true);
+  const stimuli::ConvexMesh mesh(stimuli::cube(0.06));
+  const rendering::ContactTrees trees(mesh, true);
   const auto pose = [](int i) {
     const double height = 0.031 + 1e-5 * (i % 7);
-    return LineProbe{Vec3(-0.02, 0.01, height), Vec3(0.1, 0.02, height + 0.01)};
+    return rendering::LineProbe{Vec3(-0.02, 0.01, height), Vec3(0.1, 0.02, height + 0.01)};
   };
   constexpr int kLooks = 20000;
   int found = 0;
-  const auto time = [&](const std::function<bool(const LineProbe&, const LineProbe&)>& look) {
+  const auto time = [&](const std::function<bool(const rendering::LineProbe&,
+                                                 const rendering::LineProbe&)>& look) {
     double fastest = HUGE_VAL;
     for (int round = 0; round < 5; ++round) {
       const double start = now_ns();
@@ -68,35 +69,37 @@ void time_first_contact(AccuracyReport& report) {
     }
     return fastest;
   };
-  report.paper_test_ns = time([&](const LineProbe& before, const LineProbe& after) {
-    return paper_first_contact(mesh, before, after);
-  });
-  report.exact_test_ns = time([&](const LineProbe& before, const LineProbe& after) {
-    return first_contact_segment(mesh, trees, before, after, 1e-12 * mesh.size()).facet.kind !=
-           MinkowskiFacet::Kind::none;
-  });
+  report.paper_test_ns =
+      time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
+        return rendering::paper_first_contact(mesh, before, after);
+      });
+  report.exact_test_ns =
+      time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
+        return rendering::first_contact_segment(mesh, trees, before, after, 1e-12 * mesh.size())
+                   .facet.kind != rendering::MinkowskiFacet::Kind::none;
+      });
   if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
 }
 
 /// The walks shared out among threads; the sums do not depend on how.
-SearchCounts search_all(std::uint64_t ticks, std::uint64_t seed, int jobs) {
-  const std::uint64_t walks = (ticks + kTicksPerWalk - 1) / kTicksPerWalk;
+rendering::SearchCounts search_all(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  const std::uint64_t walks = (ticks + rendering::kTicksPerWalk - 1) / rendering::kTicksPerWalk;
   constexpr std::uint64_t kShare = 20;  // walks a thread takes at a time
-  SearchCounts all;
+  rendering::SearchCounts all;
   ProgressLine progress("search");
   for (std::uint64_t first = 0; first < walks;) {
     progress.show(static_cast<double>(first) / static_cast<double>(walks));
-    std::vector<SearchCounts> parts(static_cast<std::size_t>(jobs));
+    std::vector<rendering::SearchCounts> parts(static_cast<std::size_t>(jobs));
     std::vector<std::thread> threads;
-    for (SearchCounts& part : parts) {
+    for (rendering::SearchCounts& part : parts) {
       const std::uint64_t count = std::min(kShare, walks - first);
       threads.emplace_back(
-          [&part, seed, first, count] { part = search_walks(seed, first, count); });
+          [&part, seed, first, count] { part = rendering::search_walks(seed, first, count); });
       first += count;
       if (first == walks) break;
     }
     for (std::thread& thread : threads) thread.join();
-    for (const SearchCounts& part : parts) all += part;
+    for (const rendering::SearchCounts& part : parts) all += part;
   }
   return all;
 }
@@ -104,12 +107,13 @@ SearchCounts search_all(std::uint64_t ticks, std::uint64_t seed, int jobs) {
 /// \param quick  without the case whose mesh takes seconds to build
 void study_extremes(AccuracyReport& report, bool quick) {
   ProgressLine progress("extreme cases");
-  const std::span<const ExtremeCase> cases = extreme_cases();
+  const std::span<const rendering::ExtremeCase> cases = rendering::extreme_cases();
   double done = 0;
-  for (const ExtremeCase& one : cases) {
+  for (const rendering::ExtremeCase& one : cases) {
     progress.show(done++ / static_cast<double>(cases.size()));
     if (quick && std::string_view(one.name) == "million-triangles") continue;
-    for (const Renderer* renderer : {&ray_renderer(), &point_renderer()}) {
+    for (const rendering::Renderer* renderer :
+         {&rendering::ray_renderer(), &rendering::point_renderer()}) {
       report.extremes.push_back(
           {one.name, one.title, one.measure, renderer->name(), one.run(*renderer)});
     }
@@ -119,8 +123,8 @@ void study_extremes(AccuracyReport& report, bool quick) {
 void study(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
   {
     ProgressLine progress("errors and times");
-    report.rows =
-        accuracy_study(report.settings, now_ns, [&](double done) { progress.show(done); });
+    report.rows = rendering::accuracy_study(report.settings, now_ns,
+                                            [&](double done) { progress.show(done); });
   }
   // In step with the rest: 2000 of each by default.
   study_first_contacts(report,
@@ -132,8 +136,8 @@ void study(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
   report.search = search_all(kShortSearch, seed, jobs);
 }
 
-AccuracySettings quick_settings() {
-  AccuracySettings quick;
+rendering::AccuracySettings quick_settings() {
+  rendering::AccuracySettings quick;
   quick.paths = 2;
   quick.contact_ticks = 500;
   quick.most_triangles = 20480;
@@ -172,7 +176,7 @@ int accuracy_command(const std::vector<std::string>& args) {
       "  palpate accuracy --search 10000000   (random solids and paths against brute force)";
   std::string json, figure, page;
   std::uint64_t search_ticks = 0, seed = 1;
-  AccuracySettings settings;
+  rendering::AccuracySettings settings;
   int jobs = 0;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -227,4 +231,4 @@ int accuracy_command(const std::vector<std::string>& args) {
   return extremes_hold && report.search->wrong() == 0 ? 0 : 1;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,7 +11,7 @@
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/log_panel.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 // m; a logarithm must have something for an error of 0, and nobody needs to tell such errors apart.
@@ -21,24 +21,24 @@ struct Colour {
   std::string_view method, colour;
 };
 // Okabe & Ito's colours, to be told apart by everyone; the product is dark.
-constexpr std::array kColours = {
-    Colour{"tick", kInk},           Colour{"walk", "#0072B2"}, Colour{"walk-float", "#56B4E9"},
-    Colour{"walk-cold", "#8C8C8C"}, Colour{"scan", "#009E73"}, Colour{"brute-force", "#E69F00"},
-    Colour{"bullet", "#D55E00"},    Colour{"fcl", "#CC79A7"}};
+constexpr std::array kColours = {Colour{"tick", analysis::kInk},  Colour{"walk", "#0072B2"},
+                                 Colour{"walk-float", "#56B4E9"}, Colour{"walk-cold", "#8C8C8C"},
+                                 Colour{"scan", "#009E73"},       Colour{"brute-force", "#E69F00"},
+                                 Colour{"bullet", "#D55E00"},     Colour{"fcl", "#CC79A7"}};
 
-double of_shape(const AccuracyRow& row) {
+double of_shape(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfShape, row.shape_errors.depth.rms);
 }
-double of_polyhedron(const AccuracyRow& row) {
+double of_polyhedron(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfPolyhedron, row.polyhedron_errors.depth.worst);
 }
 
 /// One shape's panel: a line for each method from its coarsest tessellation to its finest.
-void draw_methods(Svg& svg, const LogPanel& panel, const AccuracyReport& report,
-                  std::string_view shape, double (*error)(const AccuracyRow&)) {
+void draw_methods(analysis::Svg& svg, const LogPanel& panel, const AccuracyReport& report,
+                  std::string_view shape, double (*error)(const rendering::AccuracyRow&)) {
   for (auto c = kColours.rbegin(); c != kColours.rend(); ++c) {  // the product is on top
     std::vector<std::pair<double, double>> points;
-    for (const AccuracyRow& row : report.rows) {
+    for (const rendering::AccuracyRow& row : report.rows) {
       if (row.probe == "ray" && row.shape == shape && row.method == c->method) {
         points.emplace_back(row.ns_per_tick, error(row));
       }
@@ -51,15 +51,17 @@ void draw_methods(Svg& svg, const LogPanel& panel, const AccuracyReport& report,
   }
 }
 
-void draw_legend(Svg& svg, const AccuracyReport& report, double x, double y) {
+void draw_legend(analysis::Svg& svg, const AccuracyReport& report, double x, double y) {
   for (const Colour& colour : kColours) {
-    const bool there = std::any_of(report.rows.begin(), report.rows.end(),
-                                   [&](const AccuracyRow& r) { return r.method == colour.method; });
+    const bool there =
+        std::any_of(report.rows.begin(), report.rows.end(),
+                    [&](const rendering::AccuracyRow& r) { return r.method == colour.method; });
     if (!there) continue;
     svg.line(x, y - 4, x + 18, y - 4, colour.colour, colour.method == "tick" ? 2.5 : 1.5);
     svg.circle(x + 9, y - 4, 3, colour.colour);
-    svg.text(x + 24, y, colour.method, {12, kInk, Svg::Anchor::start, false, 0});
-    x += 24 + text_width(colour.method, 12) + 22;
+    svg.text(x + 24, y, colour.method,
+             {12, analysis::kInk, analysis::Svg::Anchor::start, false, 0});
+    x += 24 + analysis::text_width(colour.method, 12) + 22;
   }
 }
 
@@ -72,19 +74,19 @@ std::string accuracy_figure(const AccuracyReport& report) {
   // The legend needs the width of four panels.
   const auto columns = static_cast<double>(std::max<std::size_t>(shapes.size(), 4));
   const double width = kLeft + columns * (kPanel + kGap) - kGap + kRight;
-  Svg svg;
+  analysis::Svg svg;
   svg.rect(0, 0, width, kTop + 2 * kHeight + kBetween + 52, "#ffffff");
   svg.text(16, 30, "Tessellation decides the error, the method decides the time",
-           {18, kInk, Svg::Anchor::start, true, 0});
+           {18, analysis::kInk, analysis::Svg::Anchor::start, true, 0});
   svg.text(16, 52,
            "Each line runs from the coarsest to the finest tessellation; a stylus felt as a ray, "
            "a hand at 0.1 m/s, 1 to 2 mm deep.",
-           {13, kSoft, Svg::Anchor::start, false, 0});
+           {13, analysis::kSoft, analysis::Svg::Anchor::start, false, 0});
   draw_legend(svg, report, 16, 78);
   LogPanel shape_errors{0, kTop, kPanel, kHeight, 1e9, 1, 1e9, kLeastOfShape};
   LogPanel exact_errors{0,   kTop + kHeight + kBetween, kPanel, kHeight, 1e9, 1,
                         1e9, kLeastOfPolyhedron};
-  for (const AccuracyRow& row : report.rows) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     if (row.probe != "ray") continue;
     for (auto [panel, error] :
          {std::pair{&shape_errors, of_shape(row)}, std::pair{&exact_errors, of_polyhedron(row)}}) {
@@ -119,4 +121,4 @@ std::string accuracy_figure(const AccuracyReport& report) {
                       "against the analytic shape. Bottom: against the exact polyhedron.");
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -1,17 +1,17 @@
 #include "rendering/accuracy/peers.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json spread_json(const ErrorSpread& s, const char* unit) {
+Json spread_json(const rendering::ErrorSpread& s, const char* unit) {
   const std::string u(unit);
   return {{"count", s.count}, {"rms_" + u, s.rms}, {"p999_" + u, s.p999}, {"worst_" + u, s.worst}};
 }
 
-Json errors_json(const ErrorSummary& e) {
+Json errors_json(const rendering::ErrorSummary& e) {
   return {{"ticks", e.ticks},
           {"lost", e.lost},
           {"gave_up", e.gave_up},
@@ -31,28 +31,28 @@ Json accuracy_json(const AccuracyReport& report) {
   json["version"] = 1;
   json["program_version"] = PALPATE_VERSION;
   if (!report.rows.empty()) {
-    const AccuracySettings& s = report.settings;
+    const rendering::AccuracySettings& s = report.settings;
     json["settings"] = {{"paths", s.paths},
                         {"contact_ticks", s.contact_ticks},
                         {"stylus_length_m", s.length},
                         {"most_triangles", s.most_triangles},
-                        {"stiffness_n_per_m", kStiffness},
-                        {"least_flat_angle_rad", kFlat}};
-    for (const MethodKind& method : accuracy_methods()) {
+                        {"stiffness_n_per_m", rendering::kStiffness},
+                        {"least_flat_angle_rad", rendering::kFlat}};
+    for (const rendering::MethodKind& method : rendering::accuracy_methods()) {
       json["methods"].push_back({{"name", method.name},
                                  {"description", method.description},
                                  {"keeps_its_side", method.follows_side}});
     }
   }
-  for (const PeerLibrary& library : peer_libraries()) {
+  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
     json["peers"].push_back({{"name", library.name},
                              {"present", library.make != nullptr},
                              {"version", library.make ? Json(library.version) : Json()}});
   }
   if (!report.rows.empty()) {
     for (const std::string& shape : measured_shapes(report)) {
-      const int hand = triangles_for(report.rows, shape, kHand);
-      const int device = triangles_for(report.rows, shape, kDevice);
+      const int hand = rendering::triangles_for(report.rows, shape, kHand);
+      const int device = rendering::triangles_for(report.rows, shape, kDevice);
       json["recommended"].push_back({{"shape", shape},
                                      {"triangles_for_hand", hand ? Json(hand) : Json()},
                                      {"triangles_for_device", device ? Json(device) : Json()},
@@ -60,7 +60,7 @@ Json accuracy_json(const AccuracyReport& report) {
     }
   }
   json["rows"] = Json::array();
-  for (const AccuracyRow& row : report.rows) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     json["rows"].push_back(
         {{"shape", row.shape},
          {"triangles", row.triangles},
@@ -75,7 +75,7 @@ Json accuracy_json(const AccuracyReport& report) {
          {"against_polyhedron", errors_json(row.polyhedron_errors)}});
   }
   for (const FirstContactStudy& study : report.first_contacts) {
-    for (const FirstContactLoss& loss : study.speeds) {
+    for (const rendering::FirstContactLoss& loss : study.speeds) {
       json["first_contact"]["rows"].push_back({{"shape", study.shape},
                                                {"speed_m_per_s", loss.speed},
                                                {"turning_rad_per_s", loss.turning},
@@ -103,7 +103,7 @@ Json accuracy_json(const AccuracyReport& report) {
                                 {"detail", row.result.detail}});
   }
   if (report.search) {
-    const SearchCounts& c = *report.search;
+    const rendering::SearchCounts& c = *report.search;
     json["search"] = {{"seed", report.search_seed},
                       {"ticks", c.ticks},
                       {"walks", c.walks},
@@ -125,4 +125,4 @@ Json accuracy_json(const AccuracyReport& report) {
   return json;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

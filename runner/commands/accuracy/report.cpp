@@ -7,12 +7,12 @@
 #include "rendering/accuracy/peers.h"
 #include "runner/commands/shared/page.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// What was measured, how the numbers are meant, and what the methods are.
 std::vector<std::string> how_to_read(const AccuracyReport& report) {
-  const AccuracySettings& s = report.settings;
+  const rendering::AccuracySettings& s = report.settings;
   std::vector<std::string> all;
   all.emplace_back(
       "Measured on " + std::to_string(s.paths) + " paths for each shape and probe, " +
@@ -39,14 +39,14 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
   all.emplace_back(
       "Worst: once in some 10,000 ticks a tessellation lets go of a side one tick before or after "
       "the shape does.");
-  for (const MethodKind& method : accuracy_methods()) {
+  for (const rendering::MethodKind& method : rendering::accuracy_methods()) {
     std::string line = "Method ";
     line += method.name;
     line += ": ";
     line += method.description;
     all.push_back(line + ".");
   }
-  for (const PeerLibrary& library : peer_libraries()) {
+  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
     if (library.make) continue;
     std::string line = "Method ";
     line += library.name;
@@ -62,26 +62,27 @@ constexpr const char* kQuestion =
 
 void put_wrapped(std::ostream& out, const std::string& text) {
   constexpr std::size_t kColumns = 98;
-  for (const std::string& line :
-       wrapped(text, [](std::string_view part) { return width(part) <= kColumns; })) {
+  for (const std::string& line : analysis::wrapped(
+           text, [](std::string_view part) { return analysis::width(part) <= kColumns; })) {
     out << "  " << line << "\n";
   }
 }
 
 }  // namespace
 
-void put_table(std::ostream& out, const Table& table) {
+void put_table(std::ostream& out, const analysis::Table& table) {
   std::vector<std::size_t> widths;
-  for (const std::string& name : table.header) widths.push_back(width(name));
+  for (const std::string& name : table.header) widths.push_back(analysis::width(name));
   for (const auto& row : table.rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      widths[i] = std::max(widths[i], analysis::width(row[i]));
   }
   out << "\n" << table.caption << "\n";
   const auto put = [&](const std::vector<std::string>& cells) {
     std::string line;
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      line += "  " +
-              (i < table.n_names ? pad_right(cells[i], widths[i]) : pad_left(cells[i], widths[i]));
+      line += "  " + (i < table.n_names ? analysis::pad_right(cells[i], widths[i])
+                                        : analysis::pad_left(cells[i], widths[i]));
     }
     line.erase(line.find_last_not_of(' ') + 1);
     out << line << "\n";
@@ -98,7 +99,7 @@ std::string accuracy_text(const AccuracyReport& report) {
     out << "\n";
     for (const std::string& sentence : recommendations(report)) out << "  " << sentence << "\n";
   }
-  for (const Table& table : accuracy_tables(report)) put_table(out, table);
+  for (const analysis::Table& table : accuracy_tables(report)) put_table(out, table);
   if (!report.rows.empty()) {
     out << "\nHow to read it\n";
     for (const std::string& note : how_to_read(report)) put_wrapped(out, note);
@@ -122,4 +123,4 @@ std::string accuracy_page(const AccuracyReport& report) {
   return page_html(page);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -14,38 +14,38 @@
 #include "rendering/verification/search.h"
 #include "stimuli/shapes.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// First contacts of one shape at several speeds of the hand.
 struct FirstContactStudy {
   std::string shape;
-  std::vector<FirstContactLoss> speeds;
+  std::vector<rendering::FirstContactLoss> speeds;
 };
 
 /// An extreme case by one of the renderers.
 struct ExtremeRow {
   std::string name, title, measure, probe;
-  ExtremeResult result;
+  rendering::ExtremeResult result;
 };
 
 struct AccuracyReport {
-  AccuracySettings settings;
-  std::vector<AccuracyRow> rows;
+  rendering::AccuracySettings settings;
+  std::vector<rendering::AccuracyRow> rows;
   std::vector<FirstContactStudy> first_contacts;
   double paper_test_ns = 0, exact_test_ns = 0;  ///< of a first contact with a cube, all tried
   std::vector<ExtremeRow> extremes;
-  std::optional<SearchCounts> search;
+  std::optional<rendering::SearchCounts> search;
   std::uint64_t search_seed = 0;
 };
 
 /// What a hand can feel, and what a device resolves.
-constexpr Demand kHand{1e-3, 0.17453292519943295};  ///< 1 mm, 10 degrees
-constexpr Demand kDevice{3e-5, kNoDemand};          ///< 0.03 mm
+constexpr rendering::Demand kHand{1e-3, 0.17453292519943295};     ///< 1 mm, 10 degrees
+constexpr rendering::Demand kDevice{3e-5, rendering::kNoDemand};  ///< 0.03 mm
 
 /// The shapes that were measured, in order.
 std::vector<std::string> measured_shapes(const AccuracyReport& report);
 /// What the shape of this name needs; nothing for a name that is none.
-ShapeNeeds needs_of_shape(const std::string& name);
+stimuli::ShapeNeeds needs_of_shape(const std::string& name);
 /// It is made of flats: its one tessellation is the shape itself.
 bool is_flat_sided(const std::string& shape);
 
@@ -54,13 +54,13 @@ std::string significant(double value);
 /// "327,680"
 std::string thousands(long long n);
 /// For a terminal.
-void put_table(std::ostream& out, const Table& table);
+void put_table(std::ostream& out, const analysis::Table& table);
 
 /// "sphere: ...", the tessellation a lab should choose.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);
 std::vector<std::string> recommendations(const AccuracyReport& report);
 /// All of what was measured, in the order of display.
-std::vector<Table> accuracy_tables(const AccuracyReport& report);
+std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 
 std::string accuracy_text(const AccuracyReport& report);
 nlohmann::ordered_json accuracy_json(const AccuracyReport& report);
@@ -69,4 +69,4 @@ std::string accuracy_figure(const AccuracyReport& report);
 /// All of it as one page without scripts.
 std::string accuracy_page(const AccuracyReport& report);
 
-}  // namespace palpate
+}  // namespace palpate::runner

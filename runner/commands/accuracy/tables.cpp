@@ -5,7 +5,7 @@
 
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 std::string significant(double value) {
   char text[32];
@@ -30,7 +30,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// A dash where there was nothing to compare.
-std::string known(const ErrorSpread& spread, double value) {
+std::string known(const rendering::ErrorSpread& spread, double value) {
   return spread.count > 0 ? significant(value) : "-";
 }
 
@@ -39,16 +39,17 @@ std::string share(std::size_t part, std::size_t all) {
                    : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
 }
 
-std::string setting_of(const AccuracyRow& row) {
+std::string setting_of(const rendering::AccuracyRow& row) {
   if (needs_of_shape(row.shape).subdivisions)
     return "subdivisions " + std::to_string(row.subdivisions);
   if (row.segments > 0) return "segments " + std::to_string(row.segments);
   return "";
 }
 
-const AccuracyRow* find(const AccuracyReport& report, const std::string& shape, int triangles,
-                        const std::string& probe, const std::string& method) {
-  for (const AccuracyRow& row : report.rows) {
+const rendering::AccuracyRow* find(const AccuracyReport& report, const std::string& shape,
+                                   int triangles, const std::string& probe,
+                                   const std::string& method) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     if (row.shape == shape && row.triangles == triangles && row.probe == probe &&
         row.method == method) {
       return &row;
@@ -58,28 +59,28 @@ const AccuracyRow* find(const AccuracyReport& report, const std::string& shape, 
 }
 
 std::string choice(const AccuracyReport& report, const std::string& shape, int triangles) {
-  const AccuracyRow* row = find(report, shape, triangles, "ray", "tick");
+  const rendering::AccuracyRow* row = find(report, shape, triangles, "ray", "tick");
   const std::string setting = row ? setting_of(*row) : "";
   return thousands(triangles) + " triangles" + (setting.empty() ? "" : " (" + setting + ")");
 }
 
 /// Worse of the two probes.
 double worse(const AccuracyReport& report, const std::string& shape, int triangles,
-             double (*of)(const ErrorSummary&)) {
+             double (*of)(const rendering::ErrorSummary&)) {
   double most = 0;
   for (const char* probe : {"ray", "point"}) {
-    const AccuracyRow* row = find(report, shape, triangles, probe, "tick");
+    const rendering::AccuracyRow* row = find(report, shape, triangles, probe, "tick");
     if (row) most = std::max(most, of(row->shape_errors));
   }
   return most;
 }
 
-double depth_of(const ErrorSummary& e) { return e.depth.p999; }
-double normal_of(const ErrorSummary& e) { return e.normal.p999; }
+double depth_of(const rendering::ErrorSummary& e) { return e.depth.p999; }
+double normal_of(const rendering::ErrorSummary& e) { return e.normal.p999; }
 
 /// The product over the tessellations of one shape.
-Table tessellation_table(const AccuracyReport& report, const std::string& shape) {
-  Table table;
+analysis::Table tessellation_table(const AccuracyReport& report, const std::string& shape) {
+  analysis::Table table;
   table.caption = "Whole ticks on the " + shape + ", against the analytic shape";
   table.header = {"triangles", "probe",           "ns a tick",       "depth um rms",
                   "99.9 %",    "worst",           "angle rms",       "99.9 %",
@@ -87,9 +88,9 @@ Table tessellation_table(const AccuracyReport& report, const std::string& shape)
                   "lost %"};
   table.n_names = 0;
   for (const char* probe : {"ray", "point"}) {
-    for (const AccuracyRow& row : report.rows) {
+    for (const rendering::AccuracyRow& row : report.rows) {
       if (row.shape != shape || row.probe != probe || row.method != "tick") continue;
-      const ErrorSummary& e = row.shape_errors;
+      const rendering::ErrorSummary& e = row.shape_errors;
       table.rows.push_back(
           {thousands(row.triangles), row.probe, significant(row.ns_per_tick),
            significant(1e6 * e.depth.rms), significant(1e6 * e.depth.p999),
@@ -103,16 +104,17 @@ Table tessellation_table(const AccuracyReport& report, const std::string& shape)
 }
 
 /// All methods on one tessellation, ray.
-Table method_table(const AccuracyReport& report, const std::string& shape, int triangles) {
-  Table table;
+analysis::Table method_table(const AccuracyReport& report, const std::string& shape,
+                             int triangles) {
+  analysis::Table table;
   table.caption = "Methods on the " + shape + " of " + choice(report, shape, triangles) +
                   ", ray, against the exact polyhedron";
   table.header = {"method",       "ns a tick",      "depth m: rms",           "worst",
                   "angle: worst", "point m: worst", "force N: worst",         "lost %",
                   "phantom %",    "not least %",    "shape, depth um: 99.9 %"};
-  for (const AccuracyRow& row : report.rows) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     if (row.shape != shape || row.triangles != triangles || row.probe != "ray") continue;
-    const ErrorSummary& e = row.polyhedron_errors;
+    const rendering::ErrorSummary& e = row.polyhedron_errors;
     table.rows.push_back({row.method, significant(row.ns_per_tick), significant(e.depth.rms),
                           significant(e.depth.worst), known(e.normal, e.normal.worst / kDegree),
                           known(e.point, e.point.worst), significant(e.force.worst),
@@ -123,14 +125,14 @@ Table method_table(const AccuracyReport& report, const std::string& shape, int t
   return table;
 }
 
-Table first_contact_table(const AccuracyReport& report) {
-  Table table;
+analysis::Table first_contact_table(const AccuracyReport& report) {
+  analysis::Table table;
   table.caption = "First contact: the paper's test (appendix 7 and 8, to the letter) and ours";
   table.header = {
       "shape",         "hand m/s",      "turning rad/s", "entries", "paper: missed in the tick %",
       "never found %", "ours: missed %"};
   for (const FirstContactStudy& study : report.first_contacts) {
-    for (const FirstContactLoss& loss : study.speeds) {
+    for (const rendering::FirstContactLoss& loss : study.speeds) {
       const auto n = static_cast<std::size_t>(loss.entries);
       table.rows.push_back({study.shape, significant(loss.speed), significant(loss.turning),
                             thousands(loss.entries),
@@ -147,26 +149,26 @@ Table first_contact_table(const AccuracyReport& report) {
 
 std::vector<int> tessellations_shown(const AccuracyReport& report, const std::string& shape) {
   std::vector<int> all;
-  for (const AccuracyRow& row : report.rows) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     if (row.shape == shape && (all.empty() || all.back() != row.triangles)) {
       if (std::find(all.begin(), all.end(), row.triangles) == all.end())
         all.push_back(row.triangles);
     }
   }
   std::vector<int> shown;
-  const int device = triangles_for(report.rows, shape, kDevice);
+  const int device = rendering::triangles_for(report.rows, shape, kDevice);
   if (device > 0) shown.push_back(device);
   if (!all.empty() && all.back() != device) shown.push_back(all.back());
   return shown;
 }
 
-Table extreme_table(const AccuracyReport& report) {
-  Table table;
+analysis::Table extreme_table(const AccuracyReport& report) {
+  analysis::Table table;
   table.caption = "Extreme geometry and extreme hands";
   table.header = {"case", "probe", "ticks", "in contact", "worst", "allowed", "", "measured"};
   table.n_names = 2;
   for (const ExtremeRow& row : report.extremes) {
-    const ExtremeResult& r = row.result;
+    const rendering::ExtremeResult& r = row.result;
     table.rows.push_back({row.title, row.probe, thousands(static_cast<long long>(r.ticks)),
                           thousands(static_cast<long long>(r.in_contact)), significant(r.worst),
                           significant(r.limit), r.passed ? "holds" : "FAILS", row.measure});
@@ -175,8 +177,8 @@ Table extreme_table(const AccuracyReport& report) {
   return table;
 }
 
-Table search_table(const SearchCounts& c, std::uint64_t seed) {
-  Table table;
+analysis::Table search_table(const rendering::SearchCounts& c, std::uint64_t seed) {
+  analysis::Table table;
   table.caption = "Search over random solids and paths, every tick against brute force (seed " +
                   std::to_string(seed) + ")";
   table.header = {"wrong", "ticks"};
@@ -199,7 +201,7 @@ Table search_table(const SearchCounts& c, std::uint64_t seed) {
                         thousands(static_cast<long long>(c.entries)) +
                         " first contacts; deepest ideal probe " + significant(c.worst_penetration) +
                         " of the size.");
-  for (const SearchFault& fault : c.faults) {
+  for (const rendering::SearchFault& fault : c.faults) {
     table.notes.push_back("seed " + std::to_string(fault.seed) + " walk " +
                           std::to_string(fault.walk) + " tick " + std::to_string(fault.tick) +
                           ": " + fault.what);
@@ -210,10 +212,11 @@ Table search_table(const SearchCounts& c, std::uint64_t seed) {
 }  // namespace
 
 std::string recommendation(const AccuracyReport& report, const std::string& shape) {
-  const int hand = triangles_for(report.rows, shape, kHand);
-  const int device = triangles_for(report.rows, shape, kDevice);
+  const int hand = rendering::triangles_for(report.rows, shape, kHand);
+  const int device = rendering::triangles_for(report.rows, shape, kDevice);
   if (is_flat_sided(shape)) {
-    const int only = std::ranges::find(report.rows, shape, &AccuracyRow::shape)->triangles;
+    const int only =
+        std::ranges::find(report.rows, shape, &rendering::AccuracyRow::shape)->triangles;
     return shape + ": its " + choice(report, shape, only) +
            " are the shape itself: there is nothing to choose (errors below " +
            significant(1e3 * worse(report, shape, only, depth_of)) + " mm and " +
@@ -232,21 +235,21 @@ std::string recommendation(const AccuracyReport& report, const std::string& shap
          " to be finer than the device resolves (within " + within(device) + ").";
 }
 
-ShapeNeeds needs_of_shape(const std::string& name) {
-  for (const ShapeKind shape : kShapes) {
-    if (name == needs_of(shape).name) return needs_of(shape);
+stimuli::ShapeNeeds needs_of_shape(const std::string& name) {
+  for (const stimuli::ShapeKind shape : stimuli::kShapes) {
+    if (name == stimuli::needs_of(shape).name) return stimuli::needs_of(shape);
   }
   return {};
 }
 
 bool is_flat_sided(const std::string& shape) {
-  const ShapeNeeds needs = needs_of_shape(shape);
+  const stimuli::ShapeNeeds needs = needs_of_shape(shape);
   return !needs.subdivisions && !needs.segments;
 }
 
 std::vector<std::string> measured_shapes(const AccuracyReport& report) {
   std::vector<std::string> all;
-  for (const AccuracyRow& row : report.rows) {
+  for (const rendering::AccuracyRow& row : report.rows) {
     if (std::find(all.begin(), all.end(), row.shape) == all.end()) all.push_back(row.shape);
   }
   return all;
@@ -260,8 +263,8 @@ std::vector<std::string> recommendations(const AccuracyReport& report) {
   return all;
 }
 
-std::vector<Table> accuracy_tables(const AccuracyReport& report) {
-  std::vector<Table> tables;
+std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
+  std::vector<analysis::Table> tables;
   const std::vector<std::string> shapes = measured_shapes(report);
   tables.reserve(shapes.size());
   for (const std::string& shape : shapes) tables.push_back(tessellation_table(report, shape));
@@ -276,4 +279,4 @@ std::vector<Table> accuracy_tables(const AccuracyReport& report) {
   return tables;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

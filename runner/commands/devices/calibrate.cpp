@@ -23,20 +23,22 @@
 #include "runner/servo/realtime.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
-using namespace palpate::falcon;
+using namespace palpate::runner::falcon;
 
 /// Questions on stderr, ENTER on stdin; q, the end of stdin or a signal stops.
 class TerminalGuide final : public Guide {
  public:
   explicit TerminalGuide(const FaultSignals& signals) : signals_(signals) {}
 
-  void say(const std::string& text) override { std::cerr << printable_lines(text) << "\n"; }
+  void say(const std::string& text) override {
+    std::cerr << stimuli::printable_lines(text) << "\n";
+  }
   void ask(const std::string& text) override {
-    std::cerr << printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
+    std::cerr << stimuli::printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
   }
   Answer answer() override {
     if (signals_.end_requested() != 0) return Answer::stop;
@@ -111,8 +113,8 @@ RegistrationSettings registration_settings(const po::variables_map& values) {
 }
 
 std::string now_utc() {
-  return format_utc(std::chrono::system_clock::now().time_since_epoch() /
-                    std::chrono::nanoseconds(1));
+  return data::format_utc(std::chrono::system_clock::now().time_since_epoch() /
+                          std::chrono::nanoseconds(1));
 }
 
 /// The nominal scale: what is stored must not enter what is measured.
@@ -135,7 +137,7 @@ constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force 
 
 void store(const std::string& path, const Calibration& calibration) {
   write_whole(path, to_json(calibration));
-  std::cerr << "Stored in " << printable(path) << "\n";
+  std::cerr << "Stored in " << stimuli::printable(path) << "\n";
 }
 
 int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
@@ -154,7 +156,7 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
   force.made_utc = now_utc();
   calibration.put(force);
   store(order.calibration, calibration);
-  std::cout << "serial                   " << printable(force.serial) << "\n"
+  std::cout << "serial                   " << stimuli::printable(force.serial) << "\n"
             << "counts per newton metre  " << force.counts_per_torque << " (nominal "
             << kCountsPerTorque << ")\n"
             << "residual                 " << force.residual << " N\n"
@@ -187,8 +189,8 @@ int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
   calibration.put(pair);
   store(order.calibration, calibration);
   const Vec3& p = pair.tail_in_tip.position;
-  std::cout << "tip, tail      " << printable(pair.tip_serial) << ", "
-            << printable(pair.tail_serial) << "\n"
+  std::cout << "tip, tail      " << stimuli::printable(pair.tip_serial) << ", "
+            << stimuli::printable(pair.tail_serial) << "\n"
             << "tail's centre  " << p.x << ", " << p.y << ", " << p.z << " m from the tip's\n"
             << "residual       " << pair.residual * 1e3 << " mm over " << pair.points
             << " places\n";
@@ -215,13 +217,13 @@ void add_calibrate_options(po::options_description& options) {
 int calibrate_devices(const std::string& device, const DeviceOrder& order,
                       const po::variables_map& values) {
   check(!order.calibration.empty(), "--calibrate needs --calibration FILE to store into");
-  TakenFiles firmware;
+  data::TakenFiles firmware;
   firmware.add(order.firmware, "--firmware reads it, it would be overwritten");
-  const std::string why = why_not_to_write(order.calibration, true, firmware);
+  const std::string why = data::why_not_to_write(order.calibration, true, firmware);
   check(why.empty(), "--calibration " + order.calibration + ": " + why);
   if (device == "falcon") return calibrate_force(order, values);
   if (device == "falcon2") return calibrate_pair(order, values);
   throw UsageError("--calibrate is for the devices falcon and falcon2, not for '" + device + "'");
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

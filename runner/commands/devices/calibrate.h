@@ -6,7 +6,7 @@
 
 #include "runner/devices/registry.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The options that only calibration has.
 void add_calibrate_options(boost::program_options::options_description& options);
@@ -17,4 +17,4 @@ void add_calibrate_options(boost::program_options::options_description& options)
 int calibrate_devices(const std::string& device, const DeviceOrder& order,
                       const boost::program_options::variables_map& values);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -17,7 +17,7 @@
 #include "runner/safety/guard.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
@@ -54,9 +54,10 @@ void print_limits(const DeviceCapabilities& c) {
   }
   std::printf("    reaches %g mm about its centre, resolves %g um\n", c.workspace_radius * 1e3,
               c.resolution * 1e6);
-  if (!c.serial.empty()) std::printf("    serial number %s\n", printable(c.serial).c_str());
+  if (!c.serial.empty())
+    std::printf("    serial number %s\n", stimuli::printable(c.serial).c_str());
   if (!c.calibration.empty())
-    std::printf("    calibration: %s\n", printable(c.calibration).c_str());
+    std::printf("    calibration: %s\n", stimuli::printable(c.calibration).c_str());
 }
 
 /// Opened, its limits, its self-test. \return whether the test was passed
@@ -75,7 +76,7 @@ bool open_and_test(const DeviceKind& kind, const DeviceOrder& order, Json& row) 
     row["self_test"].push_back(
         {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
     std::printf("    %-8s%s: %s\n", result.passed ? "passed" : "FAILED", result.what.c_str(),
-                printable(result.found).c_str());
+                stimuli::printable(result.found).c_str());
   }
   return passed;
 }
@@ -92,9 +93,9 @@ bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& ro
       row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
       usable = usable || found.trouble.empty();
       if (!found.serial.empty())
-        std::printf("    connected: %s\n", printable(found.serial).c_str());
+        std::printf("    connected: %s\n", stimuli::printable(found.serial).c_str());
       if (!found.trouble.empty())
-        std::printf("    cannot be used: %s\n", printable(found.trouble).c_str());
+        std::printf("    cannot be used: %s\n", stimuli::printable(found.trouble).c_str());
     }
     if (connected.empty()) std::printf("    none connected\n");
     if (kind.pushes && !named) {
@@ -106,7 +107,7 @@ bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& ro
     }
   } catch (const std::runtime_error& error) {
     row["trouble"] = error.what();
-    std::printf("    %s\n", printable(error.what()).c_str());
+    std::printf("    %s\n", stimuli::printable(error.what()).c_str());
     good = !named;
   }
   rows.push_back(std::move(row));
@@ -262,4 +263,4 @@ int devices_command(const std::vector<std::string>& args) {
   return status;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

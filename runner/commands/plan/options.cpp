@@ -16,7 +16,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 namespace po = boost::program_options;
 
@@ -43,7 +43,8 @@ std::size_t whole_number(const std::string& option, const std::string& text, std
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
     throw UsageError("--" + option + ": expected a whole number from " + std::to_string(least) +
-                     " to " + std::to_string(most) + ", found '" + printable(text, 60) + "'");
+                     " to " + std::to_string(most) + ", found '" + stimuli::printable(text, 60) +
+                     "'");
   }
   return value;
 }
@@ -52,31 +53,32 @@ double real_number(const std::string& option, const std::string& text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw UsageError("--" + option + ": expected a number, found '" + printable(text, 60) + "'");
+    throw UsageError("--" + option + ": expected a number, found '" + stimuli::printable(text, 60) +
+                     "'");
   }
   return value;
 }
 
 void check_within(const std::string& option, double value, double low, double high) {
   if (value >= low && value <= high) return;
-  throw UsageError("--" + option + ": expected a number from " + fixed(low, 2) + " to " +
-                   fixed(high, 2));
+  throw UsageError("--" + option + ": expected a number from " + analysis::fixed(low, 2) + " to " +
+                   analysis::fixed(high, 2));
 }
 
-std::string shapes_of(const StudyModel& model) {
+std::string shapes_of(const analysis::StudyModel& model) {
   std::string known;
   for (const std::string& each : model.shapes)
-    known += (known.empty() ? "" : ", ") + printable(each, 60);
+    known += (known.empty() ? "" : ", ") + stimuli::printable(each, 60);
   return known;
 }
 
 /// "cone=22,cube=11": percent reductions; shapes that are not named have no effect. "11": all.
-void put_effects(const std::string& text, StudyModel& model) {
+void put_effects(const std::string& text, analysis::StudyModel& model) {
   const auto log_ratio = [](const std::string& percent) {
     const double value = real_number("effect", percent);
     if (!(value < 100) || value < -1000) {
       throw UsageError("--effect: expected a percent reduction of time below 100, found '" +
-                       printable(percent, 60) + "'");
+                       stimuli::printable(percent, 60) + "'");
     }
     return std::log1p(-value / 100);
   };
@@ -92,11 +94,11 @@ void put_effects(const std::string& text, StudyModel& model) {
     const auto shape = std::ranges::find(model.shapes, name);
     if (at == std::string::npos || shape == model.shapes.end()) {
       throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + shapes_of(model) +
-                       ", found '" + printable(part, 60) + "'");
+                       ", found '" + stimuli::printable(part, 60) + "'");
     }
     if (!named.insert(name).second) {
-      throw UsageError("--effect: expected each shape once, found '" + printable(name, 60) +
-                       "' again");
+      throw UsageError("--effect: expected each shape once, found '" +
+                       stimuli::printable(name, 60) + "' again");
     }
     model.log_ratios[static_cast<std::size_t>(shape - model.shapes.begin())] =
         log_ratio(part.substr(at + 1));
@@ -105,7 +107,7 @@ void put_effects(const std::string& text, StudyModel& model) {
 
 /// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
 /// paper's effects. \return what was taken
-std::string put_default_effects(StudyModel& model) {
+std::string put_default_effects(analysis::StudyModel& model) {
   constexpr double kCone = 22, kCube = 11;
   bool known = false;
   for (std::size_t s = 0; s < model.shapes.size(); ++s) {
@@ -116,7 +118,7 @@ std::string put_default_effects(StudyModel& model) {
   std::string taken = "the paper's";
   if (!known) {
     std::ranges::fill(model.log_ratios, std::log1p(-kCube / 100));
-    taken = fixed(kCube, 0) +
+    taken = analysis::fixed(kCube, 0) +
             " % for every shape, the smaller of the paper's, whose shapes are "
             "not among these";
   }
@@ -124,19 +126,19 @@ std::string put_default_effects(StudyModel& model) {
          ". The shapes: " + shapes_of(model) + ".";
 }
 
-TrialTable read_trials(const std::string& database, const std::string& csv) {
-  if (!csv.empty()) return read_trials_csv(csv);
+analysis::TrialTable read_trials(const std::string& database, const std::string& csv) {
+  if (!csv.empty()) return analysis::read_trials_csv(csv);
   try {
-    return read_trials_store(database);
-  } catch (const StoreRefused& error) {
+    return analysis::read_trials_store(database);
+  } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());
   }
 }
 
 }  // namespace
 
-Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
-  Pilot pilot;
+analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
+  analysis::Pilot pilot;
   if (options.database.empty() && options.csv.empty()) {
     for (const char* needed : {"gain-sd", "residual-sd"}) {
       if (values.count(needed) == 0) {
@@ -151,18 +153,21 @@ Pilot starting_point(const PlanOptions& options, const po::variables_map& values
     return pilot;
   }
   const std::string& source = options.csv.empty() ? options.database : options.csv;
-  pilot = read_pilot(analyze(read_trials(options.database, options.csv), {}, PALPATE_VERSION));
+  pilot = analysis::read_pilot(
+      analysis::analyze(read_trials(options.database, options.csv), {}, PALPATE_VERSION));
   if (!pilot.undefined.empty()) {
     throw UsageError(
         source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
   }
   pilot.notes.insert(pilot.notes.begin(), "Standard deviations and share of used trials from " +
-                                              printable(source, 200) + ", the wanted effects not.");
+                                              stimuli::printable(source, 200) +
+                                              ", the wanted effects not.");
   return pilot;
 }
 
-StudyModel model_of(Pilot& pilot, const PlanOptions& options, const po::variables_map& values) {
-  StudyModel model = std::move(pilot.model);
+analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options,
+                              const po::variables_map& values) {
+  analysis::StudyModel model = std::move(pilot.model);
   const auto put = [&](const char* option, double value, double low, double high, double& target) {
     if (values.count(option) == 0) return;
     check_within(option, value, low, high);
@@ -186,8 +191,8 @@ StudyModel model_of(Pilot& pilot, const PlanOptions& options, const po::variable
     throw UsageError(
         "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
         "point, this pilot is of " +
-        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60) +
-        "; its shapes: " + shapes_of(model));
+        stimuli::printable(pilot.pair.renderer, 60) + " against " +
+        stimuli::printable(pilot.pair.reference, 60) + "; its shapes: " + shapes_of(model));
   }
   if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
     throw UsageError(
@@ -197,8 +202,8 @@ StudyModel model_of(Pilot& pilot, const PlanOptions& options, const po::variable
   return model;
 }
 
-PlanSettings settings_of(const PlanOptions& options, const po::variables_map& values) {
-  PlanSettings out;
+analysis::PlanSettings settings_of(const PlanOptions& options, const po::variables_map& values) {
+  analysis::PlanSettings out;
   const auto ends = split(options.participants, '-');
   if (ends.size() > 2) throw UsageError("--participants: expected a range such as 4-40");
   out.least = whole_number("participants", ends.front(), 2, kMostParticipants);
@@ -212,15 +217,16 @@ PlanSettings settings_of(const PlanOptions& options, const po::variables_map& va
   if (options.goal != "all" && options.goal != "any") {
     throw UsageError("--goal: expected all or any");
   }
-  out.goal = options.goal == "all" ? Goal::all : Goal::any;
+  out.goal = options.goal == "all" ? analysis::Goal::all : analysis::Goal::any;
   if (options.test != "paired" && options.test != "model") {
     throw UsageError("--test: expected paired or model");
   }
-  PowerSettings& simulation = out.simulation;
-  simulation.test = options.test == "paired" ? StudyTest::paired : StudyTest::model;
+  analysis::PowerSettings& simulation = out.simulation;
+  simulation.test =
+      options.test == "paired" ? analysis::StudyTest::paired : analysis::StudyTest::model;
   simulation.alpha = options.alpha;
   simulation.seed = options.seed;
-  simulation.studies = simulation.test == StudyTest::paired ? 10'000 : 1'000;
+  simulation.studies = simulation.test == analysis::StudyTest::paired ? 10'000 : 1'000;
   if (values.count("studies") != 0) {
     simulation.studies = whole_number("studies", options.studies, 100, kMostStudies);
   }
@@ -229,4 +235,4 @@ PlanSettings settings_of(const PlanOptions& options, const po::variables_map& va
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 #include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct PlanOptions {
   std::string database, csv, effect, participants = "2-100", trials = "10,20,40,76", goal = "all",
@@ -22,14 +22,14 @@ struct PlanOptions {
 // Each throws UsageError.
 
 /// The pilot's model, or the paper's shapes with the figures given.
-Pilot starting_point(const PlanOptions& options,
-                     const boost::program_options::variables_map& values);
+analysis::Pilot starting_point(const PlanOptions& options,
+                               const boost::program_options::variables_map& values);
 
 /// The pilot's model, which is moved from, with the figures and effects given.
-StudyModel model_of(Pilot& pilot, const PlanOptions& options,
-                    const boost::program_options::variables_map& values);
+analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options,
+                              const boost::program_options::variables_map& values);
 
-PlanSettings settings_of(const PlanOptions& options,
-                         const boost::program_options::variables_map& values);
+analysis::PlanSettings settings_of(const PlanOptions& options,
+                                   const boost::program_options::variables_map& values);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,7 +10,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 namespace po = boost::program_options;
 
@@ -73,9 +73,9 @@ int plan_command(const std::vector<std::string>& args) {
                      "\nMore: add --help");
   }
   Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
-  PlanSettings settings = settings_of(options, *values);
-  Pilot pilot = starting_point(options, *values);
-  StudyModel model = model_of(pilot, options, *values);
+  analysis::PlanSettings settings = settings_of(options, *values);
+  analysis::Pilot pilot = starting_point(options, *values);
+  analysis::StudyModel model = model_of(pilot, options, *values);
 
   const std::string curves = std::to_string(settings.trials.size());
   const auto studies = static_cast<double>(settings.simulation.studies);
@@ -83,18 +83,19 @@ int plan_command(const std::vector<std::string>& args) {
   settings.simulation.progress = [&progress, studies](std::size_t done) {
     progress.show(static_cast<double>(done) / studies);
   };
-  Plan plan = make_plan(std::move(model), std::move(settings), std::move(pilot.notes),
-                        [&](std::size_t curve, std::size_t point) {
-                          progress.begin("curve " + std::to_string(curve) + " of " + curves +
-                                         ", point " + std::to_string(point));
-                        });
+  analysis::Plan plan =
+      analysis::make_plan(std::move(model), std::move(settings), std::move(pilot.notes),
+                          [&](std::size_t curve, std::size_t point) {
+                            progress.begin("curve " + std::to_string(curve) + " of " + curves +
+                                           ", point " + std::to_string(point));
+                          });
   progress.clear();
   plan.label = std::move(pilot.label);
-  if (outputs.wanted("json")) outputs.put("json", plan_json(plan));
-  if (outputs.wanted("figure")) outputs.put("figure", plan_svg(plan));
+  if (outputs.wanted("json")) outputs.put("json", analysis::plan_json(plan));
+  if (outputs.wanted("figure")) outputs.put("figure", analysis::plan_svg(plan));
   outputs.write();
-  std::cout << plan_text(plan);
+  std::cout << analysis::plan_text(plan);
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,11 +7,11 @@
 #include <map>
 #include <set>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// ns a call: the least of several runs, each long enough for the clock.
-double cost_of(const Rehearsal& rehearsal) {
+double cost_of(const rendering::Rehearsal& rehearsal) {
   constexpr int kRuns = 15;
   constexpr std::chrono::milliseconds kLong{1};
   volatile double sink = 0;
@@ -42,7 +42,8 @@ std::string nanoseconds(const std::optional<double>& ns) {
 /// Of the whole tick, where the stage is part of it.
 std::optional<double> share(const Explanation& e, const StageCost& cost) {
   if (!cost.ns || !e.contact_ns) return std::nullopt;
-  if (cost.stage.time != StageTime::tick && cost.stage.time != StageTime::contact)
+  if (cost.stage.time != rendering::StageTime::tick &&
+      cost.stage.time != rendering::StageTime::contact)
     return std::nullopt;
   return *cost.ns / *e.contact_ns;
 }
@@ -60,19 +61,19 @@ void pad(std::string& line, std::size_t column) {
 
 }  // namespace
 
-Explanation explain_with_costs(const Scene& scene, const Renderer& renderer) {
+Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer) {
   Explanation explanation;
   explanation.renderer = renderer.name();
   explanation.parts = scene.parts().size();
   std::set<int> objects;
-  for (const ScenePart& part : scene.parts()) {
+  for (const rendering::ScenePart& part : scene.parts()) {
     objects.insert(part.object);
     explanation.facets += part.mesh->facets().size();
     explanation.edges += part.mesh->edges().size();
   }
   explanation.objects = objects.size();
   std::map<std::string, double> costs;
-  for (const Rehearsal& rehearsal : rehearse(scene, renderer)) {
+  for (const rendering::Rehearsal& rehearsal : rendering::rehearse(scene, renderer)) {
     if (rehearsal.calls > 0) costs[rehearsal.name] = cost_of(rehearsal);
   }
   const auto cost = [&](const std::string& name) -> std::optional<double> {
@@ -80,9 +81,9 @@ Explanation explain_with_costs(const Scene& scene, const Renderer& renderer) {
     if (found == costs.end()) return std::nullopt;
     return found->second;
   };
-  explanation.contact_ns = cost(kTickInContact);
-  explanation.free_ns = cost(kTickInFreeSpace);
-  for (Stage& stage : explain(scene, renderer)) {
+  explanation.contact_ns = cost(rendering::kTickInContact);
+  explanation.free_ns = cost(rendering::kTickInFreeSpace);
+  for (rendering::Stage& stage : rendering::explain(scene, renderer)) {
     StageCost with{std::move(stage), std::nullopt};
     if (with.stage.runs) with.ns = cost(with.stage.name);
     explanation.stages.push_back(std::move(with));
@@ -110,7 +111,7 @@ std::string to_text(const Explanation& e) {
   for (const StageCost& c : e.stages) {
     std::string line = c.stage.name;
     pad(line, 25);
-    line += c.stage.runs ? to_string(c.stage.time) : "left out";
+    line += c.stage.runs ? rendering::to_string(c.stage.time) : "left out";
     const std::string ns = nanoseconds(c.ns), part = percent(share(e, c));
     pad(line, 49 - ns.size());
     line += ns;
@@ -139,7 +140,7 @@ nlohmann::ordered_json to_json(const Explanation& e) {
   Json stages = Json::array();
   for (const StageCost& c : e.stages) {
     stages.push_back({{"stage", c.stage.name},
-                      {"when", to_string(c.stage.time)},
+                      {"when", rendering::to_string(c.stage.time)},
                       {"runs", c.stage.runs},
                       {"why", c.stage.why},
                       {"ns", figure(c.ns)},
@@ -158,4 +159,4 @@ nlohmann::ordered_json to_json(const Explanation& e) {
           {"stages", std::move(stages)}};
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,11 +8,11 @@
 
 #include "rendering/verification/explain.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A stage with what it costs on this machine.
 struct StageCost {
-  Stage stage;
+  rendering::Stage stage;
   /// ns a call, run by itself over recorded ticks; empty: left out, did not happen, or not to be
   /// told apart from others.
   std::optional<double> ns;
@@ -26,9 +26,9 @@ struct Explanation {
   std::vector<StageCost> stages;
 };
 
-Explanation explain_with_costs(const Scene& scene, const Renderer& renderer);
+Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer);
 
 std::string to_text(const Explanation& explanation);
 nlohmann::ordered_json to_json(const Explanation& explanation);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,21 +8,22 @@
 #include "runner/scene_builder.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
 
-Scene build_scene(const std::string& path, const std::vector<ObjectSpec>& objects,
-                  const Renderer& renderer) {
+rendering::Scene build_scene(const std::string& path,
+                             const std::vector<stimuli::ObjectSpec>& objects,
+                             const rendering::Renderer& renderer) {
   try {
     return SceneBuilder().build(objects, renderer.side_contact());
-  } catch (const MeshError& error) {
+  } catch (const stimuli::MeshError& error) {
     std::vector<std::string> faults;
     for (const std::string& fault : error.faults()) {
       faults.push_back(std::string(path).append(": ").append(fault));
     }
-    throw MeshError(std::move(faults));
+    throw stimuli::MeshError(std::move(faults));
   }
 }
 
@@ -33,16 +34,17 @@ std::string given(const po::variables_map& values, const char* option, const cha
   return values[option].as<std::string>();
 }
 
-void explain_scene(Outputs& outputs, const Scene& scene, const Renderer& renderer) {
+void explain_scene(Outputs& outputs, const rendering::Scene& scene,
+                   const rendering::Renderer& renderer) {
   const Explanation explanation = explain_with_costs(scene, renderer);
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
 }
 
-ForceTable forces_along(const Scene& scene, const Renderer& renderer,
+ForceTable forces_along(const rendering::Scene& scene, const rendering::Renderer& renderer,
                         const std::vector<TimedPose>& poses) {
-  RenderState state = scene.initial_state();
+  rendering::RenderState state = scene.initial_state();
   ForceTable table;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
@@ -88,26 +90,27 @@ int render_command(const std::vector<std::string>& args) {
   if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))
     throw UsageError("--explain renders nothing: leave out --trajectory and --out");
   if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
-  const Renderer& renderer = renderer_for(name == "ray" ? RendererKind::ray : RendererKind::point);
+  const rendering::Renderer& renderer =
+      renderer_for(name == "ray" ? protocols::RendererKind::ray : protocols::RendererKind::point);
   const std::string scene_path = (*values)["scene"].as<std::string>();
   Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
-    const std::vector<ObjectSpec> objects = parse_scene(scene_path);
-    for (const ObjectSpec& object : objects) outputs.keep(object);
+    const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
+    for (const stimuli::ObjectSpec& object : objects) outputs.keep(object);
     explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
   given(*values, "out", "unless --explain is given");
-  const std::vector<ObjectSpec> objects = parse_scene(scene_path);
-  for (const ObjectSpec& object : objects) outputs.keep(object);
+  const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
+  for (const stimuli::ObjectSpec& object : objects) outputs.keep(object);
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
   const ForceTable table =
       forces_along(build_scene(scene_path, objects, renderer), renderer, poses);
   outputs.put("out", table.text());
   outputs.write();
-  std::cerr << printable_lines(table.warnings(trajectory));
+  std::cerr << stimuli::printable_lines(table.warnings(trajectory));
   return 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

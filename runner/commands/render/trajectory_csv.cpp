@@ -10,7 +10,7 @@
 #include "analysis/input/csv_reader.h"
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::size_t kFaultsShown = 20;
@@ -20,11 +20,11 @@ constexpr const char* kForceHeader =
     "device1_z,"
     "device2_x,device2_y,device2_z,depth,contacts,contact_type,object,faults";
 
-CsvReader open(const std::string& path) {
+analysis::CsvReader open(const std::string& path) {
   try {
-    return CsvReader(path);
+    return analysis::CsvReader(path);
   } catch (const std::runtime_error& error) {
-    throw InputError(
+    throw protocols::InputError(
         {{path, "(file)", std::string("a readable file was expected: ") + error.what()}});
   }
 }
@@ -65,7 +65,7 @@ void append(std::string& out, const Vec3& v) {
 /// "non-finite+started-inside".
 std::string names_of(std::uint32_t faults) {
   std::string names;
-  for (const FaultBit& fault : kRenderFaults) {
+  for (const rendering::FaultBit& fault : rendering::kRenderFaults) {
     if ((faults & fault.bit) != 0) (names += names.empty() ? "" : "+") += fault.name;
   }
   return names;
@@ -74,9 +74,9 @@ std::string names_of(std::uint32_t faults) {
 }  // namespace
 
 std::vector<TimedPose> read_trajectory(const std::string& path) {
-  CsvReader reader = open(path);
+  analysis::CsvReader reader = open(path);
   std::vector<TimedPose> poses;
-  std::vector<Fault> faults;
+  std::vector<protocols::Fault> faults;
   bool header = false;
   while (faults.size() < kFaultsShown && reader.next()) {
     const std::string place = "line " + std::to_string(reader.line());
@@ -86,7 +86,7 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
     }
     if (!header) {
       if (joined(reader.fields()) != kTrajectoryHeader) {
-        throw InputError(
+        throw protocols::InputError(
             {{path, place, std::string("the header ") + kTrajectoryHeader + " was expected"}});
       }
       header = true;
@@ -116,14 +116,16 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
   } else if (!reader.fault().empty()) {
     faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
   }
-  if (!faults.empty()) throw InputError(std::move(faults));
-  if (poses.empty()) throw InputError({{path, "(file)", "at least one row was expected"}});
+  if (!faults.empty()) throw protocols::InputError(std::move(faults));
+  if (poses.empty())
+    throw protocols::InputError({{path, "(file)", "at least one row was expected"}});
   return poses;
 }
 
-ForceTable::ForceTable() : text_(std::string(kForceHeader) + '\n'), seen_(kRenderFaults.size()) {}
+ForceTable::ForceTable()
+    : text_(std::string(kForceHeader) + '\n'), seen_(rendering::kRenderFaults.size()) {}
 
-void ForceTable::add(const TimedPose& pose, const Rendering& r) {
+void ForceTable::add(const TimedPose& pose, const rendering::Rendering& r) {
   ++rows_;
   append(text_, pose.t);
   for (const Vec3& v :
@@ -132,24 +134,24 @@ void ForceTable::add(const TimedPose& pose, const Rendering& r) {
   }
   text_ += ',';
   append(text_, r.deepest.depth);
-  text_ += ',' + std::to_string(r.contacts) + ',' + to_string(r.deepest.type) + ',' +
+  text_ += ',' + std::to_string(r.contacts) + ',' + rendering::to_string(r.deepest.type) + ',' +
            std::to_string(r.object) + ',' + names_of(r.faults) + '\n';
-  for (std::size_t i = 0; i < kRenderFaults.size(); ++i) {
-    if ((r.faults & kRenderFaults[i].bit) == 0) continue;
+  for (std::size_t i = 0; i < rendering::kRenderFaults.size(); ++i) {
+    if ((r.faults & rendering::kRenderFaults[i].bit) == 0) continue;
     if (seen_[i].ticks++ == 0) seen_[i].first_line = pose.line;
   }
 }
 
 std::string ForceTable::warnings(const std::string& path) const {
   std::string out;
-  for (std::size_t i = 0; i < kRenderFaults.size(); ++i) {
+  for (std::size_t i = 0; i < rendering::kRenderFaults.size(); ++i) {
     if (seen_[i].ticks == 0) continue;
-    out += path + ": warning: " + kRenderFaults[i].name + " in " + std::to_string(seen_[i].ticks) +
-           " of " + std::to_string(rows_) + " rows, first on line " +
-           std::to_string(seen_[i].first_line) + " (" + kRenderFaults[i].meaning +
-           "); see the column 'faults'\n";
+    out += path + ": warning: " + rendering::kRenderFaults[i].name + " in " +
+           std::to_string(seen_[i].ticks) + " of " + std::to_string(rows_) +
+           " rows, first on line " + std::to_string(seen_[i].first_line) + " (" +
+           rendering::kRenderFaults[i].meaning + "); see the column 'faults'\n";
   }
   return out;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,14 +7,14 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 inline constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
 inline constexpr std::size_t kMostPoses = 4'000'000;  // more than an hour at 1 kHz
 
 struct TimedPose {
   double t = 0;  ///< s
-  LineProbe probe;
+  rendering::LineProbe probe;
   std::size_t line = 0;  ///< of the file
 };
 
@@ -26,7 +26,7 @@ std::vector<TimedPose> read_trajectory(const std::string& path);
 class ForceTable {
  public:
   ForceTable();
-  void add(const TimedPose& pose, const Rendering& rendering);
+  void add(const TimedPose& pose, const rendering::Rendering& rendering);
   const std::string& text() const { return text_; }
   /// A line for each fault that ticks had: in how many of them, and where first. Empty: none had.
   std::string warnings(const std::string& path) const;
@@ -41,4 +41,4 @@ class ForceTable {
   std::vector<Seen> seen_;  ///< as kRenderFaults
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

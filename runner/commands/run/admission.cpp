@@ -22,12 +22,14 @@
 #include "runner/session/near_codes.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace fs = std::filesystem;
 
-void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
+void say(const std::string& text) {
+  std::fprintf(stderr, "%s\n", stimuli::printable_lines(text).c_str());
+}
 
 /// What the database holds already.
 struct Known {
@@ -40,16 +42,18 @@ struct Known {
 };
 
 /// Other texts, the same trials: one counterbalancing, so numbers count on.
-void count_on(Store& store, const Protocol& protocol, const RunSettings& settings, Known& known) {
+void count_on(data::Store& store, const protocols::Protocol& protocol, const RunSettings& settings,
+              Known& known) {
   std::set<int> taken;
-  for (const ProtocolInfo& info : store.protocols()) {
+  for (const data::ProtocolInfo& info : store.protocols()) {
     if (info.name != protocol.name) continue;
     const bool same = info.sha256 == protocol.sha256;
-    const ProtocolDifference differs = difference(info.text, protocol.source_text);
-    const std::vector<Participant> people = store.participants(info.sha256);
-    if (!same && !people.empty()) known.others.push_back(in_words(differs));
+    const protocols::ProtocolDifference differs =
+        protocols::difference(info.text, protocol.source_text);
+    const std::vector<data::Participant> people = store.participants(info.sha256);
+    if (!same && !people.empty()) known.others.push_back(protocols::in_words(differs));
     if (!differs.only_texts()) continue;
-    for (const Participant& one : people) {
+    for (const data::Participant& one : people) {
       taken.insert(one.number);
       if (settings.number == one.number && !same)
         throw UsageError("--number: " + std::to_string(one.number) + " is taken by participant " +
@@ -63,14 +67,15 @@ void count_on(Store& store, const Protocol& protocol, const RunSettings& setting
 }
 
 /// In a moment: nothing is held open while somebody thinks about a question, or a guard is forked.
-Known look_into(const RunSettings& settings, const Protocol& protocol, const std::string& code) {
+Known look_into(const RunSettings& settings, const protocols::Protocol& protocol,
+                const std::string& code) {
   Known known;
   std::error_code error;
   if (!fs::exists(settings.database, error)) return known;
-  Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   if (!settings.after_withdrawal) refuse_withdrawn(store, code);
   known.codes = store.codes();
-  for (const Participant& one : store.participants(protocol.sha256))
+  for (const data::Participant& one : store.participants(protocol.sha256))
     known.enrolled = known.enrolled || one.code == code;
   known.newest_ns = store.newest_record();
   if (known.enrolled) return known;
@@ -110,7 +115,8 @@ void confirm_new(const RunSettings& settings, const std::string& code,
                                        : settings.database + " does not hold " + code +
                                              ", but others (" + latest(codes) + ").\n";
   if (!near.empty()) question += alike + " there: a slip of the hand?\n";
-  const auto answer = ask(printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
+  const auto answer =
+      ask(stimuli::printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
   if (answer != "y" && answer != "Y" && answer != "yes")
     throw UsageError("nobody was enrolled, nothing was begun; the same command asks again");
 }
@@ -154,7 +160,7 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
 
 std::string ask_new_code() {
   const auto code = ask("The new code: ");
-  if (!code || !is_participant_code(*code))
+  if (!code || !data::is_participant_code(*code))
     throw UsageError("a pseudonym of 1 to 32 letters and digits was expected");
   return *code;
 }
@@ -163,7 +169,7 @@ std::string ask_new_code() {
 
 Admission admit(const RunSettings& settings) {
   Admission admission;
-  admission.protocol = parse_protocol(settings.protocol);
+  admission.protocol = protocols::parse_protocol(settings.protocol);
   admission.participant = settings.participant;
   admission.number = settings.number;
   Known known = look_into(settings, admission.protocol, admission.participant);
@@ -175,10 +181,11 @@ Admission admit(const RunSettings& settings) {
     const ProtocolChoice choice = choose_protocol(changed);
     admission.notes.push_back(to_json_text(changed, choice));
     if (choice != ProtocolChoice::new_code) {
-      StoredFiles files;
-      for (const ProtocolFile& file : known.earlier->info.files)
+      protocols::StoredFiles files;
+      for (const data::ProtocolFile& file : known.earlier->info.files)
         files.emplace(file.name, file.bytes);
-      Protocol stored = parse_protocol_text(known.earlier->info.text, settings.protocol, files);
+      protocols::Protocol stored =
+          protocols::parse_protocol_text(known.earlier->info.text, settings.protocol, files);
       admission.enrolled = info_of(stored);
       if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
       return admission;
@@ -192,4 +199,4 @@ Admission admit(const RunSettings& settings) {
   return admission;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

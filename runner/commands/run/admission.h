@@ -8,15 +8,15 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct RunSettings;
 
 struct Admission {
-  std::string participant;    ///< may be another one than was named
-  std::optional<int> number;  ///< to be given; none: the next unused one
-  ProtocolInfo enrolled;      ///< the protocol that the participant is, or will be, enrolled in
-  Protocol protocol;          ///< to be shown; but for its texts the same
+  std::string participant;       ///< may be another one than was named
+  std::optional<int> number;     ///< to be given; none: the next unused one
+  data::ProtocolInfo enrolled;   ///< the protocol that the participant is, or will be, enrolled in
+  protocols::Protocol protocol;  ///< to be shown; but for its texts the same
   std::vector<std::string> warnings;  ///< for the experimenter, also on the console
   std::vector<std::string> notes;     ///< JSON, for the record
 };
@@ -26,4 +26,4 @@ struct Admission {
 /// changed. \throws UsageError: not meant, or told otherwise than it is; InputError; StoreError.
 Admission admit(const RunSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::runner

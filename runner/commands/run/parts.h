@@ -14,7 +14,7 @@
 #include "runner/session/feeble_push.h"
 #include "runner/session/live_session.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// What the command line asks for.
 struct RunSettings {
@@ -33,18 +33,18 @@ struct RunSettings {
 /// What the session's thread works with; all of it is owned by the main thread.
 struct RunParts {
   const RunSettings& settings;
-  const Protocol& protocol;
+  const protocols::Protocol& protocol;
   const StimulusLibrary& library;
   const DeviceKind& kind;
   GuardedDevice* guard;
   const DeviceCapabilities& device;
   ServoThread& servo;
   Clock& clock;
-  Store& store;
+  data::Store& store;
   DisplayLoop& display;
   Markers& markers;
   FaultSignals& signals;
-  Participant participant;
+  data::Participant participant;
   int session;
   const Admission& admission;
   NoisePlayer* noise;  ///< may be none
@@ -52,4 +52,4 @@ struct RunParts {
   const FeeblePush& push;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "runner/session/preflight.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 namespace {
 
@@ -17,7 +17,7 @@ void take_note(RunRecord& record, const ConsoleCommand& note, std::vector<std::s
   try {
     record.note(note.time_ns, note.text);
     messages.push_back("note: " + note.text);
-  } catch (const StoreRefused& refused) {  // empty, or no UTF-8
+  } catch (const data::StoreRefused& refused) {  // empty, or no UTF-8
     messages.push_back(refused.what());
   }
 }
@@ -53,11 +53,11 @@ std::string way_on(const RunParts& at, DeviceTrouble trouble) {
 /// Also where the push or the homing is waited for. \throws EndOfSession
 void end_if_due(const RunParts& at, const Sample& sample) {
   if (at.signals.end_requested() != 0)
-    throw EndOfSession(RunEnd::aborted, "a signal asked for the end", true);
+    throw EndOfSession(data::RunEnd::aborted, "a signal asked for the end", true);
   if (!at.display.participant().open())
-    throw EndOfSession(RunEnd::aborted, "the participant's screen was closed", true);
+    throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
   if (sample.trouble == DeviceTrouble::guard_lost)
-    throw EndOfSession(RunEnd::aborted, advice(sample.trouble), true);
+    throw EndOfSession(data::RunEnd::aborted, advice(sample.trouble), true);
 }
 
 }  // namespace
@@ -141,4 +141,4 @@ PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
   return {findings, state.messages};
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 
 #include "runner/commands/run/parts.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 struct PreflightRecord {
   std::vector<std::string> findings;
@@ -19,4 +19,4 @@ struct PreflightRecord {
 PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
                                      const std::vector<std::string>& news);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -31,9 +31,9 @@ std::string in_format(const std::tm& time, const char* format) {
 
 /// The newest that `wanted` is true of.
 template <class Wanted>
-std::optional<StoredRun> newest_run(Store& store, Wanted wanted) {
-  std::optional<StoredRun> newest;
-  for (const StoredRun& run : store.runs()) {
+std::optional<data::StoredRun> newest_run(data::Store& store, Wanted wanted) {
+  std::optional<data::StoredRun> newest;
+  for (const data::StoredRun& run : store.runs()) {
     if (wanted(run) && (!newest || run.info.clock.utc_ns >= newest->info.clock.utc_ns))
       newest = run;
   }
@@ -55,23 +55,23 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
   return day + clock;
 }
 
-std::string resumption(Store& store, const Participant& participant, int session,
+std::string resumption(data::Store& store, const data::Participant& participant, int session,
                        const SessionPlan& plan) {
-  const std::optional<StoredRun> last = newest_run(store, [&](const StoredRun& run) {
+  const std::optional<data::StoredRun> last = newest_run(store, [&](const data::StoredRun& run) {
     return run.participant.id == participant.id && run.info.session == session;
   });
   if (participant.id == 0 || !last) return "";
   std::string text = std::to_string(plan.done()) + " of " + std::to_string(plan.size()) +
                      " trials done, last run " + spoken_time(last->info.clock.utc_ns, utc_now()) +
-                     " (" + to_string(last->end) + ")";
+                     " (" + data::to_string(last->end) + ")";
   if (!plan.finished()) text += ", goes on with trial " + std::to_string(plan.next().trial);
   return text;
 }
 
-std::string withdrawn_when(Store& store, const std::string& code) {
-  const std::optional<StoredRun> last =
-      newest_run(store, [&code](const StoredRun& run) { return run.participant.code == code; });
-  if (!last || last->end != RunEnd::withdrawn) return "";
+std::string withdrawn_when(data::Store& store, const std::string& code) {
+  const std::optional<data::StoredRun> last = newest_run(
+      store, [&code](const data::StoredRun& run) { return run.participant.code == code; });
+  if (!last || last->end != data::RunEnd::withdrawn) return "";
   return spoken_time(last->info.clock.utc_ns, utc_now());
 }
 
@@ -82,9 +82,9 @@ void throw_withdrawn(const std::string& code, const std::string& when) {
                    "take part again; 'palpate forget' removes what is on record");
 }
 
-void refuse_withdrawn(Store& store, const std::string& code) {
+void refuse_withdrawn(data::Store& store, const std::string& code) {
   const std::string when = withdrawn_when(store, code);
   if (!when.empty()) throw_withdrawn(code, when);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,14 +8,14 @@
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
 
 void check(RunSettings& settings) {
   settings.participant = given_or_asked(settings.participant, "participant code");
-  if (!is_participant_code(settings.participant))
+  if (!data::is_participant_code(settings.participant))
     throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
   if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
   const std::string& changed = settings.changed_protocol;
@@ -120,4 +120,4 @@ int run_command(const std::vector<std::string>& args) {
   return run_station(settings);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

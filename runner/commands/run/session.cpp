@@ -12,19 +12,19 @@
 #include "runner/commands/run/resumption.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
-ClockStamp stamp_now(Clock& clock) {
+data::ClockStamp stamp_now(Clock& clock) {
   const std::int64_t before = clock.now_ns();
   const std::int64_t utc =
       std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
   return {utc, before + (clock.now_ns() - before) / 2};
 }
 
-RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, int session,
-                 const ClockStamp& stamp) {
-  RunInfo info;
+data::RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, int session,
+                       const data::ClockStamp& stamp) {
+  data::RunInfo info;
   info.session = session;
   info.clock = stamp;
   info.program_version = PALPATE_VERSION;
@@ -41,9 +41,9 @@ RunInfo describe(const RunSettings& settings, const DeviceCapabilities& device, 
   return info;
 }
 
-SessionPlan plan_of(const RunParts& at, const SessionProgress& before) {
+SessionPlan plan_of(const RunParts& at, const data::SessionProgress& before) {
   SessionPlan plan(at.protocol, at.participant.enrolled_number, at.session);
-  for (const TrialRecord& record : before.completed) plan.answered(record.correct);
+  for (const data::TrialRecord& record : before.completed) plan.answered(record.correct);
   return plan;
 }
 
@@ -62,7 +62,7 @@ std::vector<std::string> news(const RunParts& at, const SessionPlan& plan) {
 LiveSession::Outcome ended_early(const RunParts& at, RunRecord& record, const SessionPlan& plan,
                                  const EndOfSession& end) {
   LiveSession::Outcome outcome{end.end, end.what(), plan.done(), plan.size(), end.failed};
-  if (end.end == RunEnd::withdrawn || (at.participant.id != 0 && !record.waiting().empty()))
+  if (end.end == data::RunEnd::withdrawn || (at.participant.id != 0 && !record.waiting().empty()))
     record.begin();
   outcome.unkept = record.waiting();
   const std::int64_t now = at.clock.now_ns();
@@ -72,16 +72,16 @@ LiveSession::Outcome ended_early(const RunParts& at, RunRecord& record, const Se
 }
 
 /// As choose_session, but for withdrawals.
-int session_due(Store& store, const Participant& participant, const Protocol& protocol,
-                const RunSettings& settings, Clock& clock) {
+int session_due(data::Store& store, const data::Participant& participant,
+                const protocols::Protocol& protocol, const RunSettings& settings, Clock& clock) {
   const int count = protocol.sessions.count;
   if (settings.session && *settings.session > count)
     throw UsageError("--session: the protocol has " + std::to_string(count));
   int session = 1;
-  SessionProgress before;
+  data::SessionProgress before;
   for (; session <= count; ++session) {
-    const SessionProgress progress = store.progress(participant, session);
-    if (progress.last_end != RunEnd::done) break;
+    const data::SessionProgress progress = store.progress(participant, session);
+    if (progress.last_end != data::RunEnd::done) break;
     before = progress;
   }
   if (settings.session) {
@@ -92,18 +92,18 @@ int session_due(Store& store, const Participant& participant, const Protocol& pr
   }
   if (session > count)
     throw UsageError("participant " + participant.code + " has done every session");
-  const std::string day = format_utc(before.clock.utc_ns).substr(0, 10);
-  if (session > 1 && day == format_utc(stamp_now(clock).utc_ns).substr(0, 10))
+  const std::string day = data::format_utc(before.clock.utc_ns).substr(0, 10);
+  if (session > 1 && day == data::format_utc(stamp_now(clock).utc_ns).substr(0, 10))
     std::fprintf(stderr, "session %d was today as well\n", session - 1);
   return session;
 }
 
 /// \throws UsageError: the participant has withdrawn, and nobody said that this is known.
-void check_withdrawal(Store& store, const Participant& participant, int session,
+void check_withdrawal(data::Store& store, const data::Participant& participant, int session,
                       const RunSettings& settings) {
   const std::string& code = participant.code;
   const std::string when = withdrawn_when(store, code);
-  const bool here = store.progress(participant, session).last_end == RunEnd::withdrawn;
+  const bool here = store.progress(participant, session).last_end == data::RunEnd::withdrawn;
   if (!here && when.empty()) {
     if (settings.after_withdrawal)
       throw UsageError("--after-withdrawal: participant " + code +
@@ -115,21 +115,21 @@ void check_withdrawal(Store& store, const Participant& participant, int session,
 
 }  // namespace
 
-int choose_session(Store& store, const Participant& participant, const Protocol& protocol,
-                   const RunSettings& settings, Clock& clock) {
+int choose_session(data::Store& store, const data::Participant& participant,
+                   const protocols::Protocol& protocol, const RunSettings& settings, Clock& clock) {
   const int session = session_due(store, participant, protocol, settings, clock);
   check_withdrawal(store, participant, session, settings);
   return session;
 }
 
 LiveSession::Outcome run_session(const RunParts& at) {
-  const ClockStamp stamp = stamp_now(at.clock);
-  const ProtocolInfo shown = info_of(at.protocol);
+  const data::ClockStamp stamp = stamp_now(at.clock);
+  const data::ProtocolInfo shown = info_of(at.protocol);
   const bool other_texts = shown.sha256 != at.admission.enrolled.sha256;
   RunRecord record(at.store, at.admission.enrolled, at.participant,
                    describe(at.settings, at.device, at.session, stamp),
                    other_texts ? std::optional(shown) : std::nullopt);
-  const SessionProgress before = at.store.progress(at.participant, at.session);
+  const data::SessionProgress before = at.store.progress(at.participant, at.session);
   const SessionPlan plan = plan_of(at, before);
   PreflightRecord preflight;
   try {
@@ -145,7 +145,7 @@ LiveSession::Outcome run_session(const RunParts& at) {
        at.display.console(), at.markers, at.settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
        [&at] { return at.signals.end_requested(); }, at.noise},
       stamp, plan);
-  for (const TrialRecord& trial : before.completed) session.count(trial);
+  for (const data::TrialRecord& trial : before.completed) session.count(trial);
   for (const std::string& warning : at.admission.warnings) session.say(warning);
   for (const std::string& note : at.admission.notes) record.note(stamp.monotonic_ns, note);
   for (const std::string& message : preflight.messages) session.say(message);  // it shows on
@@ -168,4 +168,4 @@ LiveSession::Outcome run_session(const RunParts& at) {
   return session.run();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

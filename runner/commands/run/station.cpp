@@ -17,7 +17,7 @@
 #include "runner/display/text_display.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr const char* kNotEnrolledYet =
@@ -38,7 +38,7 @@ const DeviceKind& kind_of(const std::string& name) {
 }
 
 OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
-                       const Protocol& protocol) {
+                       const protocols::Protocol& protocol) {
   const DeviceOrder order{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
                           settings.serials,    settings.firmware,      settings.calibration};
   try {
@@ -56,7 +56,7 @@ OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
 
 /// \throws UsageError where the device cannot or should not show the protocol.
 void check_fitness(const DeviceKind& kind, const Device& device, const RunSettings& settings,
-                   const Protocol& protocol, const StimulusLibrary& library) {
+                   const protocols::Protocol& protocol, const StimulusLibrary& library) {
   const DeviceCapabilities& able = device.capabilities();
   std::string reasons;
   for (const std::string& misfit : misfits(protocol, library, able)) {
@@ -90,15 +90,16 @@ std::vector<std::unique_ptr<MarkerSink>> open_markers(const std::vector<std::str
 }
 
 /// None where the protocol wants none, or the experimenter. \throws SoundError
-std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings, const Protocol& protocol) {
+std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
+                                        const protocols::Protocol& protocol) {
   if (!protocol.masking_noise || settings.without_noise) return nullptr;
   return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
                                        settings.sound_device);
 }
 
-std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Protocol& protocol,
-                                          Clock& clock, Device& device,
-                                          const std::function<void()>& emergency) {
+std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
+                                          const protocols::Protocol& protocol, Clock& clock,
+                                          Device& device, const std::function<void()>& emergency) {
   if (!settings.no_window) {
     WindowSettings window;
     window.title = protocol.name + ", " + settings.participant;
@@ -111,7 +112,7 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
                     texts.end,          texts.move_away, texts.ready,
                     texts.go,           texts.wait,      texts.other_key};
     for (const auto& [key, name] : protocol.response.keys)
-      window.texts.push_back(answer_label(protocol, name));
+      window.texts.push_back(protocols::answer_label(protocol, name));
     window.emergency = emergency;
     window.mouse = dynamic_cast<MouseStylus*>(&device);
     window.workspace = {protocol.workspace.centre, protocol.workspace.scale};
@@ -119,13 +120,14 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings, const Pro
     try {
       auto windows = make_windows(window);
       const std::string missing = windows->unreadable();
-      if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
+      if (!missing.empty()) std::fprintf(stderr, "%s\n", stimuli::printable_lines(missing).c_str());
       const std::string warning = windows->warning();
       if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
       return windows;
     } catch (const DisplayError& error) {
       if (window.mouse != nullptr) throw;
-      std::fprintf(stderr, "%s; a text display instead\n", printable(error.what()).c_str());
+      std::fprintf(stderr, "%s; a text display instead\n",
+                   stimuli::printable(error.what()).c_str());
     }
   }
   return make_text_display({&clock, emergency});
@@ -158,18 +160,18 @@ void report_servo(const RunParts& at, std::int64_t started_ns) {
 
 /// \return the exit status
 int report(const RunParts& at, const LiveSession::Outcome& outcome) {
-  const Participant who = at.store.look_up(at.admission.enrolled, at.participant.code, std::nullopt,
-                                           at.participant.simulated);
+  const data::Participant who = at.store.look_up(at.admission.enrolled, at.participant.code,
+                                                 std::nullopt, at.participant.simulated);
   const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
   std::printf("%s, participant %s (%s), session %d: %zu of %zu trials on record; %s\n",
               at.protocol.name.c_str(), who.code.c_str(), number.c_str(), at.session,
-              outcome.recorded, outcome.trials, to_string(outcome.end));
+              outcome.recorded, outcome.trials, data::to_string(outcome.end));
   for (const std::string& note : outcome.unkept)
     std::fprintf(stderr, "not on record, as nobody was enrolled: %s\n",
-                 printable_lines(note).c_str());
+                 stimuli::printable_lines(note).c_str());
   if (!outcome.reason.empty())
-    std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
-  if (outcome.end == RunEnd::paused || outcome.end == RunEnd::aborted)
+    std::fprintf(stderr, "%s\n", stimuli::printable_lines(outcome.reason).c_str());
+  if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
     std::fprintf(stderr, "the same command goes on from here\n");
   if (at.markers.dropped() > 0)
     std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
@@ -184,7 +186,7 @@ int run_station(const RunSettings& named) {
   Admission admission = admit(named);
   RunSettings settings = named;
   settings.participant = admission.participant;
-  Protocol& protocol = admission.protocol;
+  protocols::Protocol& protocol = admission.protocol;
   Markers markers(open_markers(settings.markers, settings.marker_codes
                                                      ? MarkerCodes::everywhere
                                                      : MarkerCodes::this_computer));
@@ -197,11 +199,11 @@ int run_station(const RunSettings& named) {
   check_fitness(kind, *open.device, settings, protocol, library);
   const auto noise = open_noise(settings, protocol);  // after the guard's fork: it has a thread
 
-  Store store = Store::open(settings.database, Store::Mode::write_or_create);
+  data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
   RealClock clock;
   // What a simulated device gave is labelled simulated, whoever answered.
-  const Participant participant =
+  const data::Participant participant =
       store.look_up(admission.enrolled, settings.participant, admission.number, able.simulated);
   const int session = choose_session(store, participant, protocol, settings, clock);
   std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
@@ -260,4 +262,4 @@ int run_station(const RunSettings& named) {
   return report(parts, outcome);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,11 +4,11 @@
 
 #include "runner/commands/run/parts.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Opens what a session needs, runs it in a thread of its own beside the display's loop, and
 /// reports. \returns the exit status. \throws UsageError: the device cannot show the protocol, or
 /// no session is due; as what it opens.
 int run_station(const RunSettings& settings);
 
-}  // namespace palpate
+}  // namespace palpate::runner

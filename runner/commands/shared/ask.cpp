@@ -8,7 +8,7 @@
 
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 bool on_a_terminal() { return isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1; }
 
@@ -50,4 +50,4 @@ std::string in_words(const std::vector<std::string>& names) {
   return words;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

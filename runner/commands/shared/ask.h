@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Somebody can be asked: standard input and standard error are a terminal.
 bool on_a_terminal();
@@ -24,4 +24,4 @@ std::string given_or_asked(const std::string& given, const std::string& what);
 /// "P01", "P01 and P02", "P01, P02 and P03"
 std::string in_words(const std::vector<std::string>& names);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 #include "data/files/private_files.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 namespace po = boost::program_options;
 
@@ -18,8 +18,8 @@ namespace {
 /// numbers.
 void check_number(const std::string& option, const std::string& text, const boost::any& value) {
   const auto refuse = [&](const char* expected) {
-    throw UsageError("--" + option + ": expected " + expected + ", found '" + printable(text, 60) +
-                     "'");
+    throw UsageError("--" + option + ": expected " + expected + ", found '" +
+                     stimuli::printable(text, 60) + "'");
   };
   const auto is = [&](const auto& example) { return value.type() == typeid(example); };
   const bool no_sign = is(0U) || is(0UL) || is(0ULL);
@@ -74,8 +74,8 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
 }
 
 void warn_of_exposure(const std::string& database) {
-  const std::string exposure = exposure_of(database);
-  if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";
+  const std::string exposure = data::exposure_of(database);
+  if (!exposure.empty()) std::cerr << "warning: " << stimuli::printable(exposure) << "\n";
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

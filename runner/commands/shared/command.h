@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 
 class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -50,4 +50,4 @@ int simulate_command(const std::vector<std::string>& args);
 int stability_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -5,7 +5,7 @@
 
 #include "analysis/figures/axes.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 double share(double value, double low, double high) {
@@ -43,10 +43,10 @@ void LogPanel::round_ends() {
   widen(y_low, y_high);
 }
 
-void draw_panel(Svg& svg, const LogPanel& panel, const PanelTitles& titles) {
+void draw_panel(analysis::Svg& svg, const LogPanel& panel, const PanelTitles& titles) {
   constexpr double kSmall = 11;
   const double right = panel.left + panel.width, bottom = panel.top + panel.height;
-  svg.rect(panel.left, panel.top, panel.width, panel.height, "none", kGrid);
+  svg.rect(panel.left, panel.top, panel.width, panel.height, "none", analysis::kGrid);
   const auto every = [](int first, int last, double room) {  // decades between figures
     return std::max(1, static_cast<int>(std::ceil((last - first + 1) * 26.0 / room)));
   };
@@ -54,25 +54,28 @@ void draw_panel(Svg& svg, const LogPanel& panel, const PanelTitles& titles) {
   const int y0 = decade(panel.y_low), y1 = decade(panel.y_high);
   for (int e = x0; e <= x1; ++e) {
     const double x = panel.x(std::pow(10.0, e));
-    svg.line(x, panel.top, x, bottom, kGrid);
+    svg.line(x, panel.top, x, bottom, analysis::kGrid);
     if ((e - x0) % every(x0, x1, panel.width) != 0) continue;
-    svg.text(x, bottom + 16, power(e), {kSmall, kSoft, Svg::Anchor::middle, false, 0});
+    svg.text(x, bottom + 16, power(e),
+             {kSmall, analysis::kSoft, analysis::Svg::Anchor::middle, false, 0});
   }
   for (int e = y0; e <= y1; ++e) {
     const double y = panel.y(std::pow(10.0, e));
-    svg.line(panel.left, y, right, y, kGrid);
+    svg.line(panel.left, y, right, y, analysis::kGrid);
     if ((e - y0) % every(y0, y1, panel.height) != 0) continue;
-    svg.text(panel.left - 7, y + 4, power(e), {kSmall, kSoft, Svg::Anchor::end, false, 0});
+    svg.text(panel.left - 7, y + 4, power(e),
+             {kSmall, analysis::kSoft, analysis::Svg::Anchor::end, false, 0});
   }
-  svg.text(panel.left, panel.top - 9, titles.panel, {13, kInk, Svg::Anchor::start, true, 0});
+  svg.text(panel.left, panel.top - 9, titles.panel,
+           {13, analysis::kInk, analysis::Svg::Anchor::start, true, 0});
   svg.text(panel.left + panel.width / 2, bottom + 34, titles.x,
-           {12, kSoft, Svg::Anchor::middle, false, 0});
+           {12, analysis::kSoft, analysis::Svg::Anchor::middle, false, 0});
   if (titles.y.empty()) return;
   svg.text(panel.left - 44, panel.top + panel.height / 2, titles.y,
-           {12, kSoft, Svg::Anchor::middle, false, -90});
+           {12, analysis::kSoft, analysis::Svg::Anchor::middle, false, -90});
 }
 
-void draw_path(Svg& svg, const LogPanel& panel,
+void draw_path(analysis::Svg& svg, const LogPanel& panel,
                const std::vector<std::pair<double, double>>& points, std::string_view colour,
                double width) {
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -81,13 +84,13 @@ void draw_path(Svg& svg, const LogPanel& panel,
   }
 }
 
-void draw_level(Svg& svg, const LogPanel& panel, double level, std::string_view name) {
+void draw_level(analysis::Svg& svg, const LogPanel& panel, double level, std::string_view name) {
   const double y = panel.y(level), right = panel.left + panel.width;
   constexpr double kDash = 5;
   for (double x = panel.left; x < right; x += 2 * kDash) {
-    svg.line(x, y, std::min(x + kDash, right), y, kSoft);
+    svg.line(x, y, std::min(x + kDash, right), y, analysis::kSoft);
   }
-  svg.text(right - 4, y - 5, name, {11, kSoft, Svg::Anchor::end, false, 0});
+  svg.text(right - 4, y - 5, name, {11, analysis::kSoft, analysis::Svg::Anchor::end, false, 0});
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

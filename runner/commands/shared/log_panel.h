@@ -6,7 +6,7 @@
 
 #include "analysis/figures/svg.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// The frame of one panel with logarithmic axes; maps values to px, cut to what is shown.
 struct LogPanel {
@@ -24,12 +24,12 @@ struct PanelTitles {
 };
 
 /// Frame, a grid line and figure for each decade (fewer figures where there are many), titles.
-void draw_panel(Svg& svg, const LogPanel& panel, const PanelTitles& titles);
+void draw_panel(analysis::Svg& svg, const LogPanel& panel, const PanelTitles& titles);
 /// A line from point to point.
-void draw_path(Svg& svg, const LogPanel& panel,
+void draw_path(analysis::Svg& svg, const LogPanel& panel,
                const std::vector<std::pair<double, double>>& points, std::string_view colour,
                double width);
 /// A dashed line across the panel at a level, with its name above it at the right; empty: none.
-void draw_level(Svg& svg, const LogPanel& panel, double level, std::string_view name);
+void draw_level(analysis::Svg& svg, const LogPanel& panel, double level, std::string_view name);
 
-}  // namespace palpate
+}  // namespace palpate::runner

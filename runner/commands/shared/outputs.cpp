@@ -17,7 +17,7 @@
 #include "data/files/draft_file.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace fs = std::filesystem;
@@ -46,7 +46,8 @@ void require_folder(const std::string& path) {
 
 bool is_stream(const std::string& path) {
   std::error_code error;
-  return descriptor_named(path) || (fs::exists(path, error) && !fs::is_regular_file(path, error));
+  return data::descriptor_named(path) ||
+         (fs::exists(path, error) && !fs::is_regular_file(path, error));
 }
 
 /// A reader that has gone is an error like any other, not the end of the program.
@@ -64,7 +65,7 @@ class NoPipeSignal {
 void stream_out(const std::string& path, std::string_view text) {
   std::cout.flush();  // what came before stands before it
   const NoPipeSignal quiet;
-  const auto named = descriptor_named(path);
+  const auto named = data::descriptor_named(path);
   const int out = named ? *named : ::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC);
   int error = out < 0 ? errno : 0;
   while (error == 0 && !text.empty()) {
@@ -83,7 +84,7 @@ void stream_out(const std::string& path, std::string_view text) {
 }  // namespace
 
 void write_whole(const std::string& path, const std::string& text) {
-  DraftFile draft(path);
+  data::DraftFile draft(path);
   draft.write(text);
   draft.sync();
   draft.give_name(true);
@@ -111,18 +112,18 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
   check();
 }
 
-void Outputs::keep(const ObjectSpec& object) {
+void Outputs::keep(const stimuli::ObjectSpec& object) {
   inputs_.add(object.file, "it is a mesh that is read, and would be overwritten");
-  for (const ObjectSpec& part : object.parts) keep(part);
+  for (const stimuli::ObjectSpec& part : object.parts) keep(part);
   check();
 }
 
 void Outputs::check() const {
   std::string faults;
-  TakenFiles others;
+  data::TakenFiles others;
   for (const Output& output : outputs_) {
     const std::string named = "--" + output.option + " " + output.path;
-    std::string why = why_not_to_write(output.path, force_, inputs_);
+    std::string why = data::why_not_to_write(output.path, force_, inputs_);
     if (why.empty()) why = others.why(output.path);
     if (!why.empty()) faults += (faults.empty() ? "" : "\n") + named + ": " + why;
     others.add(output.path, "--" + output.option + " writes the same file");
@@ -153,21 +154,21 @@ void Outputs::write() {
   if (error) throw std::runtime_error(folder_ + ": " + error.message());
   try {
     check();  // much may have happened since
-    std::deque<DraftFile> drafts;
+    std::deque<data::DraftFile> drafts;
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) continue;
-      DraftFile& draft = drafts.emplace_back(output.path);
+      data::DraftFile& draft = drafts.emplace_back(output.path);
       draft.write(output.text);
       draft.sync();
     }
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) stream_out(output.path, output.text);
     }
-    give_names(drafts, force_);
+    data::give_names(drafts, force_);
   } catch (...) {
     if (made) fs::remove(folder_, error);
     throw;
   }
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -9,7 +9,7 @@
 #include "data/files/output_check.h"
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Writes one file whole, private (0600), in place of one that may be there. For what a command
 /// keeps up to date itself (calibrations). \throws StoreError.
@@ -26,7 +26,7 @@ class Outputs {
           const char* folder = nullptr);
 
   /// The mesh files of an object are read as well, though no option names them. \throws UsageError.
-  void keep(const ObjectSpec& object);
+  void keep(const stimuli::ObjectSpec& object);
 
   bool wanted(const char* option) const { return values_.count(option) > 0; }
   /// The text for an option's file; no effect where the option was not given.
@@ -44,9 +44,9 @@ class Outputs {
   void check() const;
   const boost::program_options::variables_map& values_;
   bool force_ = false;
-  TakenFiles inputs_;
+  data::TakenFiles inputs_;
   std::vector<Output> outputs_;
   std::string folder_option_, folder_;
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

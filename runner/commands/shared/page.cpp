@@ -4,7 +4,7 @@
 
 #include "analysis/text.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::string_view kHead =
@@ -45,27 +45,28 @@ void put_row(std::string& out, const std::vector<std::string>& cells, std::size_
     out += head ? "<th scope=\"col\"" : "<td";
     if (i < n_names) out += " class=\"name\"";
     out += '>';
-    out += escaped(cells[i]);
+    out += analysis::escaped(cells[i]);
     out += head ? "</th>" : "</td>";
   }
   out += "</tr>\n";
 }
 
-void put_table(std::string& out, const Table& table) {
-  out += "<section>\n<table>\n<caption>" + escaped(table.caption) + "</caption>\n<thead>\n";
+void put_table(std::string& out, const analysis::Table& table) {
+  out +=
+      "<section>\n<table>\n<caption>" + analysis::escaped(table.caption) + "</caption>\n<thead>\n";
   put_row(out, table.header, table.n_names, true);
   out += "</thead>\n<tbody>\n";
   for (const auto& row : table.rows) put_row(out, row, table.n_names, false);
   out += "</tbody>\n</table>\n";
   for (const std::string& note : table.notes)
-    out += "<p class=\"note\">" + escaped(note) + "</p>\n";
+    out += "<p class=\"note\">" + analysis::escaped(note) + "</p>\n";
   out += "</section>\n";
 }
 
 void put_list(std::string& out, const std::vector<std::string>& items) {
   if (items.empty()) return;
   out += "<ul>\n";
-  for (const std::string& item : items) out += "<li>" + escaped(item) + "</li>\n";
+  for (const std::string& item : items) out += "<li>" + analysis::escaped(item) + "</li>\n";
   out += "</ul>\n";
 }
 
@@ -73,18 +74,18 @@ void put_list(std::string& out, const std::vector<std::string>& items) {
 
 std::string page_html(const ReportPage& page) {
   std::string out(kHead);
-  out += "<title>" + escaped(page.title) + "</title>\n</head>\n<body>\n<main>\n<h1>" +
-         escaped(page.title) + "</h1>\n";
+  out += "<title>" + analysis::escaped(page.title) + "</title>\n</head>\n<body>\n<main>\n<h1>" +
+         analysis::escaped(page.title) + "</h1>\n";
   put_list(out, page.sentences);
   for (const ReportPage::Figure& figure : page.figures) {
     out += "<figure>\n" + figure.svg;
     if (!figure.caption.empty())
-      out += "<figcaption>" + escaped(figure.caption) + "</figcaption>\n";
+      out += "<figcaption>" + analysis::escaped(figure.caption) + "</figcaption>\n";
     out += "</figure>\n";
   }
-  for (const Table& table : page.tables) put_table(out, table);
+  for (const analysis::Table& table : page.tables) put_table(out, table);
   put_list(out, page.notes);
   return out + "</main>\n</body>\n</html>\n";
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

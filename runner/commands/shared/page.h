@@ -6,7 +6,7 @@
 
 #include "analysis/report/tables.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// Text is escaped here; figures are SVG documents.
 struct ReportPage {
@@ -16,10 +16,10 @@ struct ReportPage {
     std::string svg, caption;
   };
   std::vector<Figure> figures;
-  std::vector<Table> tables;
+  std::vector<analysis::Table> tables;
   std::vector<std::string> notes;  ///< how to read it; what was measured, and where
 };
 
 std::string page_html(const ReportPage& page);
 
-}  // namespace palpate
+}  // namespace palpate::runner

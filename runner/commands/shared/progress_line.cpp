@@ -7,7 +7,7 @@
 #include <iostream>
 #include <utility>
 
-namespace palpate {
+namespace palpate::runner {
 
 double now_ns() {
   return std::chrono::duration<double, std::nano>(
@@ -41,4 +41,4 @@ void ProgressLine::clear() {
   shown_ = 0;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

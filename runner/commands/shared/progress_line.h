@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// ns, of a steady clock.
 double now_ns();
@@ -30,4 +30,4 @@ class ProgressLine {
   double first_ = -1;             // done at the start; negative: not known yet
 };
 
-}  // namespace palpate
+}  // namespace palpate::runner

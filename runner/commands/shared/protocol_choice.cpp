@@ -9,11 +9,11 @@
 #include "runner/commands/shared/command.h"
 #include "stimuli/printable.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 std::string to_the_minute(std::int64_t utc_ns) {
-  std::string text = format_utc(utc_ns).substr(0, 16);
+  std::string text = data::format_utc(utc_ns).substr(0, 16);
   text[10] = ' ';
   return text + " UTC";
 }
@@ -30,14 +30,17 @@ const char* to_string(ProtocolChoice choice) {
   return "";
 }
 
-void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
+void say(const std::string& text) {
+  std::fprintf(stderr, "%s\n", stimuli::printable_lines(text).c_str());
+}
 
-std::string what_happened(const ChangedProtocol& changed, const ProtocolDifference& difference) {
+std::string what_happened(const ChangedProtocol& changed,
+                          const protocols::ProtocolDifference& difference) {
   const EarlierProtocol& earlier = changed.earlier;
   return changed.code + " began with another text of protocol " + changed.now.name + " (" +
          std::to_string(earlier.trials) + (earlier.trials == 1 ? " trial" : " trials") +
          " on record" + (earlier.last_run.empty() ? "" : ", last run on " + earlier.last_run) +
-         "). " + changed.path + " has changed since (" + in_words(difference) + ")";
+         "). " + changed.path + " has changed since (" + protocols::in_words(difference) + ")";
 }
 
 ProtocolChoice ask_which(const std::string& code, bool only_texts) {
@@ -57,20 +60,21 @@ ProtocolChoice ask_which(const std::string& code, bool only_texts) {
 
 }  // namespace
 
-std::optional<EarlierProtocol> earlier_protocol(Store& store, const Protocol& protocol,
+std::optional<EarlierProtocol> earlier_protocol(data::Store& store,
+                                                const protocols::Protocol& protocol,
                                                 const std::string& code) {
   std::optional<EarlierProtocol> found;
   std::int64_t found_ns = 0;
-  const std::vector<StoredRun> runs = store.runs();
-  for (ProtocolInfo& info : store.protocols()) {
+  const std::vector<data::StoredRun> runs = store.runs();
+  for (data::ProtocolInfo& info : store.protocols()) {
     if (info.name != protocol.name || info.sha256 == protocol.sha256) continue;
-    for (const Participant& person : store.participants(info.sha256)) {
+    for (const data::Participant& person : store.participants(info.sha256)) {
       if (person.code != code) continue;
       EarlierProtocol one{info, "", 0, ""};
       one.info.files = store.files(info.sha256);
       std::int64_t latest_ns = 0;
       std::set<int> sessions;
-      for (const StoredRun& run : runs) {
+      for (const data::StoredRun& run : runs) {
         if (run.participant.id != person.id) continue;
         sessions.insert(run.info.session);
         if (run.info.clock.utc_ns < latest_ns) continue;
@@ -89,7 +93,8 @@ std::optional<EarlierProtocol> earlier_protocol(Store& store, const Protocol& pr
 }
 
 ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
-  const ProtocolDifference differs = difference(changed.earlier.info.text, changed.now.source_text);
+  const protocols::ProtocolDifference differs =
+      protocols::difference(changed.earlier.info.text, changed.now.source_text);
   const std::string happened = what_happened(changed, differs);
   if (changed.option == "texts" && !differs.only_texts()) {
     throw UsageError("--changed-protocol texts: " + happened +
@@ -116,7 +121,8 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
 }
 
 std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) {
-  const ProtocolDifference differs = difference(changed.earlier.info.text, changed.now.source_text);
+  const protocols::ProtocolDifference differs =
+      protocols::difference(changed.earlier.info.text, changed.now.source_text);
   nlohmann::ordered_json what = {
       {"shown", to_string(choice)},          {"stored_sha256", changed.earlier.info.sha256},
       {"file_sha256", changed.now.sha256},   {"texts", differs.texts},
@@ -125,4 +131,4 @@ std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) 
   return nlohmann::ordered_json{{"protocol_change", what}}.dump();
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -10,25 +10,26 @@
 #include "protocols/difference.h"
 #include "protocols/protocol.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// A participant's own protocol, where it is not, to the byte, the one that was named.
 struct EarlierProtocol {
-  ProtocolInfo info;
+  data::ProtocolInfo info;
   std::string shown_sha256;  ///< of what the last run was shown with; "": of the participant's own
   std::size_t trials = 0;    ///< on record
   std::string last_run;      ///< "2026-11-21 15:02 UTC"; "" where there was none
 };
 
 /// The latest protocol of this name but another text that `code` is enrolled in.
-std::optional<EarlierProtocol> earlier_protocol(Store& store, const Protocol& protocol,
+std::optional<EarlierProtocol> earlier_protocol(data::Store& store,
+                                                const protocols::Protocol& protocol,
                                                 const std::string& code);
 
 enum class ProtocolChoice { stored, new_texts, new_code };
 
 struct ChangedProtocol {
   const EarlierProtocol& earlier;
-  const Protocol& now;
+  const protocols::Protocol& now;
   std::string path;    ///< of `now`
   std::string code;    ///< of the participant
   std::string option;  ///< --changed-protocol; "": not given
@@ -42,4 +43,4 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed);
 /// What differed and what was chosen, for the record.
 std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice);
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
@@ -20,4 +20,4 @@ const std::atomic<bool>& watch_stop_signals() {
   return stop_asked;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -2,10 +2,10 @@
 
 #include <atomic>
 
-namespace palpate {
+namespace palpate::runner {
 
 /// From now on the first Ctrl-C (SIGINT or SIGTERM) only sets the flag that is returned, for the
 /// command to end cleanly; a second one ends the program as usual.
 const std::atomic<bool>& watch_stop_signals();
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,7 +11,7 @@
 #include "runner/commands/shared/log_panel.h"
 #include "runner/commands/stability/report.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 // Okabe & Ito's colours.
@@ -19,8 +19,9 @@ constexpr std::array<std::string_view, 8> kColours = {"#0072B2", "#D55E00", "#00
                                                       "#E69F00", "#56B4E9", "#1f2328", "#8C8C8C"};
 constexpr double kLeastDamping = 1e-4, kLeastError = 1e-19;
 
-void draw_boundaries(Svg& svg, LogPanel panel, const std::vector<const BoundaryCurve*>& curves,
-                     const std::string& title, bool first) {
+void draw_boundaries(analysis::Svg& svg, LogPanel panel,
+                     const std::vector<const BoundaryCurve*>& curves, const std::string& title,
+                     bool first) {
   draw_panel(svg, panel, {title, "stiffness K, N/m", first ? "damping b of each end, N s/m" : ""});
   double y = panel.top + 18;
   for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -39,7 +40,8 @@ void draw_boundaries(Svg& svg, LogPanel panel, const std::vector<const BoundaryC
       }
     }
     svg.circle(panel.left + 12, y - 4, 3.5, colour);
-    svg.text(panel.left + 21, y, curves[i]->name, {11, kInk, Svg::Anchor::start, false, 0});
+    svg.text(panel.left + 21, y, curves[i]->name,
+             {11, analysis::kInk, analysis::Svg::Anchor::start, false, 0});
     y += 15;
   }
 }
@@ -57,15 +59,15 @@ std::string stability_figure(const StabilityReport& report) {
   const std::size_t rows = (panels.size() + kColumns - 1) / kColumns;
   const double width = kLeft + kColumns * kPanel + (kColumns - 1) * kGap + 24;
   const double height = kTop + static_cast<double>(rows) * (kHeight + kBetween) - 36;
-  Svg svg;
+  analysis::Svg svg;
   svg.rect(0, 0, width, height, "#ffffff");
   svg.text(16, 30, "A stiffer wall needs more damping: lines are the theory, dots the loop",
-           {18, kInk, Svg::Anchor::start, true, 0});
+           {18, analysis::kInk, analysis::Svg::Anchor::start, true, 0});
   svg.text(
       16, 53,
       "Below a line no hand can make it buzz. A dot on or under its line is on the safe side; a "
       "triangle at the bottom: stable without any damping.",
-      {13, kSoft, Svg::Anchor::start, false, 0});
+      {13, analysis::kSoft, analysis::Svg::Anchor::start, false, 0});
   for (std::size_t i = 0; i < panels.size(); ++i) {
     const std::size_t row = i / kColumns, column = i % kColumns;
     LogPanel panel;
@@ -94,18 +96,18 @@ std::string integrator_figure(const StabilityReport& report) {
     if (cases.empty() || cases.back() != row.oscillator) cases.push_back(row.oscillator);
   }
   const double width = kLeft + 3 * kPanel + 2 * kGap + 24, height = kTop + kHeight + 56;
-  Svg svg;
+  analysis::Svg svg;
   svg.rect(0, 0, width, height, "#ffffff");
   svg.text(16, 30, "Integrators: the exact one costs least and errs least",
-           {18, kInk, Svg::Anchor::start, true, 0});
+           {18, analysis::kInk, analysis::Svg::Anchor::start, true, 0});
   double x = 16;
   for (std::size_t i = 0; i < kMethods.size(); ++i) {
     svg.circle(x + 5, 58, 4, kColours[i]);
-    svg.text(x + 14, 62, kMethods[i], {12, kInk, Svg::Anchor::start, false, 0});
-    x += 14 + text_width(kMethods[i], 12) + 22;
+    svg.text(x + 14, 62, kMethods[i], {12, analysis::kInk, analysis::Svg::Anchor::start, false, 0});
+    x += 14 + analysis::text_width(kMethods[i], 12) + 22;
   }
   svg.text(x, 62, "dots: 1, 4, 16, ... 1024 steps a tick; what blows up is not drawn",
-           {12, kSoft, Svg::Anchor::start, false, 0});
+           {12, analysis::kSoft, analysis::Svg::Anchor::start, false, 0});
   LogPanel panel{kLeft, kTop, kPanel, kHeight, 1, 1e5, kLeastError, 1};
   for (std::size_t c = 0; c < cases.size(); ++c) {
     panel.left = kLeft + static_cast<double>(c) * (kPanel + kGap);
@@ -127,4 +129,4 @@ std::string integrator_figure(const StabilityReport& report) {
                       "A panel for each oscillator, logarithmic both ways.");
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

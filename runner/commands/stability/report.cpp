@@ -8,15 +8,15 @@
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/page.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 std::string times(double factor) { return significant(factor) + " times"; }
 
-Table theory_table(const StabilityReport& report) {
-  Table table;
+analysis::Table theory_table(const StabilityReport& report) {
+  analysis::Table table;
   table.caption = "The theory's own case: a plain wall, ends too heavy for their mass to matter";
   table.header = {"curve", "stiffness N/m", "damping N s/m: theory", "measured", "ratio"};
   for (const BoundaryCurve& curve : report.theory) {
@@ -28,8 +28,8 @@ Table theory_table(const StabilityReport& report) {
   return table;
 }
 
-Table curve_table(const StabilityReport& report, const std::string& panel) {
-  Table table;
+analysis::Table curve_table(const StabilityReport& report, const std::string& panel) {
+  analysis::Table table;
   table.caption = "Damping that a loop needs, N s/m at each end: " + panel;
   table.header = {"curve", "stiffness N/m", "theory", "measured"};
   for (const BoundaryCurve& curve : report.curves) {
@@ -53,15 +53,15 @@ std::vector<std::string> panels_of(const StabilityReport& report) {
   return panels;
 }
 
-Table gain_table(const StabilityReport& report) {
-  Table table;
+analysis::Table gain_table(const StabilityReport& report) {
+  analysis::Table table;
   table.caption = "The stiffest that is stable, N/m, without the passivity controller and with it";
   table.header = {"scene", "probe",  "Hz",      "damping N s/m", "resolution um",
                   "delay", "theory", "without", "with",          "factor"};
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
     const LoopSettings& s = g.loop.settings;
-    table.rows.push_back({to_string(g.loop.situation), to_string(g.loop.renderer),
+    table.rows.push_back({to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
                           significant(s.rate), significant(g.damping),
                           significant(1e6 * s.resolution), std::to_string(s.delay),
                           significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
@@ -70,8 +70,8 @@ Table gain_table(const StabilityReport& report) {
   return table;
 }
 
-Table integrator_table(const StabilityReport& report) {
-  Table table;
+analysis::Table integrator_table(const StabilityReport& report) {
+  analysis::Table table;
   table.caption = "Integrators for what moves, 1 kHz: error after 500 ticks over run time";
   table.header = {"case", "method", "steps a tick", "ns a tick", "worst error, m"};
   table.n_names = 2;
@@ -101,8 +101,8 @@ double integrator_gain(const StabilityReport& report) {
 
 void put_wrapped(std::ostream& out, const std::string& text) {
   constexpr std::size_t kColumns = 98;
-  for (const std::string& line :
-       wrapped(text, [](std::string_view part) { return width(part) <= kColumns; })) {
+  for (const std::string& line : analysis::wrapped(
+           text, [](std::string_view part) { return analysis::width(part) <= kColumns; })) {
     out << "  " << line << "\n";
   }
 }
@@ -130,7 +130,7 @@ std::vector<std::string> how_to_read() {
 Json loop_json(const LoopCase& loop) {
   const LoopSettings& s = loop.settings;
   return {{"scene", to_string(loop.situation)},
-          {"renderer", to_string(loop.renderer)},
+          {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
           {"virtual_damping_ns_per_m", loop.virtual_damping},
@@ -214,8 +214,8 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
   return out;
 }
 
-std::vector<Table> stability_tables(const StabilityReport& report) {
-  std::vector<Table> tables;
+std::vector<analysis::Table> stability_tables(const StabilityReport& report) {
+  std::vector<analysis::Table> tables;
   if (!report.gains.empty()) tables.push_back(gain_table(report));
   tables.push_back(theory_table(report));
   for (const std::string& panel : panels_of(report)) tables.push_back(curve_table(report, panel));
@@ -226,7 +226,7 @@ std::vector<Table> stability_tables(const StabilityReport& report) {
 std::string stability_text(const StabilityReport& report) {
   std::ostringstream out;
   for (const std::string& sentence : stability_sentences(report)) put_wrapped(out, sentence);
-  for (const Table& table : stability_tables(report)) put_table(out, table);
+  for (const analysis::Table& table : stability_tables(report)) put_table(out, table);
   out << "\nHow to read it\n";
   for (const std::string& note : how_to_read()) put_wrapped(out, note);
   return out.str();
@@ -269,4 +269,4 @@ std::string stability_page(const StabilityReport& report) {
   return page_html(page);
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -9,7 +9,7 @@
 #include "runner/stability/boundary.h"
 #include "runner/stability/integrators.h"
 
-namespace palpate {
+namespace palpate::runner {
 
 /// One curve of the map: the boundary over stiffness.
 struct BoundaryCurve {
@@ -40,7 +40,7 @@ struct StabilityReport {
 
 /// The answers in sentences.
 std::vector<std::string> stability_sentences(const StabilityReport& report);
-std::vector<Table> stability_tables(const StabilityReport& report);
+std::vector<analysis::Table> stability_tables(const StabilityReport& report);
 std::string stability_text(const StabilityReport& report);
 nlohmann::ordered_json stability_json(const StabilityReport& report);
 /// Damping over stiffness, measured beside theory, a panel for each question; SVG.
@@ -49,4 +49,4 @@ std::string stability_figure(const StabilityReport& report);
 std::string integrator_figure(const StabilityReport& report);
 std::string stability_page(const StabilityReport& report);
 
-}  // namespace palpate
+}  // namespace palpate::runner

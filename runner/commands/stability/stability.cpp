@@ -12,7 +12,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/stability/report.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kRates[] = {500, 1000, 2000, 5000, 10000};  // Hz
@@ -42,13 +42,15 @@ std::vector<BoundaryCurve> theory_curves() {
 
 std::vector<BoundaryCurve> map_curves() {
   std::vector<BoundaryCurve> out;
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const Situation situation : kSituations) {
       LoopCase loop;
       loop.situation = situation;
       loop.renderer = renderer;
-      out.push_back(curve(renderer == RendererKind::point ? "scenes, point" : "scenes, ray",
-                          to_string(situation), loop));
+      out.push_back(
+          curve(renderer == protocols::RendererKind::point ? "scenes, point" : "scenes, ray",
+                to_string(situation), loop));
     }
   }
   for (const double rate : kRates) {
@@ -96,7 +98,8 @@ std::vector<BoundaryCurve> map_curves() {
 std::vector<ControllerGain> gain_cases() {
   std::vector<ControllerGain> out;
   const auto add = [&](const LoopCase& loop) { out.push_back({loop, kEndDamping, 0, 0}); };
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const Situation situation : kSituations) {
       LoopCase loop;
       loop.situation = situation;
@@ -212,4 +215,4 @@ int stability_command(const std::vector<std::string>& args) {
   return report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
 }
 
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/kinematics.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr int kMaxImplausible = 5;               // in a row; then the counter has lost its place
@@ -190,4 +190,4 @@ double sure_force(double counts_per_torque) {
   return least;
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

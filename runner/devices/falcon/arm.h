@@ -14,7 +14,7 @@
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 struct ArmSettings {
   double counts_per_torque = kCountsPerTorque;  ///< 1/(N m); from the calibration
@@ -94,4 +94,4 @@ class FalconArm {
 /// The force (N) that the motors can show in every direction everywhere in the workspace.
 double sure_force(double counts_per_torque);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

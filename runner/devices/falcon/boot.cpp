@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/packets.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
@@ -180,4 +180,4 @@ void boot(Transport& transport, const FirmwareImage* image, const BootSettings& 
   if (report) report(progress);
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -8,7 +8,7 @@
 #include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/transport.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 struct BootSettings {
   int monitor_probes = 100;                   ///< until the monitor answers
@@ -38,4 +38,4 @@ bool firmware_runs(Transport& transport, const BootSettings& settings = {});
 void boot(Transport& transport, const FirmwareImage* image, const BootSettings& settings = {},
           const BootReport& report = {});
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -16,7 +16,7 @@
 #include "protocols/object_reader.h"
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr int kVersion = 1;
@@ -48,7 +48,7 @@ std::optional<std::int64_t> parse_utc(const std::string& text) {
   return instant.time_since_epoch() / nanoseconds(1);
 }
 
-void read_date(ObjectReader& reader, std::string& out) {
+void read_date(protocols::ObjectReader& reader, std::string& out) {
   reader.text("made_utc", out);
   if (!parse_utc(out)) {
     reader.faults().add(reader.pointer("made_utc"),
@@ -56,12 +56,12 @@ void read_date(ObjectReader& reader, std::string& out) {
   }
 }
 
-ForceCalibration read_force(ObjectReader& reader) {
+ForceCalibration read_force(protocols::ObjectReader& reader) {
   ForceCalibration force;
   reader.text("serial", force.serial);
   reader.number("counts_per_newton_metre", force.counts_per_torque,
                 {kCountsPerTorque * kMostSlope, kCountsPerTorque * kLeastSlope, "1/(N m)"},
-                Need::required);
+                protocols::Need::required);
   reader.number("residual_n", force.residual, {0, 1e3, "N"});
   reader.number("sideways_n_per_n", force.sideways, {0, 1e3, "N/N"});
   reader.number("arm_weight_n", force.arm_weight, {-1e3, 1e3, "N"});
@@ -71,7 +71,7 @@ ForceCalibration read_force(ObjectReader& reader) {
       if (weight.is_number()) {
         force.weights.push_back(weight.get<double>());
       } else {
-        reader.faults().add(child_pointer(reader.pointer("weights_kg"), i),
+        reader.faults().add(protocols::child_pointer(reader.pointer("weights_kg"), i),
                             "expected a mass in kg");
       }
     }
@@ -80,13 +80,13 @@ ForceCalibration read_force(ObjectReader& reader) {
   return force;
 }
 
-PairRegistration read_pair(ObjectReader& reader) {
+PairRegistration read_pair(protocols::ObjectReader& reader) {
   PairRegistration pair;
   reader.text("tip_serial", pair.tip_serial);
   reader.text("tail_serial", pair.tail_serial);
   reader.vector("tail_position_m", pair.tail_in_tip.position, {-2, 2, "m"});
   reader.quaternion("tail_orientation_wxyz", pair.tail_in_tip.orientation);
-  reader.number("stylus_length_m", pair.stylus_length, {0.02, 1, "m"}, Need::required);
+  reader.number("stylus_length_m", pair.stylus_length, {0.02, 1, "m"}, protocols::Need::required);
   reader.number("residual_m", pair.residual, {0, 1, "m"});
   reader.integer("points", pair.points, {0, 1e6});
   read_date(reader, pair.made_utc);
@@ -94,11 +94,12 @@ PairRegistration read_pair(ObjectReader& reader) {
 }
 
 template <class T, class Read>
-void read_list(ObjectReader& root, const char* key, std::vector<T>& out, Read read) {
+void read_list(protocols::ObjectReader& root, const char* key, std::vector<T>& out, Read read) {
   const auto* list = root.array(key, 0, kMany);
   if (list == nullptr) return;
   for (std::size_t i = 0; i < list->size(); ++i) {
-    ObjectReader reader((*list)[i], child_pointer(root.pointer(key), i), root.faults());
+    protocols::ObjectReader reader((*list)[i], protocols::child_pointer(root.pointer(key), i),
+                                   root.faults());
     out.push_back(read(reader));
     reader.refuse_unknown_keys();
   }
@@ -138,7 +139,7 @@ void require_own(const std::string& path) {
   if (::stat(path.c_str(), &found) != 0) return;  // reading it will tell
   const bool ours = found.st_uid == ::geteuid() || found.st_uid == 0;
   if (ours && (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) return;
-  throw InputError(
+  throw protocols::InputError(
       {{path, "",
         ours ? "expected a file that only its owner can write, since it decides what force reaches "
                "a hand: chmod go-w"
@@ -180,12 +181,12 @@ void Calibration::put(const PairRegistration& pair) {
 }
 
 Calibration parse_calibration(const std::string& text, const std::string& path) {
-  FaultList faults(path);
-  const nlohmann::json json = read_json(text, faults);
+  protocols::FaultList faults(path);
+  const nlohmann::json json = protocols::read_json(text, faults);
   Calibration calibration;
-  ObjectReader root(json, "", faults);
+  protocols::ObjectReader root(json, "", faults);
   int version = kVersion;
-  root.integer("version", version, {kVersion, kVersion}, Need::required);
+  root.integer("version", version, {kVersion, kVersion}, protocols::Need::required);
   read_list(root, "forces", calibration.forces, read_force);
   read_list(root, "pairs", calibration.pairs, read_pair);
   root.refuse_unknown_keys();
@@ -196,7 +197,7 @@ Calibration parse_calibration(const std::string& text, const std::string& path) 
 Calibration read_calibration(const std::string& path) {
   if (!std::filesystem::exists(path)) return {};
   require_own(path);
-  return parse_calibration(read_text_file(path), path);
+  return parse_calibration(protocols::read_text_file(path), path);
 }
 
 std::string to_json(const Calibration& calibration) {
@@ -253,4 +254,4 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
                pair != nullptr ? pair->made_utc : "", pair != nullptr, unix_ns);
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

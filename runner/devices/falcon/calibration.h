@@ -9,7 +9,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// Scale of force of one device, from known weights.
 struct ForceCalibration {
@@ -71,4 +71,4 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
 /// The worse state, both texts.
 CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

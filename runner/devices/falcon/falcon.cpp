@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 FalconDevice::FalconDevice(std::unique_ptr<FalconArm> arm, const std::string& calibration)
     : arm_(std::move(arm)) {
@@ -28,4 +28,4 @@ void FalconDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
   arm_->push(device1 + device2);
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

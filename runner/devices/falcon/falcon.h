@@ -7,7 +7,7 @@
 #include "runner/devices/falcon/arm.h"
 #include "runner/servo/device.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 class FalconDevice final : public Device {
  public:
@@ -29,4 +29,4 @@ class FalconDevice final : public Device {
   DeviceCapabilities capabilities_;
 };
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

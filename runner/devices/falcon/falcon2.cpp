@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 Falcon2Device::Falcon2Device(std::unique_ptr<FalconArm> tip, std::unique_ptr<FalconArm> tail,
                              const StylusFromEnds& stylus, const std::string& calibration)
@@ -50,4 +50,4 @@ void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
   tail_->push(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2));
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

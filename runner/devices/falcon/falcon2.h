@@ -10,7 +10,7 @@
 #include "runner/devices/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 class Falcon2Device final : public Device {
  public:
@@ -38,4 +38,4 @@ class Falcon2Device final : public Device {
   bool lost_ = true;
 };
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 class Guide {
  public:
@@ -24,4 +24,4 @@ class GuideError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

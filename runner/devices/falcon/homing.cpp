@@ -1,6 +1,6 @@
 #include "runner/devices/falcon/homing.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
   constexpr std::int64_t kTickNs = 1'000'000;
@@ -22,4 +22,4 @@ void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
   }
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -8,7 +8,7 @@
 
 #include "protocols/parse.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr std::uint32_t kKey = 0x08AA;
@@ -17,9 +17,10 @@ constexpr std::size_t kHeader =
 constexpr std::uintmax_t kMaxBytes = 1 << 18;  // the processor's whole memory
 
 [[noreturn]] void refuse(const std::string& file, std::size_t at, const std::string& expected) {
-  throw InputError({{file, "byte " + std::to_string(at),
-                     expected + ": this is no firmware of a Falcon (a boot stream of TI's C28x "
-                                "processors)"}});
+  throw protocols::InputError(
+      {{file, "byte " + std::to_string(at),
+        expected + ": this is no firmware of a Falcon (a boot stream of TI's C28x "
+                   "processors)"}});
 }
 
 std::string hex(std::uint32_t word) {
@@ -64,18 +65,19 @@ FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& fi
 FirmwareImage read_image(const std::string& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
-    throw InputError({{file, "",
-                       "expected a firmware file. None is shipped: name the one of the Falcon's "
-                       "own driver or of a libnifalcon checkout"}});
+    throw protocols::InputError(
+        {{file, "",
+          "expected a firmware file. None is shipped: name the one of the Falcon's "
+          "own driver or of a libnifalcon checkout"}});
   }
   if (std::filesystem::file_size(file, error) > kMaxBytes || error) {
-    throw InputError({{file, "", "expected at most 256 KiB of firmware"}});
+    throw protocols::InputError({{file, "", "expected at most 256 KiB of firmware"}});
   }
   std::ifstream in(file, std::ios::binary);
   std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in),
                                   std::istreambuf_iterator<char>()};
-  if (!in) throw InputError({{file, "", "cannot be read; check its permissions"}});
+  if (!in) throw protocols::InputError({{file, "", "cannot be read; check its permissions"}});
   return parse_image(std::move(bytes), file);
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

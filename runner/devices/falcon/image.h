@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// Firmware that a user has pointed to; we ship none. A stream for the boot ROM of TI's C28x
 /// processors: 16-bit little-endian words; key 0x08AA, 8 reserved words, entry point; blocks of a
@@ -20,4 +20,4 @@ FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& fi
 /// \throws InputError.
 FirmwareImage read_image(const std::string& file);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -6,7 +6,7 @@
 
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr double kMaxStep = 0.02;     // m; farther, the linear model misleads
@@ -133,4 +133,4 @@ double force_in_every_direction(const Vec3& position, double max_torque) noexcep
                                 glm::length(j.columns[2])});
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -11,7 +11,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// What the joints of a leg stand at, rad.
 struct LegAngles {
@@ -52,4 +52,4 @@ Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
 /// (N m); 0 out of reach.
 double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

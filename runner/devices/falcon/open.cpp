@@ -16,7 +16,7 @@
 #include "runner/devices/falcon/usb.h"
 #include "stimuli/printable.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 std::int64_t unix_ns() {
@@ -36,7 +36,7 @@ std::optional<FirmwareImage> image_in(const std::string& path) {
 const PairRegistration& registration_in(const Calibration& calibration, const DeviceOrder& order) {
   const std::string &tip = order.serials[0], &tail = order.serials[1];
   if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
-  throw InputError(
+  throw protocols::InputError(
       {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
         "expected a registration of the Falcons " + tip + " (tip) and " + tail +
             " (tail), without which nobody knows how they stand to each other: run "
@@ -70,10 +70,11 @@ void tell(const std::string& serial, const BootProgress& progress) {
   if (isatty(STDERR_FILENO) == 0) return;
   using Stage = BootProgress::Stage;
   if (progress.stage == Stage::monitor && progress.attempt > 1) {
-    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
+    std::cerr << "\n  " << stimuli::printable(progress.trouble) << "; attempt " << progress.attempt
+              << "\n";
   }
   if (progress.stage != Stage::uploading) return;
-  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
+  std::cerr << "\rFalcon " << stimuli::printable(serial) << ": firmware "
             << 100 * progress.sent / progress.size << " %"
             << (progress.sent == progress.size ? "\n" : "") << std::flush;
 }
@@ -147,4 +148,4 @@ std::unique_ptr<Device> open_falcon2(const DeviceOrder& order) {
       std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

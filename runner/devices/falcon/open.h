@@ -12,7 +12,7 @@
 #include "runner/devices/registry.h"
 #include "runner/servo/device.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// Falcons that are plugged in. \throws TransportError where this computer cannot look.
 std::vector<ConnectedDevice> connected_falcons();
@@ -40,4 +40,4 @@ CalibrationVerdict judge_calibration(const std::string& path,
 std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
                                     const Calibration& calibration);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

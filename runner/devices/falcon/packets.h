@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 using Packet = std::array<std::uint8_t, 16>;
 
@@ -52,4 +52,4 @@ class PacketStream {
   std::uint64_t dropped_ = 0;
 };
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr std::int64_t kTickNs = 1'000'000;
@@ -122,4 +122,4 @@ PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& g
   return pair;
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -6,7 +6,7 @@
 #include "runner/devices/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 struct RegistrationSettings {
   double stylus_length = 0.12;  ///< m, between the centres of the grips on the stylus
@@ -22,4 +22,4 @@ struct RegistrationSettings {
 PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
                                const RegistrationSettings& settings);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

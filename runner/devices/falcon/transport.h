@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// The line cannot be used; what() says why and what would help.
 class TransportError : public std::runtime_error {
@@ -61,4 +61,4 @@ class Transport {
   virtual std::int64_t now_ns() noexcept = 0;
 };
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

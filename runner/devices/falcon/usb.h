@@ -9,7 +9,7 @@
 
 #include "runner/devices/falcon/transport.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 /// A Falcon that is plugged in.
 struct UsbListing {
@@ -45,4 +45,4 @@ std::unique_ptr<HotplugWatch> watch_usb();
 /// A libusb error code in words, with what would help. \param what e.g. "cannot open the Falcon"
 std::string usb_error(const std::string& what, int code);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

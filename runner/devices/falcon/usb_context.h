@@ -7,7 +7,7 @@
 
 #include "runner/devices/falcon/usb.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 using UsbContext = std::unique_ptr<libusb_context, decltype(&libusb_exit)>;
 using UsbHandle = std::unique_ptr<libusb_device_handle, decltype(&libusb_close)>;
@@ -20,4 +20,4 @@ std::vector<UsbDevice> falcons_on(libusb_context* context);
 /// Opens one; nullptr and the reason in `listing.trouble` where it cannot be.
 UsbHandle open_listed(libusb_device* device, UsbListing& listing);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

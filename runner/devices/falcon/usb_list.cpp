@@ -6,7 +6,7 @@
 #include "runner/devices/falcon/serial.h"
 #include "runner/devices/falcon/usb_context.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 /// Where it is plugged in: stays the same over re-plugging, for a device without a serial number.
@@ -142,4 +142,4 @@ std::vector<UsbListing> list_usb() {
 
 std::unique_ptr<HotplugWatch> watch_usb() { return std::make_unique<LibusbWatch>(); }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
@@ -235,4 +235,4 @@ ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
   return force;
 }
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

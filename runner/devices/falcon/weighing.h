@@ -10,7 +10,7 @@
 #include "runner/devices/falcon/guide.h"
 #include "runner/servo/device.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 
 struct WeighingSettings {
   std::vector<double> weights = {0.1, 0.2, 0.4};  ///< kg, each hung at the grip in turn
@@ -37,4 +37,4 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
 ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings);
 
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -11,7 +11,7 @@
 #include "analysis/input/trials.h"
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 const std::string kHeader =
@@ -27,10 +27,10 @@ class TrialsCsv : public ::testing::Test {
     std::ofstream(path_, std::ios::binary) << text;
     return read_trials_csv(path_);
   }
-  std::vector<Fault> faults(const std::string& text) {
+  std::vector<protocols::Fault> faults(const std::string& text) {
     try {
       read(text);
-    } catch (const InputError& error) {
+    } catch (const protocols::InputError& error) {
       return error.faults();
     }
     ADD_FAILURE() << "no fault found in " << text.substr(0, 300);
@@ -193,7 +193,7 @@ TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
                             "P1,1,1,1,ray,cone,cone,1,2\n" + "\t,1,1,2,ray,cone,cone,1,nan\n");
   std::vector<std::string> places;
   places.reserve(found.size());
-  for (const Fault& fault : found) places.push_back(fault.place);
+  for (const protocols::Fault& fault : found) places.push_back(fault.place);
   EXPECT_EQ(places, (std::vector<std::string>{
                         "line 2, column session", "line 2, column block", "line 2, column trial",
                         "line 2, column renderer", "line 2, column shape", "line 2, column correct",
@@ -235,8 +235,8 @@ TEST_F(TrialsCsv, BrokenFiles) {
   expect_fault(kHeader + row + "P\xFF,1,1,2,ray,cone,cone,1,2\n", "line 3, column participant_id",
                "UTF-8");
   expect_fault(kHeader + "P1,1,1,1,ray,cone,no_response,0,2\n", "line 2, column response", "empty");
-  EXPECT_THROW(read_trials_csv(::testing::TempDir()), InputError);
-  EXPECT_THROW(read_trials_csv(path_ + ".is_not_there"), InputError);
+  EXPECT_THROW(read_trials_csv(::testing::TempDir()), protocols::InputError);
+  EXPECT_THROW(read_trials_csv(path_ + ".is_not_there"), protocols::InputError);
 }
 
 TEST_F(TrialsCsv, OverlongFieldsAreRefusedWhereverTheyStand) {
@@ -333,4 +333,4 @@ TEST_F(TrialsCsv, ABlockMayEndAnywhereInAQuotedRecord) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

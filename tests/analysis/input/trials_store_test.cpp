@@ -12,7 +12,7 @@
 #include "data/store/store.h"
 #include "protocols/parse.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 class TrialsStore : public ::testing::Test {
@@ -24,9 +24,9 @@ class TrialsStore : public ::testing::Test {
   }
   ~TrialsStore() override { std::filesystem::remove_all(folder_); }
 
-  static TrialRecord trial(int number, const std::string& renderer, const std::string& shape,
-                           const std::string& response) {
-    TrialRecord record;
+  static data::TrialRecord trial(int number, const std::string& renderer, const std::string& shape,
+                                 const std::string& response) {
+    data::TrialRecord record;
     record.trial = number;
     record.renderer = renderer;
     record.shape = shape;
@@ -38,22 +38,22 @@ class TrialsStore : public ::testing::Test {
     record.response_ns = record.onset_ns + static_cast<std::int64_t>(record.response_time * 1e9);
     return record;
   }
-  void study(const std::vector<TrialRecord>& records) {
-    Store store = Store::open(path_, Store::Mode::write_or_create);
+  void study(const std::vector<data::TrialRecord>& records) {
+    data::Store store = data::Store::open(path_, data::Store::Mode::write_or_create);
     // Own stimuli stand in the protocol's order, not in that of their appearance.
     const std::string text =
         R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})";
-    const ProtocolInfo protocol{"test", text, checksum_hex(text)};
-    const Participant person = store.enrol(protocol, "S1", 1, true, 7);
-    RunInfo info;
+    const data::ProtocolInfo protocol{"test", text, data::checksum_hex(text)};
+    const data::Participant person = store.enrol(protocol, "S1", 1, true, 7);
+    data::RunInfo info;
     info.program_version = "9.9.9";
     info.build = "test";
     info.device = "simulated";
     info.response_device = "simulated";
     info.observer_sha256 = std::string(64, 'b');
-    const palpate::Run run = store.begin_run(person, info);
+    const palpate::data::Run run = store.begin_run(person, info);
     store.record_simulated(run, records);
-    store.end_run(run, RunEnd::done, 1'000'000'000'000LL);
+    store.end_run(run, data::RunEnd::done, 1'000'000'000'000LL);
   }
 
   std::string folder_, path_;
@@ -80,7 +80,7 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
   EXPECT_EQ(table.rows[2].answer, 1);
   EXPECT_EQ(table.provenance.protocol_name, "test");
   EXPECT_EQ(table.provenance.protocol_sha256,
-            (std::vector<std::string>{checksum_hex(
+            (std::vector<std::string>{data::checksum_hex(
                 R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})")}));
   EXPECT_EQ(table.provenance.observer_sha256, std::string(64, 'b'));
   EXPECT_EQ(table.provenance.program_versions, (std::vector<std::string>{"9.9.9"}));
@@ -90,9 +90,9 @@ TEST_F(TrialsStore, PracticeAloneIsNothingToAnalyse) {
   auto practice = trial(1, "ray", "cube", "cube");
   practice.practice = true;
   study({practice});
-  EXPECT_THROW(read_trials_store(path_), InputError);
-  EXPECT_THROW(read_trials_store(folder_ + "/none.db"), StoreRefused);
+  EXPECT_THROW(read_trials_store(path_), protocols::InputError);
+  EXPECT_THROW(read_trials_store(folder_ + "/none.db"), data::StoreRefused);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -15,7 +15,7 @@
 #include "analysis/statistics/power.h"
 #include "analysis/statistics/wording.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 /// Changes a right answer after 5 s, or leaves the trial out by returning false.
@@ -365,4 +365,4 @@ TEST(Pilot, LeavesOutOfTheShareWhatIsTooFast) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

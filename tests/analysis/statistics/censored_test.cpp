@@ -18,7 +18,7 @@
 #include "analysis/statistics/analysis.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 using Json = nlohmann::json;
@@ -104,8 +104,8 @@ TrialTable table_of(const std::vector<Row>& rows) {
 }
 
 /// A study with its own gain for everybody; times past the limit are time-outs.
-std::vector<Row> simulated(Random& random, int people, int trials, double gain, double gain_sd,
-                           double limit, double residual_sd = 0.5) {
+std::vector<Row> simulated(stimuli::Random& random, int people, int trials, double gain,
+                           double gain_sd, double limit, double residual_sd = 0.5) {
   std::vector<Row> rows;
   for (int p = 0; p < people; ++p) {
     const double own = 3.0 + 0.3 * random.normal(), own_gain = gain + gain_sd * random.normal();
@@ -123,7 +123,7 @@ std::vector<Row> simulated(Random& random, int people, int trials, double gain, 
 
 TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
   for (const std::uint64_t seed : {3, 4, 5}) {
-    Random random(seed);
+    stimuli::Random random(seed);
     const auto rows = simulated(random, 4, 9, -0.4, 0.1, 30);
     const CensoredEstimate found = estimate_all(table_of(rows));
     ASSERT_EQ(found.undefined, "");
@@ -178,7 +178,7 @@ TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
 }
 
 TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
-  Random random(8);
+  stimuli::Random random(8);
   const TrialTable table = table_of(simulated(random, 6, 5, -0.3, 0.2, 1e9));
   const CensoredEstimate found = estimate_all(table);
   const Description description = describe(table, 0.2);
@@ -197,7 +197,7 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
   constexpr double kGain = -0.4;
   constexpr int kStudies = 1000;
   for (const std::uint64_t seed : {21, 22}) {
-    Random random(seed);
+    stimuli::Random random(seed);
     int held = 0, primary_held = 0;
     double bias = 0, primary_bias = 0;
     for (int i = 0; i < kStudies; ++i) {
@@ -221,7 +221,7 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
 }
 
 TEST(Censored, TakesTheParticipantWhoNeverAnswersInTimeWithOneRenderer) {
-  Random random(12);
+  stimuli::Random random(12);
   auto rows = simulated(random, 4, 6, -0.3, 0.1, 60);
   const double without = *estimate_all(table_of(rows)).log_ratio;
   for (int i = 0; i < 6; ++i) {
@@ -255,4 +255,4 @@ TEST(Censored, SaysWhatCannotBeKnown) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -9,7 +9,7 @@
 
 #include "analysis/input/trial_table_builder.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 TrialTable table_of(const std::vector<RawTrial>& trials) {
@@ -83,4 +83,4 @@ TEST(StandardDeviation, DividesByOneLess) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -12,7 +12,7 @@
 #include "analysis/statistics/mixed_model.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 using Eigen::Index;
@@ -35,7 +35,7 @@ DenseStudy dense_study(
     std::size_t n_people, std::size_t n_shapes,
     const std::function<std::size_t(std::size_t, std::size_t, std::size_t)>& trials,
     std::uint64_t seed) {
-  Random random(seed);
+  stimuli::Random random(seed);
   DenseStudy out;
   for (std::size_t s = 0; s < n_shapes; ++s) out.shapes.push_back("s" + std::to_string(s));
   out.people.assign(kRenderers, {n_shapes, std::vector<ParticipantCell>(n_people)});
@@ -207,4 +207,4 @@ TEST(MixedModelByDefinition, OneRendererOnly) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -12,7 +12,7 @@
 #include "analysis/statistics/anova.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 using Json = nlohmann::json;
@@ -34,7 +34,7 @@ ParticipantCell cell_of(const std::vector<double>& logs) {
 /// Log times of two renderers and two shapes with the sds given.
 People people_of(std::size_t n, std::size_t repetitions, double intercept, double slope,
                  double residual, std::uint64_t seed) {
-  Random random(seed);
+  stimuli::Random random(seed);
   People people(2, {2, std::vector<ParticipantCell>(n)});
   for (std::size_t p = 0; p < n; ++p) {
     const double a = intercept * random.normal(), b = slope * random.normal();
@@ -205,4 +205,4 @@ TEST(MixedModel, SaysWhyThereIsNoFit) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -11,7 +11,7 @@
 #include "analysis/statistics/analysis.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 using Json = nlohmann::json;
@@ -111,7 +111,7 @@ TEST(BootstrapOracle, SameResamplesGiveTheSameInterval) {
 
 TEST(BootstrapOracle, OwnResamplesComeCloseToMany) {
   for (const Json& set : load("bca")) {
-    Random random(1);
+    stimuli::Random random(1);
     const Bootstrap found = bootstrap_mean(set["differences"].get<std::vector<double>>(), random);
     ASSERT_EQ(found.undefined, "");
     EXPECT_EQ(found.resamples, 9999U);
@@ -124,4 +124,4 @@ TEST(BootstrapOracle, OwnResamplesComeCloseToMany) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

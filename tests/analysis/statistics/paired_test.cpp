@@ -13,13 +13,13 @@
 
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 const std::string kPairedFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
 Bootstrap bootstrap(const std::vector<double>& differences) {
-  Random random(5);
+  stimuli::Random random(5);
   return bootstrap_mean(differences, random, 999);
 }
 
@@ -91,7 +91,7 @@ TEST(PercentReduction, PositiveWhenTheRayIsFasterAndEndsSwap) {
 }
 
 TEST(Properties, SignsFlipTogether) {
-  Random random(9);
+  stimuli::Random random(9);
   for (int round = 0; round < 50; ++round) {
     std::vector<double> d, flipped;
     for (std::size_t i = 0; i < 3 + random.below(30); ++i) {
@@ -110,7 +110,7 @@ TEST(Properties, SignsFlipTogether) {
 }
 
 TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
-  Random random(4);
+  stimuli::Random random(4);
   std::vector<double> d;
   while (d.size() < kExactWilcoxon) d.push_back(random.normal() + 0.1);
   const Wilcoxon exact = wilcoxon(d);
@@ -137,7 +137,7 @@ TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
   constexpr int kStudies = 2000;
   for (const std::uint64_t seed : {31, 32}) {
     for (const std::size_t n : {2U, 5U, 7U, 12U}) {
-      Random random(seed, {n});
+      stimuli::Random random(seed, {n});
       int held = 0;
       for (int i = 0; i < kStudies; ++i) {
         std::vector<double> d(n);
@@ -153,9 +153,9 @@ TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
 TEST(Bootstrap, RepeatsFromItsSeed) {
   const std::vector<double> d{-0.2, -0.1, 0.05, -0.4, -0.15};
   EXPECT_EQ(bootstrap(d).log_ratio_ci95->low, bootstrap(d).log_ratio_ci95->low);
-  Random other(6);
+  stimuli::Random other(6);
   EXPECT_NE(bootstrap(d).log_ratio_ci95->low, bootstrap_mean(d, other, 999).log_ratio_ci95->low);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

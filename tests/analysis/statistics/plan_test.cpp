@@ -14,7 +14,7 @@
 #include "analysis/statistics/power.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 StudyModel model_of(double gain_sd, double shape_gain_sd, double residual_sd,
@@ -148,7 +148,7 @@ TEST(Plan, SaysWhereTheRangeIsTooSmall) {
 /// A study of 60 people with the sds given.
 Analysis pilot_study(double gain_sd, double shape_gain_sd, double residual_sd, std::uint64_t seed) {
   TrialTableBuilder builder;
-  Random random(seed);
+  stimuli::Random random(seed);
   for (int p = 0; p < 60; ++p) {
     const std::string name = std::to_string(p);
     const double intercept = 0.3 * random.normal(), gain = gain_sd * random.normal();
@@ -194,4 +194,4 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

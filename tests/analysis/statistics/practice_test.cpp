@@ -13,7 +13,7 @@
 #include "analysis/statistics/speed_accuracy.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::analysis {
 namespace {
 
 /// A person who does `first` and then the other renderer, a trial after the other, shapes in turn.
@@ -115,7 +115,7 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
 }
 
 /// Participants who cannot learn, of noise alone.
-Analysis study_without_learning(Random& random) {
+Analysis study_without_learning(stimuli::Random& random) {
   TrialTableBuilder builder;
   for (int p = 0; p < 7; ++p) {
     const std::string name(1, static_cast<char>('A' + p));
@@ -136,7 +136,7 @@ Analysis study_without_learning(Random& random) {
 
 TEST(Learning, IsNoVerdictAndPracticeIsOneFamilyOfTests) {
   for (const std::uint64_t seed : {41, 42}) {
-    Random random(seed);
+    stimuli::Random random(seed);
     constexpr int kStudies = 400;
     int any_raw = 0, any_adjusted = 0, warned = 0;
     for (int i = 0; i < kStudies; ++i) {
@@ -236,4 +236,4 @@ TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::analysis

@@ -6,22 +6,23 @@
 #include "runner/commands/shared/command.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 class ExportCommand : public ::testing::Test {
  protected:
   ExportCommand() {
     Store store = Store::open(database_, Store::Mode::write_or_create);
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+    const palpate::data::Run run =
+        store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
     store.record_simulated(run, {a_record(1), a_record(2)});
   }
   std::string usage_error(const std::vector<std::string>& words) {
     try {
-      export_command(words);
-    } catch (const UsageError& error) {
+      runner::export_command(words);
+    } catch (const runner::UsageError& error) {
       return error.what();
     }
     ADD_FAILURE() << "no UsageError";
@@ -33,7 +34,7 @@ class ExportCommand : public ::testing::Test {
 };
 
 TEST_F(ExportCommand, WritesTheCsv) {
-  EXPECT_EQ(export_command({"--db", database_, "--format", "csv", "--out", out_}), 0);
+  EXPECT_EQ(runner::export_command({"--db", database_, "--format", "csv", "--out", out_}), 0);
   const std::string text = contents_of(out_);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 3);
 }
@@ -43,7 +44,8 @@ TEST_F(ExportCommand, OverwritesOnlyWithForce) {
   EXPECT_TRUE(
       contains(usage_error({"--db", database_, "--format", "csv", "--out", out_}), "--force"));
   EXPECT_EQ(contents_of(out_), "mine");
-  EXPECT_EQ(export_command({"--db", database_, "--format", "csv", "--out", out_, "--force"}), 0);
+  EXPECT_EQ(
+      runner::export_command({"--db", database_, "--format", "csv", "--out", out_, "--force"}), 0);
   EXPECT_TRUE(contains(contents_of(out_), "S1,1,1,2,ray"));
 }
 
@@ -60,4 +62,4 @@ TEST_F(ExportCommand, WrongUsageAndWrongFilesAreBadInput) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

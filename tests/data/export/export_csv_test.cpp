@@ -10,10 +10,10 @@
 #include "data/files/spreadsheet_text.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 using Rows = std::vector<std::vector<std::string>>;
 
@@ -76,7 +76,7 @@ class ExportCsv : public ::testing::Test {
   const TemporaryFolder folder_, out_folder_;
   Store store_ = Store::open(folder_ / "study.db", Store::Mode::write_or_create);
   const Participant person_ = store_.enrol(a_protocol(), "P1", 4);
-  const palpate::Run run_ = store_.begin_run(person_, a_run());
+  const palpate::data::Run run_ = store_.begin_run(person_, a_run());
   const std::string out_ = out_folder_ / "trials.csv";
 };
 
@@ -373,4 +373,4 @@ TEST_F(ExportCsv, DuringASessionOnlyCommittedTrialsAreSeen) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 TEST(FormatUtc, IsIso8601CutToMicroseconds) {
@@ -35,4 +35,4 @@ TEST(ToUnixNs, StaysAtTheEndsOfTheRange) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

@@ -15,10 +15,10 @@
 #include "tests/data/store/seal_again.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 using Lines = std::multiset<std::string>;
 
@@ -35,7 +35,7 @@ void show_session(Store& store, const std::string& code, std::optional<int> numb
   info.clock.utc_ns += session * kDay;
   info.device = "falcon of " + code;
   info.response_latency = 0.003;
-  palpate::Run run = store.begin_run(person, info);
+  palpate::data::Run run = store.begin_run(person, info);
   store.add_note(run, 7, "a note on " + code);
   store.begin_attempt(run, a_plan(1, session), 5'000'000'000);
   store.end_run(run, RunEnd::paused, 9'000'000'000);
@@ -376,7 +376,7 @@ TEST_F(Merging, AnInputThatIsBeingWrittenIsRefused) {
 TEST_F(Merging, TakesWhatADeadWriterLeftWithoutTouchingIt) {
   {
     Store a = write(a_);
-    const palpate::Run run = a.begin_run(a.enrol(a_protocol(), "P1"), a_run());
+    const palpate::data::Run run = a.begin_run(a.enrol(a_protocol(), "P1"), a_run());
     TrialRecord record = a_record(1);
     record.attempt = a.begin_attempt(run, record, 1);
     a.finish_attempt(run, record);
@@ -413,4 +413,4 @@ TEST_F(Merging, StoppedItLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

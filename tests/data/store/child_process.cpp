@@ -7,7 +7,7 @@
 
 #include <stdexcept>
 
-namespace palpate::testing {
+namespace palpate::data::testing {
 
 ChildProcess::ChildProcess(const std::vector<std::string>& arguments) {
   int ends[2];
@@ -58,4 +58,4 @@ int ChildProcess::wait() {
   return status_;
 }
 
-}  // namespace palpate::testing
+}  // namespace palpate::data::testing

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::testing {
+namespace palpate::data::testing {
 
 class ChildProcess {
  public:
@@ -28,4 +28,4 @@ class ChildProcess {
   int status_ = 0;
 };
 
-}  // namespace palpate::testing
+}  // namespace palpate::data::testing

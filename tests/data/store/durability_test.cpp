@@ -15,10 +15,10 @@
 #include "tests/data/store/child_process.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 /// What the lives of a process said.
 struct Said {
@@ -167,4 +167,4 @@ TEST(Durability, ASimulationKilledAtAnyMomentExportsTheSameBytes) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

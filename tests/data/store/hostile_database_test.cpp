@@ -17,17 +17,17 @@
 #include "tests/data/store/seal_again.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 
 /// A study with everything that exports read.
 void make_study(const std::string& path) {
   Store store = Store::open(path, Store::Mode::write_or_create);
   for (const char* code : {"P1", "P2"}) {
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), code), a_run());
+    const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), code), a_run());
     for (int trial = 1; trial <= 4; ++trial) {
       TrialRecord record = a_record(trial);
       record.samples.resize(40);
@@ -311,4 +311,4 @@ TEST_F(Hostile, AHiddenRowIsMissed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

@@ -13,10 +13,10 @@
 #include "tests/data/store/old_database.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 constexpr int kNow = kSchemaVersion;
 constexpr Migration kSteps[] = {
@@ -29,7 +29,8 @@ class Migrating : public ::testing::Test {
  protected:
   Migrating() {
     Store store = Store::open(path_, Store::Mode::write_or_create);
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+    const palpate::data::Run run =
+        store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
     store.record_simulated(run, {a_record(1), a_record(2)});
     store.end_run(run, RunEnd::done, 1);
   }
@@ -141,4 +142,4 @@ TEST(VersionOne, BecomesThisVersionWhenItIsWrittenTo) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

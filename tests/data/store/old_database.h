@@ -7,7 +7,7 @@
 #include "data/store/schema.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate::testing {
+namespace palpate::data::testing {
 
 /// As the first palpate made it, with two trials.
 inline void make_version_1(const std::string& path) {
@@ -31,4 +31,4 @@ inline void make_version_1(const std::string& path) {
   }
 }
 
-}  // namespace palpate::testing
+}  // namespace palpate::data::testing

@@ -7,10 +7,10 @@
 #include "data/store/store.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 ProtocolInfo with_files(const std::string& wedge) {
   ProtocolInfo protocol = a_protocol();
@@ -48,7 +48,7 @@ TEST_F(ProtocolFiles, AChangedOneIsRefusedAndNothingIsStored) {
 TEST_F(ProtocolFiles, OneThatWasNotKeptIsAdded) {
   Store store = open();
   store.enrol(a_protocol(), "P1");  // as an older palpate did
-  const palpate::Run first = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
+  const palpate::data::Run first = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
   store.end_run(first, RunEnd::paused, 1);
   store.end_run(store.begin_run(store.enrol(with_files("v"), "P1"), a_run()), RunEnd::done, 2);
   const auto runs = store.runs();
@@ -110,4 +110,4 @@ TEST_F(ProtocolFiles, ARunMayBeShownWithOtherTexts) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

@@ -11,7 +11,7 @@
 #include "data/store/store.h"
 #include "tests/shared/peak_memory.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
 std::vector<std::uint64_t> bits_of(const SampleRecord& sample) {
@@ -237,4 +237,4 @@ TEST(SamplesCodec, DamageIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

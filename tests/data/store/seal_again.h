@@ -4,7 +4,7 @@
 
 #include "data/store/seal_writer.h"
 
-namespace palpate::testing {
+namespace palpate::data::testing {
 
 /// As somebody who deceives would: every seal is made anew over what the rows say now.
 inline void seal_again(SQLite::Database& db) {
@@ -15,4 +15,4 @@ inline void seal_again(SQLite::Database& db) {
   SealWriter(db).all_as_found();
 }
 
-}  // namespace palpate::testing
+}  // namespace palpate::data::testing

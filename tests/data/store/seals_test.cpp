@@ -14,10 +14,10 @@
 #include "tests/data/store/seal_again.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 class Seals : public ::testing::Test {
  protected:
@@ -26,7 +26,7 @@ class Seals : public ::testing::Test {
     {
       Store store = open();
       const Participant person = store.enrol(a_protocol(), "P1");
-      palpate::Run run = store.begin_run(person, a_run());
+      palpate::data::Run run = store.begin_run(person, a_run());
       show(store, run, 1);
       store.add_note(run, 7, "sneezed");
       store.begin_attempt(run, a_plan(2), 8);
@@ -45,7 +45,7 @@ class Seals : public ::testing::Test {
   Store open(Store::Mode mode = Store::Mode::write_or_create) const {
     return Store::open(path_, mode);
   }
-  static void show(Store& store, const palpate::Run& run, int trial, bool sampled = false) {
+  static void show(Store& store, const palpate::data::Run& run, int trial, bool sampled = false) {
     TrialRecord record = a_record(trial);
     record.attempt = store.begin_attempt(run, a_plan(trial), 6);
     if (sampled) record.samples = {SampleRecord{.tick = 0}, SampleRecord{.tick = 1, .depth = 1e-3}};
@@ -176,7 +176,7 @@ TEST_F(Seals, ASessionThatWasChangedIsNotGoneOnWith) {
 TEST_F(Seals, WhatADeadProgramLeftIsSealedByTheNext) {
   {
     Store store = open();
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
+    const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
     show(store, run, 1);
     store.begin_attempt(run, a_plan(2), 8);
     Store reader = open(Store::Mode::read_only);
@@ -193,7 +193,8 @@ TEST_F(Seals, WhatADeadProgramLeftIsSealedByTheNext) {
 TEST_F(Seals, ATransactionThatFailsLeavesTheChainWhole) {
   {
     Store store = open();
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "S2", {}, true, 6), a_run());
+    const palpate::data::Run run =
+        store.begin_run(store.enrol(a_protocol(), "S2", {}, true, 6), a_run());
     store.record_simulated(run, {a_record(1)});
     EXPECT_THROW(store.record_simulated(run, {a_record(2), a_record(1)}), StoreRefused);
     store.record_simulated(run, {a_record(2)});
@@ -251,4 +252,4 @@ TEST(SealedValues, AreToldApart) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

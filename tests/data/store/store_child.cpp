@@ -20,10 +20,10 @@
 
 namespace {
 
-using namespace palpate;
-using palpate::testing::a_protocol;
-using palpate::testing::a_record;
-using palpate::testing::a_run;
+using namespace palpate::data;
+using palpate::data::testing::a_protocol;
+using palpate::data::testing::a_record;
+using palpate::data::testing::a_run;
 
 void say(const std::string& line) {
   const std::string text = line + "\n";

@@ -14,10 +14,10 @@
 #include "data/store/store.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 
 Store open_to_write(const std::string& path) {
@@ -78,7 +78,7 @@ TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionGoesOnAfterwards) {
     write_file(folder / "ballast", std::string(300'000, 'x'));
     Store store = open_to_write(path);
     const Participant person = store.enrol(a_protocol(), "A");
-    const palpate::Run run = store.begin_run(person, a_run());
+    const palpate::data::Run run = store.begin_run(person, a_run());
     std::string error;
     const int lost = show_until_full(store, run, error);
     EXPECT_GT(lost, 1);
@@ -94,7 +94,7 @@ TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionGoesOnAfterwards) {
     fs::remove(folder / "ballast");
     fs::remove(folder / "more");
     store.end_run(run, RunEnd::aborted, 1);
-    const palpate::Run again = store.begin_run(person, a_run());
+    const palpate::data::Run again = store.begin_run(person, a_run());
     TrialRecord record = a_record(lost);
     record.attempt = store.begin_attempt(again, record, 1);
     store.finish_attempt(again, record);
@@ -109,7 +109,7 @@ TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
     const std::string path = folder / "study.db";
     {
       Store store = open_to_write(path);
-      const palpate::Run run =
+      const palpate::data::Run run =
           store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
       store.record_simulated(run, {a_record(1)});
     }
@@ -128,7 +128,7 @@ TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
   const TemporaryFolder folder;
   Store store = open_to_write(folder / "study.db");
   const Participant person = store.enrol(a_protocol(), "A");
-  const palpate::Run run = store.begin_run(person, a_run());
+  const palpate::data::Run run = store.begin_run(person, a_run());
   rlimit before{};
   ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
   const auto handler = ::signal(SIGXFSZ, SIG_IGN);
@@ -149,7 +149,7 @@ void expect_not_saved_after(const std::function<void(const std::string& path)>& 
   const TemporaryFolder folder;
   const std::string path = folder / "study.db";
   Store store = open_to_write(path);
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   store.begin_attempt(run, a_record(1), 1);
   mishap(path);
   const std::string error = error_of([&] { store.finish_attempt(run, a_record(1)); });
@@ -199,4 +199,4 @@ TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

@@ -18,10 +18,10 @@
 #include "tests/data/store/child_process.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 
 constexpr const char* kGone = "WITHDRAWNPARTICIPANT7";
@@ -40,7 +40,7 @@ void show_session(Store& store, const std::string& code, double pose, int trials
   const Participant person = store.enrol(a_protocol(), code);
   RunInfo info = a_run();
   info.device_calibration = "calibrated by " + code;
-  const palpate::Run run = store.begin_run(person, info);
+  const palpate::data::Run run = store.begin_run(person, info);
   for (int trial = 1; trial <= trials; ++trial) {
     TrialRecord record = a_record(trial);
     record.orientation_wxyz[1] = pose;
@@ -242,7 +242,7 @@ TEST_F(Forgetting, AnExportMadeMeanwhileIsRefused) {
 
 TEST_F(Forgetting, CountsNotesOnOthersThatSayTheCode) {
   Store store = open();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
   for (const char* text : {"came with P7", "P7x", "xP7", "(P7)", "P77"}) {
     store.add_note(run, 1, text);
   }
@@ -382,4 +382,4 @@ TEST(Traces, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

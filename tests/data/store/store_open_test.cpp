@@ -14,10 +14,10 @@
 #include "tests/data/store/child_process.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 
 class StoreOpen : public ::testing::Test {
@@ -46,7 +46,8 @@ class StoreOpen : public ::testing::Test {
   }
   void make_study(int trials = 300) {
     Store store = write(path_);
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+    const palpate::data::Run run =
+        store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
     std::vector<TrialRecord> records;
     for (int i = 1; i <= trials; ++i) records.push_back(a_record(i));
     store.record_simulated(run, records);
@@ -192,7 +193,7 @@ TEST_F(StoreOpen, TheSecondWriterIsRefusedAndToldWhoHoldsIt) {
 
 TEST_F(StoreOpen, AReaderSeesWhatWasCommittedWhenItOpened) {
   Store writer = write(path_);
-  const palpate::Run run = writer.begin_run(writer.enrol(a_protocol(), "A"), a_run());
+  const palpate::data::Run run = writer.begin_run(writer.enrol(a_protocol(), "A"), a_run());
   writer.begin_attempt(run, a_record(1), 1);
   Store before = read(path_);
   writer.finish_attempt(run, a_record(1));
@@ -278,7 +279,7 @@ TEST_F(StoreOpen, AnIndexThatIsCutShortWhileInUseCostsNothing) {
   constexpr int kTrials = 12;
   {
     Store store = write(path_);
-    const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+    const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
     std::optional<Store> reader;
     for (int trial = 1; trial <= kTrials; ++trial) {
       const std::string index = path_ + "-shm";
@@ -307,4 +308,4 @@ TEST_F(StoreOpen, NoDatabaseGetsTheNameOfWhatLiesBesideAnother) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

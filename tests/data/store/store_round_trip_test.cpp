@@ -7,10 +7,10 @@
 #include "data/store/store.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 void expect_same(const TrialRecord& got, const TrialRecord& want) {
   EXPECT_EQ(got.session, want.session);
@@ -84,7 +84,7 @@ TEST(StoreRoundTrip, EveryFieldOfATrial) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const Participant person = store.enrol(a_protocol(), "P1");
-  const palpate::Run run = store.begin_run(person, a_run(2));
+  const palpate::data::Run run = store.begin_run(person, a_run(2));
   TrialRecord wrong = unusual_record();
   TrialRecord timed_out = a_record(4, 2);
   timed_out.timed_out = true;
@@ -108,7 +108,7 @@ TEST(StoreRoundTrip, EveryFieldOfATrial) {
 TEST(StoreRoundTrip, OnsetOnTheCalendarFollowsFromTheRunsClock) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
   TrialRecord record = a_record(1);
   record.onset_ns = a_run().clock.monotonic_ns + 61'000'002'000;
   record.onset_utc = "what a caller says is not taken";
@@ -132,7 +132,7 @@ TEST(StoreRoundTrip, EveryFieldOfARunAndItsParticipant) {
   simulated.observer_sha256 = std::string(64, 'f');
   const auto seed = std::numeric_limits<std::uint64_t>::max();
   store.begin_run(store.enrol(a_protocol(), "zoe", 12), info);
-  const palpate::Run run =
+  const palpate::data::Run run =
       store.begin_run(store.enrol(a_protocol('b'), "S1", {}, true, seed), simulated);
   store.record_simulated(run, {a_record(1)});
 
@@ -158,7 +158,7 @@ TEST(StoreRoundTrip, EveryFieldOfARunAndItsParticipant) {
 TEST(StoreRoundTrip, SamplesAreTiedToTheirTrialBitForBit) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
   TrialRecord record = a_record(2);
   record.samples.resize(1500);
   for (std::uint32_t i = 0; i < 1500; ++i) record.samples[i].tick = i;
@@ -198,7 +198,7 @@ TEST(StoreRoundTrip, HostileTextsAreOnlyTexts) {
     RunInfo info = a_run();
     info.program_version = info.build = info.device = info.device_calibration =
         info.response_device = info.consent_version = info.hand = text;
-    const palpate::Run run = store.begin_run(person, info);
+    const palpate::data::Run run = store.begin_run(person, info);
     TrialRecord record = a_record(1);
     record.renderer = record.shape = record.response = text;
     store.begin_attempt(run, record, 1);
@@ -222,7 +222,7 @@ TEST(StoreRoundTrip, HostileTextsAreOnlyTexts) {
 TEST(StoreRoundTrip, NotesCarryTheirTime) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run(3));
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run(3));
   store.add_note(run, a_run().clock.monotonic_ns, "stylus slipped");
   ASSERT_EQ(store.notes().size(), 1u);
   EXPECT_EQ(store.notes()[0].utc, "2023-11-14T22:13:20.123456Z");
@@ -234,7 +234,7 @@ TEST(StoreRoundTrip, WhatNoDatabaseKeepsIsRefusedFieldByField) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const Participant person = store.enrol(a_protocol(), "P1");
-  const palpate::Run run = store.begin_run(person, a_run());
+  const palpate::data::Run run = store.begin_run(person, a_run());
   store.begin_attempt(run, a_record(1), 1);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   TrialRecord record = a_record(1);
@@ -277,4 +277,4 @@ TEST(StoreRoundTrip, WhatNoDatabaseKeepsIsRefusedFieldByField) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

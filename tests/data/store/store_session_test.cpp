@@ -5,15 +5,15 @@
 #include "data/store/store.h"
 #include "tests/data/store_fixture.h"
 
-namespace palpate {
+namespace palpate::data {
 namespace {
 
-using namespace palpate::testing;
+using namespace palpate::data::testing;
 
 class StoreSession : public ::testing::Test {
  protected:
   Store open() { return Store::open(path_, Store::Mode::write_or_create); }
-  void show(Store& store, const palpate::Run& run, int trial) {
+  void show(Store& store, const palpate::data::Run& run, int trial) {
     TrialRecord record = a_record(trial, run.session);
     record.attempt = store.begin_attempt(run, record, record.onset_ns - 1);
     store.finish_attempt(run, record);
@@ -61,7 +61,7 @@ TEST_F(StoreSession, TheNewestRecordIsOfALiveSession) {
   store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 7), info);
   EXPECT_EQ(store.newest_record(), std::nullopt) << "a simulated study has its own calendar";
   info = a_run();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), info);
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), info);
   EXPECT_EQ(store.newest_record(), info.clock.utc_ns);
   show(store, run, 2);
   const std::int64_t answered_ns = a_record(2).response_ns - info.clock.monotonic_ns;
@@ -114,7 +114,7 @@ TEST_F(StoreSession, ProgressStartsEmptyAndGrowsByTrial) {
   const Participant person = store.enrol(a_protocol(), "A");
   EXPECT_EQ(store.progress(person, 1).last_end, std::nullopt);
   EXPECT_TRUE(store.progress(person, 1).completed.empty());
-  const palpate::Run run = store.begin_run(person, a_run());
+  const palpate::data::Run run = store.begin_run(person, a_run());
   show(store, run, 2);
   show(store, run, 1);
   store.begin_attempt(run, a_plan(3), 1);
@@ -134,7 +134,7 @@ TEST_F(StoreSession, AnInterruptionIsOnRecordAndTheTrialIsShownAgain) {
   {
     Store store = open();
     person = store.enrol(a_protocol(), "A");
-    const palpate::Run run = store.begin_run(person, a_run());
+    const palpate::data::Run run = store.begin_run(person, a_run());
     show(store, run, 1);
     EXPECT_EQ(store.begin_attempt(run, a_plan(2), 77), 1);
   }  // no end_run: as if the process had died
@@ -150,7 +150,7 @@ TEST_F(StoreSession, AnInterruptionIsOnRecordAndTheTrialIsShownAgain) {
   RunInfo later = a_run();
   later.clock = {.utc_ns = 1'800'000'000'000'000'000, .monotonic_ns = 40};
   later.program_version = "0.1.1";
-  const palpate::Run run = store.begin_run(person, later);
+  const palpate::data::Run run = store.begin_run(person, later);
   TrialRecord record = a_record(2);
   record.attempt = store.begin_attempt(run, record, 90);
   EXPECT_EQ(record.attempt, 2);
@@ -188,7 +188,7 @@ TEST_F(StoreSession, PausedAndAbortedSessionsGoOnDoneAndWithdrawnOnesDoNot) {
   const Participant person = store.enrol(a_protocol(), "A");
   int session = 0;
   for (const RunEnd end : {RunEnd::paused, RunEnd::aborted, RunEnd::done, RunEnd::withdrawn}) {
-    const palpate::Run run = store.begin_run(person, a_run(++session));
+    const palpate::data::Run run = store.begin_run(person, a_run(++session));
     store.end_run(run, end, 9);
     EXPECT_EQ(store.progress(person, session).last_end, end);
     if (end == RunEnd::paused || end == RunEnd::aborted) {
@@ -204,7 +204,7 @@ TEST_F(StoreSession, PausedAndAbortedSessionsGoOnDoneAndWithdrawnOnesDoNot) {
 TEST_F(StoreSession, ARunEndsOnceAndTakesNothingAfterwards) {
   Store store = open();
   const Participant person = store.enrol(a_protocol(), "A");
-  const palpate::Run run = store.begin_run(person, a_run());
+  const palpate::data::Run run = store.begin_run(person, a_run());
   EXPECT_THROW(store.end_run(run, RunEnd::running, 1), StoreRefused);
   EXPECT_THROW(store.end_run(run, RunEnd::interrupted, 1), StoreRefused);
   store.begin_attempt(run, a_plan(1), 1);
@@ -218,7 +218,7 @@ TEST_F(StoreSession, ARunEndsOnceAndTakesNothingAfterwards) {
 
 TEST_F(StoreSession, ATrialHasOneRecordAndOneOpenAttempt) {
   Store store = open();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   show(store, run, 1);
   EXPECT_TRUE(
       contains(error_of([&] { store.begin_attempt(run, a_plan(1), 1); }), "has its record"));
@@ -234,7 +234,7 @@ TEST_F(StoreSession, ATrialHasOneRecordAndOneOpenAttempt) {
 
 TEST_F(StoreSession, ARecordOfAnotherTrialThanWasBegunIsRefused) {
   Store store = open();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   store.begin_attempt(run, a_plan(1), 1);
   const auto refused = [&](auto change) {
     TrialRecord record = a_record(1);
@@ -257,7 +257,8 @@ TEST_F(StoreSession, ARecordOfAnotherTrialThanWasBegunIsRefused) {
 
 TEST_F(StoreSession, SimulatedTrialsComeAllOrNone) {
   Store store = open();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+  const palpate::data::Run run =
+      store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
   store.record_simulated(run, {a_record(1), a_record(2)});
   EXPECT_TRUE(contains(error_of([&] {
                          store.record_simulated(run, {a_record(3), a_record(2)});
@@ -275,7 +276,7 @@ TEST_F(StoreSession, SimulatedTrialsComeAllOrNone) {
 
 TEST_F(StoreSession, ARealParticipantsTrialsAreNotStoredInBulk) {
   Store store = open();
-  const palpate::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   EXPECT_THROW(store.record_simulated(run, {a_record(1)}), StoreRefused);
   EXPECT_EQ(store.counts().completed, 0);
 }
@@ -298,7 +299,7 @@ TEST_F(StoreSession, TrialsComeByProtocolNumberSessionAndTrialWhateverTheOrderOf
   const Participant early = store.enrol(a_protocol(), "Early", 1);
   for (const auto& person : {late, early}) {
     for (const int session : {2, 1}) {
-      const palpate::Run run = store.begin_run(person, a_run(session));
+      const palpate::data::Run run = store.begin_run(person, a_run(session));
       for (const int trial : {10, 9, 2}) show(store, run, trial);
     }
   }
@@ -317,4 +318,4 @@ TEST_F(StoreSession, TrialsComeByProtocolNumberSessionAndTrialWhateverTheOrderOf
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::data

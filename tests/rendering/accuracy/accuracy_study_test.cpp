@@ -5,23 +5,23 @@
 #include "rendering/accuracy/study.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 TEST(AccuracyStudy, CountsTrianglesAsTheMeshesHaveThem) {
-  for (const ShapeKind shape :
-       {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder, ShapeKind::cube}) {
+  for (const stimuli::ShapeKind shape : {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
+                                         stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     int last = 0;
-    for (const ObjectSpec& spec : tessellations(shape, 5000)) {
+    for (const stimuli::ObjectSpec& spec : tessellations(shape, 5000)) {
       int triangles = 0;
-      for (const auto& face : polygons_of(spec).faces)
+      for (const auto& face : stimuli::polygons_of(spec).faces)
         triangles += static_cast<int>(face.size()) - 2;
       EXPECT_EQ(triangles_of(spec), triangles);
       EXPECT_GT(triangles, last);
       EXPECT_LE(triangles, 5000);
       last = triangles;
     }
-    EXPECT_GT(last, shape == ShapeKind::cube ? 0 : 900);
+    EXPECT_GT(last, shape == stimuli::ShapeKind::cube ? 0 : 900);
   }
 }
 
@@ -109,4 +109,4 @@ TEST(AccuracyStudy, ChoosesTheCoarsestThatIsGoodEnoughForBothProbes) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

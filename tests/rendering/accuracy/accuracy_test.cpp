@@ -15,14 +15,14 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
-constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                 ShapeKind::cube};
+constexpr stimuli::ShapeKind kShapes[] = {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
+                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube};
 
-ObjectSpec primitive(ShapeKind shape, int fineness = 0) {
-  ObjectSpec spec;
+stimuli::ObjectSpec primitive(stimuli::ShapeKind shape, int fineness = 0) {
+  stimuli::ObjectSpec spec;
   spec.shape = shape;
   spec.subdivisions = fineness;
   spec.segments = 8 << fineness;
@@ -30,8 +30,8 @@ ObjectSpec primitive(ShapeKind shape, int fineness = 0) {
 }
 
 TEST(HandPath, ComesFromOutsideAndStaysAtItsDepth) {
-  for (const ShapeKind shape : kShapes) {
-    const ObjectSpec spec = primitive(shape);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    const stimuli::ObjectSpec spec = primitive(shape);
     for (const double length : {0.0, 0.12}) {
       HandPathSettings settings;
       settings.seed = 3;
@@ -66,8 +66,9 @@ TEST(HandPath, ComesFromOutsideAndStaysAtItsDepth) {
 }
 
 TEST(HandPath, TouchesWithTipAndSide) {
-  for (const ShapeKind shape : {ShapeKind::cone, ShapeKind::cylinder, ShapeKind::cube}) {
-    const ObjectSpec spec = primitive(shape);
+  for (const stimuli::ShapeKind shape :
+       {stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
+    const stimuli::ObjectSpec spec = primitive(shape);
     int tip = 0, side = 0;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
       HandPathSettings settings;
@@ -88,10 +89,10 @@ TEST(HandPath, TouchesWithTipAndSide) {
 TEST(HandPath, SeedsDiffer) {
   HandPathSettings settings;
   settings.contact_ticks = 1;
-  const Vec3 first = hand_path(primitive(ShapeKind::sphere), settings).poses[0].tip;
-  EXPECT_EQ(first, hand_path(primitive(ShapeKind::sphere), settings).poses[0].tip);
+  const Vec3 first = hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip;
+  EXPECT_EQ(first, hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
   settings.seed = 2;
-  EXPECT_NE(first, hand_path(primitive(ShapeKind::sphere), settings).poses[0].tip);
+  EXPECT_NE(first, hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
 }
 
 TEST(ErrorTally, SumsUpByHand) {
@@ -145,9 +146,9 @@ TEST(ErrorTally, AnglesAreAngles) {
 }
 
 TEST(PlainWalk, InDoubleIsTheWalk) {
-  Random random(1);
-  for (const ShapeKind shape : kShapes) {
-    const ConvexMesh mesh(polygons_of(primitive(shape, 2)));
+  stimuli::Random random(1);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(primitive(shape, 2)));
     const PlainWalk<double> plain(mesh);
     testing::ProbePath path = testing::sliding_path(random, mesh, 0.12, 2000, 0.02);
     MinkowskiFacet facet;
@@ -173,10 +174,10 @@ TEST(PlainWalk, InDoubleIsTheWalk) {
 
 /// Errors of every method over three short paths: against the shape and against the polyhedron. Of
 /// one alone: against the shape.
-std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const ObjectSpec& spec,
+std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const stimuli::ObjectSpec& spec,
                                                                     const std::string& only = "") {
   std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> result;
-  const ConvexMesh mesh(polygons_of(spec));
+  const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   std::vector<HandPath> paths;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     HandPathSettings settings;
@@ -203,7 +204,7 @@ std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const Object
 }
 
 TEST(Accuracy, OursIsExactOnThePolyhedron) {
-  for (const ShapeKind shape : kShapes) {
+  for (const stimuli::ShapeKind shape : kShapes) {
     auto all = errors(primitive(shape, 2));
     for (const char* name : {"tick", "walk", "scan"}) {
       const ErrorSummary& s = all.at(name).second;
@@ -228,7 +229,7 @@ TEST(Accuracy, OursIsExactOnThePolyhedron) {
 }
 
 TEST(Accuracy, ACubeIsItsOwnPolyhedron) {
-  const auto all = errors(primitive(ShapeKind::cube));
+  const auto all = errors(primitive(stimuli::ShapeKind::cube));
   EXPECT_LE(all.at("tick").first.depth.worst, 1e-16);
   EXPECT_LE(all.at("tick").first.normal.worst, 1e-13);
   EXPECT_LE(all.at("tick").first.point.worst, 1e-14);
@@ -237,7 +238,8 @@ TEST(Accuracy, ACubeIsItsOwnPolyhedron) {
 TEST(Accuracy, FallsAsTheSquareOfTheTriangles) {
   // An inscribed polyhedron with edges of length a lies a^2 / (8 R) inside: second order in depth,
   // first in direction. Each level halves the edges.
-  for (const ShapeKind shape : {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder}) {
+  for (const stimuli::ShapeKind shape :
+       {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder}) {
     ErrorSummary last;
     for (const int fineness : {3, 4, 5}) {
       const ErrorSummary now = errors(primitive(shape, fineness), "walk").at("walk").first;
@@ -254,14 +256,15 @@ TEST(Accuracy, FallsAsTheSquareOfTheTriangles) {
 
 TEST(Accuracy, OfASphereItIsTheSagitta) {
   // Between its corners and the middles of its facets an icosphere is 0 to the sagitta too low.
-  const ObjectSpec spec = primitive(ShapeKind::sphere, 4);
-  const ConvexMesh mesh(polygons_of(spec));
+  const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::sphere, 4);
+  const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   double sagitta = 0;
-  for (const Facet& facet : mesh.facets()) sagitta = std::max(sagitta, spec.radius - facet.offset);
+  for (const stimuli::Facet& facet : mesh.facets())
+    sagitta = std::max(sagitta, spec.radius - facet.offset);
   const ErrorSummary s = errors(spec).at("walk").first;
   EXPECT_LE(s.depth.worst, sagitta);
   EXPECT_GT(s.depth.worst, 0.8 * sagitta);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -6,11 +6,11 @@
 
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 /// The edge of a 2 m cube from (1, -1, 1) to (1, 1, 1).
-std::uint32_t top_edge(const ConvexMesh& mesh) {
+std::uint32_t top_edge(const stimuli::ConvexMesh& mesh) {
   for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) {
     const Vec3 middle =
         0.5 * (mesh.vertices()[mesh.edges()[i].v0] + mesh.vertices()[mesh.edges()[i].v1]);
@@ -27,7 +27,7 @@ LineProbe over_edge(double height, double along = 0) {
 }
 
 TEST(PaperFirstContact, AnEdgeIsCrossedByASmallMotion) {
-  const ConvexMesh mesh(cube(2));
+  const stimuli::ConvexMesh mesh(stimuli::cube(2));
   const std::uint32_t edge = top_edge(mesh);
   EXPECT_TRUE(crosses_edge(mesh, edge, over_edge(0.001), over_edge(-0.001)));
   EXPECT_TRUE(crosses_edge(mesh, edge, over_edge(0.001, 0.1), over_edge(-0.001, 0.2)));
@@ -39,7 +39,7 @@ TEST(PaperFirstContact, AnEdgeIsCrossedByASmallMotion) {
 }
 
 TEST(PaperFirstContact, APolygonIsCrossedByAPoint) {
-  const ConvexMesh mesh(cube(2));
+  const stimuli::ConvexMesh mesh(stimuli::cube(2));
   int crossed = 0, beside = 0;
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) {
     crossed += crosses_polygon(mesh, i, Vec3(0.3, 0.2, 1.1), Vec3(0.3, 0.2, 0.9)) ? 1 : 0;
@@ -54,7 +54,7 @@ TEST(PaperFirstContact, APolygonIsCrossedByAPoint) {
 }
 
 TEST(PaperFirstContact, IsMostlyRightForASlowHandAndLosesContactsForAFastOne) {
-  const ConvexMesh mesh(cylinder(0.03, 0.06, 64));
+  const stimuli::ConvexMesh mesh(stimuli::cylinder(0.03, 0.06, 64));
   const FirstContactLoss slow = first_contact_loss(mesh, 0.1, 0, 300, 1);
   EXPECT_EQ(slow.entries, 300);
   EXPECT_LE(slow.paper_missed, 10);
@@ -69,4 +69,4 @@ TEST(PaperFirstContact, IsMostlyRightForASlowHandAndLosesContactsForAFastOne) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -12,7 +12,7 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::probe_at;
@@ -30,7 +30,7 @@ struct Tally {
 };
 
 /// One answer against the reference; all three parts of it.
-bool right(const ConvexMesh& mesh, const LineProbe& probe, const PeerContact& answer,
+bool right(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const PeerContact& answer,
            const ReferenceDepth& reference) {
   const double tolerance = 1e-9 * mesh.size();
   if (reference.depth <= 0) {
@@ -50,9 +50,9 @@ bool right(const ConvexMesh& mesh, const LineProbe& probe, const PeerContact& an
   return glm::length(out.tip + along * u - answer.point) <= tolerance;
 }
 
-void check(const PeerLibrary& library, const ConvexMesh& mesh, const std::string& shape) {
+void check(const PeerLibrary& library, const stimuli::ConvexMesh& mesh, const std::string& shape) {
   const auto peer = library.make(mesh);
-  Random random(7);
+  stimuli::Random random(7);
   Tally inside, outside;
   for (int i = 0; i < 500; ++i) {
     const Vec3 at =
@@ -76,14 +76,14 @@ void check(const PeerLibrary& library, const ConvexMesh& mesh, const std::string
 TEST(Peers, AgreeWithTheReference) {
   for (const PeerLibrary& library : peer_libraries()) {
     if (!library.make) continue;
-    check(library, ConvexMesh(cube(0.06)), "cube");
-    check(library, ConvexMesh(icosphere(0.03, 2)), "sphere");
-    check(library, ConvexMesh(cone(0.03, 0.06, 32)), "cone");
-    check(library, ConvexMesh(cylinder(0.03, 0.06, 32)), "cylinder");
+    check(library, stimuli::ConvexMesh(stimuli::cube(0.06)), "cube");
+    check(library, stimuli::ConvexMesh(stimuli::icosphere(0.03, 2)), "sphere");
+    check(library, stimuli::ConvexMesh(stimuli::cone(0.03, 0.06, 32)), "cone");
+    check(library, stimuli::ConvexMesh(stimuli::cylinder(0.03, 0.06, 32)), "cylinder");
     // Far from the origin and small: their tolerances are absolute, ours must not be.
-    PolygonSoup soup = cone(3e-4, 6e-4, 16);
+    stimuli::PolygonSoup soup = stimuli::cone(3e-4, 6e-4, 16);
     for (Vec3& v : soup.vertices) v += Vec3(1, 2, 3) * 1e-3;
-    check(library, ConvexMesh(soup), "small cone");
+    check(library, stimuli::ConvexMesh(soup), "small cone");
   }
 }
 
@@ -97,4 +97,4 @@ TEST(Peers, AreNamedWhetherBuiltOrNot) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -14,25 +14,26 @@
 #include "stimuli/signed_distance.h"
 #include "tests/shared/probe_paths.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::probe_at;
 using testing::random_direction;
 using testing::uniform;
 
-constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                 ShapeKind::cube};
+constexpr stimuli::ShapeKind kShapes[] = {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
+                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube};
 
-ObjectSpec primitive(ShapeKind shape) {
-  ObjectSpec spec;
+stimuli::ObjectSpec primitive(stimuli::ShapeKind shape) {
+  stimuli::ObjectSpec spec;
   spec.shape = shape;
   return spec;
 }
 
 /// Random poses that overlap the shape, tips and sides, also shallow ones.
-std::vector<LineProbe> inside_poses(const ObjectSpec& spec, int count, std::uint64_t seed) {
-  Random random(seed);
+std::vector<LineProbe> inside_poses(const stimuli::ObjectSpec& spec, int count,
+                                    std::uint64_t seed) {
+  stimuli::Random random(seed);
   std::vector<LineProbe> poses;
   while (static_cast<int>(poses.size()) < count) {
     const double length = poses.size() % 4 == 0 ? 0 : uniform(random, 0.01, 0.15);
@@ -56,8 +57,8 @@ std::vector<Vec3> directions(int count) {
 
 TEST(WaysOut, NoDirectionIsShorterThanTheLeast) {
   const auto sample = directions(4000);
-  for (const ShapeKind shape : kShapes) {
-    const ObjectSpec spec = primitive(shape);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 1)) {
       double sampled = 1;
       for (const Vec3& n : sample) sampled = std::min(sampled, depth_along(spec, probe, n));
@@ -67,9 +68,9 @@ TEST(WaysOut, NoDirectionIsShorterThanTheLeast) {
 }
 
 TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
-  Random random(2);
-  for (const ShapeKind shape : kShapes) {
-    const ObjectSpec spec = primitive(shape);
+  stimuli::Random random(2);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 3)) {
       for (const WayOut& way : ways_out(spec, probe)) {
         EXPECT_NEAR(glm::length(way.normal), 1, 1e-14);
@@ -84,7 +85,8 @@ TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
         // The contact is on the surface: on the plane, and not outside along any other direction.
         const Vec3 touch =
             probe.tip + way.place * (probe.tail - probe.tip) + way.depth * way.normal;
-        EXPECT_NEAR(signed_distance(spec, touch).distance, 0, 1e-13) << static_cast<int>(shape);
+        EXPECT_NEAR(stimuli::signed_distance(spec, touch).distance, 0, 1e-13)
+            << static_cast<int>(shape);
       }
     }
   }
@@ -93,11 +95,11 @@ TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
 TEST(WaysOut, AreThoseOfAFinePolyhedron) {
   // Each has its like among the polyhedron's, both ways round, but for a few that are about to be
   // born or to vanish.
-  for (const ShapeKind shape : kShapes) {
-    ObjectSpec spec = primitive(shape);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 4;
     spec.segments = 720;
-    const ConvexMesh mesh(polygons_of(spec));
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
     int all = 0, made_up = 0, missing = 0;
     const auto alone = [](const WayOut& way, const std::vector<WayOut>& others) {
       for (const WayOut& other : others) {
@@ -123,12 +125,12 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
 }
 
 TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
-  Random random(6);
-  for (const ShapeKind shape : kShapes) {
-    const ObjectSpec spec = primitive(shape);
+  stimuli::Random random(6);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    const stimuli::ObjectSpec spec = primitive(shape);
     for (int i = 0; i < 500; ++i) {
       const Vec3 p = uniform(random, 0, 0.06) * random_direction(random);
-      const SurfaceDistance distance = signed_distance(spec, p);
+      const stimuli::SurfaceDistance distance = stimuli::signed_distance(spec, p);
       const auto ways = ways_out(spec, {p, p});
       ASSERT_EQ(ways.empty(), distance.distance > 0);
       if (ways.empty()) continue;
@@ -140,12 +142,12 @@ TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
 
 TEST(WaysOut, SegmentsThatStayOutHaveNone) {
   // The reference on a fine mesh inside of the shape says who overlaps for certain.
-  Random random(7);
-  for (const ShapeKind shape : kShapes) {
-    ObjectSpec spec = primitive(shape);
+  stimuli::Random random(7);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 4;
     spec.segments = 500;
-    const ConvexMesh mesh(polygons_of(spec));
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
     int out = 0;
     for (int i = 0; i < 2000; ++i) {
       const LineProbe probe = probe_at(uniform(random, 0, 0.09) * random_direction(random),
@@ -166,12 +168,12 @@ TEST(WaysOut, SegmentsThatStayOutHaveNone) {
 }
 
 TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
-  Random random(8);
-  for (const ShapeKind shape : kShapes) {
-    ObjectSpec spec = primitive(shape);
+  stimuli::Random random(8);
+  for (const stimuli::ShapeKind shape : kShapes) {
+    stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 2;
     spec.segments = 12;
-    const ConvexMesh mesh(polygons_of(spec));
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
     for (const LineProbe& probe : inside_poses(spec, 300, 9)) {
       const ReferenceDepth reference = reference_depth(mesh, probe);
       if (reference.depth <= 0) continue;
@@ -194,8 +196,8 @@ TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
 }
 
 TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
-  const ObjectSpec spec = primitive(ShapeKind::cube);
-  const ConvexMesh mesh(polygons_of(spec));
+  const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::cube);
+  const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
     const auto analytic = ways_out(spec, probe);
     const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
@@ -209,9 +211,10 @@ TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
 }
 
 TEST(WaysOut, RefusesWhatIsNoPrimitive) {
-  EXPECT_THROW(ways_out(primitive(ShapeKind::mesh), LineProbe()), std::invalid_argument);
-  EXPECT_THROW(ways_out(primitive(ShapeKind::compound), LineProbe()), std::invalid_argument);
+  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::mesh), LineProbe()), std::invalid_argument);
+  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::compound), LineProbe()),
+               std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -9,12 +9,12 @@
 
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 SceneObject sphere(int subdivisions, int object = 0, const Vec3& position = Vec3(0)) {
   SceneObject made;
-  made.mesh = std::make_shared<const ConvexMesh>(icosphere(0.03, subdivisions));
+  made.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.03, subdivisions));
   made.pose.position = position;
   made.object = object;
   return made;
@@ -46,16 +46,17 @@ Names changed(const std::vector<Stage>& a, const std::vector<Stage>& b) {
   return names;
 }
 
-Names changed_by_mesh(const PolygonSoup& from, const PolygonSoup& to, const Renderer& renderer) {
-  const auto lines = [&](const PolygonSoup& soup) {
+Names changed_by_mesh(const stimuli::PolygonSoup& from, const stimuli::PolygonSoup& to,
+                      const Renderer& renderer) {
+  const auto lines = [&](const stimuli::PolygonSoup& soup) {
     SceneObject object;
-    object.mesh = std::make_shared<const ConvexMesh>(soup);
+    object.mesh = std::make_shared<const stimuli::ConvexMesh>(soup);
     return explain(scene_of({object}, renderer), renderer);
   };
   return changed(lines(from), lines(to));
 }
 
-Names changed_by_material(const Material& material, const Renderer& renderer) {
+Names changed_by_material(const stimuli::Material& material, const Renderer& renderer) {
   SceneObject plain = sphere(1), other = plain;
   other.material = material;
   return changed(explain(scene_of({plain}, renderer), renderer),
@@ -66,7 +67,7 @@ class Explain : public ::testing::TestWithParam<const Renderer*> {};
 
 TEST_P(Explain, EachMaterialPropertyIsALineOfItsOwn) {
   const Renderer& renderer = *GetParam();
-  Material damped, rough, layered, soft;
+  stimuli::Material damped, rough, layered, soft;
   damped.damping = 2;
   rough.friction_static = rough.friction_dynamic = 0.4;
   layered.layers = {{0.001, 200}};
@@ -101,11 +102,12 @@ TEST_P(Explain, TreesFollowTheMesh) {
   const Renderer& renderer = *GetParam();
   const bool sides = renderer.side_contact();
   // 22 facets and 60 edges; 32 and 90; 72 and 210.
-  const PolygonSoup few = cylinder(0.03, 0.06, 20), some = cylinder(0.03, 0.06, 30),
-                    many = cylinder(0.03, 0.06, 70);
+  const stimuli::PolygonSoup few = stimuli::cylinder(0.03, 0.06, 20),
+                             some = stimuli::cylinder(0.03, 0.06, 30),
+                             many = stimuli::cylinder(0.03, 0.06, 70);
   EXPECT_EQ(changed_by_mesh(few, some, renderer), sides ? Names{"tree of edges"} : Names{});
   EXPECT_EQ(changed_by_mesh(some, many, renderer), Names{"tree of polygons"});
-  EXPECT_EQ(changed_by_mesh(icosphere(0.03, 3), icosphere(0.03, 4), renderer),
+  EXPECT_EQ(changed_by_mesh(stimuli::icosphere(0.03, 3), stimuli::icosphere(0.03, 4), renderer),
             Names{"support map"});
 }
 
@@ -160,4 +162,4 @@ INSTANTIATE_TEST_SUITE_P(Renderers, Explain, ::testing::Values(&point_renderer()
                          [](const auto& tested) { return std::string(tested.param->name()); });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

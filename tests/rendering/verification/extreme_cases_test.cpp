@@ -6,7 +6,7 @@
 
 #include <string>
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 class Extreme : public ::testing::TestWithParam<ExtremeCase> {};
@@ -66,4 +66,4 @@ INSTANTIATE_TEST_SUITE_P(All, Extreme, ::testing::ValuesIn(extreme_cases()),
                          });
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -10,7 +10,7 @@
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 using testing::moved;
@@ -20,10 +20,10 @@ void expect_near(const Vec3& a, const Vec3& b, double tolerance) {
                                            << b.x << " " << b.y << " " << b.z << ")";
 }
 
-ConvexMesh cube_of_two() { return ConvexMesh(cube(2)); }
+stimuli::ConvexMesh cube_of_two() { return stimuli::ConvexMesh(stimuli::cube(2)); }
 
 TEST(ReferenceDepth, PointInACubeIsAsDeepAsItsNearestFace) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const Vec3 p(0.3, -0.9, 0.5);
   const ReferenceDepth found = reference_depth(mesh, {p, p});
   EXPECT_NEAR(found.depth, 0.1, 1e-15);
@@ -31,7 +31,7 @@ TEST(ReferenceDepth, PointInACubeIsAsDeepAsItsNearestFace) {
 }
 
 TEST(ReferenceDepth, EndOfAStickCountsFromTheDeeperEnd) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const LineProbe standing{{0.2, 0.1, 0.75}, {0.3, 0.2, 5}};
   const LineProbe hanging{standing.tail, standing.tip};
   EXPECT_NEAR(reference_depth(mesh, standing).depth, 0.25, 1e-15);
@@ -40,7 +40,7 @@ TEST(ReferenceDepth, EndOfAStickCountsFromTheDeeperEnd) {
 }
 
 TEST(ReferenceDepth, StickAcrossAnEdgeIsPushedOutAtRightAnglesToBoth) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const Vec3 out = glm::normalize(Vec3(1, 0, 1));
   const Vec3 middle = Vec3(1, 0.3, 1) - 0.1 * out;
   const Vec3 along(3, 0, -3);
@@ -50,21 +50,21 @@ TEST(ReferenceDepth, StickAcrossAnEdgeIsPushedOutAtRightAnglesToBoth) {
 }
 
 TEST(ReferenceDepth, StickThroughTheWholeCubeLeavesSideways) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const ReferenceDepth found = reference_depth(mesh, {{-7, 0.4, 0.1}, {7, 0.4, 0.1}});
   EXPECT_NEAR(found.depth, 0.6, 1e-15);
   expect_near(found.normal, Vec3(0, 1, 0), 1e-15);
 }
 
 TEST(ReferenceDepth, NegativeWithoutTouch) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   EXPECT_LT(reference_depth(mesh, {{0, 0, 1.01}, {0, 0, 2}}).depth, 0);
   // Past an edge: no facet of the cube separates the stick from it.
   EXPECT_LT(reference_depth(mesh, {{2.5, 0, -0.4}, {-0.4, 0, 2.5}}).depth, 0);
 }
 
 TEST(ReferenceGap, ToFaceEdgeAndCornerOfACube) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   EXPECT_NEAR(reference_gap(mesh, {{0.2, 0.3, 1.5}, {0.2, 0.4, 9}}), 0.5, 1e-15);
   EXPECT_NEAR(reference_gap(mesh, {{2, 0.3, 2}, {5, 0.3, 9}}), std::sqrt(2), 1e-15);
   EXPECT_NEAR(reference_gap(mesh, {{2, 2, 2}, {2, 2, 2}}), std::sqrt(3), 1e-15);
@@ -73,14 +73,14 @@ TEST(ReferenceGap, ToFaceEdgeAndCornerOfACube) {
 }
 
 TEST(ReferenceGap, ZeroOnTouchAndOverlap) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   EXPECT_EQ(reference_gap(mesh, {{0, 0, 1}, {0, 0, 3}}), 0);
   EXPECT_EQ(reference_gap(mesh, {{0, 0, 0}, {0, 0, 0.1}}), 0);
   EXPECT_EQ(reference_gap(mesh, {{-5, 0.2, 0.3}, {5, 0.2, 0.3}}), 0);
 }
 
 TEST(ReferenceFirstContact, TimeOfApproach) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const LineProbe before{{3, 0, 0}, {4, 0, 0}};
   const auto time = reference_first_contact(mesh, before, moved(before, {-4, 0, 0}), 10);
   ASSERT_TRUE(time);
@@ -90,7 +90,7 @@ TEST(ReferenceFirstContact, TimeOfApproach) {
 }
 
 TEST(ReferenceFirstContact, EmptyWhenPassingByOrOnlyTouching) {
-  const ConvexMesh mesh = cube_of_two();
+  const stimuli::ConvexMesh mesh = cube_of_two();
   const LineProbe above{{-3, 0, 1.001}, {-3, 0, 2}};
   EXPECT_FALSE(reference_first_contact(mesh, above, moved(above, {6, 0, 0}), 100));
   const LineProbe sliding{{-3, 0, 1}, {-3, 0, 2}};
@@ -103,7 +103,7 @@ TEST(ReferenceFirstContact, ZeroWhenItStartsInside) {
 }
 
 TEST(ReferenceFirstContact, SeesAsFinelyAsItsSteps) {
-  const ConvexMesh mesh(cube(0.01));
+  const stimuli::ConvexMesh mesh(stimuli::cube(0.01));
   const LineProbe before{{0.3, 0, 0}, {0.3, 0, 1}};
   const LineProbe after = moved(before, {-1, 0, 0});
   EXPECT_FALSE(reference_first_contact(mesh, before, after, 1));
@@ -113,16 +113,16 @@ TEST(ReferenceFirstContact, SeesAsFinelyAsItsSteps) {
 }
 
 // What a penetration depth is, stated without facets: along no direction is the way out shorter.
-double way_out(const ConvexMesh& mesh, const LineProbe& probe, const Vec3& direction) {
+double way_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const Vec3& direction) {
   double support = -std::numeric_limits<double>::infinity();
   for (const Vec3& v : mesh.vertices()) support = std::max(support, glm::dot(direction, v));
   return support - std::min(glm::dot(direction, probe.tip), glm::dot(direction, probe.tail));
 }
 
 // The distance from the solid is convex along a segment.
-double gap_by_search(const ConvexMesh& mesh, const LineProbe& probe) {
+double gap_by_search(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   const auto at = [&](double t) {
-    return signed_distance(mesh, probe.tip + t * (probe.tail - probe.tip)).distance;
+    return stimuli::signed_distance(mesh, probe.tip + t * (probe.tail - probe.tip)).distance;
   };
   double low = 0, high = 1;
   for (int i = 0; i < 90; ++i) {
@@ -135,8 +135,8 @@ double gap_by_search(const ConvexMesh& mesh, const LineProbe& probe) {
 TEST(ReferenceProperties, DepthIsTheShortestWayOut) {
   int inside = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    Random random(seed, {1});
-    const ConvexMesh mesh = testing::random_convex_mesh(random);
+    stimuli::Random random(seed, {1});
+    const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     for (const LineProbe& probe :
          testing::jumping_path(random, mesh, mesh.size() * 2 * random.unit(), 40)) {
       const ReferenceDepth found = reference_depth(mesh, probe);
@@ -166,8 +166,8 @@ TEST(ReferenceProperties, DepthIsTheShortestWayOut) {
 TEST(ReferenceProperties, GapIsTheLeastDistanceOfAPointOfTheProbe) {
   int outside = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    Random random(seed, {2});
-    const ConvexMesh mesh = testing::random_convex_mesh(random);
+    stimuli::Random random(seed, {2});
+    const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     for (const LineProbe& probe :
          testing::jumping_path(random, mesh, mesh.size() * 2 * random.unit(), 20)) {
       const double gap = reference_gap(mesh, probe);
@@ -179,4 +179,4 @@ TEST(ReferenceProperties, GapIsTheLeastDistanceOfAPointOfTheProbe) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

@@ -10,7 +10,7 @@
 
 #include "rendering/verification/random_solids.h"
 
-namespace palpate {
+namespace palpate::rendering {
 namespace {
 
 std::string told(const SearchCounts& counts) {
@@ -178,11 +178,11 @@ TEST(RandomSolids, AreOfEveryKindAndSize) {
   double smallest = 1e9, largest = 0, flattest = 1;
   std::size_t most_sides = 0, most_edges_at_a_corner = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
-    Random random(seed);
-    const ConvexMesh mesh = random_solid(random);
+    stimuli::Random random(seed);
+    const stimuli::ConvexMesh mesh = random_solid(random);
     smallest = std::min(smallest, mesh.size());
     largest = std::max(largest, mesh.size());
-    for (const Facet& facet : mesh.facets()) {
+    for (const stimuli::Facet& facet : mesh.facets()) {
       most_sides = std::max<std::size_t>(most_sides, facet.side_count);
       double low = 0;
       for (const Vec3& v : mesh.vertices()) {
@@ -203,4 +203,4 @@ TEST(RandomSolids, AreOfEveryKindAndSize) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::rendering

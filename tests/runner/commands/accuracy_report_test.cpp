@@ -4,11 +4,11 @@
 
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
-AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
-  AccuracyRow row;
+rendering::AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
+  rendering::AccuracyRow row;
   row.shape = shape;
   row.triangles = triangles;
   row.probe = probe;
@@ -43,4 +43,4 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,7 +7,7 @@
 
 #include "runner/devices/simulated.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kStep = 1e-3;
@@ -100,7 +100,7 @@ TEST(SimulatedStylus, EndsAreRoundedToTheResolutionAndStayInTheWorkspace) {
   SimulatedDeviceSettings device;
   SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);
   stylus.reset({{0.01234567, 0.02, -0.03}, {0, 0, 0}, glm::normalize(Vec3(1, 2, 3))});
-  const LineProbe probe = stylus.read().stylus;
+  const rendering::LineProbe probe = stylus.read().stylus;
   for (const Vec3& end : {probe.tip, probe.tail}) {
     for (int k = 0; k < 3; ++k) {
       const double steps = end[k] / device.resolution;
@@ -113,4 +113,4 @@ TEST(SimulatedStylus, EndsAreRoundedToTheResolutionAndStayInTheWorkspace) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -3,7 +3,7 @@
 #include "runner/display/console_panels.h"
 #include "runner/servo/servo_fault.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 ConsoleState in(const char* word) {
@@ -75,4 +75,4 @@ TEST(ConsoleWords, BeforeTheFirstTrialForcesThatAreOffAreNoAlarm) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,16 +7,18 @@
 #include <random>
 #include <thread>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kLength = 0.12;
 
-double length_of(const LineProbe& stylus) { return glm::length(stylus.tail - stylus.tip); }
+double length_of(const rendering::LineProbe& stylus) {
+  return glm::length(stylus.tail - stylus.tip);
+}
 
 TEST(MouseStylus, RestsOutsideOfTheHomeZoneUntilItIsMoved) {
   MouseStylus device(kLength, 1000);
-  const LineProbe start = device.read().stylus;
+  const rendering::LineProbe start = device.read().stylus;
   for (int i = 0; i < 1000; ++i) {
     const DeviceReading reading = device.read();
     EXPECT_EQ(reading.stylus.tip, start.tip);
@@ -32,12 +34,12 @@ TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
   for (const double rate : {1000.0, 4000.0}) {
     MouseStylus device(kLength, rate);
     MouseHand hand = device.resting_hand();
-    LineProbe before = device.read().stylus;
+    rendering::LineProbe before = device.read().stylus;
     hand.move(-0.12, -0.08, -0.04);
     hand.turn(M_PI - 0.1, -1.4);
     device.aim(hand.stylus());
     for (int i = 0; i < static_cast<int>(rate); ++i) {
-      const LineProbe now = device.read().stylus;
+      const rendering::LineProbe now = device.read().stylus;
       ASSERT_LE(glm::length(now.tip - before.tip), 1.0001 / rate);
       ASSERT_LE(glm::length(now.tail - before.tail), 6 / rate);
       ASSERT_NEAR(length_of(now), kLength, 1e-12);
@@ -57,12 +59,12 @@ TEST(MouseStylus, NoAimMakesAPoseThatIsNotFinite) {
     hand.move(far(random), far(random), far(random));
     hand.turn(far(random), far(random));
     device.aim(hand.stylus());
-    const LineProbe now = device.read().stylus;
+    const rendering::LineProbe now = device.read().stylus;
     ASSERT_NEAR(length_of(now), kLength, 1e-9);
     ASSERT_LT(glm::length(now.tip), 1);
   }
   // The tail straight through the tip: the axis has nowhere to go but must not be lost.
-  const LineProbe at = device.read().stylus;
+  const rendering::LineProbe at = device.read().stylus;
   device.aim({at.tail, at.tip});
   for (int i = 0; i < 2000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
 }
@@ -94,4 +96,4 @@ TEST(MouseHand, StaysInReachAndTurnsFiveDegreesOfFreedom) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

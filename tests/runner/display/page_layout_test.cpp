@@ -12,7 +12,7 @@
 // cannot see where. It asks this function whether it is wanted.
 extern "C" int __lsan_is_turned_off() { return 1; }  // NOLINT(bugprone-reserved-identifier)
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Page trial_page() {
@@ -233,4 +233,4 @@ TEST(MissingLetters, NamesWhatNoFontCanShow) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Kind = ConsoleCommand::Kind;
@@ -108,4 +108,4 @@ TEST(TextInput, AnythingAtAllIsSurvived) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

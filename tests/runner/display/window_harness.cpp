@@ -21,7 +21,7 @@
 
 #include "runner/display/window.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 class SteadyClock final : public Clock {
@@ -80,7 +80,7 @@ Page page_of(std::istringstream& words) {
   return page;
 }
 
-ConsoleState state_of(std::istringstream& words, const LineProbe& stylus) {
+ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& stylus) {
   ConsoleState state;
   words >> state.shape >> state.sample.faults;
   state.study = "ho2000";
@@ -100,12 +100,12 @@ ConsoleState state_of(std::istringstream& words, const LineProbe& stylus) {
   if (word == "homing") state.sample.waiting = Waiting::for_distance;
   if (word == "pre-flight") state.checklist = some_checklist();
   state.messages = {"10:02:11  session 1 began", "10:04:40  " + state.shape};
-  ObjectSpec object;
-  object.shape = state.shape == "cone"       ? ShapeKind::cone
-                 : state.shape == "cylinder" ? ShapeKind::cylinder
-                 : state.shape == "cube"     ? ShapeKind::cube
-                                             : ShapeKind::sphere;
-  state.objects = std::make_shared<const std::vector<ObjectSpec>>(1, object);
+  stimuli::ObjectSpec object;
+  object.shape = state.shape == "cone"       ? stimuli::ShapeKind::cone
+                 : state.shape == "cylinder" ? stimuli::ShapeKind::cylinder
+                 : state.shape == "cube"     ? stimuli::ShapeKind::cube
+                                             : stimuli::ShapeKind::sphere;
+  state.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, object);
   state.sample.probe = stylus;
   state.sample.phase = Phase::feeling;
   return state;
@@ -156,7 +156,7 @@ class Talk {
   DisplayLoop& windows_;
   MouseStylus& mouse_;
   std::mutex mutex_;
-  LineProbe stylus_;
+  rendering::LineProbe stylus_;
   std::mutex state_mutex_;
   std::optional<ConsoleState> state_;
   bool closed_ = false;
@@ -208,12 +208,12 @@ int show(const std::vector<std::string>& args) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner
 
 int main(int count, char** args) {
   try {
-    return palpate::show({args + 1, args + count});
-  } catch (const palpate::DisplayError& fault) {
+    return palpate::runner::show({args + 1, args + count});
+  } catch (const palpate::runner::DisplayError& fault) {
     std::cout << fault.what() << std::endl;  // with what was said before
     return 3;
   }

@@ -10,7 +10,7 @@
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using test::deepest_on_segment;
@@ -19,20 +19,20 @@ using test::turned_distance;
 
 /// Calls check with the line as the first block of the only stimulus sees it.
 template <class Check>
-void for_block(const ObjectSpec& object, const ShapeHypotheses& hypotheses, const Line& line,
-               Check check) {
+void for_block(const stimuli::ObjectSpec& object, const ShapeHypotheses& hypotheses,
+               const Line& line, Check check) {
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
   switch (object.shape) {
-    case ShapeKind::cone:
+    case stimuli::ShapeKind::cone:
       return check(AxialLine<ConeProfile>(hypotheses, shape, 0, line));
-    case ShapeKind::cylinder:
+    case stimuli::ShapeKind::cylinder:
       return check(AxialLine<CylinderProfile>(hypotheses, shape, 0, line));
-    case ShapeKind::cube:
+    case stimuli::ShapeKind::cube:
       return check(CubeLine(hypotheses, shape, 0, line));
-    case ShapeKind::sphere:
+    case stimuli::ShapeKind::sphere:
       return check(SphereLine(hypotheses, shape, 0, line));
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
       break;
   }
   throw std::invalid_argument("no analytic shape");
@@ -44,7 +44,7 @@ struct Case {
 };
 
 /// A stylus of 12 cm that passes the centre at up to 6 cm.
-Case random_case(Random& random) {
+Case random_case(stimuli::Random& random) {
   Case made;
   made.direction = random_direction(random);
   const Vec3 along = random_direction(random);
@@ -55,15 +55,15 @@ Case random_case(Random& random) {
   return made;
 }
 
-class DeepestPoint : public ::testing::TestWithParam<ShapeKind> {
+class DeepestPoint : public ::testing::TestWithParam<stimuli::ShapeKind> {
  protected:
   DeepestPoint() { object_.shape = GetParam(); }
-  ObjectSpec object_;
+  stimuli::ObjectSpec object_;
 };
 
 TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(11);
+  stimuli::Random random(11);
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
     const double s = 0.12 * random.unit();
@@ -80,7 +80,7 @@ TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
 
 TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(12);
+  stimuli::Random random(12);
   int far_normals = 0;
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
@@ -89,7 +89,8 @@ TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
       Deepest found;
       find_at_tip(line, found);
       for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-        const SurfaceDistance exact = turned_distance(object_, hypotheses.rotation(i), c.tip);
+        const stimuli::SurfaceDistance exact =
+            turned_distance(object_, hypotheses.rotation(i), c.tip);
         ASSERT_NEAR(found.distance[i], exact.distance, 1e-6);
         if (std::abs(found.cosine[i] - glm::dot(exact.normal, c.direction)) > 1e-3) ++far_normals;
       }
@@ -101,7 +102,7 @@ TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
 
 TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(13);
+  stimuli::Random random(13);
   double worst = 0;
   int turned_normals = 0;
   int checked = 0;
@@ -133,7 +134,7 @@ TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
 TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
   // The stylus points at the centre from outside, so its tip is deepest; or its tail, turned round.
   const ShapeHypotheses hypotheses({object_});
-  Random random(14);
+  stimuli::Random random(14);
   for (int n = 0; n < 50; ++n) {
     const Vec3 out = random_direction(random);
     const Vec3 near = 0.06 * out;
@@ -145,7 +146,8 @@ TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
         Deepest found;
         find_along_line(line, stylus.length, found);
         for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-          const SurfaceDistance exact = turned_distance(object_, hypotheses.rotation(i), near);
+          const stimuli::SurfaceDistance exact =
+              turned_distance(object_, hypotheses.rotation(i), near);
           ASSERT_NEAR(found.distance[i], exact.distance, 1e-6);
           ASSERT_NEAR(found.cosine[i], glm::dot(exact.normal, out), 1e-3);
         }
@@ -155,14 +157,14 @@ TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, DeepestPoint,
-                         ::testing::Values(ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                           ShapeKind::cube));
+                         ::testing::Values(stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
+                                           stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube));
 
 // A stylus that cuts through an edge of a cube: both faces are equally near at the deepest place,
 // and the force is perpendicular to the stylus.
 TEST(DeepestPointOnAKink, NormalIsPerpendicularToTheStylus) {
-  ObjectSpec cube;
-  cube.shape = ShapeKind::cube;
+  stimuli::ObjectSpec cube;
+  cube.shape = stimuli::ShapeKind::cube;
   const ShapeHypotheses hypotheses({cube});
   const Mat3 r = hypotheses.rotation(0);
   const Vec3 edge_normal = r * glm::normalize(Vec3(1, 1, 0));
@@ -177,4 +179,4 @@ TEST(DeepestPointOnAKink, NormalIsPerpendicularToTheStylus) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,14 +8,15 @@
 #include "stimuli/random.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate::test {
+namespace palpate::runner::test {
 
-inline Vec3 random_direction(Random& random) {
+inline Vec3 random_direction(stimuli::Random& random) {
   return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
 }
 
 /// Where a straight way out of the object leaves it.
-inline Percept touch_with_tip(const ObjectSpec& object, const Mat3& r, Random& random) {
+inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r,
+                              stimuli::Random& random) {
   const Vec3 start = 0.01 * random.unit() * random_direction(random);
   const Vec3 out = random_direction(random);
   double low = 0;
@@ -33,7 +34,8 @@ inline Percept touch_with_tip(const ObjectSpec& object, const Mat3& r, Random& r
 
 /// A stylus of 12 cm that comes sideways until it touches. Newton's steps: the distance is convex
 /// in the way, so they do not overshoot.
-inline Percept touch_with_stylus(const ObjectSpec& object, const Mat3& r, Random& random) {
+inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& r,
+                                 stimuli::Random& random) {
   const Vec3 along = random_direction(random);
   const Vec3 in = glm::normalize(glm::cross(along, random_direction(random)));
   Percept percept;
@@ -56,8 +58,8 @@ inline Percept touch_with_stylus(const ObjectSpec& object, const Mat3& r, Random
 }
 
 /// A percept of a turned object with noise of so many m and rad.
-inline Percept touch(const ObjectSpec& object, const Mat3& r, bool ray, double place_noise,
-                     double direction_noise, Random& random) {
+inline Percept touch(const stimuli::ObjectSpec& object, const Mat3& r, bool ray, double place_noise,
+                     double direction_noise, stimuli::Random& random) {
   Percept percept = ray ? touch_with_stylus(object, r, random) : touch_with_tip(object, r, random);
   const auto noise = [&random](double sd) {
     return sd * Vec3(random.normal(), random.normal(), random.normal());
@@ -69,4 +71,4 @@ inline Percept touch(const ObjectSpec& object, const Mat3& r, bool ray, double p
   return percept;
 }
 
-}  // namespace palpate::test
+}  // namespace palpate::runner::test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 TEST(LaneMath, ExpIsWithin3e7OfTheStandardLibrary) {
@@ -44,4 +44,4 @@ TEST(LaneMath, LogNormalCdfIsWithinItsBound) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

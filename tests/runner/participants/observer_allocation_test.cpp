@@ -4,7 +4,7 @@
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
@@ -29,4 +29,4 @@ TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

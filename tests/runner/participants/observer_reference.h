@@ -9,14 +9,14 @@
 #include "runner/participants/shape_observer.h"
 #include "stimuli/signed_distance.h"
 
-namespace palpate::test {
+namespace palpate::runner::test {
 
-inline std::vector<ObjectSpec> four_shapes() {
-  std::vector<ObjectSpec> stimuli(4);
-  stimuli[0].shape = ShapeKind::sphere;
-  stimuli[1].shape = ShapeKind::cone;
-  stimuli[2].shape = ShapeKind::cylinder;
-  stimuli[3].shape = ShapeKind::cube;
+inline std::vector<stimuli::ObjectSpec> four_shapes() {
+  std::vector<stimuli::ObjectSpec> stimuli(4);
+  stimuli[0].shape = stimuli::ShapeKind::sphere;
+  stimuli[1].shape = stimuli::ShapeKind::cone;
+  stimuli[2].shape = stimuli::ShapeKind::cylinder;
+  stimuli[3].shape = stimuli::ShapeKind::cube;
   return stimuli;
 }
 
@@ -27,17 +27,19 @@ struct DeepestReference {
 };
 
 /// Surface of a turned object centred at the origin.
-inline SurfaceDistance turned_distance(const ObjectSpec& object, const Mat3& world_from_local,
-                                       const Vec3& point) {
-  SurfaceDistance found = signed_distance(object, glm::transpose(world_from_local) * point);
+inline stimuli::SurfaceDistance turned_distance(const stimuli::ObjectSpec& object,
+                                                const Mat3& world_from_local, const Vec3& point) {
+  stimuli::SurfaceDistance found =
+      stimuli::signed_distance(object, glm::transpose(world_from_local) * point);
   found.normal = world_from_local * found.normal;
   return found;
 }
 
 /// By ternary search to a nanometre: the distance to a convex object is convex along a line. Where
 /// the slope jumps, the normal is the mixture of both sides' that is perpendicular to the line.
-inline DeepestReference deepest_on_segment(const ObjectSpec& object, const Mat3& world_from_local,
-                                           const Vec3& tip, const Vec3& tail) {
+inline DeepestReference deepest_on_segment(const stimuli::ObjectSpec& object,
+                                           const Mat3& world_from_local, const Vec3& tip,
+                                           const Vec3& tail) {
   const double length = glm::length(tail - tip);
   const Vec3 along = (tail - tip) / length;
   const auto at = [&](double s) {
@@ -51,8 +53,8 @@ inline DeepestReference deepest_on_segment(const ObjectSpec& object, const Mat3&
     (at(a).distance < at(b).distance ? high : low) = at(a).distance < at(b).distance ? b : a;
   }
   constexpr double kStep = 1e-7;
-  const SurfaceDistance before = at(std::max(0.0, low - kStep));
-  const SurfaceDistance after = at(std::min(length, high + kStep));
+  const stimuli::SurfaceDistance before = at(std::max(0.0, low - kStep));
+  const stimuli::SurfaceDistance after = at(std::min(length, high + kStep));
   const double falling = glm::dot(before.normal, along);
   const double rising = glm::dot(after.normal, along);
   Vec3 normal = rising <= 0 ? after.normal : before.normal;
@@ -64,8 +66,8 @@ inline DeepestReference deepest_on_segment(const ObjectSpec& object, const Mat3&
 
 class ReferenceObserver {
  public:
-  ReferenceObserver(const std::vector<ObjectSpec>& objects, const ShapeHypotheses& hypotheses,
-                    const ObserverSettings& settings)
+  ReferenceObserver(const std::vector<stimuli::ObjectSpec>& objects,
+                    const ShapeHypotheses& hypotheses, const ObserverSettings& settings)
       : objects_(objects), hypotheses_(hypotheses), settings_(settings) {
     for (const auto& shape : hypotheses.shapes()) {
       prior_.push_back(-std::log(static_cast<double>(objects.size()) * shape.count));
@@ -73,12 +75,12 @@ class ReferenceObserver {
     }
   }
 
-  double log_likelihood(const ObjectSpec& object, const Mat3& r, const Percept& p) const {
+  double log_likelihood(const stimuli::ObjectSpec& object, const Mat3& r, const Percept& p) const {
     const ObserverSettings& o = settings_;
     const double v = o.contact_sd * o.contact_sd + o.model_contact_sd * o.model_contact_sd;
     const double kappa =
         1 / (o.direction_sd * o.direction_sd + o.model_direction_sd * o.model_direction_sd);
-    const SurfaceDistance tip = turned_distance(object, r, p.tip);
+    const stimuli::SurfaceDistance tip = turned_distance(object, r, p.tip);
     const DeepestReference deepest = p.ray ? deepest_on_segment(object, r, p.tip, p.tail)
                                            : DeepestReference{tip.distance, 0, tip.normal};
     const double d = deepest.distance;
@@ -129,11 +131,11 @@ class ReferenceObserver {
   }
 
  private:
-  std::vector<ObjectSpec> objects_;
+  std::vector<stimuli::ObjectSpec> objects_;
   const ShapeHypotheses& hypotheses_;
   ObserverSettings settings_;
   std::vector<double> prior_;
   std::vector<std::vector<double>> log_posterior_;
 };
 
-}  // namespace palpate::test
+}  // namespace palpate::runner::test

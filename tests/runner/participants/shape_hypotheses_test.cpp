@@ -15,25 +15,26 @@
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
-ObjectSpec spec(ShapeKind kind) {
-  ObjectSpec made;
+stimuli::ObjectSpec spec(stimuli::ShapeKind kind) {
+  stimuli::ObjectSpec made;
   made.shape = kind;
   return made;
 }
 
-const std::vector<ShapeKind> kKinds{ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                    ShapeKind::cube};
+const std::vector<stimuli::ShapeKind> kKinds{stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
+                                             stimuli::ShapeKind::cylinder,
+                                             stimuli::ShapeKind::cube};
 
 double degrees(double cosine) { return std::acos(std::min(cosine, 1.0)) * 180 / std::numbers::pi; }
 
 /// Angle between two orientations of a shape, modulo its symmetry; degrees.
-double angle(ShapeKind kind, const Mat3& a, const Mat3& b) {
-  if (kind == ShapeKind::sphere) return 0;
-  if (kind == ShapeKind::cone) return degrees(glm::dot(a[2], b[2]));
-  if (kind == ShapeKind::cylinder) return degrees(std::abs(glm::dot(a[2], b[2])));
+double angle(stimuli::ShapeKind kind, const Mat3& a, const Mat3& b) {
+  if (kind == stimuli::ShapeKind::sphere) return 0;
+  if (kind == stimuli::ShapeKind::cone) return degrees(glm::dot(a[2], b[2]));
+  if (kind == stimuli::ShapeKind::cylinder) return degrees(std::abs(glm::dot(a[2], b[2])));
   // The 24 rotations of a cube permute its axes and flip them; the trace of a' b s gives the angle.
   double best = -1;
   std::array<int, 3> order{0, 1, 2};
@@ -71,7 +72,8 @@ TEST(ShapeHypotheses, CountsAndLayout) {
 }
 
 TEST(ShapeHypotheses, EveryHypothesisIsARotation) {
-  const ShapeHypotheses hypotheses({spec(ShapeKind::cone), spec(ShapeKind::cube)});
+  const ShapeHypotheses hypotheses(
+      {spec(stimuli::ShapeKind::cone), spec(stimuli::ShapeKind::cube)});
   for (int i = 0; i < hypotheses.padded_size(); ++i) {
     const Mat3 r = hypotheses.rotation(i);
     for (int a = 0; a < 3; ++a) {
@@ -86,12 +88,12 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
   const std::vector<double> typical{0, 4.5, 5, 6.5};
   for (std::size_t k = 1; k < kKinds.size(); ++k) {
     const ShapeHypotheses hypotheses({spec(kKinds[k])});
-    Random random(3);
+    stimuli::Random random(3);
     double worst = 0;
     double sum = 0;
     constexpr int kDraws = 400;
     for (int draw = 0; draw < kDraws; ++draw) {
-      const Mat3 wanted = glm::mat3_cast(uniform_rotation(random));
+      const Mat3 wanted = glm::mat3_cast(stimuli::uniform_rotation(random));
       double nearest = 180;
       for (int i = 0; i < hypotheses.shapes()[0].count; ++i) {
         nearest = std::min(nearest, angle(kKinds[k], wanted, hypotheses.rotation(i)));
@@ -105,7 +107,8 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
 }
 
 TEST(ShapeHypotheses, NoTwoAreAlike) {
-  for (const ShapeKind kind : {ShapeKind::cone, ShapeKind::cylinder, ShapeKind::cube}) {
+  for (const stimuli::ShapeKind kind :
+       {stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     const ShapeHypotheses hypotheses({spec(kind)});
     for (int i = 0; i < hypotheses.shapes()[0].count; i += 7) {
       for (int j = 0; j < i; ++j) {
@@ -115,7 +118,7 @@ TEST(ShapeHypotheses, NoTwoAreAlike) {
   }
 }
 
-std::string message_of(const std::vector<ObjectSpec>& stimuli) {
+std::string message_of(const std::vector<stimuli::ObjectSpec>& stimuli) {
   try {
     const ShapeHypotheses hypotheses(stimuli);
   } catch (const std::invalid_argument& error) {
@@ -125,10 +128,11 @@ std::string message_of(const std::vector<ObjectSpec>& stimuli) {
 }
 
 TEST(ShapeHypotheses, NamesEveryStimulusThatNobodyKnows) {
-  ObjectSpec flat = spec(ShapeKind::cylinder);
+  stimuli::ObjectSpec flat = spec(stimuli::ShapeKind::cylinder);
   flat.height = 0;
   const std::string message =
-      message_of({spec(ShapeKind::mesh), spec(ShapeKind::sphere), spec(ShapeKind::compound), flat});
+      message_of({spec(stimuli::ShapeKind::mesh), spec(stimuli::ShapeKind::sphere),
+                  spec(stimuli::ShapeKind::compound), flat});
   EXPECT_NE(message.find("stimulus 1: a simulated participant knows sphere"), std::string::npos);
   EXPECT_EQ(message.find("stimulus 2"), std::string::npos);
   EXPECT_NE(message.find("stimulus 3: a simulated participant knows"), std::string::npos);
@@ -137,4 +141,4 @@ TEST(ShapeHypotheses, NamesEveryStimulusThatNobodyKnows) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

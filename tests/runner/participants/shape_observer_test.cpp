@@ -16,7 +16,7 @@
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using test::four_shapes;
@@ -32,8 +32,8 @@ Percept far_away() {
 /// Two spheres have one hypothesis each, so the log odds show the likelihoods as they are.
 class TwoSpheres : public ::testing::Test {
  protected:
-  static std::vector<ObjectSpec> spheres() {
-    std::vector<ObjectSpec> made(2);
+  static std::vector<stimuli::ObjectSpec> spheres() {
+    std::vector<stimuli::ObjectSpec> made(2);
     made[0].radius = 0.030;
     made[1].radius = 0.035;
     return made;
@@ -127,7 +127,7 @@ TEST(ShapeObserver, StartsFromAlikeShapes) {
 TEST(ShapeObserver, ForgetsBackToThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  Random random(5);
+  stimuli::Random random(5);
   for (int i = 0; i < 60; ++i) {
     observer.update(touch(four_shapes()[3], Mat3(1), true, 0, 0, random));
   }
@@ -140,7 +140,7 @@ TEST(ShapeObserver, ResetIsTheStart) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   const ShapeObserver fresh(hypotheses);
-  Random random(5);
+  stimuli::Random random(5);
   observer.update(touch(four_shapes()[1], Mat3(1), false, 0, 0, random));
   EXPECT_NE(observer.probability(1), fresh.probability(1));
   observer.reset();
@@ -150,12 +150,12 @@ TEST(ShapeObserver, ResetIsTheStart) {
 TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
   const ShapeHypotheses hypotheses(four_shapes());
   const ObserverSettings settings;
-  Random random(6);
+  stimuli::Random random(6);
   double worst = 0;
   for (int object = 0; object < 4; ++object) {
     ShapeObserver observer(hypotheses, settings);
     test::ReferenceObserver reference(four_shapes(), hypotheses, settings);
-    const Mat3 r = glm::mat3_cast(uniform_rotation(random));
+    const Mat3 r = glm::mat3_cast(stimuli::uniform_rotation(random));
     for (int n = 0; n < 16; ++n) {
       Percept p =
           touch(four_shapes()[static_cast<std::size_t>(object)], r, n % 4 > 1, 0.003, 0.25, random);
@@ -180,12 +180,12 @@ TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
 /// Share of 20 objects of each shape that are named right after 60 percepts.
 double accuracy(bool ray, double place_noise, double direction_noise) {
   const ShapeHypotheses hypotheses(four_shapes());
-  Random random(7);
+  stimuli::Random random(7);
   int right = 0;
   for (int trial = 0; trial < 80; ++trial) {
     ShapeObserver observer(hypotheses);
-    const ObjectSpec object = four_shapes()[static_cast<std::size_t>(trial % 4)];
-    const Mat3 r = glm::mat3_cast(uniform_rotation(random));
+    const stimuli::ObjectSpec object = four_shapes()[static_cast<std::size_t>(trial % 4)];
+    const Mat3 r = glm::mat3_cast(stimuli::uniform_rotation(random));
     for (int n = 0; n < 60; ++n) {
       observer.update(touch(object, r, ray, place_noise, direction_noise, random));
     }
@@ -209,7 +209,7 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
   ObserverSettings settings;
   settings.threshold = 0.6;
   ShapeObserver observer(hypotheses, settings);
-  Random random(8);
+  stimuli::Random random(8);
   bool decided = false;
   for (int n = 0; n < 60; ++n) {
     observer.update(touch(four_shapes()[2], Mat3(1), false, 0, 0, random));
@@ -222,12 +222,12 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
 TEST(ShapeObserver, FreeSpaceSpeaksAgainstAShapeThatWouldHaveBeenHit) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  Random random(9);
+  stimuli::Random random(9);
   // 4 mm inside the sphere, all round: a cone has room for that.
   for (int n = 0; n < 200; ++n) {
     Percept p;
     p.tip = 0.026 * random_direction(random);
-    if (signed_distance(four_shapes()[1], p.tip).distance > 0.003) observer.update(p);
+    if (stimuli::signed_distance(four_shapes()[1], p.tip).distance > 0.003) observer.update(p);
   }
   EXPECT_LT(observer.probability(0), 0.15);
   EXPECT_GT(observer.probability(1), 0.4);
@@ -236,7 +236,7 @@ TEST(ShapeObserver, FreeSpaceSpeaksAgainstAShapeThatWouldHaveBeenHit) {
 // A flat contact has no unique place along the stylus: it must not be held against the cube that
 // the torque puts the contact here or there on its face.
 TEST(ShapeObserver, PlaceOnAFlatFaceDoesNotMatterButOnASphereItDoes) {
-  std::vector<ObjectSpec> stimuli{four_shapes()[0], four_shapes()[3]};
+  std::vector<stimuli::ObjectSpec> stimuli{four_shapes()[0], four_shapes()[3]};
   const ShapeHypotheses hypotheses(stimuli);
   ObserverSettings settings;
   const test::ReferenceObserver reference(stimuli, hypotheses, settings);
@@ -263,7 +263,7 @@ TEST(ShapeObserver, ThreadsThatShareHypothesesAgreeToTheBit) {
   const ShapeHypotheses hypotheses(four_shapes());
   std::vector<ShapeObserver> observers(3, ShapeObserver(hypotheses));
   const auto watch = [](ShapeObserver& observer) {
-    Random random(10);
+    stimuli::Random random(10);
     for (int n = 0; n < 40; ++n) {
       observer.update(touch(four_shapes()[1], Mat3(1), n % 2 == 0, 0.002, 0.1, random));
     }
@@ -283,7 +283,7 @@ TEST(ShapeObserver, AStylusWithoutLengthIsAPoint) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver as_ray(hypotheses);
   ShapeObserver as_point(hypotheses);
-  Random random(11);
+  stimuli::Random random(11);
   Percept p = touch(four_shapes()[3], Mat3(1), false, 0.002, 0.1, random);
   as_point.update(p);
   p.ray = true;
@@ -311,4 +311,4 @@ TEST(ShapeObserver, NamesEverySettingThatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -8,7 +8,7 @@
 
 #include "runner/servo/servo_fault.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// The bits that a header declares, as its text has them.
@@ -29,7 +29,7 @@ TEST(FaultBits, EveryBitThatIsDeclaredStandsInTheTableOnce) {
   EXPECT_GE(declared.size(), 12u);
   std::set<std::uint32_t> told;
   std::set<std::string> names;
-  for (const FaultBit& fault : kFaultBits) {
+  for (const rendering::FaultBit& fault : kFaultBits) {
     EXPECT_TRUE(told.insert(fault.bit).second) << fault.name;
     EXPECT_TRUE(names.insert(fault.name).second) << fault.name;
     EXPECT_EQ(fault.bit & (fault.bit - 1), 0u) << fault.name;
@@ -40,4 +40,4 @@ TEST(FaultBits, EveryBitThatIsDeclaredStandsInTheTableOnce) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

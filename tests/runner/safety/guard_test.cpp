@@ -21,7 +21,7 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/recording_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using testing::DeviceRecord;
@@ -63,8 +63,9 @@ GuardSettings no_rights() {
 /// for the end, it is over. Trials are begun again until one has had force for a while, since a
 /// busy machine may make one trip; then no fault is cleared any more.
 void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
-  const Scene scene(
-      {{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, Material{}, 0, nullptr}}, false);
+  const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                                 Pose{}, stimuli::Material{}, 0, nullptr}},
+                               false);
   FaultSignals signals;
   GuardedDevice device(
       [&shared] { return std::make_unique<RecordingDevice>(shared.record, visiting); },
@@ -80,7 +81,7 @@ void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
     int felt = 0;
     while (felt < 100) {
       servo.clear_fault();
-      servo.prepare(scene, point_renderer(), {0.062, 0.05, 0.005});
+      servo.prepare(scene, rendering::point_renderer(), {0.062, 0.05, 0.005});
       std::uint32_t faults = 0;
       for (felt = 0; felt < 100 && !(faults & servo_fault::kTripped);) {
         const Sample& sample = servo.next();
@@ -469,4 +470,4 @@ TEST(Guard, OpeningAgainTakesTheForceOffFirst) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

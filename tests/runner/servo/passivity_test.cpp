@@ -15,7 +15,7 @@
 #include "stimuli/random.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kTick = 1e-3;
@@ -49,7 +49,7 @@ TEST(Passivity, ASampledSpringGrowsWithoutAndDoesNotWith) {
 
 TEST(Passivity, NeverPushesAlongTheMotion) {
   PassivityController control({}, kTick);
-  Random random(7);
+  stimuli::Random random(7);
   const auto any = [&random] {
     return Vec3(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5);
   };
@@ -121,11 +121,11 @@ double most_force(bool controlled, double limit, double* most_change = nullptr) 
   VirtualClock clock;
   Servo servo(device, clock, 1000, {limit, 0.5, 0.2});
   if (controlled) servo.control_passivity();
-  Material material;
+  stimuli::Material material;
   material.stiffness = 3000;
-  servo.prepare(
-      Scene({{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, material, 0, nullptr}}),
-      point_renderer(), HomeZone{});
+  servo.prepare(rendering::Scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                                   Pose{}, material, 0, nullptr}}),
+                rendering::point_renderer(), HomeZone{});
   double most = 0, sum = 0;
   Vec3 last;
   for (int tick = 0; tick < 3000; ++tick) {
@@ -149,4 +149,4 @@ TEST(Passivity, TheServoKeepsItsLimitsWithTheController) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -11,14 +11,15 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using testing::FakeDevice;
 
-Scene cube_scene() {
-  return Scene({{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, Material{}, 0, nullptr}},
-               false);
+rendering::Scene cube_scene() {
+  return rendering::Scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                            Pose{}, stimuli::Material{}, 0, nullptr}},
+                          false);
 }
 
 DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
@@ -32,7 +33,7 @@ TEST(Servo, ForcesGoOnAfterTheRestInTheHomeZoneAndShowTheWall) {
   FakeDevice device([](int tick) { return come_down(tick, 0.029); });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   int zero_tick = -1;
   for (int tick = 0; tick < 3000; ++tick) {
     const Sample& sample = servo.tick();
@@ -58,17 +59,18 @@ TEST(Servo, KeepingWarmChangesNoTick) {
     return reading;
   };
   FakeDevice device(slide), other_device(slide);
-  Material rough;  // where it sticks is remembered from tick to tick
+  stimuli::Material rough;  // where it sticks is remembered from tick to tick
   rough.damping = 1;
   rough.friction_static = 0.6;
   rough.friction_dynamic = 0.4;
-  const Scene scene({{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, rough, 0, nullptr}});
+  const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                                 Pose{}, rough, 0, nullptr}});
   VirtualClock clock, other_clock;
   Servo servo(device, clock, 1000, ForceLimits{}), other(other_device, other_clock, 1000, {});
   other.keep_warm();
   for (int trial = 0; trial < 2; ++trial) {
-    servo.prepare(scene, ray_renderer(), HomeZone{});
-    other.prepare(scene, ray_renderer(), HomeZone{});
+    servo.prepare(scene, rendering::ray_renderer(), HomeZone{});
+    other.prepare(scene, rendering::ray_renderer(), HomeZone{});
     bool touched = false;
     for (int tick = 0; tick < 3000; ++tick) {
       const Sample& sample = servo.tick();
@@ -90,7 +92,7 @@ TEST(Servo, NoForceBeforeTheStylusHasRested) {
   FakeDevice device([](int) { return stylus_at(0.02); });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < 2000; ++tick) {
     ASSERT_EQ(servo.tick().phase, Phase::homing);
     ASSERT_EQ(device.force, Vec3(0));
@@ -98,7 +100,7 @@ TEST(Servo, NoForceBeforeTheStylusHasRested) {
   // Outside, but never still.
   FakeDevice restless([](int tick) { return stylus_at(0.1 + 0.01 * std::sin(0.02 * tick)); });
   Servo other(restless, clock, 1000, ForceLimits{});
-  other.prepare(cube_scene(), point_renderer(), HomeZone{});
+  other.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < 5000; ++tick) ASSERT_EQ(other.tick().phase, Phase::homing);
 }
 
@@ -109,7 +111,7 @@ TEST(Servo, ForceIsLimitedInSizeAndChangeAndRampedAndBothForcesAreOnRecord) {
     device.limit(device_limit);
     VirtualClock clock;
     Servo servo(device, clock, 1000, ForceLimits{});
-    servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+    servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
     Vec3 last(0);
     bool cut = false;
     for (int tick = 0; tick < 3000; ++tick) {
@@ -128,7 +130,7 @@ TEST(Servo, ForceIsLimitedInSizeAndChangeAndRampedAndBothForcesAreOnRecord) {
   FakeDevice pressed([](int tick) { return stylus_at(tick < 500 ? 0.1 : 0.0275); });
   VirtualClock clock;
   Servo servo(pressed, clock, 1000, ForceLimits{});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   int onset = -1;
   for (int tick = 0; tick < 1000; ++tick) {
     const Sample& sample = servo.tick();
@@ -142,14 +144,14 @@ TEST(Servo, AnEmergencyIsZeroWithinTheTickAndUntilCleared) {
   FakeDevice device([](int tick) { return come_down(tick, 0.029); });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < 2000; ++tick) servo.tick();
   ASSERT_GT(device.force.z, 0.5);
   servo.emergency_zero();
   EXPECT_TRUE(servo.tick().faults & servo_fault::kEmergency);
   EXPECT_EQ(device.force, Vec3(0));
   servo.stop();
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < 2000; ++tick) {
     EXPECT_TRUE(servo.tick().faults & servo_fault::kTripped);
     ASSERT_EQ(device.force, Vec3(0)) << "a new trial does not clear it";
@@ -171,7 +173,7 @@ TEST(Servo, WhatIsWrongWithTheDeviceIsOnRecord) {
     });
     VirtualClock clock;
     Servo servo(device, clock, 1000, ForceLimits{});
-    servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+    servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
     for (int tick = 0; tick < 2000; ++tick) servo.tick();
     const Sample& sample = servo.tick();
     EXPECT_EQ(sample.trouble, trouble);
@@ -199,7 +201,7 @@ TEST_P(ServoFault, EndsInZeroForceForGood) {
       [](int tick) { return tick == kFaultTick ? GetParam().reading : come_down(tick, 0.029); });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < kFaultTick; ++tick) servo.tick();
   ASSERT_GT(device.force.z, 0.5);
   const Sample& sample = servo.tick();
@@ -215,17 +217,21 @@ TEST_P(ServoFault, EndsInZeroForceForGood) {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-INSTANTIATE_TEST_SUITE_P(
-    All, ServoFault,
-    ::testing::Values(
-        DeviceFault{
-            "nan_tip", {{{0, kNaN, 0.029}, {0, 0, 0.15}}, 0, false}, render_fault::kNonFinite},
-        DeviceFault{
-            "nan_tail", {{{0, 0, 0.029}, {0, 0, kNaN}}, 0, false}, render_fault::kNonFinite},
-        DeviceFault{
-            "infinite", {{{0, 0, -kInfinity}, {0, 0, 0.15}}, 0, false}, render_fault::kNonFinite},
-        DeviceFault{"lost", {{{0, 0, 0.029}, {0, 0, 0.15}}, 0, true}, servo_fault::kDeviceLost}),
-    [](const auto& fault) { return std::string(fault.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, ServoFault,
+                         ::testing::Values(DeviceFault{"nan_tip",
+                                                       {{{0, kNaN, 0.029}, {0, 0, 0.15}}, 0, false},
+                                                       rendering::render_fault::kNonFinite},
+                                           DeviceFault{"nan_tail",
+                                                       {{{0, 0, 0.029}, {0, 0, kNaN}}, 0, false},
+                                                       rendering::render_fault::kNonFinite},
+                                           DeviceFault{
+                                               "infinite",
+                                               {{{0, 0, -kInfinity}, {0, 0, 0.15}}, 0, false},
+                                               rendering::render_fault::kNonFinite},
+                                           DeviceFault{"lost",
+                                                       {{{0, 0, 0.029}, {0, 0, 0.15}}, 0, true},
+                                                       servo_fault::kDeviceLost}),
+                         [](const auto& fault) { return std::string(fault.param.name); });
 
 /// Stalls once for some ticks.
 class StallingClock final : public Clock {
@@ -249,7 +255,7 @@ TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
     FakeDevice device([](int tick) { return come_down(tick, 0.029); });
     StallingClock clock(2'000'000'000, missed * 1'000'000);
     Servo servo(device, clock, 1000, ForceLimits{});
-    servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+    servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
     std::uint32_t faults = 0;
     for (int tick = 0; tick < 2500; ++tick) faults |= servo.tick().faults;
     EXPECT_EQ((faults & servo_fault::kMissedTicks) != 0, missed >= 5) << missed;
@@ -270,7 +276,7 @@ TEST(Servo, TheWorkspaceMapMovesAndScales) {
   });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{}, {{0, 0, 0.05}, 2});
-  servo.prepare(cube_scene(), point_renderer(), HomeZone{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
   for (int tick = 0; tick < 3000; ++tick) servo.tick();
   EXPECT_NEAR(device.force.z, 0.8, 1e-9);
 }
@@ -306,4 +312,4 @@ TEST(ForceLimiter, NotFiniteIsZeroUntilCleared) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

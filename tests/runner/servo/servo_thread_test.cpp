@@ -13,14 +13,15 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using testing::FakeDevice;
 
-Scene cube_scene() {
-  return Scene({{std::make_shared<const ConvexMesh>(cube(0.06)), Pose{}, Material{}, 0, nullptr}},
-               false);
+rendering::Scene cube_scene() {
+  return rendering::Scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                            Pose{}, stimuli::Material{}, 0, nullptr}},
+                          false);
 }
 
 DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
@@ -59,7 +60,7 @@ TEST(ServoThread, EverySampleComesInOrderWhateverTheSessionDoes) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   std::uint32_t expected = 0;
   for (int i = 0; i < 1000; ++i) {
     if (i == 500) std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -123,7 +124,7 @@ TEST(ServoThread, ItsTicksStayAwayFromTheKernels) {
     UnhurriedClock clock;
     clock.wait_until(start_ns);
     ServoThread servo(device, clock, fast());
-    servo.prepare(cube_scene(), point_renderer(), quick_home());
+    servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
     for (int i = 0; i < 20; ++i) {
       const Sample& sample = servo.next();
       const std::int64_t due = sample.time_ns - sample.lateness_ns;
@@ -138,7 +139,7 @@ TEST(ServoThread, AFullRingIsAFaultOnRecordAndTheServoGoesOn) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast(64));
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   Sample newest;
   while (!servo.latest(newest) || newest.tick < 500)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -154,7 +155,7 @@ TEST(ServoThread, ADisplayThatStallsForSecondsIsNotNoticed) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast(1 << 16));
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   std::atomic<bool> done{false};
   std::uint64_t during_stalls = 0;
   std::jthread display([&] {
@@ -188,7 +189,7 @@ TEST(ServoThread, StopsAndBeginsAgain) {
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
   for (int trial = 0; trial < 5; ++trial) {
-    servo.prepare(cube_scene(), point_renderer(), quick_home());
+    servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
     EXPECT_EQ(servo.next().phase, Phase::homing) << "nothing is left of the trial before";
     while (servo.next().phase != Phase::feeling) {
     }
@@ -201,7 +202,7 @@ TEST(ServoThread, EmergencyZeroHoldsUntilCleared) {
   FakeDevice device = falling_device();
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   while (glm::length(servo.next().device1) < 0.75) {
   }
   EXPECT_FALSE(servo.forces_are_off());
@@ -215,7 +216,7 @@ TEST(ServoThread, EmergencyZeroHoldsUntilCleared) {
     ASSERT_NEAR(sample.rendering.device1.z, 0.8, 1e-9) << "what was rendered is on record beside";
   }
   servo.stop();
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   EXPECT_TRUE(servo.next().faults & servo_fault::kTripped) << "a new trial does not clear it";
   servo.clear_fault();
   while (servo.next().faults & servo_fault::kTripped) {
@@ -241,7 +242,7 @@ TEST(ServoThread, ADeviceThatHangsStopsTheTrialNotTheSession) {
   HangingDevice device;
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
-  servo.prepare(cube_scene(), point_renderer(), quick_home());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
   while (servo.next().phase != Phase::feeling) {
   }
   device.hangs = true;
@@ -274,4 +275,4 @@ TEST(TimeHistogram, QuantilesAreWithinAnEighth) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

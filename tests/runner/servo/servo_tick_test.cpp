@@ -20,7 +20,7 @@
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// Slides over an object from tick 300 on; calls `hook` from the servo's thread.
@@ -47,9 +47,10 @@ class SlidingDevice final : public Device {
   DeviceCapabilities capabilities_;
 };
 
-Scene ball() {
-  return Scene(
-      {{std::make_shared<const ConvexMesh>(icosphere(0.03, 3)), Pose{}, Material{}, 0, nullptr}});
+rendering::Scene ball() {
+  return rendering::Scene(
+      {{std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.03, 3)), Pose{},
+        stimuli::Material{}, 0, nullptr}});
 }
 
 /// Two trials; the second begins and ends while the thread is watched. \return force was felt
@@ -59,10 +60,10 @@ bool two_trials(SlidingDevice& device) {
   settings.rate = 2000;
   settings.realtime = {0, false, -1};
   settings.ring = 256;  // overflows
-  const Scene scene = ball();
+  const rendering::Scene scene = ball();
   ServoThread servo(device, clock, settings);
   bool felt = false;
-  servo.prepare(scene, ray_renderer(), {0.05, 0.002, 0.005});
+  servo.prepare(scene, rendering::ray_renderer(), {0.05, 0.002, 0.005});
   const auto wait = [&](int until) {
     Sample sample;
     while (device.tick() < until) {
@@ -73,7 +74,7 @@ bool two_trials(SlidingDevice& device) {
   };
   wait(600);
   servo.stop();
-  servo.prepare(scene, ray_renderer(), {0.05, 0.002, 0.005});
+  servo.prepare(scene, rendering::ray_renderer(), {0.05, 0.002, 0.005});
   servo.next();
   wait(900);
   servo.stop();
@@ -147,4 +148,4 @@ TEST(ServoTick, CallsTheSystemForItsSleepAlone) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

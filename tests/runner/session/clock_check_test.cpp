@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000, kDay = 86'400 * kSecond, kYear = 365 * kDay;
@@ -45,4 +45,4 @@ TEST(ClockCheck, DatesOfADamagedFileAreNoTrouble) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

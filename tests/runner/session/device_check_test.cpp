@@ -6,7 +6,7 @@
 
 #include "stimuli/object_spec.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 DeviceCapabilities some_device() {
@@ -23,11 +23,11 @@ DeviceCapabilities some_device() {
   return device;
 }
 
-Protocol some_protocol(const Material& material) {
-  Protocol protocol;
-  protocol.renderers = {RendererKind::point};
+protocols::Protocol some_protocol(const stimuli::Material& material) {
+  protocols::Protocol protocol;
+  protocol.renderers = {protocols::RendererKind::point};
   protocol.servo_rate = 1000;
-  StimulusSpec stimulus;
+  protocols::StimulusSpec stimulus;
   stimulus.name = "ball";
   stimulus.object.subdivisions = 1;
   stimulus.object.material = material;
@@ -35,15 +35,15 @@ Protocol some_protocol(const Material& material) {
   return protocol;
 }
 
-Material of(double stiffness, double damping = 0) {
-  Material material;
+stimuli::Material of(double stiffness, double damping = 0) {
+  stimuli::Material material;
   material.stiffness = stiffness;
   material.damping = damping;
   return material;
 }
 
-double share(const Material& material, const DeviceCapabilities& device, double rate = 1000,
-             double scale = 1, bool controlled = false) {
+double share(const stimuli::Material& material, const DeviceCapabilities& device,
+             double rate = 1000, double scale = 1, bool controlled = false) {
   return showable(material, device, rate, scale, controlled).share;
 }
 
@@ -68,22 +68,22 @@ TEST(DeviceCheck, WhatIsNotKnownOfADeviceDoesNotBound) {
 }
 
 TEST(DeviceCheck, LayersAndPartsCount) {
-  Material layered = of(1000);
+  stimuli::Material layered = of(1000);
   layered.layers = {{1e-3, 4000}};
   EXPECT_NEAR(share(layered, some_device()), 0.5, 1e-12);
 
-  Protocol protocol = some_protocol(of(500));
-  ObjectSpec part;
+  protocols::Protocol protocol = some_protocol(of(500));
+  stimuli::ObjectSpec part;
   part.material = of(8000);
   protocol.stimuli[0].object.parts = {part};
-  protocol.material_limit = MaterialLimit::limit;
+  protocol.material_limit = protocols::MaterialLimit::limit;
   EXPECT_EQ(limit_materials(protocol, some_device()).size(), 1u);
   EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 500);
   EXPECT_NEAR(protocol.stimuli[0].object.parts[0].material.stiffness, 2000, 1e-6);
 }
 
 TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
-  Protocol protocol = some_protocol(of(2500, 0.1));
+  protocols::Protocol protocol = some_protocol(of(2500, 0.1));
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());
   EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 2500);
   const auto refused = misfits(protocol, StimulusLibrary(protocol), some_device());
@@ -99,12 +99,12 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
   EXPECT_NE(stiff[0].find("passivity_controller"), std::string::npos) << stiff[0];
   protocol.stimuli[0].object.material = of(2500, 0.1);
 
-  protocol.material_limit = MaterialLimit::limit;
+  protocol.material_limit = protocols::MaterialLimit::limit;
   const auto limited = limit_materials(protocol, some_device());
   ASSERT_EQ(limited.size(), 1u);
   EXPECT_NE(limited[0].text.find("limited to 1851.85 N/m and 0.0740741 N s/m"), std::string::npos)
       << limited[0].text;
-  const Material& shown = protocol.stimuli[0].object.material;
+  const stimuli::Material& shown = protocol.stimuli[0].object.material;
   EXPECT_NEAR(shown.stiffness / 2000 + shown.damping, 1, 1e-9);
   EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), some_device()).empty());
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing is left to do
@@ -112,27 +112,27 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
 
 TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
   const auto compound = [] {
-    Protocol protocol = some_protocol(of(2500, 0.1));
-    ObjectSpec part;
+    protocols::Protocol protocol = some_protocol(of(2500, 0.1));
+    stimuli::ObjectSpec part;
     part.material = of(7777, 0.3);
     part.material.layers = {{1e-3, 9876.5}};
-    protocol.stimuli[0].object.parts = {ObjectSpec{}, part};
-    protocol.material_limit = MaterialLimit::limit;
+    protocol.stimuli[0].object.parts = {stimuli::ObjectSpec{}, part};
+    protocol.material_limit = protocols::MaterialLimit::limit;
     return protocol;
   };
-  Protocol limited = compound();
+  protocols::Protocol limited = compound();
   const auto materials = limit_materials(limited, some_device());
   ASSERT_EQ(materials.size(), 2u);
   const std::string event = to_json_text(materials, some_device(), 1000);
   EXPECT_NE(event.find("\"asked_stiffness_n_per_m\":2500.0"), std::string::npos) << event;
   EXPECT_NE(event.find("\"rate_hz\":1000.0"), std::string::npos) << event;
 
-  Protocol again = compound();
+  protocols::Protocol again = compound();
   EXPECT_FALSE(limit_as_recorded(again, "a note {"));
   EXPECT_FALSE(limit_as_recorded(again, R"({"masking_noise":"on"})"));
   EXPECT_EQ(again.stimuli[0].object.material.stiffness, 2500);
   EXPECT_TRUE(limit_as_recorded(again, event));
-  const ObjectSpec &was = limited.stimuli[0].object, &is = again.stimuli[0].object;
+  const stimuli::ObjectSpec &was = limited.stimuli[0].object, &is = again.stimuli[0].object;
   EXPECT_EQ(is.material.stiffness, was.material.stiffness);
   EXPECT_EQ(is.material.damping, was.material.damping);
   EXPECT_EQ(is.parts[0].material.stiffness, was.parts[0].material.stiffness);
@@ -141,9 +141,9 @@ TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
   EXPECT_NE(is.parts[1].material.stiffness, 7777);
 
   EXPECT_THROW(limit_as_recorded(again, event), std::invalid_argument) << "it is limited already";
-  Protocol other = some_protocol(of(2500, 0.1));  // no parts
+  protocols::Protocol other = some_protocol(of(2500, 0.1));  // no parts
   EXPECT_THROW(limit_as_recorded(other, event), std::invalid_argument);
-  Protocol whole = compound();
+  protocols::Protocol whole = compound();
   EXPECT_THROW(limit_as_recorded(whole, R"({"material_limited":[{"stimulus":"ball"}]})"),
                std::invalid_argument);
 }
@@ -151,11 +151,11 @@ TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
 TEST(DeviceCheck, ADeviceThatDoesNotPushShowsNothingAndRefusesNothing) {
   DeviceCapabilities mouse = some_device();
   mouse.actuated_freedom = 0;
-  Protocol protocol = some_protocol(of(1e5));
+  protocols::Protocol protocol = some_protocol(of(1e5));
   EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), mouse).empty());
-  protocol.material_limit = MaterialLimit::limit;
+  protocol.material_limit = protocols::MaterialLimit::limit;
   EXPECT_TRUE(limit_materials(protocol, mouse).empty());
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

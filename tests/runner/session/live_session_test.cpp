@@ -15,7 +15,7 @@
 #include "runner/servo/realtime.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using testing::FakeDevice;
@@ -130,7 +130,7 @@ class LiveSessions : public ::testing::Test {
   LiveSessions() {
     std::string pattern = ::testing::TempDir() + "live-XXXXXX";
     folder_ = mkdtemp(pattern.data());
-    store_.emplace(Store::open(folder_ / "live.db", Store::Mode::write_or_create));
+    store_.emplace(data::Store::open(folder_ / "live.db", data::Store::Mode::write_or_create));
     participant_ = store_->enrol(info_of(protocol_), "P01");
   }
   ~LiveSessions() override {
@@ -143,11 +143,11 @@ class LiveSessions : public ::testing::Test {
     settings.rate = protocol_.servo_rate;
     settings.realtime.lock_memory = false;
     ServoThread servo(device, clock_, settings);
-    RunInfo info;
+    data::RunInfo info;
     info.program_version = "0.0.0";
     info.device = "fake";
     SessionPlan plan(protocol_, participant_.number, 1);
-    for (const TrialRecord& r : store_->progress(participant_, 1).completed)
+    for (const data::TrialRecord& r : store_->progress(participant_, 1).completed)
       plan.answered(r.correct);
     std::vector<std::unique_ptr<MarkerSink>> sinks;
     sinks.push_back(std::make_unique<Collected>(markers_));
@@ -161,18 +161,18 @@ class LiveSessions : public ::testing::Test {
   }
 
   bool has_note(const std::string& text) {
-    const std::vector<StoredNote> notes = store_->notes();
+    const std::vector<data::StoredNote> notes = store_->notes();
     return std::any_of(notes.begin(), notes.end(),
-                       [&text](const StoredNote& note) { return note.text == text; });
+                       [&text](const data::StoredNote& note) { return note.text == text; });
   }
-  std::vector<TrialRecord> records() { return store_->progress(participant_, 1).completed; }
+  std::vector<data::TrialRecord> records() { return store_->progress(participant_, 1).completed; }
   std::vector<std::string> cut_off_reasons() {
     std::vector<std::string> out;
-    store_->for_each_cut_off([&](const StoredTrial& t) { out.push_back(t.cut_off_reason); });
+    store_->for_each_cut_off([&](const data::StoredTrial& t) { out.push_back(t.cut_off_reason); });
     return out;
   }
 
-  Protocol protocol_ = parse_protocol_text(kProtocol, "live.json");
+  protocols::Protocol protocol_ = protocols::parse_protocol_text(kProtocol, "live.json");
   StimulusLibrary library_{protocol_};
   RealClock clock_;
   Screen screen_{clock_};
@@ -181,8 +181,8 @@ class LiveSessions : public ::testing::Test {
   int signal_ = 0;
   std::unique_ptr<NoisePlayer> noise_;
   std::filesystem::path folder_;
-  std::optional<Store> store_;
-  Participant participant_;
+  std::optional<data::Store> store_;
+  data::Participant participant_;
 };
 
 DeviceReading at(double x, bool lost = false, std::uint8_t buttons = 0) {
@@ -200,7 +200,7 @@ TEST_F(LiveSessions, ALostDeviceCutsTheTrialOffAndItIsShownAgainOnceCleared) {
   screen_.answers = false;
   console_.repair = [&] { plugged = screen_.answers = true; };
   const LiveSession::Outcome outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.end, data::RunEnd::done);
   EXPECT_EQ(outcome.recorded, 2u);
   EXPECT_GE(console_.faults, 1);
   ASSERT_GE(cut_off_reasons().size(), 1u);
@@ -216,8 +216,8 @@ TEST_F(LiveSessions, FirstContactIsMarkedAndAnAnswerBeforeItHasNone) {
     if (tick == 60) screen_.answers = true;
     return at(tick < 30 || tick > 64 ? 0.1 : 0.019);
   });
-  EXPECT_EQ(run(device).end, RunEnd::done);
-  const std::vector<TrialRecord> both = records();
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
+  const std::vector<data::TrialRecord> both = records();
   ASSERT_EQ(both.size(), 2u);
   ASSERT_TRUE(both[0].first_contact_time.has_value());
   EXPECT_LT(*both[0].first_contact_time, both[0].response_time);
@@ -246,7 +246,7 @@ TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
   };
   // 30 mm off, the ball alone would let its trial begin.
   FakeDevice device([&](int) { return at(far ? 0.1 : 0.03); });
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   ASSERT_EQ(seen.size(), 2u);
   const auto& texts = protocol_.texts;
   for (const auto& said : seen)
@@ -262,7 +262,7 @@ TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
     if (page.go && !page.reply.empty() && !screen_.answers) plugged = false;
   };
   console_.repair = [&] { plugged = screen_.answers = true; };
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   const auto has = [&](const auto& what) {
     return std::any_of(screen_.pages.begin(), screen_.pages.end(), what);
   };
@@ -277,7 +277,7 @@ TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleKnowsWhatWasAnswered) {
   protocol_.breaks.min_seconds = 2;
   protocol_.response.labels["ball"] = "Kugel";
   FakeDevice device([](int) { return at(0.1); });
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   std::vector<int> counted;
   for (const Page& page : screen_.pages) {
     if (page.seconds_left == 0) continue;
@@ -290,7 +290,7 @@ TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleKnowsWhatWasAnswered) {
                                   [](const Page& page) { return !page.keys.empty(); });
   ASSERT_NE(trial, screen_.pages.end());
   EXPECT_EQ(trial->keys[0], std::pair(std::string("1"), std::string("Kugel")));
-  for (const TrialRecord& record : records()) EXPECT_EQ(record.response, "ball");
+  for (const data::TrialRecord& record : records()) EXPECT_EQ(record.response, "ball");
   EXPECT_EQ(console_.last.answer.substr(0, 6), "ball, ");
   ASSERT_EQ(console_.last.scores.size(), 2u);
   EXPECT_EQ(console_.last.scores[0].right + console_.last.scores[1].right, 1);
@@ -302,31 +302,31 @@ TEST_F(LiveSessions, ButtonsAnswerAtTheirTickAndOneHeldFromBeforeDoesNot) {
     return at(0.1, false, static_cast<std::uint8_t>(1 + (tick % 40 > 35 ? 2 : 0)));
   });
   screen_.answers = false;
-  EXPECT_EQ(run(device, AnswerBy::buttons).end, RunEnd::done);
+  EXPECT_EQ(run(device, AnswerBy::buttons).end, data::RunEnd::done);
   ASSERT_EQ(records().size(), 2u);
-  for (const TrialRecord& record : records()) EXPECT_EQ(record.response, "box");
+  for (const data::TrialRecord& record : records()) EXPECT_EQ(record.response, "box");
 }
 
 TEST_F(LiveSessions, AClosedScreenASignalAndAQuitEndItResumably) {
   FakeDevice device([](int) { return at(0.1); });
   screen_.answers = screen_.is_open = false;
   LiveSession::Outcome outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_TRUE(outcome.failed);
   screen_.is_open = true;
   signal_ = 15;
   outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_TRUE(outcome.failed);
   signal_ = 0;
   console_.next = {{ConsoleCommand::Kind::quit, "tired", 0}};
   outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_FALSE(outcome.failed);
   EXPECT_EQ(outcome.reason, "ended by the experimenter: tired");
   screen_.answers = true;
   outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.end, data::RunEnd::done);
   EXPECT_EQ(outcome.recorded, 2u);
 }
 
@@ -359,9 +359,9 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
     FakeDevice device(
         [state](int tick) { return at(0.1, tick > 60 && std::string(state) == "fault"); });
     const LiveSession::Outcome outcome = run(device);
-    EXPECT_EQ(outcome.end, RunEnd::withdrawn) << text << " in " << state;
+    EXPECT_EQ(outcome.end, data::RunEnd::withdrawn) << text << " in " << state;
     EXPECT_FALSE(outcome.failed);
-    EXPECT_EQ(store_->progress(participant_, 1).last_end, RunEnd::withdrawn);
+    EXPECT_EQ(store_->progress(participant_, 1).last_end, data::RunEnd::withdrawn);
     EXPECT_EQ(store_->progress(participant_, 1).completed.size(), outcome.recorded) << state;
   }
 }
@@ -382,14 +382,14 @@ TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
   console_.in_state = {"end", {ConsoleCommand::Kind::quit, "withdrawn", 0}};
   LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.recorded, 2u);
-  EXPECT_EQ(outcome.end, RunEnd::withdrawn);
+  EXPECT_EQ(outcome.end, data::RunEnd::withdrawn);
   participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
   console_.next = {{ConsoleCommand::Kind::quit, "a mistake", 0},
                    {ConsoleCommand::Kind::note, "she said why", 0},
                    {ConsoleCommand::Kind::quit, "Withdrawn", 0}};
   outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::withdrawn);
-  EXPECT_EQ(store_->progress(participant_, 1).last_end, RunEnd::withdrawn);
+  EXPECT_EQ(outcome.end, data::RunEnd::withdrawn);
+  EXPECT_EQ(store_->progress(participant_, 1).last_end, data::RunEnd::withdrawn);
   EXPECT_TRUE(has_note("she said why"));
 }
 
@@ -404,7 +404,7 @@ TEST_F(LiveSessions, AClearedFaultIsCleared) {
   console_.repair = [&] {
     if (++tries == 3) plugged = screen_.answers = true;
   };
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   int cleared = 0, refused = 0;
   for (const std::string& message : console_.last.messages) {
     cleared += message.find("fault cleared") == 0 ? 1 : 0;
@@ -434,7 +434,7 @@ TEST_F(LiveSessions, ADeviceThatIsUnpluggedInABreakIsToldOfThere) {
                      {ConsoleCommand::Kind::go_on, "", 0}};
   };
   const LiveSession::Outcome outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::done);
+  EXPECT_EQ(outcome.end, data::RunEnd::done);
   EXPECT_EQ(outcome.recorded, 2u);
   EXPECT_EQ(state, "rest");
   EXPECT_NE(fault.find("the device is unplugged"), std::string::npos) << fault;
@@ -471,7 +471,7 @@ TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
     trouble = DeviceTrouble::none;
     screen_.answers = true;
   };
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   EXPECT_EQ(console_.pauses, 1);
 
   participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
@@ -482,7 +482,7 @@ TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
     return reading;
   });
   const LiveSession::Outcome outcome = run(dying);
-  EXPECT_EQ(outcome.end, RunEnd::aborted);
+  EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_TRUE(outcome.failed);
   EXPECT_NE(outcome.reason.find("start the program again"), std::string::npos);
   EXPECT_EQ(dying.force, Vec3(0));
@@ -493,7 +493,7 @@ TEST_F(LiveSessions, AStopIsTakenBackAndTheEndSaysSo) {
   FakeDevice device([](int) { return at(0.1); });
   const ConsoleCommand stop{ConsoleCommand::Kind::stop_after_trial, "", 0};
   console_.next = {stop, stop};
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   EXPECT_EQ(screen_.texts.back(), "that was all");
   EXPECT_EQ(console_.last.state, "end");
   EXPECT_EQ(console_.last.stop_plan, "");
@@ -510,7 +510,7 @@ TEST_F(LiveSessions, AStopIsObeyedWhileItIsHeld) {
   console_.clears = false;
   console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
   const LiveSession::Outcome outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::paused);
+  EXPECT_EQ(outcome.end, data::RunEnd::paused);
   EXPECT_FALSE(outcome.failed);
   EXPECT_EQ(outcome.recorded, 0u);
 }
@@ -519,7 +519,7 @@ TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
   protocol_.sessions.max_minutes = 1e-6;
   FakeDevice device([](int) { return at(0.1); });
   const LiveSession::Outcome outcome = run(device);
-  EXPECT_EQ(outcome.end, RunEnd::paused);
+  EXPECT_EQ(outcome.end, data::RunEnd::paused);
   EXPECT_LT(outcome.recorded, 2u);
 }
 
@@ -544,7 +544,7 @@ class Headphones final : public SoundOutput {
 TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack) {
   const Plugged plugged = std::make_shared<std::atomic<bool>>(true);
   noise_ =
-      std::make_unique<NoisePlayer>(MaskingNoise{}, 1, "headphones",
+      std::make_unique<NoisePlayer>(protocols::MaskingNoise{}, 1, "headphones",
                                     [plugged](const std::string&) -> std::unique_ptr<SoundOutput> {
                                       if (!*plugged) throw SoundError("no headphones");
                                       return std::make_unique<Headphones>(plugged);
@@ -558,12 +558,12 @@ TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack
   console_.repair = [&] {  // at the second try
     if (console_.pauses == 2) *plugged = screen_.answers = true;
   };
-  EXPECT_EQ(run(device).end, RunEnd::done);
+  EXPECT_EQ(run(device).end, data::RunEnd::done);
   EXPECT_GE(console_.pauses, 2);
   ASSERT_GE(cut_off_reasons().size(), 1u);
   EXPECT_EQ(cut_off_reasons()[0], "the masking noise stopped");
   std::vector<std::string> events;
-  for (const StoredNote& note : store_->notes()) {
+  for (const data::StoredNote& note : store_->notes()) {
     if (note.text.find("masking_noise") != std::string::npos) events.push_back(note.text);
   }
   ASSERT_EQ(events.size(), 4u);
@@ -586,4 +586,4 @@ TEST_F(LiveSessions, MarkersThatNobodyTakesAreCountedAndHoldNobodyUp) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

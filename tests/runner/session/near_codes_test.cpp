@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Codes = std::vector<std::string>;
@@ -49,4 +49,4 @@ TEST(NearCodes, ShortCodesDifferByALetterOnPurpose) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -6,7 +6,7 @@
 
 #include "runner/servo/servo.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using Step = Preflight::Step;
@@ -192,7 +192,9 @@ TEST(FeeblePush, PushesToTheRightWithinTheLimitsAndLetsGo) {
 class WrongServo final : public TickSource {
  public:
   explicit WrongServo(const std::function<void(Sample&)>& spoil) : spoil_(spoil) {}
-  void prepare(const Scene&, const Renderer&, const HomeZone&) override { sample_.tick = ~0u; }
+  void prepare(const rendering::Scene&, const rendering::Renderer&, const HomeZone&) override {
+    sample_.tick = ~0u;
+  }
   const Sample& next() noexcept override {
     sample_.phase = Phase::feeling;
     sample_.time_ns += 1'000'000;
@@ -242,4 +244,4 @@ TEST(Preflight, ADeviceThatIsLostMeanwhileIsHomedAgain) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

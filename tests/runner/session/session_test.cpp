@@ -12,7 +12,7 @@
 #include "runner/session/run_record.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 using testing::FakeDevice;
@@ -32,7 +32,7 @@ class Scripted final : public Respondent {
   explicit Scripted(std::deque<int> right) : right_(std::move(right)) {}
   void read(const std::string& text) override { pages += text + ";"; }
   void feedback(bool correct) override { pages += correct ? "right;" : "wrong;"; }
-  void begin_trial(const Trial& trial) override {
+  void begin_trial(const protocols::Trial& trial) override {
     right_now_ = right_.empty() ? 1 : right_.front();
     if (!right_.empty()) right_.pop_front();
     answer_ = right_now_ == 1 ? trial.stimulus : 1 - trial.stimulus;
@@ -50,19 +50,19 @@ class Scripted final : public Respondent {
 
 class MemoryLog final : public TrialLog {
  public:
-  int begin(const TrialRecord& planned, std::int64_t) override {
+  int begin(const data::TrialRecord& planned, std::int64_t) override {
     began.push_back(planned.trial);
     return 1;
   }
-  void finish(const TrialRecord& record) override { finished.push_back(record); }
+  void finish(const data::TrialRecord& record) override { finished.push_back(record); }
   void cut_off(const std::string& reason) override { cut.push_back(reason); }
   std::vector<int> began;
-  std::vector<TrialRecord> finished;
+  std::vector<data::TrialRecord> finished;
   std::vector<std::string> cut;
 };
 
 struct Station {
-  Protocol protocol = parse_protocol_text(kTwoShapes, "two.json");
+  protocols::Protocol protocol = protocols::parse_protocol_text(kTwoShapes, "two.json");
   StimulusLibrary library{protocol};
   FakeDevice device{[](int) { return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, false}; }};
   VirtualClock clock;
@@ -87,7 +87,7 @@ TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
   EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;rest;rest;bye;");
   ASSERT_EQ(station.log.finished.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
-    const TrialRecord& record = station.log.finished[i];
+    const data::TrialRecord& record = station.log.finished[i];
     EXPECT_EQ(record.trial, static_cast<int>(i) + 1);
     EXPECT_EQ(record.practice, i < 2);
     EXPECT_TRUE(record.correct);
@@ -103,7 +103,7 @@ TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
   Scripted respondent({1, 1, -1});
   Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
   run(session);
-  const TrialRecord& record = station.log.finished[2];
+  const data::TrialRecord& record = station.log.finished[2];
   EXPECT_TRUE(record.timed_out);
   EXPECT_FALSE(record.correct);
   EXPECT_EQ(record.response, "");
@@ -145,7 +145,7 @@ TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
     run(resumed);
     ASSERT_EQ(station.log.finished.size(), expected.size() - stop);
     for (std::size_t i = stop; i < expected.size(); ++i) {
-      const TrialRecord& record = station.log.finished[i - stop];
+      const data::TrialRecord& record = station.log.finished[i - stop];
       EXPECT_EQ(record.trial, expected[i].trial);
       EXPECT_EQ(record.shape, expected[i].shape);
       EXPECT_EQ(record.orientation_wxyz, expected[i].orientation_wxyz);
@@ -178,10 +178,10 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
   const std::filesystem::path folder = mkdtemp(pattern.data());
   {
     Station station;
-    const Protocol& protocol = station.protocol;
-    Store store = Store::open(folder / "live.db", Store::Mode::write_or_create);
-    const Participant participant = store.enrol(info_of(protocol), "P01");
-    RunInfo info;
+    const protocols::Protocol& protocol = station.protocol;
+    data::Store store = data::Store::open(folder / "live.db", data::Store::Mode::write_or_create);
+    const data::Participant participant = store.enrol(info_of(protocol), "P01");
+    data::RunInfo info;
     info.program_version = "0.0.0";
     info.device = "fake";
     FakeDevice failing([](int tick) {
@@ -194,21 +194,21 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
                     SessionPlan(protocol, participant.number, 1), {0, 0});
     EXPECT_THROW(run(session), SessionFault);
     EXPECT_EQ(failing.force, Vec3(0));
-    log.end(RunEnd::aborted, station.clock.now_ns());
+    log.end(data::RunEnd::aborted, station.clock.now_ns());
 
-    const SessionProgress before = store.progress(participant, 1);
+    const data::SessionProgress before = store.progress(participant, 1);
     EXPECT_EQ(before.completed.size(), 2u);
     EXPECT_EQ(before.cut_off, 1);
     SessionPlan plan(protocol, participant.number, 1);
-    for (const TrialRecord& record : before.completed) plan.answered(record.correct);
+    for (const data::TrialRecord& record : before.completed) plan.answered(record.correct);
     RunRecord again(store, info_of(protocol), participant, info);
     Session resumed({protocol, station.library, station.servo, station.clock, respondent, again},
                     plan, {0, 0});
     run(resumed);
-    again.end(RunEnd::done, station.clock.now_ns());
-    const SessionProgress after = store.progress(participant, 1);
+    again.end(data::RunEnd::done, station.clock.now_ns());
+    const data::SessionProgress after = store.progress(participant, 1);
     ASSERT_EQ(after.completed.size(), 6u);
-    for (const TrialRecord& record : after.completed) {
+    for (const data::TrialRecord& record : after.completed) {
       EXPECT_EQ(record.attempt, record.trial == 3 ? 2 : 1);
     }
   }
@@ -216,4 +216,4 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -13,7 +13,7 @@
 #include "protocols/parse.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 namespace fs = std::filesystem;
@@ -27,21 +27,22 @@ class SimulatedStudy : public ::testing::Test {
   ~SimulatedStudy() override { fs::remove_all(folder_); }
 
   /// Two short sessions for each participant, so that simulation of the whole takes a second.
-  Protocol protocol(const std::string& more = "") const {
-    return parse_protocol_text(R"({"version": 1, "name": "brief", "renderers": ["point", "ray"],
+  protocols::Protocol protocol(const std::string& more = "") const {
+    return protocols::parse_protocol_text(
+        R"({"version": 1, "name": "brief", "renderers": ["point", "ray"],
       "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
                   {"name": "cone", "shape": "cone", "radius_m": 0.03, "height_m": 0.06}],
       "repetitions": 3, "sessions": {"count": 2}, "practice": {"repetitions": 1, "criterion": 1, "max_rounds": 2},
       "breaks": {"every_trials": 4, "min_seconds": 5},
       "response": {"keys": {"1": "sphere", "2": "cone"}, "time_out_s": 9.0005}, "seed": 3)" +
-                                   more + "}",
-                               "brief.json");
+            more + "}",
+        "brief.json");
   }
 
   std::string csv_of(const fs::path& db) const {
-    Store store = Store::open(db, Store::Mode::read_only);
+    data::Store store = data::Store::open(db, data::Store::Mode::read_only);
     const fs::path csv = folder_ / "out.csv";
-    export_csv(store, csv, true);
+    data::export_csv(store, csv, true);
     EXPECT_FALSE(fs::exists(folder_ / "attempts.csv"))
         << "a simulated trial leaves no cut-off attempt";
     std::ifstream in(csv, std::ios::binary);
@@ -50,9 +51,9 @@ class SimulatedStudy : public ::testing::Test {
     return text.str();
   }
 
-  StudyProgress simulate(const Protocol& protocol, const fs::path& db, int jobs,
+  StudyProgress simulate(const protocols::Protocol& protocol, const fs::path& db, int jobs,
                          std::uint64_t seed = 1) const {
-    Store store = Store::open(db, Store::Mode::write_or_create);
+    data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
     return simulate_study(protocol, store, load_simulated_settings(""), {3, seed, jobs}, never, {});
   }
@@ -61,7 +62,7 @@ class SimulatedStudy : public ::testing::Test {
 };
 
 TEST_F(SimulatedStudy, IsTheSameForAnyNumberOfJobs) {
-  const Protocol p = protocol();
+  const protocols::Protocol p = protocol();
   const StudyProgress progress = simulate(p, folder_ / "one.db", 1);
   EXPECT_EQ(progress.recorded, progress.expected);
   EXPECT_GE(progress.recorded, 3 * (12 + 4));
@@ -73,14 +74,14 @@ TEST_F(SimulatedStudy, IsTheSameForAnyNumberOfJobs) {
 }
 
 TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
-  const Protocol p = protocol();
+  const protocols::Protocol p = protocol();
   simulate(p, folder_ / "whole.db", 2);
   const fs::path db = folder_ / "stopped.db";
-  Random random(11);
+  stimuli::Random random(11);
   int stops = 0;
   for (bool done = false; !done;) {
     ASSERT_LT(stops, 1000);
-    Store store = Store::open(db, Store::Mode::write_or_create);
+    data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     std::atomic<bool> stop{false};
     // A stop before the first report still finishes and records the trials under way.
     std::jthread stopper([&, after = random.below(40)] {
@@ -97,12 +98,12 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
 }
 
 TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
-  const Protocol p = protocol(R"(, "samples": true)");
+  const protocols::Protocol p = protocol(R"(, "samples": true)");
   simulate(p, folder_ / "samples.db", 2);
-  Store store = Store::open(folder_ / "samples.db", Store::Mode::read_only);
+  data::Store store = data::Store::open(folder_ / "samples.db", data::Store::Mode::read_only);
   int trials = 0;
   store.for_each_trial(
-      [&](const StoredTrial& trial) {
+      [&](const data::StoredTrial& trial) {
         ++trials;
         ASSERT_EQ(trial.record.samples.size(), trial.record.ticks);
         EXPECT_EQ(trial.record.samples.back().tick + 1, trial.record.ticks);
@@ -135,12 +136,12 @@ TEST(SimulatedSettings, PatchesAreCheckedAndChangeTheChecksum) {
   const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})");
   EXPECT_EQ(quick.motor.reaction_delay, 0.02);
   EXPECT_NE(quick.sha256, defaults.sha256);
-  EXPECT_THROW(patched(R"({"motor": {"reaction": 0.02}})"), InputError);
-  EXPECT_THROW(patched(R"({"motor": {"reaction_delay_s": "soon"}})"), InputError);
-  EXPECT_THROW(patched(R"({"motor": 3})"), InputError);
-  EXPECT_THROW(patched("{"), InputError);
+  EXPECT_THROW(patched(R"({"motor": {"reaction": 0.02}})"), protocols::InputError);
+  EXPECT_THROW(patched(R"({"motor": {"reaction_delay_s": "soon"}})"), protocols::InputError);
+  EXPECT_THROW(patched(R"({"motor": 3})"), protocols::InputError);
+  EXPECT_THROW(patched("{"), protocols::InputError);
   fs::remove(path);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

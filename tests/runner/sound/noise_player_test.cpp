@@ -11,7 +11,7 @@
 
 #include "runner/sound/masking_noise.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 /// What came out, and what goes wrong; outlives the outputs.
@@ -62,8 +62,8 @@ void wait_for(const Condition& condition) {
 class Players : public ::testing::Test {
  protected:
   std::unique_ptr<NoisePlayer> player() {
-    return std::make_unique<NoisePlayer>(MaskingNoise{NoiseKind::white, -20}, 1, "ear",
-                                         [this](const std::string&) {
+    return std::make_unique<NoisePlayer>(protocols::MaskingNoise{protocols::NoiseKind::white, -20},
+                                         1, "ear", [this](const std::string&) {
                                            ++ear_.opened;
                                            if (ear_.pulled) throw SoundError("pulled out");
                                            return std::make_unique<Headphones>(ear_);
@@ -170,4 +170,4 @@ TEST(NoisePlayer, WithoutAnOutputThereIsNone) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -7,13 +7,14 @@
 #include <complex>
 #include <vector>
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 constexpr double kRate = 48000;  // Hz
 constexpr double kPi = 3.14159265358979323846;
 
-std::vector<double> noise(NoiseKind kind, double level, double seconds, std::uint64_t seed = 3) {
+std::vector<double> noise(protocols::NoiseKind kind, double level, double seconds,
+                          std::uint64_t seed = 3) {
   NoiseSignal signal({kind, level}, kRate, seed);
   signal.sound(true);
   std::vector<double> samples(static_cast<std::size_t>((seconds + kNoiseFade) * kRate));
@@ -67,27 +68,31 @@ double density(const std::vector<double>& samples, double frequency) {
 }
 
 TEST(NoiseSignal, HasTheLevelThatIsAskedFor) {
-  for (const NoiseKind kind : {NoiseKind::white, NoiseKind::pink}) {
+  for (const protocols::NoiseKind kind :
+       {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     for (const double level : {-12.0, -24.0, -60.0}) {
-      EXPECT_NEAR(level_of(noise(kind, level, 20)), level, 0.2) << to_string(kind);
+      EXPECT_NEAR(level_of(noise(kind, level, 20)), level, 0.2) << protocols::to_string(kind);
     }
   }
 }
 
 TEST(NoiseSignal, PinkFallsByThreeDecibelAnOctaveAndWhiteByNone) {
-  for (const NoiseKind kind : {NoiseKind::white, NoiseKind::pink}) {
+  for (const protocols::NoiseKind kind :
+       {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     const std::vector<double> samples = noise(kind, -20, 12);
     const double at_1000 = density(samples, 1000);
     for (int octave = -3; octave <= 3; ++octave) {
-      const double fall = kind == NoiseKind::pink ? 10 * std::log10(std::pow(2, -octave)) : 0;
+      const double fall =
+          kind == protocols::NoiseKind::pink ? 10 * std::log10(std::pow(2, -octave)) : 0;
       EXPECT_NEAR(density(samples, 1000 * std::pow(2, octave)) - at_1000, fall, 0.8)
-          << to_string(kind) << ", " << octave << " octaves from 1000 Hz";
+          << protocols::to_string(kind) << ", " << octave << " octaves from 1000 Hz";
     }
   }
 }
 
 TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
-  for (const NoiseKind kind : {NoiseKind::white, NoiseKind::pink}) {
+  for (const protocols::NoiseKind kind :
+       {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     NoiseSignal signal({kind, -12}, kRate, 5);
     std::vector<double> before(960), rise(960), steady(48000), fall(48000);
     EXPECT_TRUE(signal.silent());
@@ -113,7 +118,7 @@ TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
 }
 
 TEST(NoiseSignal, TurnedOnInMidFadeItGoesUpFromThere) {
-  NoiseSignal signal({NoiseKind::white, -20}, kRate, 5);
+  NoiseSignal signal({protocols::NoiseKind::white, -20}, kRate, 5);
   std::vector<double> first(9600), half(4800), last(9600);
   signal.sound(true);
   signal.fill(first);
@@ -127,9 +132,11 @@ TEST(NoiseSignal, TurnedOnInMidFadeItGoesUpFromThere) {
 }
 
 TEST(NoiseSignal, FollowsFromItsSeed) {
-  EXPECT_EQ(noise(NoiseKind::pink, -20, 0.1), noise(NoiseKind::pink, -20, 0.1));
-  EXPECT_NE(noise(NoiseKind::pink, -20, 0.1), noise(NoiseKind::pink, -20, 0.1, 4));
+  EXPECT_EQ(noise(protocols::NoiseKind::pink, -20, 0.1),
+            noise(protocols::NoiseKind::pink, -20, 0.1));
+  EXPECT_NE(noise(protocols::NoiseKind::pink, -20, 0.1),
+            noise(protocols::NoiseKind::pink, -20, 0.1, 4));
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

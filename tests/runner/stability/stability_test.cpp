@@ -10,11 +10,12 @@
 #include "runner/stability/boundary.h"
 #include "runner/stability/integrators.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const double rate : {500.0, 1000.0, 10000.0}) {
       for (const int delay : {0, 1}) {
         for (const double stiffness : {10.0, 1000.0, 1e5}) {
@@ -26,7 +27,8 @@ TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
           const BoundaryPoint p = boundary_at(loop, stiffness);
           EXPECT_DOUBLE_EQ(p.theory, stiffness / rate * (0.5 + delay));
           EXPECT_NEAR(p.measured / p.theory, 1, 0.05)
-              << to_string(renderer) << ", " << rate << " Hz, delay " << delay << ", " << stiffness;
+              << protocols::to_string(renderer) << ", " << rate << " Hz, delay " << delay << ", "
+              << stiffness;
         }
       }
     }
@@ -35,7 +37,8 @@ TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
 
 TEST(Stability, IsWhereTheTheoryPromisesIt) {
   std::vector<LoopCase> loops;
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const Situation situation : kSituations) {
       for (const double damping : {0.0, 1.0}) {
         LoopCase loop;
@@ -56,20 +59,22 @@ TEST(Stability, IsWhereTheTheoryPromisesIt) {
     for (const double stiffness : {30.0, 3000.0, 30000.0}) {
       const BoundaryPoint p = boundary_at(loop, stiffness);
       EXPECT_TRUE(p.promised);
-      EXPECT_FALSE(p.unsafe()) << to_string(loop.situation) << ", " << to_string(loop.renderer)
-                               << ", B " << loop.virtual_damping << ", " << stiffness << ": "
-                               << p.measured << " of " << p.theory;
+      EXPECT_FALSE(p.unsafe()) << to_string(loop.situation) << ", "
+                               << protocols::to_string(loop.renderer) << ", B "
+                               << loop.virtual_damping << ", " << stiffness << ": " << p.measured
+                               << " of " << p.theory;
     }
   }
 }
 
 TEST(Stability, TouchesWhatItSays) {
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const Situation situation : kSituations) {
-      const LoopScene scene(situation, renderer, Material{});
+      const LoopScene scene(situation, renderer, stimuli::Material{});
       EXPECT_EQ(scene.contacts(), situation == Situation::two_objects ? 2 : 1);
       EXPECT_GT(scene.force_tip(), 0);
-      const bool side = renderer == RendererKind::ray && situation != Situation::wall;
+      const bool side = renderer == protocols::RendererKind::ray && situation != Situation::wall;
       EXPECT_EQ(scene.force_tail() > 0, side) << to_string(situation);
     }
   }
@@ -84,7 +89,8 @@ TEST(Stability, FrictionMustHoldACountOfTheResolution) {
 }
 
 TEST(Stability, ThePassivityControllerExtendsIt) {
-  for (const RendererKind renderer : {RendererKind::point, RendererKind::ray}) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const Situation situation : kSituations) {
       LoopCase loop;
       loop.situation = situation;
@@ -121,4 +127,4 @@ TEST(Integrators, TheExactOneIsAndTheOthersConverge) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner

@@ -37,7 +37,8 @@
 namespace {
 
 using namespace palpate;
-using namespace palpate::falcon;
+using namespace palpate::runner;
+using namespace palpate::runner::falcon;
 using falcon::testing::EmulatedBus;
 using falcon::testing::Emulator;
 

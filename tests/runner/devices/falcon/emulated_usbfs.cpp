@@ -10,7 +10,7 @@
 
 #include "tests/runner/devices/falcon/emulated_bus.h"
 
-namespace palpate::falcon::testing {
+namespace palpate::runner::falcon::testing {
 namespace {
 
 constexpr int kPolls = 3;  // a servo looks once a tick; who looks more often is waiting
@@ -192,4 +192,4 @@ bool EmulatedUsbfs::reap(UMockdevIoctlClient* client, UMockdevIoctlData* argumen
   return true;
 }
 
-}  // namespace palpate::falcon::testing
+}  // namespace palpate::runner::falcon::testing

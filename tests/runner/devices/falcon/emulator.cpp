@@ -10,7 +10,7 @@
 #include "runner/devices/falcon/parameters.h"
 #include "stimuli/random.h"
 
-namespace palpate::falcon::testing {
+namespace palpate::runner::falcon::testing {
 namespace {
 
 constexpr std::int64_t kMonitorNs = 4'200'000;  // four bytes at 9600 baud
@@ -291,7 +291,7 @@ std::vector<std::uint8_t> synthetic_image(std::size_t words) {
     }
   };
   put({0x08AA, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F, 0x8002});
-  Random random(words);
+  stimuli::Random random(words);
   for (const std::size_t count : {words - words / 4, words / 4}) {
     put({count, 0x3F, 0x8002});
     for (std::size_t i = 0; i < count; ++i) put({random.next()});
@@ -300,4 +300,4 @@ std::vector<std::uint8_t> synthetic_image(std::size_t words) {
   return bytes;
 }
 
-}  // namespace palpate::falcon::testing
+}  // namespace palpate::runner::falcon::testing

@@ -13,7 +13,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::falcon::testing {
+namespace palpate::runner::falcon::testing {
 
 /// What goes wrong. Counts run from the moment they are set; 0: never.
 struct EmulatorFaults {
@@ -123,4 +123,4 @@ class Emulator {
 /// A well-formed boot stream with meaningless content: tests need no vendor's firmware.
 std::vector<std::uint8_t> synthetic_image(std::size_t words);
 
-}  // namespace palpate::falcon::testing
+}  // namespace palpate::runner::falcon::testing

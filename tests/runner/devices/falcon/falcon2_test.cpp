@@ -14,7 +14,7 @@
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/runner/devices/falcon/scripted_guide.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using testing::Emulator;
@@ -227,4 +227,4 @@ TEST(FalconRegistration, TheSamePlaceTwiceIsAskedAgain) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -11,7 +11,7 @@
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using testing::Emulator;
@@ -272,4 +272,4 @@ TEST(FalconDevice, SensesThreeDegreesOfFreedom) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -11,7 +11,7 @@
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using testing::Emulator;
@@ -114,7 +114,7 @@ TEST(FalconBoot, WithoutAFileItSaysWhatIsMissing) {
 std::string refusal(std::vector<std::uint8_t> bytes) {
   try {
     parse_image(std::move(bytes), "f.bin");
-  } catch (const InputError& error) {
+  } catch (const protocols::InputError& error) {
     return error.what();
   }
   return "";
@@ -151,7 +151,7 @@ TEST(FalconImage, AnyCutAndAnyNoiseIsRefusedOrWellFormed) {
     EXPECT_FALSE(refusal({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)}).empty())
         << size;
   }
-  Random random(3);
+  stimuli::Random random(3);
   for (int round = 0; round < 5000; ++round) {
     auto noise = good;
     noise[random.below(noise.size())] = static_cast<std::uint8_t>(random.next());
@@ -164,7 +164,7 @@ TEST(FalconImage, AFileThatIsMissingOrAFolderIsNamed) {
     try {
       read_image(file);
       ADD_FAILURE() << file;
-    } catch (const InputError& error) {
+    } catch (const protocols::InputError& error) {
       EXPECT_NE(std::string(error.what()).find("None is shipped"), std::string::npos)
           << error.what();
     }
@@ -182,4 +182,4 @@ TEST(FalconImage, ReadsAFile) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -10,7 +10,7 @@
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/serial.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 constexpr std::int64_t kNow = 1'793'530'800'000'000'000;  // 2026-11-01T11:00:00Z
@@ -28,7 +28,7 @@ Calibration example() {
 std::string refusal(const std::string& text) {
   try {
     parse_calibration(text, "c.json");
-  } catch (const InputError& error) {
+  } catch (const protocols::InputError& error) {
     return error.what();
   }
   return "";
@@ -115,11 +115,11 @@ TEST(FalconCalibration, AFileThatOthersCanWriteIsRefused) {
   }
   for (const mode_t mode : {0660, 0602, 0666}) {
     ASSERT_EQ(::chmod(path.c_str(), mode), 0);
-    EXPECT_THROW(read_calibration(path), InputError) << std::oct << mode;
+    EXPECT_THROW(read_calibration(path), protocols::InputError) << std::oct << mode;
   }
   ASSERT_EQ(::chmod(path.c_str(), 0600), 0);
   if (::chown(path.c_str(), 65534, 65534) == 0 && ::geteuid() != 65534) {  // root alone may
-    EXPECT_THROW(read_calibration(path), InputError);
+    EXPECT_THROW(read_calibration(path), protocols::InputError);
   }
   ::unlink(path.c_str());
 }
@@ -156,4 +156,4 @@ TEST(FalconCalibration, OneFromTheFutureIsNotBelieved) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -19,7 +19,7 @@
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using testing::EmulatedBus;
@@ -126,11 +126,12 @@ INSTANTIATE_TEST_SUITE_P(Ends, FalconGuard,
                          });
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon
 
 int main(int argc, char** argv) {
-  if (argc > 1 && std::strcmp(argv[1], "--runner") == 0) return palpate::falcon::be_runner();
-  if (!palpate::falcon::testing::rerun_preloaded(argv)) return 1;
+  if (argc > 1 && std::strcmp(argv[1], "--runner") == 0)
+    return palpate::runner::falcon::be_runner();
+  if (!palpate::runner::falcon::testing::rerun_preloaded(argv)) return 1;
   ::testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -7,7 +7,7 @@
 #include "runner/devices/falcon/packets.h"
 #include "stimuli/random.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 std::string text(const Packet& packet) { return {packet.begin(), packet.end()}; }
@@ -126,7 +126,7 @@ TEST(FalconPackets, ALongPacketIsDropped) {
 }
 
 TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
-  Random random(7);
+  stimuli::Random random(7);
   PacketStream stream;
   const std::string whole = text(encode(Reply{{1, -2, 3}, 0, 7}));
   // Bytes near the alphabet, so that much looks like a packet.
@@ -149,4 +149,4 @@ TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon

@@ -16,7 +16,7 @@
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"
 
-namespace palpate::falcon {
+namespace palpate::runner::falcon {
 namespace {
 
 using testing::EmulatedBus;
@@ -251,10 +251,10 @@ TEST(FalconUsb, TwoAtOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::falcon
+}  // namespace palpate::runner::falcon
 
 int main(int argc, char** argv) {
-  if (!palpate::falcon::testing::rerun_preloaded(argv)) return 1;
+  if (!palpate::runner::falcon::testing::rerun_preloaded(argv)) return 1;
   ::testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -3,7 +3,7 @@
 #include "runner/servo/device.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 
-namespace palpate::falcon::testing {
+namespace palpate::runner::falcon::testing {
 
 /// The line's own time.
 class LineClock final : public Clock {
@@ -18,4 +18,4 @@ class LineClock final : public Clock {
   FakeTransport& line_;
 };
 
-}  // namespace palpate::falcon::testing
+}  // namespace palpate::runner::falcon::testing

@@ -2,10 +2,10 @@
 // umockdev's library must stand before libc: a program that mocks a bus starts itself again with it
 // preloaded.
 
-namespace palpate::falcon::testing {
+namespace palpate::runner::falcon::testing {
 
 /// Starts the program again with umockdev's library (and a sanitizer's before it) preloaded, unless
 /// it is. Returns whether it is.
 bool rerun_preloaded(char** argv);
 
-}  // namespace palpate::falcon::testing
+}  // namespace palpate::runner::falcon::testing

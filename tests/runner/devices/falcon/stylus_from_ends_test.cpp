@@ -10,14 +10,14 @@
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
-namespace palpate {
+namespace palpate::runner {
 namespace {
 
 Vec3 apply(const Pose& pose, const Vec3& p) { return pose.orientation * p + pose.position; }
 
 std::vector<PairedPoint> paired(const Pose& truth, int count, double noise, std::uint64_t seed,
                                 const Vec3& spread = Vec3(0.03)) {
-  Random random(seed);
+  stimuli::Random random(seed);
   const auto normal = [&random](double size) {
     return size * Vec3(random.normal(), random.normal(), random.normal());
   };
@@ -30,9 +30,9 @@ std::vector<PairedPoint> paired(const Pose& truth, int count, double noise, std:
 }
 
 TEST(StylusFromEnds, TheFitIsExactWithoutNoise) {
-  Random random(5);
+  stimuli::Random random(5);
   for (int round = 0; round < 200; ++round) {
-    const Pose truth{{0.3, -0.2, 0.1 * round}, uniform_rotation(random)};
+    const Pose truth{{0.3, -0.2, 0.1 * round}, stimuli::uniform_rotation(random)};
     const RigidFit fit = fit_rigid(paired(truth, 8 + round % 5, 0, 100 + round));
     EXPECT_LT(glm::length(fit.tail_in_tip.position - truth.position), 1e-12);
     EXPECT_GT(std::abs(glm::dot(fit.tail_in_tip.orientation, truth.orientation)), 1 - 1e-12);
@@ -53,7 +53,7 @@ TEST(StylusFromEnds, FlatPointsGiveNoMirrorImage) {
   const Pose truth{{0.1, 0, 0}, glm::normalize(Quat(0, 1, 1, 0))};
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     auto points = paired(truth, 8, 0, seed);
-    Random random(seed, {1});
+    stimuli::Random random(seed, {1});
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Vec3 p = 0.03 * Vec3(std::cos(i), std::sin(i), 0);
       points[i] = {apply(truth, p) + 3e-4 * Vec3(random.normal(), random.normal(), random.normal()),
@@ -92,7 +92,7 @@ TEST(StylusFromEnds, AStylusThatChangesItsLengthIsAFault) {
   StylusFromEnds stylus({{0, 0, 0.12}, {1, 0, 0, 0}}, 0.12, 0.004);
   EXPECT_FALSE(stylus.update({0, 0, 0}, {0, 0, 0.01})) << "nothing right has been seen yet";
   EXPECT_TRUE(stylus.update({0, 0, 0}, {0, 0, 0.003}));
-  const LineProbe good = stylus.stylus();
+  const rendering::LineProbe good = stylus.stylus();
   for (int i = 1; i < StylusFromEnds::kMaxWrong; ++i) {  // a late reply or two is borne
     EXPECT_TRUE(stylus.update({0, 0, 0}, {0, 0, 0.006}));
     EXPECT_EQ(stylus.stylus().tail, good.tail);
@@ -105,4 +105,4 @@ TEST(StylusFromEnds, AStylusThatChangesItsLengthIsAFault) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::runner
