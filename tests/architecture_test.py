@@ -109,6 +109,30 @@ def within(room, outer):
     return room == outer or room.startswith(outer + "/")
 
 
+def is_declaration(path, opened):
+    """Whether a namespace is opened only to declare another room's class."""
+    return re.search(rf"^namespace {opened} \{{\n((class|struct) \w+;\n)+\}}", path.read_text(), re.M) is not None
+
+
+def types_of(text):
+    """Qualified names of the types that a source defines in named namespaces."""
+    text = re.sub(r'//.*|/\*.*?\*/|^\s*#.*|R"(\w*)\(.*?\)\1"|"(\\.|[^"\\\n])*"|\'(\\.|[^\'\\\n])\'', "", text, flags=re.M)
+    scopes, head = [], ""  # names of the open braces' namespaces; None: a body
+    for piece in re.split(r"([{};])", text):
+        if piece == "{":
+            if opened := re.search(r"\bnamespace\s*([\w:]*)\s*$", head):
+                scopes.append(opened[1] or None)
+            else:
+                defined = re.search(r"(?:^|>|\s)(?:class|struct|union|enum(?: class)?) (\w+(?:::\w+)*)(?: final)?\s*( :[^()=]*)?$",
+                                    head)
+                if defined and None not in scopes:
+                    yield "::".join(scopes + [defined[1]])
+                scopes.append(None)
+        elif piece == "}":
+            scopes.pop()
+        head = "" if piece in "{};" and piece else piece
+
+
 class Architecture(unittest.TestCase):
     def test_includes_point_one_way(self):
         faults = []
@@ -140,6 +164,24 @@ class Architecture(unittest.TestCase):
         unused = {(room, header) for room, headers in PUBLIC.items() for header in headers.split()} - used
         self.assertEqual(faults, [])
         self.assertEqual(unused, set(), "listed as public, but nobody outside includes it")
+
+    def test_each_room_has_its_namespace(self):
+        # palpate itself holds what every room speaks of: vectors.
+        faults = []
+        for name, path in SOURCES.items():
+            expected = "palpate" if name == "stimuli/vec.h" else "palpate::" + name.split("/")[0]
+            for opened in re.findall(r"^namespace (palpate[\w:]*) \{", path.read_text(), re.M):
+                if opened != expected and not opened.startswith(expected + "::") and not is_declaration(path, opened):
+                    faults.append(f"{name}: namespace {opened}, must be {expected}")
+        self.assertEqual(faults, [])
+
+    def test_no_two_types_of_one_name(self):
+        places = collections.defaultdict(list)
+        for name, path in SOURCES.items():
+            for qualified in types_of(path.read_text()):
+                places[qualified].append(name)
+        faults = {qualified: names for qualified, names in places.items() if len(names) > 1}
+        self.assertEqual(faults, {}, "one definition each: the linker takes any of them for all")
 
     def test_rooms_form_no_cycle(self):
         order = []

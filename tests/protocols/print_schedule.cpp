@@ -4,6 +4,7 @@
 
 #include "protocols/schedule.h"
 
+using namespace palpate;
 using namespace palpate::protocols;
 
 int main() {
