@@ -91,7 +91,7 @@ PUBLIC = {
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source triple_buffer",
-    "runner/safety": "fault_signals guard",
+    "runner/safety": "fault_signals fault_table guard",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",

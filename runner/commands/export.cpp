@@ -1,6 +1,5 @@
 #include <atomic>
 #include <iostream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -13,7 +12,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
-#include "runner/servo/servo_fault.h"
+#include "runner/safety/fault_table.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -69,8 +68,8 @@ data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
 
 std::vector<data::FaultMeaning> fault_bits() {
   std::vector<data::FaultMeaning> all;
-  all.reserve(std::size(kFaultBits));
-  for (const rendering::FaultBit& fault : kFaultBits) {
+  all.reserve(kFaultTable.size());
+  for (const rendering::FaultBit& fault : kFaultTable) {
     all.push_back({fault.bit, std::string(fault.name) + ": " + fault.meaning});
   }
   return all;

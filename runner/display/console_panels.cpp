@@ -7,7 +7,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "runner/servo/sample.h"
+#include "runner/display/console_words.h"
+#include "runner/safety/fault_table.h"
 
 namespace palpate::runner {
 namespace {

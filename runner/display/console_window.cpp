@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "runner/display/console_panels.h"
+#include "runner/display/console_words.h"
 #include "runner/display/fonts.h"
 #include "runner/display/key_names.h"
 #include "runner/display/lost_display.h"

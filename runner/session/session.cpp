@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "data/files/utc.h"
+#include "runner/safety/fault_table.h"
 
 namespace palpate::runner {
 namespace {
@@ -31,9 +32,9 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
     if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
       if (!why.empty()) return why;
     }
-    return fault_bit(bit).why + (why.empty() ? why : ": " + why);
+    return fault_row(bit).why + (why.empty() ? why : ": " + why);
   }
-  return fault_bit(kTripped).why;
+  return fault_row(kTripped).why;
 }
 
 Session::Session(const Parts& parts, SessionPlan plan, const data::ClockStamp& stamp)

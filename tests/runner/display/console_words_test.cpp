@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "runner/display/console_panels.h"
+#include "runner/display/console_words.h"
 #include "runner/servo/servo_fault.h"
 
 namespace palpate::runner {

@@ -1,27 +1,11 @@
+#include "runner/display/console_words.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "runner/display/console_panels.h"
-#include "runner/servo/servo_fault.h"
+#include "runner/safety/fault_table.h"
 
 namespace palpate::runner {
-
-std::string fault_words(std::uint32_t faults) {
-  std::string out;
-  for (const rendering::FaultBit& fault : kFaultBits) {
-    if ((faults & fault.bit) == 0) continue;
-    if (!out.empty()) out += ", ";
-    out += fault.words;
-    faults &= ~fault.bit;
-  }
-  if (faults != 0) {
-    if (!out.empty()) out += ", ";
-    out += "others (";
-    out += std::to_string(faults);
-    out += ')';
-  }
-  return out;
-}
 
 const char* button_words(ConsoleCommand::Kind kind) {
   using Kind = ConsoleCommand::Kind;
@@ -51,7 +35,7 @@ const char* button_words(ConsoleCommand::Kind kind) {
 std::string forces_off_reason(const ConsoleState& state) {
   if (!state.fault.empty()) return state.fault;
   const std::string words = fault_words(state.sample.faults & ~servo_fault::kTripped);
-  return words.empty() ? "they have not been cleared since the last fault" : words;
+  return words.empty() ? fault_row(servo_fault::kTripped).why : words;
 }
 
 std::string state_title(const ConsoleState& state) {
