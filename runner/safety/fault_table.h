@@ -65,7 +65,8 @@ inline std::string fault_words(std::uint32_t faults) {
     out += fault.words;
     faults &= ~fault.bit;
   }
-  if (faults != 0) out += (out.empty() ? "unknown (" : ", unknown (") + std::to_string(faults) + ')';
+  if (faults != 0)
+    out += (out.empty() ? "unknown (" : ", unknown (") + std::to_string(faults) + ')';
   return out;
 }
 

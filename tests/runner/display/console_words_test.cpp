@@ -1,6 +1,7 @@
+#include "runner/display/console_words.h"
+
 #include <gtest/gtest.h>
 
-#include "runner/display/console_words.h"
 #include "runner/servo/servo_fault.h"
 
 namespace palpate::runner {

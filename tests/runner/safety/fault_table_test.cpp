@@ -1,3 +1,5 @@
+#include "runner/safety/fault_table.h"
+
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -5,8 +7,6 @@
 #include <regex>
 #include <set>
 #include <string>
-
-#include "runner/safety/fault_table.h"
 
 namespace palpate::runner {
 namespace {
