@@ -105,14 +105,14 @@ void print_verdict(const std::string& what, const std::vector<std::string>& misf
 
 /// For which devices, and for simulation; all that is in the way.
 void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
-  DeviceOrder order;
-  order.rate = protocol.servo_rate;
-  order.stylus_length = protocol.stylus.length;
-  order.stylus_grip = protocol.stylus.grip;
+  DeviceConfig config;
+  config.rate = protocol.servo_rate;
+  config.stylus_length = protocol.stylus.length;
+  config.stylus_grip = protocol.stylus.grip;
   const StimulusLibrary library(protocol);
   out << "  can be shown by (run --device NAME)\n";
   for (const DeviceKind& kind : device_kinds()) {
-    const DeviceCapabilities can = nominal_capabilities(kind, order);
+    const DeviceCapabilities can = nominal_capabilities(kind, config);
     protocols::Protocol shown = protocol;
     const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
     print_verdict(kind.name, misfits(shown, library, can), limited, out);

@@ -12,14 +12,14 @@ namespace palpate::runner {
 namespace {
 
 std::vector<ConnectedDevice> always_there() { return {{}}; }
-void nothing_to_check(const DeviceOrder& /*order*/) {}
+void nothing_to_check(const DeviceConfig& /*config*/) {}
 
-std::unique_ptr<Device> open_simulated(const DeviceOrder& order) {
-  return std::make_unique<StrokingStylus>(order.stylus_length, order.stylus_grip, order.rate);
+std::unique_ptr<Device> open_simulated(const DeviceConfig& config) {
+  return std::make_unique<StrokingStylus>(config.stylus_length, config.stylus_grip, config.rate);
 }
 
-std::unique_ptr<Device> open_mouse(const DeviceOrder& order) {
-  return std::make_unique<MouseStylus>(order.stylus_length, order.rate);
+std::unique_ptr<Device> open_mouse(const DeviceConfig& config) {
+  return std::make_unique<MouseStylus>(config.stylus_length, config.rate);
 }
 
 constexpr DeviceKind kKinds[] = {
@@ -38,8 +38,8 @@ constexpr DeviceKind kKinds[] = {
 
 std::span<const DeviceKind> device_kinds() { return kKinds; }
 
-DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceOrder& order) {
-  if (!kind.pushes) return kind.open(order)->capabilities();
+DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceConfig& config) {
+  if (!kind.has_force_feedback) return kind.open(config)->capabilities();
   const int freedom = std::string_view(kind.name) == "falcon" ? 3 : 5;
   DeviceCapabilities can;
   can.name = kind.name;

@@ -7,42 +7,29 @@
 #include <vector>
 
 #include "runner/servo/device.h"
+#include "runner/servo/device_config.h"
 
 namespace palpate::runner {
-
-/// What a session asks of a device.
-struct DeviceOrder {
-  double rate = 1000;                ///< Hz, of the servo
-  double stylus_length = 0.12;       ///< m
-  double stylus_grip = 0.06;         ///< m, from the tip
-  std::vector<std::string> serials;  ///< which ones, where several are plugged in; empty: any
-  std::string firmware;              ///< file to upload where the device needs one; empty: none
-  std::string calibration;           ///< file of calibrations; empty: none
-};
-
-/// One that is there now.
-struct ConnectedDevice {
-  std::string serial;   ///< empty where it has none
-  std::string trouble;  ///< why it cannot be used; empty: it can
-};
 
 struct DeviceKind {
   const char* name;
   const char* description;
-  bool pushes;  ///< moves a real hand: a guard process must own it
-  /// What can be wrong with an order before any device is touched, in this process: the guard's
-  /// words come back without their kind. \throws std::invalid_argument (usage), InputError (files)
-  void (*check)(const DeviceOrder& order);
-  /// \throws std::runtime_error where this computer cannot look
+  bool has_force_feedback;  ///< moves a real hand: a guard process must own it
+  /// Finds what is wrong with a config before any device is touched. Called in this process,
+  /// because the type of an exception is lost on its way from the guard process.
+  /// \throws std::invalid_argument (usage), InputError (files)
+  void (*check)(const DeviceConfig& config);
+  /// \throws std::runtime_error where this computer cannot list such devices
   std::vector<ConnectedDevice> (*connected)();
   /// Ready to be read and written. \throws std::runtime_error saying why not and what would help
-  std::unique_ptr<Device> (*open)(const DeviceOrder& order);
+  std::unique_ptr<Device> (*open)(const DeviceConfig& config);
 };
 
 std::span<const DeviceKind> device_kinds();
-/// What such a device is built for, without one: its force, serial and calibration stay open.
-DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceOrder& order);
-/// \throws std::invalid_argument naming those there are
+/// What every device of this kind can do, without opening one. What differs from device to device
+/// (force, serial, calibration) is left at its default.
+DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceConfig& config);
+/// \throws std::invalid_argument listing the known names
 const DeviceKind& device_kind(const std::string& name);
 
 }  // namespace palpate::runner

@@ -118,8 +118,8 @@ std::string now_utc() {
 }
 
 /// The nominal scale: what is stored must not enter what is measured.
-DeviceOrder one_of(const DeviceOrder& order, const std::string& serial) {
-  DeviceOrder one = order;
+DeviceConfig one_of(const DeviceConfig& config, const std::string& serial) {
+  DeviceConfig one = config;
   one.serials.clear();
   if (!serial.empty()) one.serials = {serial};
   one.calibration.clear();
@@ -128,10 +128,10 @@ DeviceOrder one_of(const DeviceOrder& order, const std::string& serial) {
 
 /// Owned by a guard process: the motors are at work here, too. It has more patience than in a
 /// session, where the hand is closer and a late tick spoils a trial. \param rate  Hz
-std::unique_ptr<GuardedDevice> guarded(const DeviceOrder& order, double rate) {
+std::unique_ptr<GuardedDevice> guarded(const DeviceConfig& config, double rate) {
   GuardSettings settings;
   settings.rate = rate;
-  return std::make_unique<GuardedDevice>([order] { return open_falcon(order); }, settings);
+  return std::make_unique<GuardedDevice>([config] { return open_falcon(config); }, settings);
 }
 constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force there is no hurry
 
@@ -140,12 +140,12 @@ void store(const std::string& path, const Calibration& calibration) {
   std::cerr << "Stored in " << stimuli::printable(path) << "\n";
 }
 
-int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
+int calibrate_force(const DeviceConfig& config, const po::variables_map& values) {
   const WeighingSettings settings = weighing_settings(values);
-  Calibration calibration = read_calibration(order.calibration);  // faults are found before work
+  Calibration calibration = read_calibration(config.calibration);  // faults are found before work
   FaultSignals signals;
   const auto device =
-      guarded(one_of(order, order.serials.empty() ? "" : order.serials[0]), kWeighingRate);
+      guarded(one_of(config, config.serials.empty() ? "" : config.serials[0]), kWeighingRate);
   signals.watch(device.get());
   request_realtime({});
   RealClock clock;
@@ -155,7 +155,7 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
   signals.watch(static_cast<GuardedDevice*>(nullptr));
   force.made_utc = now_utc();
   calibration.put(force);
-  store(order.calibration, calibration);
+  store(config.calibration, calibration);
   std::cout << "serial                   " << stimuli::printable(force.serial) << "\n"
             << "counts per newton metre  " << force.counts_per_torque << " (nominal "
             << kCountsPerTorque << ")\n"
@@ -171,14 +171,14 @@ int calibrate_force(const DeviceOrder& order, const po::variables_map& values) {
   return 0;
 }
 
-int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
+int calibrate_pair(const DeviceConfig& config, const po::variables_map& values) {
   const RegistrationSettings settings = registration_settings(values);
-  check(order.serials.size() == 2,
+  check(config.serials.size() == 2,
         "falcon2 needs two --serial: first that of the Falcon at the stylus' tip");
-  Calibration calibration = read_calibration(order.calibration);
+  Calibration calibration = read_calibration(config.calibration);
   FaultSignals signals;
-  const auto tip = guarded(one_of(order, order.serials[0]), kRegistrationRate);
-  const auto tail = guarded(one_of(order, order.serials[1]), kRegistrationRate);
+  const auto tip = guarded(one_of(config, config.serials[0]), kRegistrationRate);
+  const auto tail = guarded(one_of(config, config.serials[1]), kRegistrationRate);
   request_realtime({});
   RealClock clock;
   TerminalGuide guide(signals);
@@ -187,7 +187,7 @@ int calibrate_pair(const DeviceOrder& order, const po::variables_map& values) {
   PairRegistration pair = register_pair(*tip, *tail, clock, guide, settings);
   pair.made_utc = now_utc();
   calibration.put(pair);
-  store(order.calibration, calibration);
+  store(config.calibration, calibration);
   const Vec3& p = pair.tail_in_tip.position;
   std::cout << "tip, tail      " << stimuli::printable(pair.tip_serial) << ", "
             << stimuli::printable(pair.tail_serial) << "\n"
@@ -214,15 +214,15 @@ void add_calibrate_options(po::options_description& options) {
                                          "--calibrate falcon2: places to take");
 }
 
-int calibrate_devices(const std::string& device, const DeviceOrder& order,
+int calibrate_devices(const std::string& device, const DeviceConfig& config,
                       const po::variables_map& values) {
-  check(!order.calibration.empty(), "--calibrate needs --calibration FILE to store into");
+  check(!config.calibration.empty(), "--calibrate needs --calibration FILE to store into");
   data::TakenFiles firmware;
-  firmware.add(order.firmware, "--firmware reads it, it would be overwritten");
-  const std::string why = data::why_not_to_write(order.calibration, true, firmware);
-  check(why.empty(), "--calibration " + order.calibration + ": " + why);
-  if (device == "falcon") return calibrate_force(order, values);
-  if (device == "falcon2") return calibrate_pair(order, values);
+  firmware.add(config.firmware, "--firmware reads it, it would be overwritten");
+  const std::string why = data::why_not_to_write(config.calibration, true, firmware);
+  check(why.empty(), "--calibration " + config.calibration + ": " + why);
+  if (device == "falcon") return calibrate_force(config, values);
+  if (device == "falcon2") return calibrate_pair(config, values);
   throw UsageError("--calibrate is for the devices falcon and falcon2, not for '" + device + "'");
 }
 

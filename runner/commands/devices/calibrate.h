@@ -12,9 +12,9 @@ namespace palpate::runner {
 void add_calibrate_options(boost::program_options::options_description& options);
 
 /// Guides the experimenter through the calibration of `device` (falcon: force by weights; falcon2:
-/// registration of both frames) and stores it in order.calibration. \returns the exit status.
+/// registration of both frames) and stores it in config.calibration. \returns the exit status.
 /// \throws UsageError, std::runtime_error.
-int calibrate_devices(const std::string& device, const DeviceOrder& order,
+int calibrate_devices(const std::string& device, const DeviceConfig& config,
                       const boost::program_options::variables_map& values);
 
 }  // namespace palpate::runner

@@ -61,17 +61,17 @@ void print_limits(const DeviceCapabilities& c) {
 }
 
 /// Opened, its limits, its self-test. \return whether the test was passed
-bool open_and_test(const DeviceKind& kind, const DeviceOrder& order, Json& row) {
-  const auto factory = [&kind, order] { return kind.open(order); };
+bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row) {
+  const auto factory = [&kind, config] { return kind.open(config); };
   GuardSettings settings;
-  settings.rate = order.rate;
+  settings.rate = config.rate;
   const std::unique_ptr<Device> device =
-      kind.pushes ? std::make_unique<GuardedDevice>(factory, settings) : factory();
+      kind.has_force_feedback ? std::make_unique<GuardedDevice>(factory, settings) : factory();
   row["limits"] = to_json(device->capabilities());
   print_limits(device->capabilities());
   bool passed = true;
   row["self_test"] = Json::array();
-  for (const SelfTestResult& result : self_test(*device, order.rate)) {
+  for (const SelfTestResult& result : self_test(*device, config.rate)) {
     passed = passed && result.passed;
     row["self_test"].push_back(
         {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
@@ -82,7 +82,7 @@ bool open_and_test(const DeviceKind& kind, const DeviceOrder& order, Json& row) 
 }
 
 /// What is there of a kind; \return false where a device that is there does not work.
-bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& rows) {
+bool list(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
   Json row = {{"name", kind.name}, {"description", kind.description}};
   std::printf("%s: %s\n", kind.name, kind.description);
   bool good = true, usable = false;
@@ -98,12 +98,12 @@ bool list(const DeviceKind& kind, const DeviceOrder& order, bool named, Json& ro
         std::printf("    cannot be used: %s\n", stimuli::printable(found.trouble).c_str());
     }
     if (connected.empty()) std::printf("    none connected\n");
-    if (kind.pushes && !named) {
+    if (kind.has_force_feedback && !named) {
       if (usable)
         std::printf("    --device %s opens it: limits and self-test (nothing is pushed)\n",
                     kind.name);
     } else {
-      good = open_and_test(kind, order, row);
+      good = open_and_test(kind, config, row);
     }
   } catch (const std::runtime_error& error) {
     row["trouble"] = error.what();
@@ -164,9 +164,9 @@ void print(const ServoTiming& t) {
               t.sentence().c_str());
 }
 
-int timing(const po::variables_map& values, const DeviceOrder& order, Json& report) {
+int timing(const po::variables_map& values, const DeviceConfig& config, Json& report) {
   TimingSettings settings;
-  settings.rate = order.rate;
+  settings.rate = config.rate;
   settings.seconds = values["seconds"].as<double>();
   if (!(settings.seconds >= 0.1 && settings.seconds <= 86'400))
     throw UsageError("--seconds: 0.1 to 86400 was expected");
@@ -186,15 +186,15 @@ int timing(const po::variables_map& values, const DeviceOrder& order, Json& repo
   return result.verdict() == ServoTiming::Verdict::unfit ? 1 : 0;
 }
 
-DeviceOrder order_of(const po::variables_map& values) {
-  DeviceOrder order;
-  order.rate = values["rate"].as<double>();
-  if (!(order.rate >= 10 && order.rate <= 10'000))
+DeviceConfig config_of(const po::variables_map& values) {
+  DeviceConfig config;
+  config.rate = values["rate"].as<double>();
+  if (!(config.rate >= 10 && config.rate <= 10'000))
     throw UsageError("--rate: 10 to 10000 Hz was expected");
-  if (values.count("serial") > 0) order.serials = values["serial"].as<std::vector<std::string>>();
-  if (values.count("firmware") > 0) order.firmware = values["firmware"].as<std::string>();
-  if (values.count("calibration") > 0) order.calibration = values["calibration"].as<std::string>();
-  return order;
+  if (values.count("serial") > 0) config.serials = values["serial"].as<std::vector<std::string>>();
+  if (values.count("firmware") > 0) config.firmware = values["firmware"].as<std::string>();
+  if (values.count("calibration") > 0) config.calibration = values["calibration"].as<std::string>();
+  return config;
 }
 
 }  // namespace
@@ -233,7 +233,7 @@ int devices_command(const std::vector<std::string>& args) {
   add_calibrate_options(line.options);
   const auto values = line.parse(args);
   if (!values) return 0;
-  const DeviceOrder order = order_of(*values);
+  const DeviceConfig config = config_of(*values);
   Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
@@ -243,16 +243,16 @@ int devices_command(const std::vector<std::string>& args) {
     const DeviceKind* const only = named ? &device_kind(name) : nullptr;
     if (values->count("calibrate") > 0) {
       if (!named) throw UsageError("--calibrate: --device says which");
-      return calibrate_devices(name, order, *values);
+      return calibrate_devices(name, config, *values);
     }
     if (values->count("timing") > 0) {
-      status = timing(*values, order, report);
+      status = timing(*values, config, report);
     } else {
-      if (only != nullptr) only->check(order);
+      if (only != nullptr) only->check(config);
       report["devices"] = Json::array();
       for (const DeviceKind& kind : device_kinds()) {
         if (only != nullptr && only != &kind) continue;
-        if (!list(kind, order, named, report["devices"])) status = 1;
+        if (!list(kind, config, named, report["devices"])) status = 1;
       }
     }
   } catch (const std::invalid_argument& error) {

@@ -65,7 +65,7 @@ void end_if_due(const RunParts& at, const Sample& sample) {
 PreflightRecord go_through_preflight(const RunParts& at, RunRecord& record,
                                      const std::vector<std::string>& news) {
   PreflightNeeds needs;
-  if (at.kind.pushes) {
+  if (at.kind.has_force_feedback) {
     for (std::size_t i = 0; i < at.protocol.stimuli.size(); ++i)
       needs.reach = std::max(needs.reach, at.library.reach(static_cast<int>(i)));
     needs.push = &at.push;

@@ -149,7 +149,7 @@ LiveSession::Outcome run_session(const RunParts& at) {
   for (const std::string& warning : at.admission.warnings) session.say(warning);
   for (const std::string& note : at.admission.notes) record.note(stamp.monotonic_ns, note);
   for (const std::string& message : preflight.messages) session.say(message);  // it shows on
-  if (at.kind.pushes) {
+  if (at.kind.has_force_feedback) {
     std::string text = "pre-flight: ";
     for (const std::string& finding : preflight.findings) text += finding + "; ";
     record.note(

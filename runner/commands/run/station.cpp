@@ -39,17 +39,17 @@ const DeviceKind& kind_of(const std::string& name) {
 
 OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
                        const protocols::Protocol& protocol) {
-  const DeviceOrder order{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
-                          settings.serials,    settings.firmware,      settings.calibration};
+  const DeviceConfig config{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
+                            settings.serials,    settings.firmware,      settings.calibration};
   try {
-    kind.check(order);
+    kind.check(config);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--serial: ") + error.what());
   }
-  if (!kind.pushes) return {kind.open(order), nullptr};
+  if (!kind.has_force_feedback) return {kind.open(config), nullptr};
   GuardSettings guard;
   guard.rate = protocol.servo_rate;
-  auto guarded = std::make_unique<GuardedDevice>([&] { return kind.open(order); }, guard);
+  auto guarded = std::make_unique<GuardedDevice>([&] { return kind.open(config); }, guard);
   GuardedDevice* const itself = guarded.get();
   return {std::move(guarded), itself};
 }
@@ -69,7 +69,9 @@ void check_fitness(const DeviceKind& kind, const Device& device, const RunSettin
                      std::to_string(protocol.response.keys.size()) + " answers");
   const bool unfit =
       able.calibration.rfind("stale", 0) == 0 || able.calibration.rfind("implausible", 0) == 0;
-  if (!kind.pushes || settings.without_calibration || (!able.calibration.empty() && !unfit)) return;
+  if (!kind.has_force_feedback || settings.without_calibration ||
+      (!able.calibration.empty() && !unfit))
+    return;
   throw UsageError("the calibration of '" + settings.device + "' is " +
                    (unfit ? able.calibration : "missing") +
                    "\n'palpate devices --calibrate' makes one, --calibration names its file, "

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "runner/devices/falcon/arm.h"
-#include "runner/devices/stylus_from_ends.h"
+#include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
 namespace palpate::runner::falcon {

@@ -33,11 +33,12 @@ std::optional<FirmwareImage> image_in(const std::string& path) {
 }
 
 /// \throws InputError: the calibration has none of these two.
-const PairRegistration& registration_in(const Calibration& calibration, const DeviceOrder& order) {
-  const std::string &tip = order.serials[0], &tail = order.serials[1];
+const PairRegistration& registration_in(const Calibration& calibration,
+                                        const DeviceConfig& config) {
+  const std::string &tip = config.serials[0], &tail = config.serials[1];
   if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
   throw protocols::InputError(
-      {{order.calibration.empty() ? "(no calibration file)" : order.calibration, "/pairs",
+      {{config.calibration.empty() ? "(no calibration file)" : config.calibration, "/pairs",
         "expected a registration of the Falcons " + tip + " (tip) and " + tail +
             " (tail), without which nobody knows how they stand to each other: run "
             "palpate devices --calibrate --device falcon2"}});
@@ -112,38 +113,39 @@ std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string
   return std::make_unique<FalconArm>(std::move(line), settings);
 }
 
-void check_falcon(const DeviceOrder& order) {
-  if (order.serials.size() > 1) {
-    throw std::invalid_argument("falcon is one device; " + std::to_string(order.serials.size()) +
+void check_falcon(const DeviceConfig& config) {
+  if (config.serials.size() > 1) {
+    throw std::invalid_argument("falcon is one device; " + std::to_string(config.serials.size()) +
                                 " serial numbers are given");
   }
-  calibration_in(order.calibration);
-  image_in(order.firmware);
+  calibration_in(config.calibration);
+  image_in(config.firmware);
 }
 
-void check_falcon2(const DeviceOrder& order) {
-  if (order.serials.size() != 2 || order.serials[0] == order.serials[1]) {
+void check_falcon2(const DeviceConfig& config) {
+  if (config.serials.size() != 2 || config.serials[0] == config.serials[1]) {
     throw std::invalid_argument(
         "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
         "the one at its tail (palpate devices lists them)");
   }
-  registration_in(calibration_in(order.calibration), order);
-  image_in(order.firmware);
+  registration_in(calibration_in(config.calibration), config);
+  image_in(config.firmware);
 }
 
-std::unique_ptr<Device> open_falcon(const DeviceOrder& order) {
-  const Calibration calibration = calibration_in(order.calibration);
-  auto arm = open_arm(order.serials.empty() ? "" : order.serials[0], order.firmware, calibration);
+std::unique_ptr<Device> open_falcon(const DeviceConfig& config) {
+  const Calibration calibration = calibration_in(config.calibration);
+  auto arm =
+      open_arm(config.serials.empty() ? "" : config.serials[0], config.firmware, calibration);
   const std::string known = in_short(judge(calibration, {arm->serial()}));
   return std::make_unique<FalconDevice>(std::move(arm), known);
 }
 
-std::unique_ptr<Device> open_falcon2(const DeviceOrder& order) {
-  const Calibration calibration = calibration_in(order.calibration);
-  const PairRegistration& pair = registration_in(calibration, order);
-  auto tip = open_arm(order.serials[0], order.firmware, calibration);
-  auto tail = open_arm(order.serials[1], order.firmware, calibration);
-  const std::string known = in_short(judge(calibration, order.serials));
+std::unique_ptr<Device> open_falcon2(const DeviceConfig& config) {
+  const Calibration calibration = calibration_in(config.calibration);
+  const PairRegistration& pair = registration_in(calibration, config);
+  auto tip = open_arm(config.serials[0], config.firmware, calibration);
+  auto tail = open_arm(config.serials[1], config.firmware, calibration);
+  const std::string known = in_short(judge(calibration, config.serials));
   return std::make_unique<Falcon2Device>(
       std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
 }

@@ -9,8 +9,8 @@
 #include "runner/devices/falcon/arm.h"
 #include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/calibration.h"
-#include "runner/devices/registry.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_config.h"
 
 namespace palpate::runner::falcon {
 
@@ -18,17 +18,17 @@ namespace palpate::runner::falcon {
 std::vector<ConnectedDevice> connected_falcons();
 
 /// See DeviceKind::check.
-void check_falcon(const DeviceOrder& order);
-void check_falcon2(const DeviceOrder& order);
+void check_falcon(const DeviceConfig& config);
+void check_falcon2(const DeviceConfig& config);
 
 /// One Falcon. Its capabilities' `calibration` is empty when none is stored, and begins with
 /// "stale" when it is too old, with "implausible" when its scale is not used. \throws
 /// TransportError, InputError.
-std::unique_ptr<Device> open_falcon(const DeviceOrder& order);
+std::unique_ptr<Device> open_falcon(const DeviceConfig& config);
 
-/// Two, which order.serials names: first the one at the stylus' tip. Their registration must be in
-/// order.calibration. \throws TransportError, InputError.
-std::unique_ptr<Device> open_falcon2(const DeviceOrder& order);
+/// Two, which config.serials names: first the one at the stylus' tip. Their registration must be in
+/// config.calibration. \throws TransportError, InputError.
+std::unique_ptr<Device> open_falcon2(const DeviceConfig& config);
 
 /// For a pre-flight that has the serial numbers: is all calibrated that these need, and not too
 /// long ago? Two are a pair, tip and tail. \param path  empty: none. \throws InputError.

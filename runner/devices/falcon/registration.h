@@ -3,7 +3,7 @@
 
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/guide.h"
-#include "runner/devices/stylus_from_ends.h"
+#include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
 namespace palpate::runner::falcon {

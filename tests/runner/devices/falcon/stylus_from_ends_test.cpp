@@ -1,4 +1,4 @@
-#include "runner/devices/stylus_from_ends.h"
+#include "runner/devices/falcon/stylus_from_ends.h"
 
 #include <gtest/gtest.h>
 
