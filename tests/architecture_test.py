@@ -91,13 +91,13 @@ PUBLIC = {
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source triple_buffer",
-    "runner/safety": "fault_signals fault_table guard",
+    "runner/safety": "fault_signals fault_table guarded_device",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display text_display window",
     "runner/participants": "keyboard respondent simulated simulated_settings",
-    "runner/session": "clock_check device_check feeble_push live_session near_codes preflight replay session_plan "
+    "runner/session": "clock_check device_check force_direction_check live_session near_codes preflight replay session_plan "
                       "simulated_study",
     "runner/stability": "boundary integrators",
     "runner/bench": "servo_timing tick_cost",

@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 

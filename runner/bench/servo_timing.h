@@ -14,7 +14,7 @@ namespace palpate::runner {
 struct TimingSettings {
   double rate = 1000;   ///< Hz
   double seconds = 10;  ///< of ticks in contact
-  RealtimeWish realtime;
+  RealtimeSettings realtime;
   bool guarded = false;  ///< the device in a guard process, as a real one is
 };
 

@@ -115,7 +115,7 @@ void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
     const DeviceCapabilities can = nominal_capabilities(kind, config);
     protocols::Protocol shown = protocol;
     const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
-    print_verdict(kind.name, misfits(shown, library, can), limited, out);
+    print_verdict(kind.name, incompatibilities(shown, library, can), limited, out);
   }
   const SimulatedSettings settings = load_simulated_settings("");
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,

@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
 
 namespace palpate::runner {

@@ -1,3 +1,5 @@
+#include "runner/safety/guarded_device.h"
+
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -11,7 +13,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "runner/safety/guard.h"
 #include "runner/servo/realtime.h"
 
 namespace palpate::runner {

@@ -68,7 +68,7 @@ AwakeProcessors::~AwakeProcessors() {
   if (file_ >= 0) close(file_);
 }
 
-RealtimeRights request_realtime(const RealtimeWish& wish) {
+RealtimeRights request_realtime(const RealtimeSettings& wish) {
   RealtimeRights rights;
   // An ordinary thread's sleep may be prolonged by 50 us to save wake-ups. Needs no right.
   prctl(PR_SET_TIMERSLACK, 1UL);

@@ -14,7 +14,7 @@ class RealClock final : public Clock {
   void wait_until(std::int64_t when_ns) noexcept override;
 };
 
-struct RealtimeWish {
+struct RealtimeSettings {
   int priority = 80;        ///< of SCHED_FIFO, 1 to 99; 0: leave the ordinary scheduler
   bool lock_memory = true;  ///< no page of this program is swapped out or fetched late
   int core = -1;            ///< run on this processor alone; -1: any
@@ -44,6 +44,6 @@ class AwakeProcessors {
 };
 
 /// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.
-RealtimeRights request_realtime(const RealtimeWish& wish);
+RealtimeRights request_realtime(const RealtimeSettings& wish);
 
 }  // namespace palpate::runner

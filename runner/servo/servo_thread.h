@@ -21,7 +21,7 @@ struct ServoSettings {
   ForceLimits limits;
   WorkspaceMap workspace;
   bool passivity_controller = false;
-  RealtimeWish realtime;
+  RealtimeSettings realtime;
   std::size_t ring = 16384;  ///< samples that wait for the session before some are lost
 };
 
@@ -66,7 +66,7 @@ class ServoThread final : public TickSource {
   void take_orders() noexcept;
   void publish(const Sample& sample) noexcept;
 
-  const RealtimeWish wish_;
+  const RealtimeSettings wish_;
   Servo servo_;
   const AwakeProcessors awake_;
   RealtimeRights rights_;

@@ -171,8 +171,9 @@ bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) 
   return true;
 }
 
-std::vector<std::string> misfits(const protocols::Protocol& protocol,
-                                 const StimulusLibrary& library, const DeviceCapabilities& device) {
+std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
+                                           const StimulusLibrary& library,
+                                           const DeviceCapabilities& device) {
   std::vector<std::string> out;
   const auto add = [&out](const auto&... parts) {
     std::ostringstream text;

@@ -9,8 +9,9 @@
 namespace palpate::runner {
 
 /// Why a protocol cannot be run on a device, one sentence each with what would help; empty: it can.
-std::vector<std::string> misfits(const protocols::Protocol& protocol,
-                                 const StimulusLibrary& library, const DeviceCapabilities& device);
+std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
+                                           const StimulusLibrary& library,
+                                           const DeviceCapabilities& device);
 
 /// What of a material a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {

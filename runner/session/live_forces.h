@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
 
 namespace palpate::runner {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "runner/participants/keyboard.h"
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/markers.h"

@@ -8,7 +8,7 @@
 #include "runner/display/display.h"
 #include "runner/participants/keyboard.h"
 #include "runner/servo/sample.h"
-#include "runner/session/feeble_push.h"
+#include "runner/session/force_direction_check.h"
 
 namespace palpate::runner {
 
@@ -16,8 +16,8 @@ struct PreflightNeeds {
   double reach = 0;  ///< m, virtual frame: how far the tip must go to either side of the centre on
                      ///< each axis; 0: leave the range unchecked
   int buttons = 0;   ///< so many must work, from the first
-  const FeeblePush* push = nullptr;  ///< to be felt; its limits are shown. None: unchecked
-  double device_limit = 0;           ///< N, the device's own, to be shown
+  const ForceDirectionCheck* push = nullptr;  ///< to be felt; its limits are shown. None: unchecked
+  double device_limit = 0;                    ///< N, the device's own, to be shown
 };
 
 /// Fed with the servo's samples, step by step. Shows no force itself.

@@ -227,7 +227,7 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const SimulatedSettings& settings) {
   SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
                          protocol.stylus.grip, 1 / protocol.servo_rate);
-  std::vector<std::string> faults = misfits(protocol, library, device.capabilities());
+  std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
   bool known = true;
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     const std::string fault = ShapeHypotheses::fault_of(stimulus.object);

@@ -19,7 +19,7 @@
 #include "runner/devices/falcon/registration.h"
 #include "runner/devices/falcon/weighing.h"
 #include "runner/safety/fault_signals.h"
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 #include "stimuli/printable.h"
 

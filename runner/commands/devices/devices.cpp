@@ -14,7 +14,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/self_test.h"
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {

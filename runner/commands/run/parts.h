@@ -11,7 +11,7 @@
 #include "runner/display/window.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/device_check.h"
-#include "runner/session/feeble_push.h"
+#include "runner/session/force_direction_check.h"
 #include "runner/session/live_session.h"
 
 namespace palpate::runner {
@@ -49,7 +49,7 @@ struct RunParts {
   const Admission& admission;
   NoisePlayer* noise;  ///< may be none
   const std::vector<LimitedMaterial>& limited;
-  const FeeblePush& push;
+  const ForceDirectionCheck& push;
 };
 
 }  // namespace palpate::runner

@@ -59,7 +59,7 @@ void check_fitness(const DeviceKind& kind, const Device& device, const RunSettin
                    const protocols::Protocol& protocol, const StimulusLibrary& library) {
   const DeviceCapabilities& able = device.capabilities();
   std::string reasons;
-  for (const std::string& misfit : misfits(protocol, library, able)) {
+  for (const std::string& misfit : incompatibilities(protocol, library, able)) {
     reasons += "\n";
     reasons += misfit;
   }
@@ -226,7 +226,7 @@ int run_station(const RunSettings& named) {
   servo_settings.passivity_controller = protocol.passivity_controller;
   ForceLimits limits = servo_settings.limits;
   limits.max_force = std::min(limits.max_force, able.max_force);
-  const FeeblePush push(limits, able.sensed_freedom >= 5);
+  const ForceDirectionCheck push(limits, able.sensed_freedom >= 5);
   const std::int64_t started_ns = clock.now_ns();
   ServoThread servo(*open.device, clock, servo_settings);
   const Watch servo_watch(signals, &servo);

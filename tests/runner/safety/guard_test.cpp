@@ -1,7 +1,5 @@
 // Whatever ends the runner, zero force is at the device within 20 ms, by the device's own record.
 
-#include "runner/safety/guard.h"
-
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -17,6 +15,7 @@
 #include <thread>
 
 #include "runner/safety/fault_signals.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/recording_device.h"

@@ -39,7 +39,7 @@ class UnhurriedClock final : public Clock {
   std::int64_t now_ = 0;
 };
 
-const RealtimeWish kNoRights{0, false, -1};
+const RealtimeSettings kNoRights{0, false, -1};
 
 ServoSettings fast(std::size_t ring = 1 << 15) {
   ServoSettings settings;

@@ -86,7 +86,7 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
   protocols::Protocol protocol = some_protocol(of(2500, 0.1));
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());
   EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 2500);
-  const auto refused = misfits(protocol, StimulusLibrary(protocol), some_device());
+  const auto refused = incompatibilities(protocol, StimulusLibrary(protocol), some_device());
   ASSERT_EQ(refused.size(), 1u);
   EXPECT_NE(refused[0].find("'ball' has 2500 N/m and 0.1 N s/m"), std::string::npos) << refused[0];
   EXPECT_NE(refused[0].find("material_limit"), std::string::npos);
@@ -94,7 +94,7 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
             std::string::npos)
       << refused[0];
   protocol.stimuli[0].object.material = of(1e5);
-  const auto stiff = misfits(protocol, StimulusLibrary(protocol), some_device());
+  const auto stiff = incompatibilities(protocol, StimulusLibrary(protocol), some_device());
   ASSERT_EQ(stiff.size(), 1u);
   EXPECT_NE(stiff[0].find("passivity_controller"), std::string::npos) << stiff[0];
   protocol.stimuli[0].object.material = of(2500, 0.1);
@@ -106,7 +106,7 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
       << limited[0].text;
   const stimuli::Material& shown = protocol.stimuli[0].object.material;
   EXPECT_NEAR(shown.stiffness / 2000 + shown.damping, 1, 1e-9);
-  EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), some_device()).empty());
+  EXPECT_TRUE(incompatibilities(protocol, StimulusLibrary(protocol), some_device()).empty());
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing is left to do
 }
 
@@ -152,7 +152,7 @@ TEST(DeviceCheck, ADeviceThatDoesNotPushShowsNothingAndRefusesNothing) {
   DeviceCapabilities mouse = some_device();
   mouse.actuated_freedom = 0;
   protocols::Protocol protocol = some_protocol(of(1e5));
-  EXPECT_TRUE(misfits(protocol, StimulusLibrary(protocol), mouse).empty());
+  EXPECT_TRUE(incompatibilities(protocol, StimulusLibrary(protocol), mouse).empty());
   protocol.material_limit = protocols::MaterialLimit::limit;
   EXPECT_TRUE(limit_materials(protocol, mouse).empty());
 }

@@ -91,7 +91,7 @@ TEST(Preflight, WhatIsLeftOutIsOnRecord) {
 }
 
 TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
-  const FeeblePush push({2.5, 0.5, 0.2}, false);
+  const ForceDirectionCheck push({2.5, 0.5, 0.2}, false);
   PreflightNeeds needs{0.03, 0};
   needs.push = &push;
   needs.device_limit = 2.5;
@@ -128,7 +128,7 @@ TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
 }
 
 TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
-  const FeeblePush push({6, 0.5, 0.2}, false);
+  const ForceDirectionCheck push({6, 0.5, 0.2}, false);
   PreflightNeeds needs{0, 0};
   needs.push = &push;
   Preflight preflight(needs);
@@ -162,14 +162,14 @@ class Grip final : public Device {
   DeviceCapabilities able_;
 };
 
-TEST(FeeblePush, PushesToTheRightWithinTheLimitsAndLetsGo) {
+TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndLetsGo) {
   for (const bool both : {false, true}) {
     for (const double limit : {6.0, 0.8}) {
       Grip grip(limit);
       VirtualClock clock;
       const ForceLimits limits{limit, 0.5, 0.2};
       Servo servo(grip, clock, 1000, limits);
-      const FeeblePush push(limits, both);
+      const ForceDirectionCheck push(limits, both);
       EXPECT_EQ(push.force(), std::min(1.0, limit / 2));
       EXPECT_EQ(push.give(servo, [] { return false; }), "");
       double most = 0, before = 0;
@@ -214,8 +214,8 @@ class WrongServo final : public TickSource {
   Sample sample_;
 };
 
-TEST(FeeblePush, TellsWhatIsWrongWithTheCommands) {
-  const FeeblePush push({2, 0.5, 0.2}, true);
+TEST(ForceDirectionCheck, TellsWhatIsWrongWithTheCommands) {
+  const ForceDirectionCheck push({2, 0.5, 0.2}, true);
   const std::pair<std::string, std::function<void(Sample&)>> cases[] = {
       {"", [](Sample&) {}},
       {"above the limit of 2.00 N", [](Sample& s) { s.device2.z = s.tick < 400 ? 0 : 2.1; }},

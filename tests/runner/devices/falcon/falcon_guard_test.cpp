@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "runner/devices/falcon/open.h"
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"

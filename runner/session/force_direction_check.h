@@ -12,13 +12,13 @@ namespace palpate::runner {
 
 /// To the right, the same wherever the stylus is: a newton, or half of what the limits leave where
 /// that is less.
-class FeeblePush final : public rendering::Renderer {
+class ForceDirectionCheck final : public rendering::Renderer {
  public:
   static constexpr double kSeconds = 1;
 
   /// \param limits     that are in force: the smaller of the program's and the device's
   /// \param both_ends  of a stylus that two devices hold; else all of it at the tip
-  FeeblePush(const ForceLimits& limits, bool both_ends);
+  ForceDirectionCheck(const ForceLimits& limits, bool both_ends);
 
   double force() const { return force_; }  ///< N, at each end
   const ForceLimits& limits() const { return limits_; }

@@ -1,4 +1,4 @@
-#include "runner/session/feeble_push.h"
+#include "runner/session/force_direction_check.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -19,7 +19,7 @@ std::string newtons(const char* before, double a, const char* between, double b)
 /// Holds what was commanded, tick by tick, against what may be.
 class Watcher {
  public:
-  explicit Watcher(const FeeblePush& push) : push_(push) {}
+  explicit Watcher(const ForceDirectionCheck& push) : push_(push) {}
 
   /// \return what is wrong with the tick; empty: nothing
   std::string look(const Sample& sample) {
@@ -46,14 +46,14 @@ class Watcher {
                      limits.max_change);
     return "";
   }
-  bool over() const { return elapsed_ >= FeeblePush::kSeconds; }
+  bool over() const { return elapsed_ >= ForceDirectionCheck::kSeconds; }
   std::string verdict() const {
     if (size_ >= push_.force() - kEnough) return "";
     return newtons("no more than ", size_, " were commanded for a push of ", push_.force());
   }
 
  private:
-  const FeeblePush& push_;
+  const ForceDirectionCheck& push_;
   std::int64_t began_ns_ = 0;
   double elapsed_ = 0, size_ = 0;
   Vec3 last1_, last2_;
@@ -61,11 +61,12 @@ class Watcher {
 
 }  // namespace
 
-FeeblePush::FeeblePush(const ForceLimits& limits, bool both_ends)
+ForceDirectionCheck::ForceDirectionCheck(const ForceLimits& limits, bool both_ends)
     : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(both_ends) {}
 
-rendering::Rendering FeeblePush::tick(const rendering::Scene&, rendering::RenderState&,
-                                      const rendering::LineProbe& probe, double) const noexcept {
+rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
+                                               const rendering::LineProbe& probe,
+                                               double) const noexcept {
   rendering::Rendering out;
   out.device1 = Vec3(force_, 0, 0);
   if (both_ends_) out.device2 = out.device1;
@@ -74,7 +75,7 @@ rendering::Rendering FeeblePush::tick(const rendering::Scene&, rendering::Render
   return out;
 }
 
-std::string FeeblePush::give(TickSource& servo, const std::function<bool()>& stop) const {
+std::string ForceDirectionCheck::give(TickSource& servo, const std::function<bool()>& stop) const {
   const rendering::Scene nothing({}, false);
   constexpr HomeZone kAnywhere{0, 0};
   Watcher watcher(*this);
