@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what is made on the way: man pages, the compressed changelog, and the limits, which stand in /etc
+# Installs what is made on the way: man pages, the compressed changelog, READMEs, and the limits, which stand in /etc
 # where the rest goes to /usr. Usage: made_files.sh PALPATE VERSION PREFIX
 set -euo pipefail
 umask 022
@@ -13,3 +13,4 @@ gzip -9n < "$here/debian/changelog" > "$prefix/share/doc/palpate/changelog.gz"
 SOURCE_DATE_EPOCH="$(date -d "$(sed -n 's/^ -- .*>  //p' "$here/debian/changelog" | head -n 1)" +%s)"
 export SOURCE_DATE_EPOCH
 bash "$here/man_pages.sh" "$program" "$version" "$prefix/share/man/man1"
+bash "$here/documentation.sh" "$prefix"

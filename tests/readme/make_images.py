@@ -1,10 +1,13 @@
-"""Makes every picture of .github/images/: a live session on a display in memory, and figures of simulated studies.
+"""Makes the pictures of .github/images/: a live session on a display in memory, and figures of a simulated study.
 
-Usage: make_images.py PALPATE [NAME ...]    (all pictures, or those of these names; needs xvfb, xdotool, imagemagick)
+Usage: make_images.py PALPATE [NAME ...]    all pictures, or those of these names
+       make_images.py --list                their names
+
+Needs Xvfb, xdotool and ImageMagick, and for live-session a machine that is not busy. The figures are those of the
+study that runner/quickstart.sh simulates: the same ones wherever they are made.
 """
 
 import pathlib
-import re
 import shutil
 import sqlite3
 import subprocess
@@ -31,10 +34,10 @@ class LiveSession:
 
     def __init__(self, palpate, folder):
         self.database = folder / "try.db"
-        self.screen = VirtualScreen("1600x900")
+        self.screen = VirtualScreen("1600x900")  # one monitor: both windows side by side
         self.program = subprocess.Popen(
             [palpate, "run", PROTOCOLS / "quick.json", "--db", self.database, "--participant", "T1", "--new-participant",
-             "--device", "mouse"], env=self.screen.environment, stderr=subprocess.DEVNULL)
+             "--number", "2", "--device", "mouse"], env=self.screen.environment, stderr=subprocess.DEVNULL)
         self.participant = self.screen.window("quick, T1")
         self.console = self.screen.window("quick, T1 - console")
         time.sleep(2)  # drawn
@@ -78,7 +81,7 @@ class LiveSession:
         """The tip goes over the object in the middle of the view, from left to right and back."""
         end, step = time.monotonic() + seconds, 0
         while time.monotonic() < end:
-            self.point(0.27 + 0.004 * abs(10 - step % 20), 0.36 + 0.002 * (step % 12))
+            self.point(0.29 + 0.003 * abs(8 - step % 16), 0.41 + 0.002 * (step % 12))
             time.sleep(0.08)
             step += 1
 
@@ -95,7 +98,6 @@ class LiveSession:
 def live_session(palpate, folder):
     session = LiveSession(palpate, folder)
     try:
-        picture(session.screen, session.participant, "instructions.png")
         session.begin()
         for trial in range(9):
             session.wait_for_trial()
@@ -105,8 +107,9 @@ def live_session(palpate, folder):
         session.wait_for_trial()
         session.feel(5)
         session.check()
-        picture(session.screen, session.participant, "participant.png")
-        picture(session.screen, session.console, "console.png")
+        # Few colours: letters, lines and one shaded object.
+        subprocess.run(["import", "-silent", "-window", "root", "-trim", "+repage", "-colors", "255", "-strip",
+                        f"PNG8:{IMAGES / 'live-session.png'}"], env=session.screen.environment, check=True)
     finally:
         session.close()
         session.database.unlink()
@@ -121,13 +124,42 @@ def undisturbed(what, *arguments):
     raise SystemExit("this machine is too busy for a session at 1 kHz")
 
 
-def picture(screen, window, name):
-    """Few colours: what is drawn here are letters, lines and one shaded object."""
+def simulated_study(palpate, folder):
+    """The paper's study, once."""
+    database = folder / "study.db"
+    if not database.exists():
+        subprocess.run([palpate, "simulate", PROTOCOLS / "ho2000.json", "--db", database], check=True)
+        subprocess.run([palpate, "analyze", "--db", database, "--figures", folder], stdout=subprocess.DEVNULL,
+                       check=True)
+    return database
+
+
+def figure(name):
+    def make(palpate, folder):
+        simulated_study(palpate, folder)
+        shutil.copyfile(folder / f"{name}.svg", IMAGES / f"{name}.svg")
+    return make
+
+
+def power(palpate, folder):
+    subprocess.run([palpate, "plan", "--db", simulated_study(palpate, folder), "--effect", "cone=22,cube=11",
+                    "--figure", IMAGES / "power.svg", "--force"], stdout=subprocess.DEVNULL, check=True)
+
+
+PICTURES = {"live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
+            "speedup": figure("speedup"), "power": power}
+
+
+def main(arguments):
+    if arguments == ["--list"]:
+        print("\n".join(PICTURES))
+        return
+    palpate, *names = arguments
     IMAGES.mkdir(parents=True, exist_ok=True)
-    subprocess.run(["import", "-silent", "-window", window, "-colors", "255", "-strip", f"PNG8:{IMAGES / name}"],
-                   env=screen.environment, check=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        for name in names or PICTURES:
+            PICTURES[name](str(pathlib.Path(palpate).resolve()), pathlib.Path(scratch))
 
 
 if __name__ == "__main__":
-    with tempfile.TemporaryDirectory() as scratch:
-        undisturbed(live_session, sys.argv[1], pathlib.Path(scratch))
+    main(sys.argv[1:])

@@ -23,9 +23,10 @@ for library in libasound2 libglfw3 libpango-1.0-0 libsqlite3-0 libusb-1.0-0; do
 done
 for file in /etc/security/limits.d/palpate.conf /usr/lib/udev/rules.d/60-palpate.rules /usr/share/man/man1/palpate-run.1.gz \
   /usr/share/bash-completion/completions/palpate /usr/share/palpate/protocols/{protocol,scene}.schema.json \
-  /usr/share/palpate/protocols/ho2000.json /usr/share/doc/palpate/{copyright,README.md,runner/README.md}; do
+  /usr/share/palpate/protocols/ho2000.json /usr/share/doc/palpate/{copyright,README.md,runner/README.md,images/figure15.svg}; do
   [ -e "$root$file" ] || fail "it has no $file"
 done
+python3 tests/readme/links.py "$root/usr/share/doc/palpate"
 [ -z "$(find "$root" \( -perm /022 -o -type d ! -perm -755 -o ! -perm -444 \) -print)" ] || fail "wrong permissions"
 strings "$root/usr/bin/palpate" | grep -qF "$PWD" && fail "the program names the folder of its sources"
 
