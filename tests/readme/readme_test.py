@@ -393,6 +393,16 @@ class Reference(unittest.TestCase):
                 for kind in re.findall(r"\*([a-z ]+)\*", row[0])}
         self.assertEqual(told, given - {"byte "})
 
+    def test_messages_and_buttons_that_are_quoted(self):
+        sources = "".join(path.read_text() for path in sorted((ROOT / "runner").rglob("*.cpp")) +
+                          sorted((ROOT / "runner").rglob("*.h")) + sorted((ROOT / "data").rglob("*.cpp")))
+        sources = re.sub(r'"\s*\n\s*"', "", sources)  # literals that continue
+        page = PAGES["runner/README.md"]
+        quoted = [phrase for section in ("How to deal with trouble", "Reference: what each screen shows")
+                  for row in cells(page.section(section)) for cell in row for phrase in re.findall(r"\*([^*]+)\*", cell)]
+        self.assertGreater(len(quoted), 20)
+        self.assertEqual([phrase for phrase in quoted if phrase not in sources], [])
+
     def test_devices(self):
         listed = set(re.findall(r"^([a-z0-9]+): ", output_of("devices"), re.M))
         told = {codes(row[0])[0] for row in cells(PAGES["runner/README.md"].section("Reference: devices"))}
