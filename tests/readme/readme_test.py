@@ -128,6 +128,17 @@ class Form(unittest.TestCase):
                     self.assertTrue(block.words in (RUN, "console") or len(block.words) > len(NOT_RUN) + 10
                                     and block.words.startswith(NOT_RUN), f"{place}: '{block.words}'")
 
+    def test_code_stands_on_one_line(self):
+        for page in PAGES.values():
+            for number, line in enumerate(page.prose.splitlines(), 1):
+                self.assertEqual(line.count("`") % 2, 0, f"{page.name}:{number}: {line}")
+
+    def test_python_that_is_shown_is_python(self):
+        for page in PAGES.values():
+            for block in page.blocks:
+                if block.language() == "python":
+                    compile(block.text, f"{page.name}:{block.line}", "exec")
+
     def test_no_command_hides_in_an_indented_block(self):
         for page in PAGES.values():
             self.assertEqual(re.findall(r"^(?:    |\t)\s*(?:\$ |palpate |bash |python3 |cmake )", page.prose, re.M), [], page.name)
