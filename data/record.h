@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::data {
@@ -75,6 +76,9 @@ struct Participant {
   std::optional<std::uint64_t> seed;  ///< of a simulated participant
 };
 
+/// Whether a participant can have this code: 1 to 32 ASCII letters and digits.
+bool is_participant_code(std::string_view code);
+
 /// One instant on both clocks; ties a run's times to the calendar.
 struct ClockStamp {
   std::int64_t utc_ns = 0;        ///< since 1970-01-01T00:00:00Z
@@ -90,7 +94,8 @@ enum class RunEnd {
   withdrawn,    ///< by the participant
   interrupted,  ///< the process died; only the store says so
 };
-const char* to_string(RunEnd end);  ///< "running", "done", ...
+const char* to_string(RunEnd end);                           ///< "running", "done", ...
+std::optional<RunEnd> parse_run_end(std::string_view text);  ///< the inverse of to_string
 
 /// What is recorded when a process starts or resumes a session. Empty texts: not known.
 struct RunInfo {

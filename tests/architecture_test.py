@@ -78,10 +78,10 @@ PUBLIC = {
     "rendering/accuracy": "paper_first_contact peers study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256",
     "data": "record",
-    "data/files": "checksum draft_file draft_folder output_check private_files spreadsheet_text text_sink utc",
-    "data/store": "attempt_reader checks export_log file_checks protocol_rows schema store store_impl store_lock "
-                  "tombstones",
-    "data/export": "export_bids export_csv export_psychds",
+    "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
+                  "temporary_names text_sink trusted_links utc",
+    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store tombstones",
+    "data/export": "bids csv psychds",
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record trials",

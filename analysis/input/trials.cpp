@@ -11,7 +11,7 @@
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/text.h"
-#include "data/files/spreadsheet_text.h"
+#include "data/files/formula_guard.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {

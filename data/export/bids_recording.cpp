@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/export/column_values.h"
 #include "data/export/sample_slots.h"
-#include "data/export/table_fields.h"
 #include "data/files/utc.h"
 
 namespace palpate::data {
@@ -16,7 +16,7 @@ const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the
 
 const std::string& empty_row() {
   static const std::string row = [] {
-    TableRow all(TableStyle::tsv);
+    DelimitedRow all(DelimitedFormat::tsv);
     all << "";
     for (std::size_t k = 0; k < sample_columns().size(); ++k) all << "";
     return all.end();
@@ -42,7 +42,7 @@ void rename_files(nlohmann::ordered_json& object, const StudyLabel& study) {
 nlohmann::ordered_json objects_of(const StudyLabel& study) {
   nlohmann::ordered_json objects = nlohmann::ordered_json::object();
   for (const StimulusFacts& stimulus : study.facts.stimuli) {
-    auto& object = objects[in_table(stimulus.name)] =
+    auto& object = objects[guarded_text(stimulus.name)] =
         nlohmann::ordered_json::parse(stimulus.object);
     rename_files(object, study);
   }
@@ -66,7 +66,7 @@ std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
   return static_cast<std::int64_t>(slot);
 }
 
-bool BidsRecording::goes_on_with(const StoredTrial& trial) const {
+bool BidsRecording::continues_with(const StoredTrial& trial) const {
   const ClockStamp &a = run_.clock, &b = trial.run.clock;
   if (a.utc_ns != b.utc_ns || a.monotonic_ns != b.monotonic_ns) return false;
   const auto slot = slot_of(to_unix_ns(b, trial.record.onset_ns));
@@ -81,7 +81,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   free_ = onset + static_cast<std::int64_t>(std::clamp(length, 0.0, 1e9));
   if (record.samples.empty()) return;
   SampleSlots slots(trial, study_.facts.servo_rate);
-  TableRow row(TableStyle::tsv);
+  DelimitedRow row(DelimitedFormat::tsv);
   std::int64_t first = 0;
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = onset + slots.next();
@@ -101,8 +101,8 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
                      {"onset", static_cast<double>(onset) / study_.facts.servo_rate},
                      {"first_row", first - first_row_},
                      {"rows", next_row_ - first},
-                     {"renderer", in_table(record.renderer)},
-                     {"shape", in_table(record.shape)},
+                     {"renderer", guarded_text(record.renderer)},
+                     {"shape", guarded_text(record.shape)},
                      {"orientation_wxyz", record.orientation_wxyz}});
 }
 

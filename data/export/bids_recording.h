@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "data/export/dataset.h"
+#include "data/export/dataset_description.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 
@@ -21,7 +21,7 @@ class BidsRecording {
 
   /// Whether a trial can stand in the same recording: shown by the same process, after all that is
   /// there, and at most a minute later (longer gaps would be more n/a than data).
-  bool goes_on_with(const StoredTrial& trial) const;
+  bool continues_with(const StoredTrial& trial) const;
   /// \param path of the file, which is made when the first samples come
   /// \throws StoreRefused: the samples are damaged.
   void add(const StoredTrial& trial, const std::string& path);

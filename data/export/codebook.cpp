@@ -2,19 +2,20 @@
 
 #include <span>
 
-#include "data/export/table_row.h"
-#include "data/files/spreadsheet_text.h"
+#include "data/export/delimited_row.h"
+#include "data/files/formula_guard.h"
 
 namespace palpate::data {
 namespace {
 
 void describe_table(const char* table, std::span<const Column> columns, const ProtocolFacts& facts,
                     const ExportSettings& settings, TextSink& out) {
-  TableRow row(TableStyle::csv);
+  DelimitedRow row(DelimitedFormat::csv);
   for (const Column& column : columns) {
     row << table << column.name << column.unit << "" << column.description;
     out.write(row.end());
-    for (const auto& values : {levels_of(column, facts), bits_of(column, settings.fault_bits)}) {
+    for (const auto& values :
+         {column_levels(column, facts), column_bits(column, settings.fault_bits)}) {
       for (const auto& [value, meaning] : values.items()) {
         // A name of a stimulus is guarded already; a guard of its own would be one too many.
         row << table << column.name << column.unit << unguarded(value)
@@ -28,7 +29,7 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
 }  // namespace
 
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings) {
-  TableRow row(TableStyle::csv);
+  DelimitedRow row(DelimitedFormat::csv);
   row << "table"
       << "column"
       << "unit"

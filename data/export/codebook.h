@@ -1,9 +1,9 @@
 #pragma once
 // Internal to data/: what the columns of trials.csv and attempts.csv mean, as a table.
 
-#include "data/export/columns.h"
-#include "data/export/dataset.h"
-#include "data/export/export.h"
+#include "data/export/column_definitions.h"
+#include "data/export/dataset_description.h"
+#include "data/export/settings.h"
 #include "data/files/text_sink.h"
 
 namespace palpate::data {

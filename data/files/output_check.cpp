@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "data/errors.h"
-#include "data/files/draft_file.h"
+#include "data/files/trusted_links.h"
 
 namespace palpate::data {
 namespace {
@@ -44,7 +44,7 @@ bool is_null_device(const struct stat& found) {
 }
 
 /// Pipes, terminals and what the shell opened take a text as it comes. \return why not, or "".
-std::string why_not_to_stream(const struct stat& found, std::optional<int> descriptor) {
+std::string stream_refusal(const struct stat& found, std::optional<int> descriptor) {
   if (S_ISDIR(found.st_mode)) return "expected a file; this is a folder";
   if (is_null_device(found)) return "";
   if (S_ISFIFO(found.st_mode)) {
@@ -60,7 +60,7 @@ std::string why_not_to_stream(const struct stat& found, std::optional<int> descr
 
 }  // namespace
 
-const std::vector<std::string>& database_companions() {
+const std::vector<std::string>& sqlite_file_suffixes() {
   static const std::vector<std::string> ends = {"-wal", "-shm", "-journal"};
   return ends;
 }
@@ -85,7 +85,7 @@ bool may_be_database(const std::string& path) {
   return false;
 }
 
-bool is_named_as_companion(const std::string& path) {
+bool belongs_to_database(const std::string& path) {
   const std::string place = place_of(path);
   for (std::string_view end : {"-wal", "-shm", "-journal", kLockEnd}) {
     if (!place.ends_with(end)) continue;
@@ -95,7 +95,7 @@ bool is_named_as_companion(const std::string& path) {
   return false;
 }
 
-std::optional<int> descriptor_named(const std::string& path) {
+std::optional<int> descriptor_of_path(const std::string& path) {
   if (path == "/dev/stdout") return STDOUT_FILENO;
   if (path == "/dev/stderr") return STDERR_FILENO;
   for (const std::string_view begin : {"/dev/fd/", "/proc/self/fd/"}) {
@@ -108,17 +108,17 @@ std::optional<int> descriptor_named(const std::string& path) {
   return std::nullopt;
 }
 
-void TakenFiles::add(const std::string& path, const std::string& why) {
+void ProtectedFiles::add(const std::string& path, const std::string& why) {
   if (path.empty()) return;
   const std::string place = place_of(path);
   taken_.push_back({place, why});
   if (!may_be_database(place)) return;
-  for (const std::string& end : database_companions()) {
+  for (const std::string& end : sqlite_file_suffixes()) {
     taken_.push_back({place + end, "SQLite's file beside a database: " + why});
   }
 }
 
-std::string TakenFiles::why(const std::string& path) const {
+std::string ProtectedFiles::why(const std::string& path) const {
   const auto found = look_at(path);
   // A terminal or a pipe may be read and written.
   if (found && !S_ISREG(found->st_mode)) return "";
@@ -129,27 +129,27 @@ std::string TakenFiles::why(const std::string& path) const {
   return "";
 }
 
-std::string why_not_to_write(const std::string& path, bool force, const TakenFiles& taken) {
+std::string write_refusal(const std::string& path, bool force, const ProtectedFiles& taken) {
   if (path.empty()) return "expected a path";
   const auto found = look_at(path);
-  const auto descriptor = descriptor_named(path);
+  const auto descriptor = descriptor_of_path(path);
   if (descriptor) {
     const int mode = ::fcntl(*descriptor, F_GETFL);
     if (mode < 0 || (mode & O_ACCMODE) == O_RDONLY) return "is not open for writing";
   }
-  if (found && !S_ISREG(found->st_mode)) return why_not_to_stream(*found, descriptor);
+  if (found && !S_ISREG(found->st_mode)) return stream_refusal(*found, descriptor);
   std::string why = taken.why(path);
   if (!why.empty()) return why;
   const std::string place = place_of(path);
   const bool logged = found && (look_at(place + "-wal") || look_at(place + "-journal"));
-  if (logged || may_be_database(path) || is_named_as_companion(path)) {
+  if (logged || may_be_database(path) || belongs_to_database(path)) {
     return "is a database or what belongs to one, and is never written over; name another file";
   }
   if (descriptor) return "";
   if (place.starts_with("/dev/") && !place.starts_with("/dev/shm/")) {
     return "is in the folder of devices; name a file elsewhere";
   }
-  why = follow_own_links(path).fault;
+  why = resolve_trusted_links(path).fault;
   if (!why.empty()) return why;
   struct stat link {};
   if (!found && ::lstat(path.c_str(), &link) == 0) return "is a link that leads nowhere";

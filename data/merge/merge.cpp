@@ -1,5 +1,6 @@
 #include "data/merge/merge.h"
 
+#include <SQLiteCpp/Transaction.h>
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <unistd.h>
@@ -10,13 +11,16 @@
 #include <filesystem>
 #include <system_error>
 
-#include "data/files/draft_file.h"
-#include "data/files/draft_folder.h"
+#include "data/files/atomic_file.h"
+#include "data/files/atomic_folder.h"
+#include "data/files/file_identity.h"
 #include "data/files/output_check.h"
 #include "data/merge/merge_plan.h"
-#include "data/merge/session_content.h"
+#include "data/merge/session_copy.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
+#include "data/store/sqlite_errors.h"
+#include "data/store/statement_values.h"
 
 namespace palpate::data {
 namespace {
@@ -32,15 +36,15 @@ void require_free(const std::string& out) {
                        ": is there already; a merge makes a new database and replaces none, give "
                        "another name or move it away");
   }
-  if (is_named_as_companion(out)) {
+  if (belongs_to_database(out)) {
     throw StoreRefused(out + ": is a name of what lies beside a database; give another name");
   }
 }
 
 /// Opens every file once, however often and under whatever name it was given.
-std::deque<Station> open_stations(const std::vector<std::string>& inputs,
-                                  const DraftFolder& scratch) {
-  std::deque<Station> stations;
+std::deque<StationDatabase> open_stations(const std::vector<std::string>& inputs,
+                                          const AtomicFolder& scratch) {
+  std::deque<StationDatabase> stations;
   std::vector<FileIdentity> seen;
   for (const std::string& input : inputs) {
     const FileIdentity identity = identity_of(input);
@@ -53,7 +57,7 @@ std::deque<Station> open_stations(const std::vector<std::string>& inputs,
 
 /// A value that the tables refuse is damage of the file that it came from.
 template <class Work>
-void take_from(const Station& station, Work&& work) {
+void take_from(const StationDatabase& station, Work&& work) {
   guarded(station.path(), [&] {
     try {
       work();
@@ -68,9 +72,10 @@ void take_from(const Station& station, Work&& work) {
 void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
           const std::function<void(std::int64_t, std::int64_t)>& progress) {
   std::int64_t sessions = 0;
-  for (const PlannedProtocol& protocol : plan.protocols) keep_protocol(db, out, protocol.info);
+  for (const PlannedProtocol& protocol : plan.protocols)
+    insert_protocol_if_absent(db, out, protocol.info);
   for (const PlannedProtocol& protocol : plan.protocols) {
-    const std::int64_t protocol_id = keep_protocol(db, out, protocol.info);
+    const std::int64_t protocol_id = insert_protocol_if_absent(db, out, protocol.info);
     for (const auto& [number, person] : protocol.participants) {
       SQLite::Statement enrol(db,
                               "INSERT INTO participants (protocol_id, code, number, simulated, "
@@ -107,11 +112,12 @@ void sync_file(const std::string& file) {
 
 }  // namespace
 
-Merged merge(const std::string& out, const std::vector<std::string>& inputs,
-             const std::function<void(std::int64_t, std::int64_t)>& progress, NumberClash clash) {
+MergeResult merge(const std::string& out, const std::vector<std::string>& inputs,
+                  const std::function<void(std::int64_t, std::int64_t)>& progress,
+                  NumberConflict clash) {
   require_free(out);
-  const DraftFolder folder(out);
-  std::deque<Station> stations = open_stations(inputs, folder);
+  const AtomicFolder folder(out);
+  std::deque<StationDatabase> stations = open_stations(inputs, folder);
   const MergePlan plan = plan_merge(stations, clash);
   const std::string draft = folder / "merged.db";
   create_database(draft);
@@ -124,10 +130,11 @@ Merged merge(const std::string& out, const std::vector<std::string>& inputs,
     transaction.commit();
     db.exec("PRAGMA journal_mode = WAL");
   });
-  for (const Station& station : stations) station.require_unchanged();
-  Merged done{Store::open(draft, Store::Mode::read_only).counts(), plan.left_out, plan.renumbered};
+  for (const StationDatabase& station : stations) station.require_unchanged();
+  MergeResult done{Store::open(draft, Store::Mode::read_only).counts(), plan.excluded,
+                   plan.renumbered};
   sync_file(draft);
-  if (!name_new_file(draft, out)) {
+  if (!rename_if_absent(draft, out)) {
     throw StoreRefused(out + ": has come there meanwhile; nothing was written, give another name");
   }
   return done;

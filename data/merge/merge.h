@@ -10,24 +10,24 @@
 namespace palpate::data {
 
 /// A participant of a station who has withdrawn at some station.
-struct LeftOut {
+struct ExcludedParticipant {
   std::string code, path;  ///< of the database that still holds the participant
 };
 
 /// A participant whose number is another's as well.
-struct Renumbered {
+struct RenumberedParticipant {
   std::string code, other, path;  ///< path: of the database that holds `code`
   int from = 0, to = 0;           ///< from: orders the trials, also those to come
 };
 
-struct Merged {
+struct MergeResult {
   StoreCounts counts;  ///< of the new database
-  std::vector<LeftOut> left_out;
-  std::vector<Renumbered> renumbered;
+  std::vector<ExcludedParticipant> excluded;
+  std::vector<RenumberedParticipant> renumbered;
 };
 
 /// What becomes of one number for two codes: two stations counted for themselves.
-enum class NumberClash {
+enum class NumberConflict {
   refuse,
   renumber,  ///< who began later gets the next number after all; the store keeps both
 };
@@ -43,10 +43,10 @@ enum class NumberClash {
 /// throw to stop.
 /// \throws StoreRefused with every conflict: a participant with different content (number, a
 /// session of the same number, sessions at the same time), one number for two codes (see
-/// NumberClash), different protocols under one name; an input that Store::open would refuse, or
+/// NumberConflict), different protocols under one name; an input that Store::open would refuse, or
 /// that is open for writing.
-Merged merge(const std::string& out, const std::vector<std::string>& inputs,
-             const std::function<void(std::int64_t, std::int64_t)>& progress = {},
-             NumberClash clash = NumberClash::refuse);
+MergeResult merge(const std::string& out, const std::vector<std::string>& inputs,
+                  const std::function<void(std::int64_t, std::int64_t)>& progress = {},
+                  NumberConflict clash = NumberConflict::refuse);
 
 }  // namespace palpate::data

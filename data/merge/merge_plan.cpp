@@ -1,13 +1,16 @@
 #include "data/merge/merge_plan.h"
 
+#include <sqlite3.h>
+
 #include <algorithm>
 #include <limits>
 #include <set>
 #include <tuple>
 
-#include "data/merge/session_content.h"
-#include "data/store/checks.h"
+#include "data/merge/session_copy.h"
 #include "data/store/protocol_rows.h"
+#include "data/store/sqlite_errors.h"
+#include "data/store/statement_values.h"
 
 namespace palpate::data {
 namespace {
@@ -18,7 +21,7 @@ struct FoundParticipant {
   PlannedParticipant person;
 };
 
-std::vector<FoundParticipant> participants_of(Station& station, std::int64_t protocol_id) {
+std::vector<FoundParticipant> participants_of(StationDatabase& station, std::int64_t protocol_id) {
   std::vector<FoundParticipant> all;
   SQLite::Statement find(station.db(),
                          "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings "
@@ -29,7 +32,7 @@ std::vector<FoundParticipant> participants_of(Station& station, std::int64_t pro
   while (find.executeStep()) {
     FoundParticipant& one = all.emplace_back();
     one.person.station = &station;
-    Row(find) >> one.id >> one.number >> one.person.enrolled_number >> one.person.code >>
+    RowReader(find) >> one.id >> one.number >> one.person.enrolled_number >> one.person.code >>
         one.person.simulated >> one.person.seed;
   }
   SQLite::Statement sessions(station.db(),
@@ -40,7 +43,7 @@ std::vector<FoundParticipant> participants_of(Station& station, std::int64_t pro
     while (sessions.executeStep()) {
       int number = 0;
       std::int64_t id = 0;
-      Row(sessions) >> number >> id;
+      RowReader(sessions) >> number >> id;
       one.person.sessions[number] = {&station, id};
     }
   }
@@ -62,38 +65,40 @@ Span span_of(const PlannedSession& session) {
   Binder(find) << session.id;
   find.executeStep();
   Span span;
-  Row(find) >> span.begin >> span.end;
+  RowReader(find) >> span.begin >> span.end;
   return span;
 }
 
 class Planner {
  public:
-  MergePlan plan(std::deque<Station>& stations, NumberClash clash);
+  MergePlan plan(std::deque<StationDatabase>& stations, NumberConflict clash);
 
  private:
-  void add_protocols(Station& station);
-  void add_files(ProtocolInfo& known, Station& station, std::int64_t protocol_id);
+  void add_protocols(StationDatabase& station);
+  void add_files(ProtocolInfo& known, StationDatabase& station, std::int64_t protocol_id);
   void add_participant(PlannedProtocol& protocol, FoundParticipant found);
-  void settle_numbers(PlannedProtocol& protocol, NumberClash clash);
+  void settle_numbers(PlannedProtocol& protocol, NumberConflict clash);
   void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
-  void require_one_meaning_per_name(const std::deque<Station>& stations);
+  void require_one_meaning_per_name(const std::deque<StationDatabase>& stations);
   /// \param without_numbers so many conflicts are of another kind
   [[noreturn]] void raise(std::size_t without_numbers) const;
 
   MergePlan plan_;
   std::map<std::string, PlannedProtocol> protocols_;                       // by checksum
   std::map<std::string, std::map<std::string, FoundParticipant>> people_;  // checksum -> by code
-  std::map<std::string, std::map<const Station*, std::set<std::string>>> names_;  // -> checksums
+  std::map<std::string, std::map<const StationDatabase*, std::set<std::string>>>
+      names_;                              // -> checksums
   std::map<std::string, bool> withdrawn_;  // codes that were looked up
   std::vector<std::string> conflicts_;
 };
 
-MergePlan Planner::plan(std::deque<Station>& stations, NumberClash clash) {
-  for (Station& station : stations) {
+MergePlan Planner::plan(std::deque<StationDatabase>& stations, NumberConflict clash) {
+  for (StationDatabase& station : stations) {
     guarded(station.path(),
             [&] { plan_.tombstones.add(Tombstones::read(station.db(), station.path())); });
   }
-  for (Station& station : stations) guarded(station.path(), [&] { add_protocols(station); });
+  for (StationDatabase& station : stations)
+    guarded(station.path(), [&] { add_protocols(station); });
   require_one_meaning_per_name(stations);
   const std::size_t without_numbers = conflicts_.size();
   for (auto& [sha256, protocol] : protocols_) settle_numbers(protocol, clash);
@@ -127,12 +132,12 @@ void Planner::raise(std::size_t without_numbers) const {
   throw StoreRefused(message);
 }
 
-void Planner::add_protocols(Station& station) {
+void Planner::add_protocols(StationDatabase& station) {
   SQLite::Statement find(station.db(), "SELECT id, name, sha256, text FROM protocols ORDER BY id");
   while (find.executeStep()) {
     std::int64_t id = 0;
     ProtocolInfo found;
-    Row(find) >> id >> found.name >> found.sha256 >> found.text;
+    RowReader(find) >> id >> found.name >> found.sha256 >> found.text;
     names_[found.name][&station].insert(found.sha256);
     PlannedProtocol& protocol = protocols_[found.sha256];
     if (protocol.info.sha256.empty()) protocol.info = found;
@@ -151,7 +156,7 @@ void Planner::add_protocols(Station& station) {
       auto [at, unknown] = withdrawn_.try_emplace(code, false);
       if (unknown) at->second = plan_.tombstones.holds(code);
       if (at->second) {
-        plan_.left_out.push_back({code, station.path()});
+        plan_.excluded.push_back({code, station.path()});
       } else {
         add_participant(protocol, std::move(one));
       }
@@ -160,8 +165,8 @@ void Planner::add_protocols(Station& station) {
 }
 
 /// A station of an older palpate may not have kept them.
-void Planner::add_files(ProtocolInfo& known, Station& station, std::int64_t protocol_id) {
-  for (ProtocolFile& file : files_of(station.db(), protocol_id)) {
+void Planner::add_files(ProtocolInfo& known, StationDatabase& station, std::int64_t protocol_id) {
+  for (ProtocolFile& file : protocol_files(station.db(), protocol_id)) {
     const auto at = std::lower_bound(known.files.begin(), known.files.end(), file.name,
                                      [](const auto& a, const auto& name) { return a.name < name; });
     if (at == known.files.end() || at->name != file.name) {
@@ -206,7 +211,7 @@ void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found)
 }
 
 /// Who began first keeps a number that several have, unless it is not the one of the own trials.
-void Planner::settle_numbers(PlannedProtocol& protocol, NumberClash clash) {
+void Planner::settle_numbers(PlannedProtocol& protocol, NumberConflict clash) {
   std::vector<std::pair<std::tuple<int, bool, double, std::string>, FoundParticipant*>> ordered;
   for (auto& [code, one] : people_[protocol.info.sha256]) {
     double began = std::numeric_limits<double>::infinity();
@@ -222,7 +227,7 @@ void Planner::settle_numbers(PlannedProtocol& protocol, NumberClash clash) {
     int number = one->number;
     if (holder != protocol.participants.end()) {
       const PlannedParticipant& other = holder->second;
-      if (clash == NumberClash::refuse) {
+      if (clash == NumberConflict::refuse) {
         conflicts_.push_back("number " + std::to_string(number) + " is that of participant " +
                              other.code + " and of participant " + one->person.code + " (" +
                              other.station->path() + ", " + one->person.station->path() +
@@ -268,11 +273,11 @@ void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& 
 
 /// Names of a protocol may have several checksums within a station: it was changed there. Two
 /// stations that know different ones ran different studies.
-void Planner::require_one_meaning_per_name(const std::deque<Station>& stations) {
+void Planner::require_one_meaning_per_name(const std::deque<StationDatabase>& stations) {
   for (const auto& [name, by_station] : names_) {
     for (std::size_t i = 0; i < stations.size(); ++i) {
       for (std::size_t k = i + 1; k < stations.size(); ++k) {
-        const Station &a = stations[i], &b = stations[k];
+        const StationDatabase &a = stations[i], &b = stations[k];
         const auto of_a = by_station.find(&a), of_b = by_station.find(&b);
         if (of_a == by_station.end() || of_b == by_station.end()) continue;
         const auto &one = of_a->second, &other = of_b->second;
@@ -290,7 +295,7 @@ void Planner::require_one_meaning_per_name(const std::deque<Station>& stations) 
 
 }  // namespace
 
-MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash) {
+MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash) {
   return Planner().plan(stations, clash);
 }
 

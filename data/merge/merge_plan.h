@@ -9,18 +9,18 @@
 #include <vector>
 
 #include "data/merge/merge.h"
-#include "data/merge/station.h"
+#include "data/store/station_database.h"
 #include "data/store/tombstones.h"
 
 namespace palpate::data {
 
 struct PlannedSession {
-  Station* station = nullptr;  ///< that it is copied from
-  std::int64_t id = 0;         ///< there
+  StationDatabase* station = nullptr;  ///< that it is copied from
+  std::int64_t id = 0;                 ///< there
 };
 
 struct PlannedParticipant {
-  Station* station = nullptr;  ///< where it was found first
+  StationDatabase* station = nullptr;  ///< where it was found first
   std::string code;
   int enrolled_number = 0;  ///< as of Participant
   bool simulated = false;
@@ -36,12 +36,12 @@ struct PlannedProtocol {
 struct MergePlan {
   std::vector<PlannedProtocol> protocols;  ///< by name, then checksum
   Tombstones tombstones;
-  std::vector<LeftOut> left_out;
-  std::vector<Renumbered> renumbered;
+  std::vector<ExcludedParticipant> excluded;
+  std::vector<RenumberedParticipant> renumbered;
   std::int64_t sessions = 0;
 };
 
 /// \throws StoreRefused with every conflict, a line each.
-MergePlan plan_merge(std::deque<Station>& stations, NumberClash clash);
+MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash);
 
 }  // namespace palpate::data

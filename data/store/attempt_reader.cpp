@@ -9,12 +9,12 @@
 #include <vector>
 
 #include "data/files/utc.h"
-#include "data/store/checks.h"
 #include "data/store/protocol_rows.h"
+#include "data/store/record_columns.h"
 #include "data/store/samples_codec.h"
 #include "data/store/seals.h"
-#include "data/store/store_impl.h"
-#include "data/store/store_rows.h"
+#include "data/store/statement_values.h"
+#include "data/store/validation.h"
 
 namespace palpate::data {
 namespace {
@@ -88,7 +88,7 @@ AttemptState state_of(const std::string& text) {
   throw SQLite::Exception("state is '" + text + "'", SQLITE_CORRUPT);
 }
 
-std::optional<Link> read_link(Row& row) {
+std::optional<Link> read_link(RowReader& row) {
   std::optional<Link> link;
   std::optional<std::int64_t> place;
   std::optional<Checksum> seal;
@@ -122,7 +122,7 @@ class Reader {
     bool running = false;
   };
   bool sealed() const { return version_ >= kSealsSince; }
-  bool checks_seals() const { return sealed() && !filter_.checked_before; }
+  bool checks_seals() const { return sealed() && !filter_.seals_verified; }
   std::vector<std::int64_t> sessions();
   void read_session(std::int64_t id);
   void read_runs(const SessionHead& session, std::optional<ChainCheck>& chain);
@@ -191,7 +191,7 @@ void Reader::read_runs(const SessionHead& session, std::optional<ChainCheck>& ch
     std::int64_t id = 0;
     std::string end_reason;
     std::optional<std::int64_t> ended_ns, protocol;
-    Row row(find);
+    RowReader row(find);
     row >> id >> end_reason >> ended_ns >> protocol;
     const auto link = read_link(row), end_link = read_link(row);
     KnownRun& run = runs_[id];
@@ -218,7 +218,7 @@ void Reader::read_notes(std::int64_t session, ChainCheck& chain) {
   for (std::int64_t number = 1; find.executeStep(); ++number) {
     std::int64_t run_link = 0, at_ns = 0;
     std::string text;
-    Row row(find);
+    RowReader row(find);
     row >> run_link >> at_ns >> text;
     put_note(values_, run_link, at_ns, text);
     chain.add(read_link(row), values_, {.kind = "note", .number = number});
@@ -240,7 +240,7 @@ void Reader::read_samples(std::int64_t attempt, const std::optional<Checksum>& s
   if (sealed() && sum != checksum_of_samples(packing, count, bytes, size)) {
     throw SQLite::Exception("its samples were changed since they were recorded", SQLITE_CORRUPT);
   }
-  if (filter_.samples != SamplesWanted::unpacked) return;
+  if (filter_.samples != SampleReading::unpacked) return;
   if (packing < 1 || packing > kSamplesPacking) {
     throw StoreRefused(
         path_ + ": holds samples in a packing that this palpate does not know; use a newer one");
@@ -259,7 +259,7 @@ void Reader::read_attempt(std::optional<ChainCheck>& chain) {
   AttemptSealed about;
   std::int64_t run = 0;
   std::string state_text;
-  Row row(columns_);
+  RowReader row(columns_);
   const std::int64_t id = read_plan(row, record);
   about.began_ns = record.onset_ns;
   row >> run >> state_text;
@@ -294,7 +294,7 @@ void Reader::read_attempt(std::optional<ChainCheck>& chain) {
     chain->add(link, values_, {.kind = "trial", .number = record.trial, .attempt = record.attempt});
   }
   if (!wanted) return;
-  if (filter_.samples != SamplesWanted::no) read_samples(id, about.samples);
+  if (filter_.samples != SampleReading::no) read_samples(id, about.samples);
   record.onset_utc = format_utc(to_unix_ns(trial_.run.clock, record.onset_ns));
   visit_(trial_);
 }

@@ -16,15 +16,15 @@ namespace palpate::data {
 
 enum class AttemptState { running, completed, cut_off };
 
-enum class SamplesWanted { no, held_against_their_checksum, unpacked };
+enum class SampleReading { no, verify, unpacked };
 
 /// Which attempts are visited. The sessions that they are in are checked as a whole.
 struct AttemptFilter {
   std::optional<AttemptState> state = {};                    ///< none: both that are over
   const TrialName* trial = nullptr;                          ///< this one, in whatever protocols
   std::optional<std::pair<std::int64_t, int>> session = {};  ///< participant's id, number
-  SamplesWanted samples = SamplesWanted::no;
-  bool checked_before = false;  ///< the seals, in the same state of the database
+  SampleReading samples = SampleReading::no;
+  bool seals_verified = false;  ///< the seals, in the same state of the database
 };
 
 /// By protocol, participant number, session, trial and attempt. Every session in question is held

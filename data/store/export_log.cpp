@@ -10,9 +10,11 @@
 #include <sstream>
 #include <utility>
 
-#include "data/files/private_files.h"
+#include "data/files/file_permissions.h"
 #include "data/store/schema.h"
-#include "data/store/store_impl.h"
+#include "data/store/sqlite_errors.h"
+#include "data/store/statement_values.h"
+#include "data/store/store.h"
 
 namespace palpate::data {
 namespace {
@@ -55,7 +57,7 @@ std::string recorded_path(const std::string& database, const std::string& path) 
   return place.filename().string() + kElsewhere + tag_of(place.string()) + ")";
 }
 
-std::string place_of_record(const std::string& database, const std::string& recorded) {
+std::string export_location(const std::string& database, const std::string& recorded) {
   namespace fs = std::filesystem;
   if (recorded.find(kElsewhere) != std::string::npos) return "";
   return (fs::weakly_canonical(fs::absolute(database)).parent_path() / recorded).string();
@@ -67,14 +69,14 @@ void log_export(const std::string& database, const ExportRecord& made,
   const std::string path = recorded_path(file, made.path);
   guarded(database, [&] {
     std::optional<SQLite::Database> db;
-    require_private_companions(file);
+    require_private_sqlite_files(file);
     db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     if (checked_version(*db, database) < kSchemaVersion) {
       db.reset();
       Store::open(database, Store::Mode::write_or_create);
       db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
     }
-    require_private_companions(file);
+    require_private_sqlite_files(file);
     db->exec("PRAGMA trusted_schema = OFF; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON");
     SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
     shorten_paths(*db, file);
@@ -107,7 +109,7 @@ void log_export(const std::string& database, const ExportRecord& made,
   });
 }
 
-void ExportedPeople::add(const Participant& participant) {
+void ExportedParticipants::add(const Participant& participant) {
   if (!ids_.empty() && ids_.back() == participant.id) return;
   if (std::find(ids_.begin(), ids_.end(), participant.id) == ids_.end()) {
     ids_.push_back(participant.id);
@@ -115,8 +117,8 @@ void ExportedPeople::add(const Participant& participant) {
   (participant.simulated ? any_simulated_ : any_real_) = true;
 }
 
-std::string ExportedPeople::record(const std::string& database, const std::string& path,
-                                   const std::string& format) const {
+std::string ExportedParticipants::record(const std::string& database, const std::string& path,
+                                         const std::string& format) const {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const ExportRecord made{path, format,
                           std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};

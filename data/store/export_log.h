@@ -21,7 +21,7 @@ struct ExportRecord {
 std::string recorded_path(const std::string& database, const std::string& path);
 
 /// Where that is; "" for a place outside of the database's folder.
-std::string place_of_record(const std::string& database, const std::string& recorded);
+std::string export_location(const std::string& database, const std::string& recorded);
 
 /// Adds an export (`made.path`: where it is) that holds these participants (the store's keys), in
 /// place of an earlier one at the same path. Works beside a writer; brings a database of an older
@@ -31,7 +31,7 @@ void log_export(const std::string& database, const ExportRecord& made,
                 const std::vector<std::int64_t>& participants);
 
 /// Gathers who is in an export while it is written, and records it before it gets its name.
-class ExportedPeople {
+class ExportedParticipants {
  public:
   void add(const Participant& participant);
   bool any_simulated() const { return any_simulated_; }

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include "data/errors.h"
 #include "data/files/checksum.h"
-#include "data/store/store_impl.h"
+#include "data/store/statement_values.h"
 
 namespace palpate::data {
 namespace {
@@ -12,7 +13,7 @@ constexpr int kFilesSince = 3;  // schema version
 
 std::string shown(const std::string& sha256) { return sha256.substr(0, 12) + "..."; }
 
-std::int64_t keep_bytes(SQLite::Database& db, const std::string& bytes) {
+std::int64_t insert_file_if_absent(SQLite::Database& db, const std::string& bytes) {
   const std::string sha256 = checksum_hex(bytes);
   SQLite::Statement find(db, "SELECT id FROM files WHERE sha256 = ?");
   Binder(find) << sha256;
@@ -25,8 +26,8 @@ std::int64_t keep_bytes(SQLite::Database& db, const std::string& bytes) {
 }
 
 /// Name and checksum of each file of a protocol, by name.
-std::vector<std::pair<std::string, std::string>> sums_of(SQLite::Database& db,
-                                                         std::int64_t protocol_id) {
+std::vector<std::pair<std::string, std::string>> file_checksums(SQLite::Database& db,
+                                                                std::int64_t protocol_id) {
   std::vector<std::pair<std::string, std::string>> all;
   SQLite::Statement find(db,
                          "SELECT p.name, f.sha256 FROM protocol_files p JOIN files f ON f.id = "
@@ -34,14 +35,14 @@ std::vector<std::pair<std::string, std::string>> sums_of(SQLite::Database& db,
   Binder(find) << protocol_id;
   while (find.executeStep()) {
     auto& [name, sha256] = all.emplace_back();
-    Row(find) >> name >> sha256;
+    RowReader(find) >> name >> sha256;
   }
   return all;
 }
 
 void require_same_files(SQLite::Database& db, const std::string& path, std::int64_t protocol_id,
                         const ProtocolInfo& protocol) {
-  const auto stored = sums_of(db, protocol_id);
+  const auto stored = file_checksums(db, protocol_id);
   for (const ProtocolFile& file : protocol.files) {
     const auto known = std::find_if(stored.begin(), stored.end(),
                                     [&](const auto& one) { return one.first == file.name; });
@@ -65,7 +66,7 @@ std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::strin
   if (!find.executeStep()) return std::nullopt;
   std::int64_t id = 0;
   std::string text;
-  Row(find) >> id >> text;
+  RowReader(find) >> id >> text;
   if (text != protocol.text) {
     throw StoreRefused(path + ": holds another protocol text under the same SHA-256 " +
                        protocol.sha256);
@@ -74,8 +75,8 @@ std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::strin
   return id;
 }
 
-std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
-                           const ProtocolInfo& protocol) {
+std::int64_t insert_protocol_if_absent(SQLite::Database& db, const std::string& path,
+                                       const ProtocolInfo& protocol) {
   std::optional<std::int64_t> id = find_protocol(db, path, protocol);
   if (!id) {
     SQLite::Statement add(db, "INSERT INTO protocols (sha256, name, text) VALUES (?, ?, ?)");
@@ -87,13 +88,13 @@ std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
     SQLite::Statement add(db,
                           "INSERT INTO protocol_files (protocol_id, name, file_id) VALUES (?, ?, "
                           "?) ON CONFLICT DO NOTHING");
-    Binder(add) << *id << file.name << keep_bytes(db, file.bytes);
+    Binder(add) << *id << file.name << insert_file_if_absent(db, file.bytes);
     add.exec();
   }
   return *id;
 }
 
-std::vector<ProtocolFile> files_of(SQLite::Database& db, std::int64_t protocol_id) {
+std::vector<ProtocolFile> protocol_files(SQLite::Database& db, std::int64_t protocol_id) {
   std::vector<ProtocolFile> all;
   SQLite::Statement find(db,
                          "SELECT p.name, f.bytes FROM protocol_files p JOIN files f ON f.id = "
@@ -101,20 +102,20 @@ std::vector<ProtocolFile> files_of(SQLite::Database& db, std::int64_t protocol_i
   Binder(find) << protocol_id;
   while (find.executeStep()) {
     ProtocolFile& file = all.emplace_back();
-    Row(find) >> file.name >> file.bytes;
+    RowReader(find) >> file.name >> file.bytes;
   }
   return all;
 }
 
 std::string files_checksum(SQLite::Database& db, std::int64_t protocol_id) {
   std::string lines;
-  for (const auto& [name, sha256] : sums_of(db, protocol_id)) {
+  for (const auto& [name, sha256] : file_checksums(db, protocol_id)) {
     lines += name + '\0' + sha256 + '\n';
   }
   return lines.empty() ? "" : checksum_hex(lines);
 }
 
-void require_sound_protocols(SQLite::Database& db, const std::string& path, int version) {
+void verify_protocol_checksums(SQLite::Database& db, const std::string& path, int version) {
   const auto refuse = [&](const std::string& what) {
     throw StoreRefused(path + ": " + what +
                        " does not match its SHA-256: it was changed after it was stored; restore a "
@@ -123,7 +124,7 @@ void require_sound_protocols(SQLite::Database& db, const std::string& path, int 
   SQLite::Statement texts(db, "SELECT name, text, sha256 FROM protocols");
   while (texts.executeStep()) {
     ProtocolInfo one;
-    Row(texts) >> one.name >> one.text >> one.sha256;
+    RowReader(texts) >> one.name >> one.text >> one.sha256;
     if (checksum_hex(one.text) != one.sha256) refuse("the text of protocol " + one.name);
   }
   if (version < kFilesSince) return;
@@ -132,7 +133,7 @@ void require_sound_protocols(SQLite::Database& db, const std::string& path, int 
                           "f.id), '(of no protocol)'), f.bytes, f.sha256 FROM files f");
   while (files.executeStep()) {
     std::string name, bytes, sha256;
-    Row(files) >> name >> bytes >> sha256;
+    RowReader(files) >> name >> bytes >> sha256;
     if (checksum_hex(bytes) != sha256) refuse("the stored file " + name);
   }
 }

@@ -19,11 +19,11 @@ std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::strin
 
 /// The same; it is added where it is not there yet. One that came from a version without files gets
 /// them.
-std::int64_t keep_protocol(SQLite::Database& db, const std::string& path,
-                           const ProtocolInfo& protocol);
+std::int64_t insert_protocol_if_absent(SQLite::Database& db, const std::string& path,
+                                       const ProtocolInfo& protocol);
 
 /// By name.
-std::vector<ProtocolFile> files_of(SQLite::Database& db, std::int64_t protocol_id);
+std::vector<ProtocolFile> protocol_files(SQLite::Database& db, std::int64_t protocol_id);
 
 /// One checksum for all files of a protocol: SHA-256 of, for each by name, its name, a zero byte,
 /// its SHA-256 as 64 digits and a line feed. "" where there are none.
@@ -31,6 +31,6 @@ std::string files_checksum(SQLite::Database& db, std::int64_t protocol_id);
 
 /// Every protocol's text and every file has the checksum that it had when it was stored.
 /// \param version  of the schema. \throws StoreRefused.
-void require_sound_protocols(SQLite::Database& db, const std::string& path, int version);
+void verify_protocol_checksums(SQLite::Database& db, const std::string& path, int version);
 
 }  // namespace palpate::data

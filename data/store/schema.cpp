@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "data/errors.h"
-#include "data/files/draft_file.h"
-#include "data/files/draft_folder.h"
+#include "data/files/atomic_file.h"
+#include "data/files/atomic_folder.h"
 #include "data/store/seal_writer.h"
 #include "data/store/sqlite_errors.h"
 
@@ -38,12 +38,12 @@ void make_private_file(const std::string& file) {
 std::span<const Migration> migrations() {
   static const std::array<Migration, 2> steps = {
       {{1, withdrawal_sql()},
-       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).all_as_found(); }}}};
+       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); }}}};
   return steps;
 }
 
 void create_database(const std::string& path) {
-  const DraftFolder folder(path);
+  const AtomicFolder folder(path);
   const std::string draft = folder / "new.db";
   make_private_file(draft);
   guarded(path, [&] {
@@ -57,7 +57,7 @@ void create_database(const std::string& path) {
     set_version(db, kSchemaVersion);
     transaction.commit();
   });
-  if (!name_new_file(draft, path)) {
+  if (!rename_if_absent(draft, path)) {
     throw StoreRefused(path + ": has come there while it was to be created; start again");
   }
 }
@@ -83,7 +83,7 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest) {
 std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
                     std::span<const Migration> steps) {
   const std::string stem = path + ".v" + std::to_string(from);
-  const DraftFolder folder(stem);
+  const AtomicFolder folder(stem);
   const std::string draft = folder / "backup.db";
   make_private_file(draft);
   std::string copy = stem + ".backup";
@@ -94,7 +94,7 @@ std::string migrate(SQLite::Database& db, const std::string& path, int from, int
                        " before it is migrated: another program keeps it locked");
     }
   });
-  for (int i = 2; !name_new_file(draft, copy); ++i) {
+  for (int i = 2; !rename_if_absent(draft, copy); ++i) {
     copy = stem + "-" + std::to_string(i) + ".backup";
   }
   guarded(path, [&] {

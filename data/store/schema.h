@@ -44,7 +44,7 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest = 
 /// Every table and index of ours in the file is the one that we would make, so that its CHECKs hold
 /// where quick_check says so, and nothing runs by itself (triggers). Others' tables are left alone.
 /// \throws StoreRefused.
-void require_our_schema(SQLite::Database& db, const std::string& path, int version);
+void verify_schema(SQLite::Database& db, const std::string& path, int version);
 
 /// Brings a database of version `from` to `to`: copies it to a new `path`.v<from>.backup (0600),
 /// then runs every step in one transaction. \return the path of the copy. \throws StoreError; the

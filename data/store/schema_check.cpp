@@ -58,7 +58,7 @@ std::map<std::string, std::string> our_objects(int version) {
 
 }  // namespace
 
-void require_our_schema(SQLite::Database& db, const std::string& path, int version) {
+void verify_schema(SQLite::Database& db, const std::string& path, int version) {
   const auto found = objects_of(db, path);
   for (const auto& [name, sql] : our_objects(version)) {
     const auto object = found.find(name);

@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "data/store/store_impl.h"
-#include "data/store/store_rows.h"
+#include "data/store/record_columns.h"
+#include "data/store/statement_values.h"
 
 namespace palpate::data {
 namespace {
@@ -39,7 +39,7 @@ const Link& SealWriter::last_of(std::int64_t session) {
                          "r.session_id = ?1) WHERE link IS NOT NULL ORDER BY link DESC LIMIT 1");
   Binder(find) << session;
   if (find.executeStep()) {
-    Row(find) >> link.place >> link.seal;
+    RowReader(find) >> link.place >> link.seal;
   } else {
     SealedValues whose;
     put_session(whose, read_session_head(db_, session, kVersion));
@@ -65,7 +65,7 @@ void SealWriter::run(std::int64_t id) {
   require_row(find);
   std::int64_t session = 0;
   RunInfo info;
-  Row row(find);
+  RowReader row(find);
   row >> session >> info;
   put_run(values_, info);
   seal("UPDATE runs SET link = ?, seal = ? WHERE id = ?", session, id);
@@ -79,7 +79,7 @@ void SealWriter::note(std::int64_t id) {
   require_row(find);
   std::int64_t session = 0, run_link = 0, at_ns = 0;
   std::string text;
-  Row(find) >> session >> run_link >> at_ns >> text;
+  RowReader(find) >> session >> run_link >> at_ns >> text;
   put_note(values_, run_link, at_ns, text);
   seal("UPDATE notes SET link = ?, seal = ? WHERE id = ?", session, id);
 }
@@ -92,7 +92,7 @@ void SealWriter::end(std::int64_t run_id) {
   std::int64_t session = 0, run_link = 0;
   std::string reason;
   std::optional<std::int64_t> ended_ns;
-  Row(find) >> session >> run_link >> reason >> ended_ns;
+  RowReader(find) >> session >> run_link >> reason >> ended_ns;
   put_end(values_, run_link, reason, ended_ns);
   seal("UPDATE runs SET end_link = ?, end_seal = ? WHERE id = ?", session, run_id);
 }
@@ -112,7 +112,7 @@ void SealWriter::attempt(std::int64_t id) {
   std::int64_t session = 0;
   AttemptSealed about;
   TrialRecord record;
-  Row row(find);
+  RowReader row(find);
   row >> session >> about.run_link;
   read_plan(row, record);
   about.began_ns = record.onset_ns;
@@ -129,7 +129,7 @@ void SealWriter::attempt(std::int64_t id) {
   last_[session] = link;
 }
 
-void SealWriter::all_as_found() {
+void SealWriter::seal_existing_rows() {
   for (const std::int64_t id : ids(db_, "SELECT attempt_id FROM samples")) {
     SQLite::Statement find(db_, "SELECT packing, count, data FROM samples WHERE attempt_id = ?");
     Binder(find) << id;

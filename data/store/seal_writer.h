@@ -14,7 +14,7 @@ namespace palpate::data {
 
 /// Each call reads a row back as it is stored, and seals it as the next of its session. To be
 /// called within the transaction that wrote the row; when that fails, or sessions are removed, call
-/// start_anew: what it knows of the sessions may be wrong.
+/// reset_chains: what it knows of the sessions may be wrong.
 class SealWriter {
  public:
   explicit SealWriter(SQLite::Database& db) : db_(db) {}
@@ -23,10 +23,10 @@ class SealWriter {
   void note(std::int64_t id);
   void attempt(std::int64_t id);  ///< that is over
   void end(std::int64_t run_id);  ///< of a run
-  void start_anew() { last_.clear(); }
+  void reset_chains() { last_.clear(); }
 
   /// What a palpate without seals has recorded, as it is found.
-  void all_as_found();
+  void seal_existing_rows();
 
  private:
   const Link& last_of(std::int64_t session);

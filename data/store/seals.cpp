@@ -4,7 +4,8 @@
 
 #include <array>
 
-#include "data/store/store_rows.h"
+#include "data/errors.h"
+#include "data/store/record_columns.h"
 
 namespace palpate::data {
 namespace {

@@ -73,7 +73,7 @@ struct StoredRun {
 };
 
 /// What a database holds of one code, in all its protocols.
-struct Holdings {
+struct ParticipantSummary {
   bool withdrawn_before = false;  ///< the code has a tombstone
   std::int64_t protocols = 0;     ///< it is enrolled in
   std::int64_t sessions = 0, trials = 0, cut_off = 0;
@@ -192,9 +192,9 @@ class Store {
   std::vector<StoredNote> notes();   ///< same order
   /// When the last that is on record of live sessions happened, ns since 1970. Simulated studies
   /// keep a calendar of their own.
-  std::optional<std::int64_t> newest_record();
+  std::optional<std::int64_t> latest_recorded_time();
   StoreCounts counts();
-  Holdings holdings(const std::string& code);
+  ParticipantSummary participant_summary(const std::string& code);
   bool has_samples(const Participant& participant, int session);
   /// Code -> its first completed trial in any protocol (where there is none: the first attempt), ns
   /// since 1970.

@@ -10,8 +10,9 @@
 #include <memory>
 #include <optional>
 
+#include "data/errors.h"
 #include "data/files/checksum.h"
-#include "data/store/store_impl.h"
+#include "data/store/statement_values.h"
 
 namespace palpate::data {
 namespace {
@@ -76,7 +77,7 @@ Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
   while (find.executeStep()) {
     std::string hash;
     std::optional<std::string> secret;
-    Row(find) >> hash >> secret;
+    RowReader(find) >> hash >> secret;
     const std::string salt = salt_of(hash);
     const bool clean = std::all_of(hash.begin(), hash.end(), [](char c) {
       return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||

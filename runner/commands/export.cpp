@@ -4,9 +4,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "data/export/export_bids.h"
-#include "data/export/export_csv.h"
-#include "data/export/export_psychds.h"
+#include "data/export/bids.h"
+#include "data/export/csv.h"
+#include "data/export/psychds.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
@@ -82,8 +82,8 @@ data::Times times_of(const std::string& word, const std::string& format, const s
   throw UsageError("no times '" + word + "'; there are: absolute, relative\nUsage: " + usage);
 }
 
-data::ExportDone export_as(const std::string& format, data::Store& store, const std::string& out,
-                           const data::ExportSettings& settings) {
+data::ExportResult export_as(const std::string& format, data::Store& store, const std::string& out,
+                             const data::ExportSettings& settings) {
   if (format == "bids") return data::export_bids(store, out, settings);
   if (format == "psych-ds") return data::export_psychds(store, out, settings);
   return data::export_csv(store, out, settings);
@@ -146,7 +146,7 @@ int export_command(const std::vector<std::string>& args) {
     settings.times = told;
     settings.codebook = codebook;
     settings.fault_bits = fault_bits();
-    data::ExportDone done;
+    data::ExportResult done;
     {
       Progress progress(store, watch_stop_signals());
       settings.progress = [&](std::int64_t trials) { progress.show(trials); };

@@ -16,12 +16,13 @@ namespace {
 namespace po = boost::program_options;
 
 /// \param database whose folder the paths are relative to
-void list_exports(const data::Holdings& holdings, const std::string& database, std::ostream& out) {
+void list_exports(const data::ParticipantSummary& holdings, const std::string& database,
+                  std::ostream& out) {
   if (holdings.exports.empty()) return;
   out << "These exports hold the participant; delete them and their copies, or export again:\n";
   for (const data::ExportRecord& one : holdings.exports) {
     std::error_code error;
-    const std::string place = data::place_of_record(database, one.path);
+    const std::string place = data::export_location(database, one.path);
     const std::string path = place.empty() ? one.path : place;
     out << "  " << stimuli::printable(path) << " (" << one.format << ", "
         << data::format_utc(one.made_utc_ns)
@@ -69,7 +70,7 @@ int forget_command(const std::vector<std::string>& args) {
 
   data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
   warn_of_exposure(database);
-  const data::Holdings holdings = store.holdings(code);
+  const data::ParticipantSummary holdings = store.participant_summary(code);
   if (holdings.protocols == 0 && !holdings.withdrawn_before) {
     throw UsageError(database + ": there is no participant " + code + " here");
   }

@@ -52,24 +52,25 @@ int merge_command(const std::vector<std::string>& args) {
   const std::atomic<bool>& stop_asked = watch_stop_signals();
   try {
     ProgressLine progress("sessions");
-    const data::Merged done = data::merge(
+    const data::MergeResult done = data::merge(
         out, inputs,
         [&](std::int64_t session, std::int64_t all) {
           if (stop_asked) throw std::runtime_error("stopped; nothing was written");
           progress.show(all > 0 ? static_cast<double>(session) / static_cast<double>(all) : 1);
         },
-        (*values)["renumber"].as<bool>() ? data::NumberClash::renumber : data::NumberClash::refuse);
+        (*values)["renumber"].as<bool>() ? data::NumberConflict::renumber
+                                         : data::NumberConflict::refuse);
     progress.clear();
     warn_of_exposure(out);
     std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
               << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
               << done.counts.cut_off << " attempts that were cut off\n";
-    for (const data::Renumbered& one : done.renumbered) {
+    for (const data::RenumberedParticipant& one : done.renumbered) {
       std::cout << one.code << " (" << stimuli::printable(one.path) << ") has number " << one.to
                 << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
                 << one.code << " keep the order of number " << one.from << "\n";
     }
-    for (const data::LeftOut& one : done.left_out) {
+    for (const data::ExcludedParticipant& one : done.excluded) {
       std::cerr << stimuli::printable(one.code)
                 << " has withdrawn and is left out, but is still in "
                 << stimuli::printable(one.path) << "; remove with: palpate forget --db '"

@@ -217,9 +217,9 @@ void add_calibrate_options(po::options_description& options) {
 int calibrate_devices(const std::string& device, const DeviceConfig& config,
                       const po::variables_map& values) {
   check(!config.calibration.empty(), "--calibrate needs --calibration FILE to store into");
-  data::TakenFiles firmware;
+  data::ProtectedFiles firmware;
   firmware.add(config.firmware, "--firmware reads it, it would be overwritten");
-  const std::string why = data::why_not_to_write(config.calibration, true, firmware);
+  const std::string why = data::write_refusal(config.calibration, true, firmware);
   check(why.empty(), "--calibration " + config.calibration + ": " + why);
   if (device == "falcon") return calibrate_force(config, values);
   if (device == "falcon2") return calibrate_pair(config, values);

@@ -9,7 +9,7 @@
 #include <set>
 #include <utility>
 
-#include "data/store/checks.h"
+#include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/difference.h"
 #include "protocols/parse.h"
@@ -77,7 +77,7 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
   known.codes = store.codes();
   for (const data::Participant& one : store.participants(protocol.sha256))
     known.enrolled = known.enrolled || one.code == code;
-  known.newest_ns = store.newest_record();
+  known.newest_ns = store.latest_recorded_time();
   if (known.enrolled) return known;
   known.earlier = earlier_protocol(store, protocol, code);
   if (known.earlier) return known;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <csignal>
 
-#include "data/store/checks.h"
+#include "data/record.h"
 #include "runner/commands/run/station.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <typeinfo>
 
-#include "data/files/private_files.h"
+#include "data/files/file_permissions.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -74,7 +74,7 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
 }
 
 void warn_of_exposure(const std::string& database) {
-  const std::string exposure = data::exposure_of(database);
+  const std::string exposure = data::access_warning(database);
   if (!exposure.empty()) std::cerr << "warning: " << stimuli::printable(exposure) << "\n";
 }
 

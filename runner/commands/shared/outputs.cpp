@@ -14,7 +14,7 @@
 #include <system_error>
 #include <utility>
 
-#include "data/files/draft_file.h"
+#include "data/files/atomic_file.h"
 #include "runner/commands/shared/command.h"
 
 namespace palpate::runner {
@@ -46,7 +46,7 @@ void require_folder(const std::string& path) {
 
 bool is_stream(const std::string& path) {
   std::error_code error;
-  return data::descriptor_named(path) ||
+  return data::descriptor_of_path(path) ||
          (fs::exists(path, error) && !fs::is_regular_file(path, error));
 }
 
@@ -65,7 +65,7 @@ class NoPipeSignal {
 void stream_out(const std::string& path, std::string_view text) {
   std::cout.flush();  // what came before stands before it
   const NoPipeSignal quiet;
-  const auto named = data::descriptor_named(path);
+  const auto named = data::descriptor_of_path(path);
   const int out = named ? *named : ::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC);
   int error = out < 0 ? errno : 0;
   while (error == 0 && !text.empty()) {
@@ -84,10 +84,10 @@ void stream_out(const std::string& path, std::string_view text) {
 }  // namespace
 
 void write_whole(const std::string& path, const std::string& text) {
-  data::DraftFile draft(path);
+  data::AtomicFile draft(path);
   draft.write(text);
   draft.sync();
-  draft.give_name(true);
+  draft.commit(true);
 }
 
 Outputs::Outputs(const po::variables_map& values, std::initializer_list<const char*> options,
@@ -120,10 +120,10 @@ void Outputs::keep(const stimuli::ObjectSpec& object) {
 
 void Outputs::check() const {
   std::string faults;
-  data::TakenFiles others;
+  data::ProtectedFiles others;
   for (const Output& output : outputs_) {
     const std::string named = "--" + output.option + " " + output.path;
-    std::string why = data::why_not_to_write(output.path, force_, inputs_);
+    std::string why = data::write_refusal(output.path, force_, inputs_);
     if (why.empty()) why = others.why(output.path);
     if (!why.empty()) faults += (faults.empty() ? "" : "\n") + named + ": " + why;
     others.add(output.path, "--" + output.option + " writes the same file");
@@ -154,17 +154,17 @@ void Outputs::write() {
   if (error) throw std::runtime_error(folder_ + ": " + error.message());
   try {
     check();  // much may have happened since
-    std::deque<data::DraftFile> drafts;
+    std::deque<data::AtomicFile> drafts;
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) continue;
-      data::DraftFile& draft = drafts.emplace_back(output.path);
+      data::AtomicFile& draft = drafts.emplace_back(output.path);
       draft.write(output.text);
       draft.sync();
     }
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) stream_out(output.path, output.text);
     }
-    data::give_names(drafts, force_);
+    data::commit_all(drafts, force_);
   } catch (...) {
     if (made) fs::remove(folder_, error);
     throw;

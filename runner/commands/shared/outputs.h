@@ -44,7 +44,7 @@ class Outputs {
   void check() const;
   const boost::program_options::variables_map& values_;
   bool force_ = false;
-  data::TakenFiles inputs_;
+  data::ProtectedFiles inputs_;
   std::vector<Output> outputs_;
   std::string folder_option_, folder_;
 };

@@ -4,7 +4,7 @@
 
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {

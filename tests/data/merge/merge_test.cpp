@@ -8,12 +8,12 @@
 #include <algorithm>
 #include <set>
 
-#include "data/export/export_csv.h"
+#include "data/export/csv.h"
 #include "data/store/schema.h"
 #include "tests/data/store/child_process.h"
 #include "tests/data/store/old_database.h"
 #include "tests/data/store/seal_again.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {
@@ -142,7 +142,7 @@ TEST_F(Merging, NumbersGivenTwiceAreRenumberedOnRequestAndTheTrialsKeepTheirOrde
 
   Lines parts = exported(a_, export_folder_);
   parts.merge(exported(b_, export_folder_));
-  const Merged done = merge(out_, {b_, a_}, {}, NumberClash::renumber);
+  const MergeResult done = merge(out_, {b_, a_}, {}, NumberConflict::renumber);
   ASSERT_EQ(done.renumbered.size(), 2u);
   EXPECT_EQ(done.renumbered[0].code + done.renumbered[0].other, "Q1P1");
   EXPECT_EQ(done.renumbered[0].from, 1);
@@ -158,13 +158,13 @@ TEST_F(Merging, NumbersGivenTwiceAreRenumberedOnRequestAndTheTrialsKeepTheirOrde
     EXPECT_EQ(all.look_up(a_protocol(), "NEW").number, 5);
   }
   // The merged one with its parts again, in any order: nothing changes, and nobody asks again.
-  const Merged repeated = merge(again, {a_, out_, b_});
+  const MergeResult repeated = merge(again, {a_, out_, b_});
   EXPECT_TRUE(repeated.renumbered.empty());
   EXPECT_EQ(exported(again, export_folder_), parts);
   EXPECT_EQ(write(again).look_up(a_protocol(), "Q1").number, 3);
   fs::remove(again);
   // A number that was given away by a merge is no claim against a station that counted so far.
-  const Merged more = merge(again, {out_, c}, {}, NumberClash::renumber);
+  const MergeResult more = merge(again, {out_, c}, {}, NumberConflict::renumber);
   ASSERT_EQ(more.renumbered.size(), 1u);
   EXPECT_EQ(more.renumbered[0].code + more.renumbered[0].other, "P2R1");
   EXPECT_EQ(more.renumbered[0].from, 2);
@@ -184,14 +184,14 @@ TEST_F(Merging, HoldsWhatTheStationsHold) {
   parts.merge(exported(b_, export_folder_));
   rest.merge(the_rest(b_));
   const std::string recorded_a = contents_of(a_), recorded_b = contents_of(b_);
-  const Merged done = merge(out_, {a_, b_});
+  const MergeResult done = merge(out_, {a_, b_});
   EXPECT_EQ(done.counts.participants, 4);
   EXPECT_EQ(done.counts.sessions, 5);
   EXPECT_EQ(done.counts.runs, 10);
   EXPECT_EQ(done.counts.completed, 15);
   EXPECT_EQ(done.counts.cut_off, 5);
   EXPECT_EQ(done.counts.sampled, 10);
-  EXPECT_TRUE(done.left_out.empty());
+  EXPECT_TRUE(done.excluded.empty());
   EXPECT_EQ(exported(out_, export_folder_), parts);
   EXPECT_EQ(the_rest(out_), rest);
   EXPECT_EQ(contents_of(a_), recorded_a) << "an input was written to";
@@ -321,13 +321,13 @@ TEST_F(Merging, WhoHasWithdrawnNeverComesBack) {
     show_session(b, "P3", 3);
     a.forget("P2");
   }
-  const Merged done = merge(out_, {b_, a_});
+  const MergeResult done = merge(out_, {b_, a_});
   EXPECT_EQ(done.counts.participants, 2);
-  ASSERT_EQ(done.left_out.size(), 1u);
-  EXPECT_EQ(done.left_out[0].code, "P2");
-  EXPECT_EQ(done.left_out[0].path, b_);
+  ASSERT_EQ(done.excluded.size(), 1u);
+  EXPECT_EQ(done.excluded[0].code, "P2");
+  EXPECT_EQ(done.excluded[0].path, b_);
   EXPECT_TRUE(contains(error_of([&] { write(out_).enrol(a_protocol(), "P2"); }), "withdrawn"));
-  EXPECT_EQ(merge(folder_ / "later.db", {out_, b_}).left_out.size(), 1u)
+  EXPECT_EQ(merge(folder_ / "later.db", {out_, b_}).excluded.size(), 1u)
       << "nor from a later merge";
   write(b_).forget("P3");
   EXPECT_EQ(merge(folder_ / "two.db", {out_, b_}).counts.participants, 1);
@@ -386,7 +386,7 @@ TEST_F(Merging, TakesWhatADeadWriterLeftWithoutTouchingIt) {
   }
   const std::string before = contents_of(b_), log = contents_of(b_ + "-wal");
   ASSERT_FALSE(log.empty());
-  const Merged done = merge(out_, {b_});
+  const MergeResult done = merge(out_, {b_});
   EXPECT_EQ(done.counts.completed, 1);
   EXPECT_EQ(done.counts.cut_off, 1);
   EXPECT_EQ(done.counts.interrupted_runs, 1);

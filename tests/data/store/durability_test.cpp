@@ -10,10 +10,10 @@
 #include <sstream>
 #include <thread>
 
-#include "data/export/export_csv.h"
+#include "data/export/csv.h"
 #include "data/store/store.h"
 #include "tests/data/store/child_process.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {

@@ -11,7 +11,7 @@
 #include "data/store/schema.h"
 #include "data/store/store.h"
 #include "tests/data/store/old_database.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {
@@ -134,10 +134,10 @@ TEST(VersionOne, BecomesThisVersionWhenItIsWrittenTo) {
   }
   SQLite::Database db(path, SQLite::OPEN_READWRITE);
   EXPECT_EQ(checked_version(db, path), kNow);
-  EXPECT_NO_THROW(require_our_schema(db, path, kNow)) << "as if it had been made today";
+  EXPECT_NO_THROW(verify_schema(db, path, kNow)) << "as if it had been made today";
   SQLite::Database backup(path + ".v1.backup", SQLite::OPEN_READWRITE);
   EXPECT_EQ(checked_version(backup, path), 1);
-  EXPECT_NO_THROW(require_our_schema(backup, path, 1));
+  EXPECT_NO_THROW(verify_schema(backup, path, 1));
   EXPECT_EQ(backup.execAndGet("SELECT count(*) FROM attempts").getInt(), 2);
 }
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "data/store/schema.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data::testing {
 
@@ -13,7 +13,7 @@ namespace palpate::data::testing {
 inline void make_version_1(const std::string& path) {
   SQLite::Database db(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   db.exec("PRAGMA page_size = 4096; PRAGMA journal_mode = WAL");
-  db.exec(contents_of(PALPATE_SOURCE_DIR "/tests/data/schema_v1.sql"));
+  db.exec(contents_of(PALPATE_SOURCE_DIR "/tests/data/store/schema_v1.sql"));
   db.exec("PRAGMA application_id = " + std::to_string(kApplicationId) +
           "; PRAGMA user_version = 1");
   db.exec(

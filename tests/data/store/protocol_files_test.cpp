@@ -5,7 +5,7 @@
 
 #include "data/merge/merge.h"
 #include "data/store/store.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {

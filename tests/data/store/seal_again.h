@@ -12,7 +12,7 @@ inline void seal_again(SQLite::Database& db) {
       "UPDATE runs SET link = NULL, seal = NULL, end_link = NULL, end_seal = NULL;"
       "UPDATE notes SET link = NULL, seal = NULL;"
       "UPDATE attempts SET link = NULL, seal = NULL, samples_sha256 = NULL;");
-  SealWriter(db).all_as_found();
+  SealWriter(db).seal_existing_rows();
 }
 
 }  // namespace palpate::data::testing

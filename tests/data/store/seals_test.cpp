@@ -12,7 +12,7 @@
 #include "data/store/store.h"
 #include "tests/data/store/old_database.h"
 #include "tests/data/store/seal_again.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {
 namespace {

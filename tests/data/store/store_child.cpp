@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "data/store/store.h"
-#include "tests/data/store_fixture.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace {
 

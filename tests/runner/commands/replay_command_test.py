@@ -10,7 +10,7 @@ import tempfile
 import unittest
 
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
 import seals  # noqa: E402
 
 PALPATE = sys.argv[1]

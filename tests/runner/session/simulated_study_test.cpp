@@ -9,7 +9,7 @@
 #include <sstream>
 #include <thread>
 
-#include "data/export/export_csv.h"
+#include "data/export/csv.h"
 #include "protocols/parse.h"
 #include "stimuli/random.h"
 

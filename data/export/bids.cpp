@@ -1,0 +1,277 @@
+#include "data/export/bids.h"
+
+#include <algorithm>
+#include <optional>
+#include <regex>
+
+#include "data/export/bids_recording.h"
+#include "data/export/column_values.h"
+#include "data/export/dataset_description.h"
+#include "data/export/dataset_writer.h"
+#include "data/files/text_sink.h"
+#include "data/files/utc.h"
+
+namespace palpate::data {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kBidsVersion = "1.9.0";
+
+/// The columns of trials.csv that a beh.tsv has: whose they are is in its name.
+std::span<const Column> beh_columns(Times times) { return trial_columns(times).subspan(1); }
+
+const Column kOnset{"onset", "First tick with forces on, from that of the first row", "s"};
+const Column kDuration{"duration", "From onset to the response, or the limit for a time-out", "s"};
+
+/// The values of the columns that name what a session was run with.
+Json found_in(const std::string& column, const std::vector<RunInfo>& runs,
+              const StudyLabel& study) {
+  Json levels;
+  if (column == "protocol_sha256") {
+    levels[study.protocol.sha256] = "sourcedata/" + study.label + "_protocol.json";
+  }
+  for (const RunInfo& run : runs) {
+    if (column == "device") levels[guarded_text(run.device)] = "as given to palpate run --device";
+    if (column == "program_version") {
+      levels[guarded_text(run.program_version)] = "palpate " + run.program_version;
+    }
+    if (column == "observer_sha256" && run.observer_sha256.empty()) levels["n/a"] = "a person";
+    if (column == "observer_sha256" && !run.observer_sha256.empty()) {
+      levels[run.observer_sha256] = "settings of the simulated participant";
+    }
+  }
+  return levels;
+}
+
+Json describe(const RunInfo& run, const Participant& person, const ExportClock& clock) {
+  Json json{{"StartedUTC", clock.utc(person, run.clock.utc_ns)},
+            {"ProgramVersion", run.program_version},
+            {"Build", run.build},
+            {"Device", run.device},
+            {"DeviceCalibration", clock.without_dates(run.device_calibration)},
+            {"ResponseDevice", run.response_device},
+            {"Hand", run.hand}};
+  json["ResponseLatency"] = run.response_latency ? Json(*run.response_latency) : Json("unknown");
+  return json;
+}
+
+class BidsWriter {
+ public:
+  BidsWriter(Store& store, const std::string& path, const ExportSettings& settings,
+             const ExportClock& clock)
+      : store_(store),
+        settings_(settings),
+        clock_(clock),
+        labels_(label_protocols(store, settings)),
+        folder_(path) {}
+
+  /// Whether an export of ours has such a file.
+  static bool has_file(const std::string& name);
+
+  AtomicFolder& folder() { return folder_; }
+  static std::string begin_attempts() { return "sourcedata/attempts.csv"; }
+  void add(const StoredTrial& trial);
+  void end_table();
+  void describe_dataset(bool simulated);
+  std::int64_t samples() const { return samples_; }
+
+ private:
+  struct Row {
+    std::int64_t onset_ns = 0;
+    std::string rest;  // from the second column on, with its end
+  };
+  /// The session, or with samples the run, that is being gathered.
+  struct Table {
+    std::string stem;  // of its files, with folders
+    const StudyLabel* study = nullptr;
+    Participant person;
+    std::vector<Row> rows;
+    std::vector<RunInfo> runs;
+  };
+  void write(const std::string& name, const std::string& text) {
+    FileSink file(folder_.place(name));
+    file.write(text);
+    file.close(false);
+  }
+  void begin_session(const StoredTrial& trial);
+  void add_row(const StoredTrial& trial);
+  void write_table();
+  void describe_participants();
+
+  Store& store_;
+  const ExportSettings& settings_;
+  const ExportClock& clock_;
+  const std::map<std::string, StudyLabel> labels_;
+  AtomicFolder folder_;
+  std::map<std::string, std::string> people_;  // code -> simulated
+  std::int64_t participant_ = -1;
+  int session_ = 0;
+  std::string session_stem_;
+  int run_ = 0;  // of BIDS, within the session; 0: it has no servo samples
+  Table table_;
+  std::optional<BidsRecording> recording_;
+  DelimitedRow row_{DelimitedFormat::tsv};
+  std::int64_t samples_ = 0;
+};
+
+void BidsWriter::begin_session(const StoredTrial& trial) {
+  const std::string who = "sub-" + trial.participant.code;
+  const std::string when = "ses-" + std::to_string(trial.record.session);
+  participant_ = trial.participant.id;
+  session_ = trial.record.session;
+  session_stem_ = who + "/" + when + "/beh/" + who + "_" + when + "_task-" +
+                  labels_.at(trial.protocol_sha256).label;
+  run_ = store_.has_samples(trial.participant, session_) ? 1 : 0;
+  const std::string simulated = trial.participant.simulated ? "1" : "0";
+  const auto [at, added] = people_.emplace(trial.participant.code, simulated);
+  if (!added && at->second != simulated) at->second = "mixed";
+}
+
+void BidsWriter::add(const StoredTrial& trial) {
+  if (trial.participant.id != participant_ || trial.record.session != session_) {
+    end_table();
+    begin_session(trial);
+  } else if (recording_ && !recording_->continues_with(trial)) {
+    end_table();
+    ++run_;
+  }
+  if (table_.rows.empty()) {
+    table_.study = &labels_.at(trial.protocol_sha256);
+    table_.stem = session_stem_ + (run_ > 0 ? "_run-" + std::to_string(run_) : "");
+    table_.person = trial.participant;
+    if (run_ > 0) recording_.emplace(trial, *table_.study);
+  }
+  add_row(trial);
+  if (!recording_) return;
+  recording_->add(trial, folder_.place(table_.stem + "_recording-haptic_physio.tsv.gz"));
+  samples_ += static_cast<std::int64_t>(trial.record.samples.size());
+}
+
+void BidsWriter::add_row(const StoredTrial& trial) {
+  row_ << trial.record.response_time;
+  put_trial_but_who(row_, trial, clock_);
+  table_.rows.push_back({to_unix_ns(trial.run.clock, trial.record.onset_ns), row_.end()});
+  const ClockStamp& clock = trial.run.clock;
+  if (table_.runs.empty() || table_.runs.back().clock.utc_ns != clock.utc_ns ||
+      table_.runs.back().clock.monotonic_ns != clock.monotonic_ns) {
+    table_.runs.push_back(trial.run);
+  }
+}
+
+void BidsWriter::end_table() {
+  if (!table_.rows.empty()) write_table();
+  if (recording_) {
+    if (const auto about = recording_->finish(settings_.fault_bits)) {
+      write(table_.stem + "_recording-haptic_physio.json", json_text(*about));
+    }
+  }
+  recording_.reset();
+  table_ = {};
+}
+
+void BidsWriter::write_table() {
+  auto& rows = table_.rows;
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a.onset_ns < b.onset_ns; });
+  FileSink file(folder_.place(table_.stem + "_beh.tsv"));
+  row_ << kOnset.name << kDuration.name << beh_columns(settings_.times);
+  file.write(row_.end());
+  for (const Row& row : rows) {
+    // Without sign: damaged times may lie further apart than 63 bits reach.
+    const auto since = static_cast<std::uint64_t>(row.onset_ns) -
+                       static_cast<std::uint64_t>(rows.front().onset_ns);
+    row_ << static_cast<double>(since) / 1e9;
+    const std::string_view onset = row_.end();
+    file.write(onset.substr(0, onset.size() - 1));
+    file.write("\t");
+    file.write(row.rest);
+  }
+  file.close(false);
+
+  const StudyLabel& study = *table_.study;
+  Json json{{"TaskName", study.protocol.name},
+            {"TaskDescription", study.facts.title},
+            {"Simulated", table_.person.simulated}};
+  if (table_.person.simulated) json["SimulatedNote"] = kSimulatedSentence;
+  for (const RunInfo& run : table_.runs) {
+    json["Sittings"].push_back(describe(run, table_.person, clock_));
+  }
+  for (const Column& column : {kOnset, kDuration}) {
+    json[column.name] = describe(column, study.facts, settings_.fault_bits);
+  }
+  for (const Column& column : beh_columns(settings_.times)) {
+    Json& about = json[column.name] = describe(column, study.facts, settings_.fault_bits);
+    const Json levels = found_in(column.name, table_.runs, study);
+    if (!levels.is_null()) about["Levels"] = levels;
+  }
+  write(table_.stem + "_beh.json", json_text(json));
+}
+
+void BidsWriter::describe_participants() {
+  std::string table = "participant_id\tsimulated\n";
+  for (const auto& [code, simulated] : people_) table += "sub-" + code + "\t" + simulated + "\n";
+  write("participants.tsv", table);
+  const Json json{
+      {"participant_id", {{"Description", "Pseudonym of the participant"}}},
+      {"simulated",
+       {{"Description", "Who took part"},
+        {"Levels",
+         {{"0", "a person"},
+          {"1", "a SIMULATED participant: no person"},
+          {"mixed", "simulated with one protocol, a person with another: see the beh.tsv"}}}}}};
+  write("participants.json", json_text(json));
+}
+
+void BidsWriter::describe_dataset(bool simulated) {
+  describe_participants();
+  for (const auto& [sha256, study] : labels_) {
+    write("sourcedata/" + study.label + "_protocol.json", study.protocol.text);
+    write_protocol_files(store_, study, "stimuli", folder_);
+  }
+  const Json json{
+      {"Name", dataset_name(labels_, simulated)},
+      {"BIDSVersion", kBidsVersion},
+      {"DatasetType", "raw"},
+      {"GeneratedBy",
+       {{{"Name", "palpate"},
+         {"Version", settings_.program_version},
+         {"Description", "palpate export --format bids; trials recorded by palpate"}}}}};
+  write("dataset_description.json", json_text(json));
+  write(
+      "README",
+      dataset_name(labels_, simulated) + "\n\n" + dataset_description(labels_, simulated) +
+          "\n\n"
+          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
+          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
+          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
+          "checksum.\n\n"
+          "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
+          "it "
+          "holds\nthose of all its trials, one row a period of the servo, and its JSON file where "
+          "each trial stands,\nwhich object was felt, how it was turned and with which renderer. A "
+          "new run begins with every\nstart of the program and after more than a minute between "
+          "two trials. Periods between trials, and\nthose whose tick was missed, are rows of n/a. "
+          "Places are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
+          (clock_.relative() ? kRelativeSentence : "") + kGuardSentence +
+          "\n"
+          "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
+          "trials were\nshown again. They are in no other table.\n");
+}
+
+bool BidsWriter::has_file(const std::string& name) {
+  static const std::regex pattern(
+      R"(dataset_description\.json|README|participants\.(tsv|json)|)"
+      R"(sourcedata/([0-9A-Za-z]+_protocol\.json|attempts\.csv)|stimuli/[0-9A-Za-z]+/[^/]+|)"
+      R"(sub-[0-9A-Za-z]+/ses-\d+/beh/sub-[0-9A-Za-z]+_ses-\d+_task-[0-9A-Za-z]+(_run-\d+)?)"
+      R"((_beh\.(tsv|json)|_recording-haptic_physio\.(tsv\.gz|json)))");
+  return std::regex_match(name, pattern);
+}
+
+}  // namespace
+
+ExportResult export_bids(Store& store, const std::string& path, const ExportSettings& settings) {
+  return export_dataset<BidsWriter>(store, path, settings, "bids");
+}
+
+}  // namespace palpate::data

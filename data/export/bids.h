@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+
+#include "data/export/settings.h"
+#include "data/store/store.h"
+
+namespace palpate::data {
+
+/// Writes the completed trials as a BIDS dataset (behaviour, https://bids.neuroimaging.io):
+///
+///   dataset_description.json, README, participants.tsv and .json
+///   sub-CODE/ses-S/beh/sub-CODE_ses-S_task-T_beh.tsv and .json   a session, one row a trial
+///   sourcedata/T_protocol.json   the protocol's text, byte for byte
+///   sourcedata/attempts.csv      attempts that were cut off
+///   stimuli/T/                   the files that the protocol names (meshes)
+///
+/// T is the protocol's name without '-'. Rows are sorted by onset (s, from the session's first
+/// trial); their other columns are those of trials.csv but for participant_id.
+///
+/// Where servo samples are stored, the session is split into BIDS runs: a new one with every start
+/// of the program and after more than a minute without a trial. Each has a table,
+/// ..._run-1_beh.tsv, and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row a
+/// servo period (bids_recording.h); its sidecar has the trials' places, poses and renderers and the
+/// objects. Trials come one at a time: memory holds the samples of one.
+///
+/// Experimenter's notes are not exported. The folder is made whole or not at all.
+/// \throws StoreRefused: `path` is taken (see require_replaceable), there are no trials, a text
+/// does not fit a TSV file; StoreError: it could not be written.
+ExportResult export_bids(Store& store, const std::string& path, const ExportSettings& settings);
+
+}  // namespace palpate::data

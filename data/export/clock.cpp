@@ -1,0 +1,53 @@
+#include "data/export/clock.h"
+
+#include <limits>
+#include <regex>
+
+#include "data/files/utc.h"
+
+namespace palpate::data {
+namespace {
+
+constexpr std::int64_t kYear1900 = -2'208'988'800'000'000'000;  // ns since 1970
+
+/// a - b; sums beyond the range stay at its end: the values may come from a damaged file.
+std::int64_t difference(std::int64_t a, std::int64_t b) {
+  std::int64_t out = 0;
+  if (!__builtin_sub_overflow(a, b, &out)) return out;
+  return a < b ? std::numeric_limits<std::int64_t>::min()
+               : std::numeric_limits<std::int64_t>::max();
+}
+
+}  // namespace
+
+ExportClock::ExportClock(Store& store, Times times) : times_(times) {
+  if (relative()) firsts_ = store.first_onsets();
+}
+
+std::string ExportClock::onset_utc(const StoredTrial& trial) const {
+  if (!relative()) return trial.record.onset_utc;
+  return utc(trial.participant, to_unix_ns(trial.run.clock, trial.record.onset_ns));
+}
+
+double ExportClock::elapsed(const StoredTrial& trial) const {
+  return static_cast<double>(
+             since_first(trial.participant, to_unix_ns(trial.run.clock, trial.record.onset_ns))) /
+         1e9;
+}
+
+std::string ExportClock::utc(const Participant& person, std::int64_t unix_ns) const {
+  if (!relative()) return format_utc(unix_ns);
+  return format_utc(to_unix_ns({.utc_ns = kYear1900}, since_first(person, unix_ns)));
+}
+
+std::string ExportClock::without_dates(const std::string& text) const {
+  static const std::regex date(R"(\d{4}-\d{2}-\d{2}([T ][0-9:.]+Z?)?)");
+  return relative() ? std::regex_replace(text, date, "(date left out)") : text;
+}
+
+std::int64_t ExportClock::since_first(const Participant& person, std::int64_t unix_ns) const {
+  const auto first = firsts_.find(person.code);
+  return first == firsts_.end() ? 0 : difference(unix_ns, first->second);
+}
+
+}  // namespace palpate::data

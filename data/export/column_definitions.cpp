@@ -1,0 +1,191 @@
+#include "data/export/column_definitions.h"
+
+namespace palpate::data {
+namespace {
+
+const Column kParticipant{"participant_id", "Pseudonym of the participant"};
+const Column kSession{"session", "Session of the participant, from 1", "1"};
+const Column kBlock{"block", "Block, from 1 through all sessions of the participant", "1"};
+const Column kTrial{"trial", "Trial within the session, from 1", "1"};
+const Column kAttempt{
+    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off", "1"};
+const Column kRenderer{"renderer",
+                       "How the stylus was felt",
+                       "",
+                       {{"point", "only its tip"}, {"ray", "tip and side, as force and torque"}}};
+const Column kShape{"shape", "Name of the stimulus that was shown"};
+const Column kPractice{
+    "practice",
+    "Practice or warm-up",
+    "",
+    {{"0", "a trial that counts"}, {"1", "practice or warm-up, not to be analysed"}}};
+const Column kDevice{"device", "Force-feedback device"};
+const Column kSimulated{"simulated",
+                        "Who took part",
+                        "",
+                        {{"0", "a person"}, {"1", "SIMULATED: no person, or no real device"}}};
+const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
+const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
+const Column kNumber{"participant_number",
+                     "Orders the counterbalancing; two stations may have given the same one", "1"};
+const Column kOrientation[] = {
+    {"orientation_w", "Orientation of the stimulus, unit quaternion, w", "1"},
+    {"orientation_x", "Orientation of the stimulus, unit quaternion, x", "1"},
+    {"orientation_y", "Orientation of the stimulus, unit quaternion, y", "1"},
+    {"orientation_z", "Orientation of the stimulus, unit quaternion, z", "1"},
+};
+
+std::vector<Column> make_trials() {
+  return {
+      kParticipant,
+      kSession,
+      kBlock,
+      kTrial,
+      kRenderer,
+      kShape,
+      {"response", "Name of the stimulus that was answered; missing where there was no answer"},
+      {"correct",
+       "Whether response is shape",
+       "",
+       {{"0", "wrong, or no answer in time"}, {"1", "correct"}}},
+      {"response_time",
+       "From the first tick with forces on to the response; the limit for a time-out. The latency "
+       "of the response device is not subtracted",
+       "s"},
+      kOrientation[0],
+      kOrientation[1],
+      kOrientation[2],
+      kOrientation[3],
+      kPractice,
+      {"timed_out",
+       "Whether the time for an answer ran out",
+       "",
+       {{"0", "answered"}, {"1", "no answer in time"}}},
+      {"first_contact_time",
+       "From the first tick with forces on to the first contact; missing where there was none",
+       "s"},
+      {"onset_utc", "First tick with forces on, ISO 8601, UTC", "ISO 8601"},
+      kDevice,
+      kSimulated,
+      {"missed_ticks", "Servo ticks that came too late", "1"},
+      kAttempt,
+      kProtocol,
+      kVersion,
+      kNumber,
+      {"started_inside",
+       "Whether the stylus was inside an object when forces went on",
+       "",
+       {{"0", "outside"}, {"1", "inside: that object gave no force until it was left"}}},
+      {"ticks", "Servo ticks of the trial", "1"},
+      {"longest_period", "Longest time between two servo ticks", "s"},
+      {"faults", "Fault bits of all ticks, or-ed; 0 for none", "1"},
+      {"max_force", "Largest force on the hand", "N"},
+      {"observer_sha256",
+       "SHA-256 of the settings of a simulated participant; missing for a person"},
+      {"before_contact",
+       "Whether the answer came before the first contact",
+       "",
+       {{"0", "after it, or no answer"}, {"1", "before it: nothing had been felt"}}},
+      {"response_device",
+       "What the participant answered with; missing where it is not known",
+       "",
+       {{"keyboard", "keys, also of a numeric pad"},
+        {"device buttons", "buttons of the force-feedback device"},
+        {"simulated", "a SIMULATED participant"}}},
+  };
+}
+
+std::vector<Column> make_attempts() {
+  return {kParticipant,
+          kSession,
+          kBlock,
+          kTrial,
+          kAttempt,
+          kRenderer,
+          kShape,
+          kOrientation[0],
+          kOrientation[1],
+          kOrientation[2],
+          kOrientation[3],
+          kPractice,
+          {"began_utc", "When the attempt was begun, ISO 8601, UTC", "ISO 8601"},
+          {"reason", "Why the attempt was cut off; its trial was shown again"},
+          kDevice,
+          kSimulated,
+          kProtocol,
+          kVersion,
+          kNumber};
+}
+
+std::vector<Column> make_samples() {
+  return {
+      {"tick", "Servo tick, from the first one with forces on (0)", "1"},
+      {"tip_x", "Tip of the stylus, world frame, x", "m"},
+      {"tip_y", "Tip of the stylus, world frame, y", "m"},
+      {"tip_z", "Tip of the stylus, world frame, z", "m"},
+      {"tail_x", "Tail of the stylus, world frame, x", "m"},
+      {"tail_y", "Tail of the stylus, world frame, y", "m"},
+      {"tail_z", "Tail of the stylus, world frame, z", "m"},
+      {"force_x", "Force on the hand as rendered, world frame, x", "N"},
+      {"force_y", "Force on the hand as rendered, world frame, y", "N"},
+      {"force_z", "Force on the hand as rendered, world frame, z", "N"},
+      {"torque_x", "Torque about the virtual tip, world frame, x", "N m"},
+      {"torque_y", "Torque about the virtual tip, world frame, y", "N m"},
+      {"torque_z", "Torque about the virtual tip, world frame, z", "N m"},
+      {"device1_x", "Force commanded to the device at the tip, after the limits, x", "N"},
+      {"device1_y", "Force commanded to the device at the tip, after the limits, y", "N"},
+      {"device1_z", "Force commanded to the device at the tip, after the limits, z", "N"},
+      {"device2_x", "Force commanded to the device at the tail, after the limits, x", "N"},
+      {"device2_y", "Force commanded to the device at the tail, after the limits, y", "N"},
+      {"device2_z", "Force commanded to the device at the tail, after the limits, z", "N"},
+      {"depth", "Depth of the deepest contact, 0 in free space", "m"},
+      {"contacts", "Contacts of the stylus", "1"},
+      {"contact_type",
+       "Type of the deepest contact",
+       "",
+       {{"0", "none"}, {"1", "point-polygon"}, {"2", "segment-edge"}, {"3", "segment-face"}}},
+      {"buttons", "Buttons of the device, one bit each", "1"},
+      {"faults", "Fault bits of the tick; 0 for none", "1"},
+      {"period", "Time since the tick before; 0 where it is not known", "s"},
+      {"lateness", "Begin of the tick behind the time at which it was due", "s"},
+      {"compute", "From the device's reading to the command for it", "s"},
+  };
+}
+
+/// The same with dates that are shifted, and the seconds between them.
+std::vector<Column> made_relative(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "onset_utc") {
+      column.description =
+          "First tick with forces on, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    } else if (name == "began_utc") {
+      column.description =
+          "When the attempt was begun, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    }
+  }
+  columns.push_back(
+      {"elapsed", "The moment of the row's date, from the participant's first trial", "s"});
+  return columns;
+}
+
+}  // namespace
+
+std::span<const Column> trial_columns(Times times) {
+  static const std::vector<Column> absolute = make_trials(), relative = made_relative(absolute);
+  return times == Times::absolute ? absolute : relative;
+}
+
+std::span<const Column> attempt_columns(Times times) {
+  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute);
+  return times == Times::absolute ? absolute : relative;
+}
+
+std::span<const Column> sample_columns() {
+  static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+}  // namespace palpate::data

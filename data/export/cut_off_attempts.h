@@ -1,0 +1,16 @@
+#pragma once
+// Internal to data/: attempts.csv, the same in every export.
+
+#include "data/export/clock.h"
+#include "data/export/settings.h"
+#include "data/files/text_sink.h"
+#include "data/store/export_log.h"
+#include "data/store/store.h"
+
+namespace palpate::data {
+
+/// Writes all attempts that were cut off, RFC 4180 with a header. \return rows
+std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
+                            ExportedParticipants& people, ProgressCounter& counter);
+
+}  // namespace palpate::data

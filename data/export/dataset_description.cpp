@@ -1,0 +1,164 @@
+#include "data/export/dataset_description.h"
+
+#include <algorithm>
+#include <set>
+#include <string_view>
+
+#include "data/files/formula_guard.h"
+#include "data/files/text_sink.h"
+
+namespace palpate::data {
+namespace {
+
+bool is_alphanumeric(char c) {
+  return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+}
+
+std::string only_alphanumeric(std::string_view text) {
+  std::string kept;
+  std::copy_if(text.begin(), text.end(), std::back_inserter(kept), is_alphanumeric);
+  return kept;
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+/// Base names that every disk takes, each once; a protocol may name files anywhere.
+std::map<std::string, std::string> file_names(const std::vector<ProtocolFile>& files) {
+  constexpr std::size_t kLongest = 100;
+  std::map<std::string, std::string> names;
+  std::set<std::string> taken;
+  for (const ProtocolFile& file : files) {
+    std::string name = file.name.substr(file.name.find_last_of('/') + 1);
+    for (char& c : name) {
+      if (!is_alphanumeric(c) && c != '.' && c != '-') c = '_';
+    }
+    if (name.empty() || name[0] == '.') name = "_" + name;
+    if (name.size() > kLongest) name.erase(0, name.size() - kLongest);
+    std::string unique = name;
+    for (int k = 2; !taken.insert(lower(unique)).second; ++k) {
+      unique = std::to_string(k) + "_" + name;
+    }
+    names[file.name] = unique;
+  }
+  return names;
+}
+
+}  // namespace
+
+void write_protocol_files(Store& store, const StudyLabel& study, const std::string& folder,
+                          const AtomicFolder& draft) {
+  if (study.files.empty()) return;
+  for (const ProtocolFile& file : store.files(study.protocol.sha256)) {
+    FileSink out(draft.place(folder + "/" + study.label + "/" + study.files.at(file.name)));
+    out.write(file.bytes);
+    out.close(false);
+  }
+}
+
+std::map<std::string, StudyLabel> label_protocols(Store& store, const ExportSettings& settings) {
+  constexpr std::size_t kLongest = 64;  // of a name: file systems end at 255 bytes
+  std::map<std::string, StudyLabel> labels;
+  std::map<std::string, int> uses;
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    StudyLabel& study = labels[protocol.sha256];
+    study.protocol = protocol;
+    study.label = only_alphanumeric(protocol.name).substr(0, kLongest);
+    if (study.label.empty()) study.label = "task";
+    if (settings.facts) study.facts = settings.facts(protocol);
+    study.files = file_names(store.files(protocol.sha256));
+    ++uses[lower(study.label)];
+  }
+  for (auto& [sha256, study] : labels) {
+    if (uses[lower(study.label)] == 1) continue;
+    study.label += "x" + only_alphanumeric(sha256);
+  }
+  return labels;
+}
+
+void require_exportable(Store& store) {
+  if (store.counts().completed == 0) {
+    throw StoreRefused(store.path() + ": has no completed trials; there is nothing to export");
+  }
+  std::map<std::string, std::string> seen;  // in lower case -> as it is
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    for (const Participant& person : store.participants(protocol.sha256)) {
+      const auto [at, added] = seen.emplace(lower(person.code), person.code);
+      if (added || at->second == person.code) continue;
+      throw StoreRefused(store.path() + ": the participants " + at->second + " and " + person.code +
+                         " differ in case only, which names of files in a dataset must not; "
+                         "export as csv");
+    }
+  }
+}
+
+std::string dataset_name(const std::map<std::string, StudyLabel>& labels, bool simulated) {
+  std::set<std::string> names;
+  for (const auto& [sha256, study] : labels) names.insert(study.protocol.name);
+  std::string name;
+  for (const auto& one : names) name += (name.empty() ? "" : ", ") + one;
+  return name + (simulated ? " (SIMULATED participants)" : "");
+}
+
+std::string dataset_description(const std::map<std::string, StudyLabel>& labels, bool simulated) {
+  std::string text =
+      "Identification of shapes by touch through a force-feedback stylus, one row a trial, "
+      "recorded by palpate.";
+  for (const auto& [sha256, study] : labels) {
+    if (!study.facts.title.empty())
+      text += " " + study.protocol.name + ": " + study.facts.title + ".";
+  }
+  return text + (simulated ? std::string(" ") + kSimulatedSentence : "");
+}
+
+nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& facts) {
+  nlohmann::ordered_json levels;
+  for (const auto& [value, meaning] : column.levels) levels[value] = meaning;
+  const std::string_view name = column.name;
+  if (name == "shape" || name == "response") {
+    for (const auto& stimulus : facts.stimuli) {
+      levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
+    }
+  }
+  return levels;
+}
+
+nlohmann::ordered_json column_bits(const Column& column,
+                                   const std::vector<FaultMeaning>& fault_bits) {
+  nlohmann::ordered_json bits;
+  if (std::string_view(column.name) != "faults") return bits;
+  for (const FaultMeaning& fault : fault_bits) bits[std::to_string(fault.bit)] = fault.text;
+  return bits;
+}
+
+nlohmann::ordered_json describe(const Column& column, const ProtocolFacts& facts,
+                                const std::vector<FaultMeaning>& fault_bits) {
+  nlohmann::ordered_json json{{"Description", column.description}};
+  if (*column.unit != '\0') json["Units"] = column.unit;
+  if (const auto levels = column_levels(column, facts); !levels.is_null()) json["Levels"] = levels;
+  if (const auto bits = column_bits(column, fault_bits); !bits.is_null()) json["Bits"] = bits;
+  return json;
+}
+
+ProtocolFacts all_facts(const std::map<std::string, StudyLabel>& labels) {
+  ProtocolFacts facts;
+  for (const auto& [sha256, study] : labels) {
+    facts.stimuli.insert(facts.stimuli.end(), study.facts.stimuli.begin(),
+                         study.facts.stimuli.end());
+  }
+  return facts;
+}
+
+std::string guarded_text(std::string_view text) {
+  return (needs_guard(text) ? "'" : "") + std::string(text);
+}
+
+std::string json_text(const nlohmann::ordered_json& json) {
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace palpate::data

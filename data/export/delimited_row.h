@@ -1,0 +1,58 @@
+#pragma once
+// Internal to data/: one row of a CSV or TSV file.
+
+#include <array>
+#include <charconv>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "data/export/column_definitions.h"
+
+namespace palpate::data {
+
+enum class DelimitedFormat {
+  csv,  ///< RFC 4180: fields quoted where needed, CRLF; a missing value is an empty field
+  tsv,  ///< BIDS: tab, LF; a missing value is n/a. There is no quoting: see DelimitedRow::text
+};
+
+/// Builds a row value by value. Numbers are the shortest text that reads back as the same number,
+/// never with a decimal comma; booleans are 0 or 1.
+class DelimitedRow {
+ public:
+  explicit DelimitedRow(DelimitedFormat style) : style_(style) {}
+
+  /// "" is a missing value; what a spreadsheet would run is guarded (spreadsheet_text.h).
+  /// \throws StoreRefused: a text that this style cannot hold (TSV: tabs, line breaks, the text
+  /// "n/a").
+  DelimitedRow& operator<<(std::string_view text);
+  DelimitedRow& operator<<(const char* text) { return *this << std::string_view(text); }
+  DelimitedRow& operator<<(bool value) { return raw(value ? "1" : "0"); }
+  template <class Number>
+  requires std::is_arithmetic_v<Number> DelimitedRow& operator<<(Number value) {
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
+    return raw({text.data(), static_cast<std::size_t>(end.ptr - text.data())});
+  }
+  /// With at most so many decimals, zeros at the end left out.
+  DelimitedRow& rounded(double value, int decimals);
+  template <class T>
+  DelimitedRow& operator<<(const std::optional<T>& value) {
+    return value ? *this << *value : *this << std::string_view();
+  }
+  DelimitedRow& operator<<(std::span<const Column> names);
+
+  /// The row with its end; valid until the next one is begun.
+  const std::string& end();
+
+ private:
+  DelimitedRow& raw(std::string_view text);
+  DelimitedRow& cell(std::string_view text);
+  DelimitedFormat style_;
+  std::string row_;
+  bool ended_ = true;
+};
+
+}  // namespace palpate::data

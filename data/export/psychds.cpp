@@ -1,0 +1,205 @@
+#include "data/export/psychds.h"
+
+#include <optional>
+#include <regex>
+#include <set>
+#include <string_view>
+
+#include "data/export/column_values.h"
+#include "data/export/dataset_description.h"
+#include "data/export/dataset_writer.h"
+#include "data/export/sample_slots.h"
+#include "data/files/text_sink.h"
+
+namespace palpate::data {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const Column kTimeOfTick{"time", "Time of the tick, from the first tick with forces on", "s"};
+
+class PsychDsWriter {
+ public:
+  PsychDsWriter(Store& store, const std::string& path, const ExportSettings& settings,
+                const ExportClock& clock)
+      : store_(store),
+        settings_(settings),
+        clock_(clock),
+        labels_(label_protocols(store, settings)),
+        folder_(path) {}
+
+  /// Whether an export of ours has such a file.
+  static bool has_file(const std::string& name);
+
+  AtomicFolder& folder() { return folder_; }
+  void add(const StoredTrial& trial);
+  void end_table();
+  void use(std::span<const Column> columns) {
+    for (const Column& column : columns) used_.insert(column.name);
+  }
+  void describe_dataset(bool simulated);
+  /// One table for all: an attempt names its participant and its protocol.
+  std::string begin_attempts() {
+    use(attempt_columns(settings_.times));
+    return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";
+  }
+  std::int64_t samples() const { return samples_; }
+
+ private:
+  void write(const std::string& name, const std::string& text) {
+    FileSink file(folder_.place(name));
+    file.write(text);
+    file.close(false);
+  }
+  void write_samples(const StoredTrial& trial, const std::string& stem, double servo_rate);
+  Json variables() const;
+
+  Store& store_;
+  const ExportSettings& settings_;
+  const ExportClock& clock_;
+  const std::map<std::string, StudyLabel> labels_;
+  AtomicFolder folder_;
+  std::set<std::string> used_;  // columns
+  std::int64_t participant_ = -1;
+  int session_ = 0;  // of haptic_
+  std::optional<FileSink> table_, haptic_;
+  DelimitedRow row_{DelimitedFormat::csv};
+  std::int64_t samples_ = 0;
+};
+
+void PsychDsWriter::add(const StoredTrial& trial) {
+  const std::string who = "subject-" + trial.participant.code;
+  const StudyLabel& study = labels_.at(trial.protocol_sha256);
+  const std::string stem = "data/" + who + "/study-" + study.label + "_" + who;
+  if (trial.participant.id != participant_) {
+    end_table();
+    participant_ = trial.participant.id;
+    table_.emplace(folder_.place(stem + "_data.csv"));
+    row_ << trial_columns(settings_.times);
+    table_->write(row_.end());
+    use(trial_columns(settings_.times));
+  }
+  put_trial(row_, trial, clock_);
+  table_->write(row_.end());
+  if (!trial.record.samples.empty()) write_samples(trial, stem, study.facts.servo_rate);
+}
+
+void PsychDsWriter::end_table() {
+  for (std::optional<FileSink>* file : {&table_, &haptic_}) {
+    if (*file) (*file)->close(false);
+    file->reset();
+  }
+}
+
+void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& stem,
+                                  double servo_rate) {
+  const TrialRecord& record = trial.record;
+  if (haptic_ && session_ != record.session) {
+    haptic_->close(false);
+    haptic_.reset();
+  }
+  if (!haptic_) {
+    session_ = record.session;
+    haptic_.emplace(folder_.place(stem + "_session-" + std::to_string(session_) +
+                                  "_description-haptic_data.csv"));
+    row_ << "participant_id"
+         << "session"
+         << "trial" << kTimeOfTick.name << sample_columns();
+    haptic_->write(row_.end());
+    use({&kTimeOfTick, 1});
+    use(sample_columns());
+  }
+  SampleSlots slots(trial, servo_rate);
+  for (const SampleRecord& sample : record.samples) {
+    row_ << trial.participant.code << record.session << record.trial
+         << static_cast<double>(slots.next()) / servo_rate;
+    put_sample(row_, sample);
+    haptic_->write(row_.end());
+  }
+  samples_ += static_cast<std::int64_t>(record.samples.size());
+}
+
+Json PsychDsWriter::variables() const {
+  const ProtocolFacts facts = all_facts(labels_);
+  Json all = Json::array();
+  std::set<std::string> named;
+  const auto add = [&](std::span<const Column> columns) {
+    for (const Column& column : columns) {
+      if (!used_.contains(column.name) || !named.insert(column.name).second) continue;
+      std::string text = column.description;
+      if (const Json levels = column_levels(column, facts); !levels.is_null()) {
+        text += ". Values:";
+        for (const auto& [value, meaning] : levels.items()) {
+          text += " " + value + " = " + meaning.get<std::string>() + ";";
+        }
+        text.back() = '.';
+      }
+      if (const Json bits = column_bits(column, settings_.fault_bits); !bits.is_null()) {
+        text += ". Bits:";
+        for (const auto& [bit, meaning] : bits.items()) {
+          text += " " + bit + " = " + meaning.get<std::string>() + ";";
+        }
+        text.back() = '.';
+      }
+      Json& one = all.emplace_back(
+          Json{{"@type", "PropertyValue"}, {"name", column.name}, {"description", text}});
+      if (*column.unit != '\0') one["unitText"] = column.unit;
+    }
+  };
+  add(trial_columns(settings_.times));
+  add(attempt_columns(settings_.times));
+  add({&kTimeOfTick, 1});
+  add(sample_columns());
+  return all;
+}
+
+void PsychDsWriter::describe_dataset(bool simulated) {
+  for (const auto& [sha256, study] : labels_) {
+    write("materials/" + study.label + "_protocol.json", study.protocol.text);
+    write_protocol_files(store_, study, "materials", folder_);
+  }
+  const std::string name = dataset_name(labels_, simulated),
+                    about = dataset_description(labels_, simulated);
+  write("dataset_description.json",
+        json_text({{"@context", "https://schema.org/"},
+                   {"@type", "Dataset"},
+                   {"name", name},
+                   {"description", about},
+                   {"measurementTechnique", "palpate " + settings_.program_version},
+                   {"variableMeasured", variables()}}));
+  write(
+      "README.md",
+      "# " + name + "\n\n" + about +
+          "\n\n"
+          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
+          "one row a trial.\n"
+          "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
+          "samples of session S,\none row a tick; `time` counts from the first tick with forces on "
+          "of its trial, which is the `onset_utc` of\nthat trial. What was felt, how it was turned "
+          "and with which renderer stands in the trial's row.\nPlaces are rounded to 1 nm, forces "
+          "to "
+          "1 uN and torques to 1 uN m.\n"
+          "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
+          "were cut off; their\ntrials were shown again.\n"
+          "Every column is described in `dataset_description.json`; an empty field is a missing "
+          "value. The protocol\nthat was run is in `materials/`, byte for byte; "
+          "`protocol_sha256` is its checksum.\n\n" +
+          (clock_.relative() ? kRelativeSentence : "") + kGuardSentence);
+}
+
+bool PsychDsWriter::has_file(const std::string& name) {
+  static const std::regex pattern(
+      R"(dataset_description\.json|README\.md|materials/[0-9A-Za-z]+(_protocol\.json|/[^/]+)|)"
+      R"(data/study-[0-9A-Za-z]+_description-attempts_data\.csv|)"
+      R"(data/subject-[0-9A-Za-z]+/study-[0-9A-Za-z]+_subject-[0-9A-Za-z]+)"
+      R"((_session-\d+(_trial-\d+)?_description-haptic)?_data\.csv)");
+  return std::regex_match(name, pattern);
+}
+
+}  // namespace
+
+ExportResult export_psychds(Store& store, const std::string& path, const ExportSettings& settings) {
+  return export_dataset<PsychDsWriter>(store, path, settings, "psych-ds");
+}
+
+}  // namespace palpate::data

@@ -1,0 +1,97 @@
+#include "data/files/file_permissions.h"
+
+#include <grp.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include "data/errors.h"
+#include "data/files/output_check.h"
+
+namespace palpate::data {
+namespace {
+
+std::string octal(mode_t mode) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "%04o", static_cast<unsigned>(mode & 07777));
+  return text.data();
+}
+
+/// A group that is one user's own, as Debian makes them: its members are nobody else.
+bool is_private_group(uid_t user, gid_t group) {
+  const passwd* const person = ::getpwuid(user);
+  if (person == nullptr || person->pw_gid != group) return false;
+  const std::string name = person->pw_name;
+  const ::group* const members = ::getgrgid(group);
+  return members != nullptr && name == members->gr_name && members->gr_mem[0] == nullptr;
+}
+
+bool others_may_write(const struct stat& found) {
+  if ((found.st_mode & S_IWOTH) != 0) return true;
+  return (found.st_mode & S_IWGRP) != 0 && !is_private_group(found.st_uid, found.st_gid);
+}
+
+bool is_strange(uid_t owner) { return owner != ::geteuid() && owner != 0; }
+
+}  // namespace
+
+void require_private_sqlite_files(const std::string& file) {
+  struct stat database {};
+  const bool there = ::stat(file.c_str(), &database) == 0;
+  const mode_t open_to = there ? database.st_mode & 0777 : 0600;
+  for (const std::string& end : sqlite_file_suffixes()) {
+    const std::string beside = file + end;
+    struct stat found {};
+    if (::lstat(beside.c_str(), &found) != 0) continue;
+    const auto refuse = [&](const std::string& why) {
+      throw StoreRefused(file + ": beside it lies " + beside + ", which " + why +
+                         "; nothing was read or written. Move it away if it is not yours, and keep "
+                         "the database in a folder that only you can write to");
+    };
+    if (!S_ISREG(found.st_mode)) refuse("is no regular file");
+    if (is_strange(found.st_uid) && !(there && found.st_uid == database.st_uid)) {
+      refuse("belongs to another user (number " + std::to_string(found.st_uid) + ")");
+    }
+    if (found.st_nlink > 1) refuse("has a second name elsewhere (a hard link)");
+    if ((found.st_mode & 077 & ~open_to) != 0) {
+      refuse("is open to others (mode " + octal(found.st_mode) + ") to whom the database is not (" +
+             octal(open_to) + "); if it is yours: chmod 600");
+    }
+  }
+}
+
+std::string access_warning(const std::string& database) {
+  std::error_code error;
+  const std::filesystem::path file =
+      std::filesystem::weakly_canonical(std::filesystem::absolute(database, error), error);
+  const std::string folder = file.parent_path().string();
+  const char* const advice = "keep studies in a folder that only you can write to";
+  struct stat found {};
+  if (::stat(folder.c_str(), &found) == 0) {
+    if (is_strange(found.st_uid)) {
+      return "the folder " + folder + " belongs to another user (number " +
+             std::to_string(found.st_uid) + "), who can replace the database; " + advice;
+    }
+    if (others_may_write(found)) {
+      return "others can write to the folder " + folder + " (mode " + octal(found.st_mode) +
+             ") and put files beside the database; " + advice + " (chmod go-w)";
+    }
+  }
+  if (::stat(file.c_str(), &found) != 0) return "";
+  if (is_strange(found.st_uid)) {
+    return "the database " + database + " belongs to another user (number " +
+           std::to_string(found.st_uid) + "), who can read and change it";
+  }
+  if (others_may_write(found)) {
+    return "others can write to the database " + database + " (mode " + octal(found.st_mode) +
+           "); chmod 600 keeps it private";
+  }
+  return "";
+}
+
+}  // namespace palpate::data

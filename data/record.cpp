@@ -1,0 +1,30 @@
+#include "data/record.h"
+
+namespace palpate::data {
+namespace {
+
+// In the order of the enumerators.
+constexpr std::array<const char*, 6> kRunEnds = {"running", "done",      "paused",
+                                                 "aborted", "withdrawn", "interrupted"};
+
+}  // namespace
+
+const char* to_string(RunEnd end) { return kRunEnds.at(static_cast<std::size_t>(end)); }
+
+std::optional<RunEnd> parse_run_end(std::string_view text) {
+  for (std::size_t i = 0; i < kRunEnds.size(); ++i) {
+    if (text == kRunEnds[i]) return static_cast<RunEnd>(i);
+  }
+  return std::nullopt;
+}
+
+bool is_participant_code(std::string_view code) {
+  if (code.empty() || code.size() > 32) return false;
+  for (const char c : code) {
+    // Not std::isalnum: that one follows the locale.
+    if (!((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'))) return false;
+  }
+  return true;
+}
+
+}  // namespace palpate::data

@@ -1,0 +1,133 @@
+// Who takes part: enrolment in a protocol, codes and numbers.
+
+#include "data/store/connection.h"
+#include "data/store/protocol_rows.h"
+#include "data/store/statement_values.h"
+#include "data/store/tombstones.h"
+#include "data/store/validation.h"
+
+namespace palpate::data {
+namespace {
+
+/// A database that is open, and what it is called in messages.
+struct Place {
+  SQLite::Database& db;
+  const std::string& path;
+  [[noreturn]] void refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
+};
+
+void require_enrollable(const std::string& path, const ProtocolInfo& protocol,
+                        const std::string& code, std::optional<int> wanted_number, bool simulated,
+                        std::optional<std::uint64_t> seed) {
+  Validator checks;
+  checks.expect(
+      is_participant_code(code),
+      "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
+  if (wanted_number) checks.positive("the participant's number", *wanted_number);
+  checks.expect(simulated || !seed, "only a simulated participant has a seed");
+  check(checks, protocol);
+  checks.raise(path + ": participant");
+}
+
+/// Who is in the protocol under this code. \throws StoreRefused: as somebody else.
+std::optional<Participant> enrolled(const Place& in, std::int64_t protocol,
+                                    const Participant& wanted, std::optional<int> number) {
+  SQLite::Statement find(
+      in.db,
+      "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
+      "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
+      "AND code = ?");
+  Binder(find) << protocol << wanted.code;
+  if (!find.executeStep()) return std::nullopt;
+  Participant person = wanted;
+  bool was_simulated = false;
+  std::optional<std::string> was_seed;
+  RowReader(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
+      was_seed;
+  if (number && *number != person.number && *number != person.enrolled_number) {
+    in.refuse("participant " + person.code + " has number " + std::to_string(person.number) +
+              ", not " + std::to_string(*number) + "; leave the number out to go on");
+  }
+  if (was_simulated != person.simulated) {
+    in.refuse("participant " + person.code + " is " + (was_simulated ? "simulated" : "real") +
+              " in this database; use another code or another database");
+  }
+  const auto text = person.seed ? std::optional(std::to_string(*person.seed)) : std::nullopt;
+  if (was_seed != text) {
+    in.refuse("participant " + person.code + " was simulated with seed " +
+              was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
+              "; use that seed or another database");
+  }
+  return person;
+}
+
+/// The wanted number, or the smallest unused: the counterbalancing has no gaps.
+int free_number(const Place& in, std::optional<std::int64_t> protocol, std::optional<int> wanted) {
+  SQLite::Statement numbers(
+      in.db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
+  Binder(numbers) << protocol;
+  int next = 1;
+  while (numbers.executeStep()) {
+    const int number = numbers.getColumn(0).getInt();
+    if (wanted == number) {
+      in.refuse("number " + std::to_string(number) + " is taken by participant " +
+                numbers.getColumn(1).getString() +
+                "; leave the number out for the next unused one");
+    }
+    if (number == next) ++next;
+  }
+  return wanted.value_or(next);
+}
+
+}  // namespace
+
+Participant Store::look_up(const ProtocolInfo& protocol, const std::string& code,
+                           std::optional<int> wanted_number, bool simulated,
+                           std::optional<std::uint64_t> seed) {
+  require_enrollable(impl_->path, protocol, code, wanted_number, simulated, seed);
+  return guarded(impl_->path, [&] {
+    const Place in{*impl_->db, impl_->path};
+    Participant person{.code = code, .simulated = simulated, .seed = seed};
+    const auto protocol_id = find_protocol(in.db, in.path, protocol);
+    if (protocol_id) {
+      if (const auto known = enrolled(in, *protocol_id, person, wanted_number)) return *known;
+    }
+    if (Tombstones::read(in.db, in.path).holds(code)) {
+      in.refuse("the participant with code " + code +
+                " has withdrawn; the code is not given again, choose another");
+    }
+    person.number = person.enrolled_number = free_number(in, protocol_id, wanted_number);
+    return person;
+  });
+}
+
+Participant Store::enrol(const ProtocolInfo& protocol, const std::string& code,
+                         std::optional<int> wanted_number, bool simulated,
+                         std::optional<std::uint64_t> seed) {
+  return impl_->commit([&] {
+    SQLite::Database& db = *impl_->db;
+    Participant person = look_up(protocol, code, wanted_number, simulated, seed);
+    const std::int64_t protocol_id = insert_protocol_if_absent(db, impl_->path, protocol);
+    if (person.id != 0) return person;
+    SQLite::Statement add(db,
+                          "INSERT INTO participants (protocol_id, code, number, simulated, seed) "
+                          "VALUES (?, ?, ?, ?, ?)");
+    Binder(add) << protocol_id << code << person.number << simulated
+                << (seed ? std::optional(std::to_string(*seed)) : std::nullopt);
+    add.exec();
+    person.id = db.getLastInsertRowid();
+    return person;
+  });
+}
+
+std::vector<std::string> Store::codes() {
+  return guarded(impl_->path, [&] {
+    std::vector<std::string> all;
+    SQLite::Statement find(*impl_->db,
+                           "SELECT code FROM participants GROUP BY code ORDER BY min(id)");
+    while (find.executeStep()) all.push_back(find.getColumn(0).getString());
+    return all;
+  });
+}
+
+}  // namespace palpate::data

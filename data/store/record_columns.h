@@ -1,0 +1,56 @@
+#pragma once
+// Internal to data/: which columns stand for a person, a run and a trial, each list beside the
+// function that takes its values from a row, in the same order.
+
+#include <SQLiteCpp/Database.h>
+
+#include <cstdint>
+#include <string>
+
+#include "data/record.h"
+#include "data/store/statement_values.h"
+
+namespace palpate::data {
+
+// Aliases: pr protocols, pa participants, s sessions, r runs, a attempts.
+std::string person_columns(int version);  ///< of the schema
+RowReader& operator>>(RowReader& row, Participant& person);
+
+std::string run_columns(int version);
+RowReader& operator>>(RowReader& row, RunInfo& info);
+
+/// \throws SQLite::Exception (damage)
+RunEnd run_end_of(const std::string& text);
+
+/// Whose a session is.
+struct SessionHead {
+  std::int64_t id = 0, protocol_id = 0;
+  std::string protocol_name, protocol_sha256;
+  Participant participant;
+  int number = 1;
+  std::string observer_sha256;
+};
+/// \throws SQLite::Exception: there is none.
+SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version);
+
+inline constexpr const char* kPlanColumns =
+    "a.id, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
+    "a.orientation_w, a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
+/// kPlanColumns, all of a plan but the session; the onset is when the attempt was begun, until
+/// read_outcome knows better. \returns the attempt's key
+std::int64_t read_plan(RowReader& row, TrialRecord& record);
+
+inline constexpr const char* kOutcomeColumns =
+    "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, a.onset_ns, "
+    "a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, a.start_tail_x, a.start_tail_y, "
+    "a.start_tail_z, a.ticks, a.missed_ticks, a.longest_period_ns, a.faults, a.started_inside, "
+    "a.max_force";
+void read_outcome(RowReader& row, TrialRecord& record);
+
+// CROSS JOIN keeps SQLite to this nesting; with the indexes each level comes in order, so nothing
+// is sorted in memory or in a temporary file, however many trials there are.
+inline constexpr const char* kFromProtocolDown =
+    " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
+    "ON s.participant_id = pa.id ";
+
+}  // namespace palpate::data

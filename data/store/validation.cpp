@@ -1,0 +1,116 @@
+#include "data/store/validation.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "data/errors.h"
+#include "data/files/checksum.h"
+
+namespace palpate::data {
+// Table 3-7 of the Unicode standard.
+bool is_clean_utf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[i++]);
+    if (lead == 0) return false;
+    if (lead < 0x80) continue;
+    const int more = lead >= 0xC2 && lead <= 0xDF   ? 1
+                     : lead >= 0xE0 && lead <= 0xEF ? 2
+                     : lead >= 0xF0 && lead <= 0xF4 ? 3
+                                                    : 0;
+    if (more == 0) return false;
+    for (int k = 0; k < more; ++k, ++i) {
+      if (i >= text.size()) return false;
+      const auto next = static_cast<unsigned char>(text[i]);
+      unsigned low = 0x80, high = 0xBF;
+      if (k == 0 && lead == 0xE0) low = 0xA0;   // overlong
+      if (k == 0 && lead == 0xED) high = 0x9F;  // surrogates
+      if (k == 0 && lead == 0xF0) low = 0x90;   // overlong
+      if (k == 0 && lead == 0xF4) high = 0x8F;  // past U+10FFFF
+      if (next < low || next > high) return false;
+    }
+  }
+  return true;
+}
+
+void Validator::expect(bool holds, const std::string& expectation) {
+  if (!holds) faults_.push_back(expectation);
+}
+
+void Validator::text(const char* field, std::string_view value) {
+  expect(is_clean_utf8(value), std::string(field) + " must be UTF-8 text without NUL");
+}
+
+void Validator::present(const char* field, std::string_view value) {
+  text(field, value);
+  expect(!value.empty(), std::string(field) + " must not be empty");
+}
+
+void Validator::amount(const char* field, double value) {
+  finite(field, value);
+  expect(!(value < 0), std::string(field) + " must not be below zero");
+}
+
+void Validator::finite(const char* field, double value) {
+  expect(std::isfinite(value), std::string(field) + " must be a finite number");
+}
+
+void Validator::positive(const char* field, int value) {
+  expect(value >= 1, std::string(field) + " must be 1 or more, not " + std::to_string(value));
+}
+
+void Validator::raise(const std::string& what) const {
+  if (faults_.empty()) return;
+  std::string message = what + ": not stored:";
+  for (std::size_t i = 0; i < faults_.size(); ++i) message += (i > 0 ? "; " : " ") + faults_[i];
+  throw StoreRefused(message);
+}
+
+void check(Validator& checks, const ProtocolInfo& protocol) {
+  checks.present("protocol's name", protocol.name);
+  checks.present("protocol's text", protocol.text);
+  checks.expect(protocol.sha256 == checksum_hex(protocol.text),
+                "protocol's SHA-256 must be that of its text");
+  for (const ProtocolFile& file : protocol.files) checks.present("name of a file", file.name);
+}
+
+void check(Validator& checks, const RunInfo& info, bool simulated) {
+  checks.positive("session", info.session);
+  checks.present("program version", info.program_version);
+  checks.present("device", info.device);
+  checks.text("build", info.build);
+  checks.text("device calibration", info.device_calibration);
+  checks.text("response device", info.response_device);
+  checks.text("consent version", info.consent_version);
+  checks.text("hand", info.hand);
+  checks.text("observer's checksum", info.observer_sha256);
+  checks.expect(simulated || info.observer_sha256.empty(),
+                "only a simulated participant has observer settings");
+  if (info.response_latency) checks.finite("response latency", *info.response_latency);
+}
+
+void validate_plan(Validator& checks, const TrialRecord& record, int session) {
+  checks.expect(record.session == session, "session must be the run's, " + std::to_string(session));
+  checks.positive("block", record.block);
+  checks.positive("trial", record.trial);
+  checks.present("renderer", record.renderer);
+  checks.present("shape", record.shape);
+  for (const double q : record.orientation_wxyz) checks.finite("orientation", q);
+}
+
+void validate_outcome(Validator& checks, const TrialRecord& record) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+  checks.text("response", record.response);
+  checks.amount("response_time", record.response_time);
+  if (record.first_contact_time) checks.amount("first_contact_time", *record.first_contact_time);
+  for (int i = 0; i < 3; ++i) {
+    checks.finite("start_tip", record.start_tip[i]);
+    checks.finite("start_tail", record.start_tail[i]);
+  }
+  checks.amount("max_force", record.max_force);
+  checks.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
+  checks.expect(!record.timed_out || (record.response.empty() && !record.correct),
+                "a time-out has no response and is not correct");
+}
+
+}  // namespace palpate::data

@@ -1,0 +1,376 @@
+#include "data/export/csv.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+
+#include "data/files/formula_guard.h"
+#include "tests/data/store/store_fixture.h"
+
+namespace palpate::data {
+namespace {
+
+using namespace palpate::data::testing;
+namespace fs = std::filesystem;
+using Rows = std::vector<std::vector<std::string>>;
+
+/// RFC 4180 to the letter: anything else fails the test.
+Rows parse_rfc4180(const std::string& text) {
+  Rows rows(1);
+  rows.back().emplace_back();
+  std::size_t i = 0;
+  while (i < text.size()) {
+    std::string& field = rows.back().back();
+    if (text[i] == '"' && field.empty()) {
+      for (++i;; ++i) {
+        if (i >= text.size()) {
+          ADD_FAILURE() << "unclosed quote";
+          return rows;
+        }
+        if (text[i] == '"') {
+          if (i + 1 >= text.size() || text[i + 1] != '"') break;
+          ++i;
+        }
+        field += text[i];
+      }
+      ++i;
+    }
+    while (i < text.size() && text[i] != ',' && text[i] != '\r') {
+      EXPECT_TRUE(text[i] != '"' && text[i] != '\n') << "at " << i;
+      field += text[i++];
+    }
+    if (i >= text.size()) break;
+    if (text[i++] == ',') {
+      rows.back().emplace_back();
+    } else {
+      EXPECT_EQ(text.at(i++), '\n');
+      rows.emplace_back().emplace_back();
+    }
+  }
+  EXPECT_EQ(rows.back(), std::vector<std::string>{""}) << "the last line has its end";
+  rows.pop_back();
+  return rows;
+}
+
+/// Column name -> value of one row.
+std::map<std::string, std::string> by_name(const Rows& rows, std::size_t row) {
+  std::map<std::string, std::string> values;
+  EXPECT_EQ(rows.at(row).size(), rows.at(0).size());
+  for (std::size_t i = 0; i < rows[0].size(); ++i) values[rows[0][i]] = rows[row].at(i);
+  return values;
+}
+
+class ExportCsv : public ::testing::Test {
+ protected:
+  void show(const TrialRecord& record) {
+    store_.begin_attempt(run_, record, record.onset_ns);
+    store_.finish_attempt(run_, record);
+  }
+  Rows rows() { return parse_rfc4180(contents_of(out_)); }
+  std::ptrdiff_t files() const {
+    return std::distance(fs::directory_iterator(out_folder_.path()), fs::directory_iterator());
+  }
+  const TemporaryFolder folder_, out_folder_;
+  Store store_ = Store::open(folder_ / "study.db", Store::Mode::write_or_create);
+  const Participant person_ = store_.enrol(a_protocol(), "P1", 4);
+  const palpate::data::Run run_ = store_.begin_run(person_, a_run());
+  const std::string out_ = out_folder_ / "trials.csv";
+};
+
+TEST_F(ExportCsv, HasTheColumnsOfTheContractAlways) {
+  export_csv(store_, out_, false);
+  EXPECT_EQ(
+      contents_of(out_),
+      "participant_id,session,block,trial,renderer,shape,response,correct,response_time,"
+      "orientation_w,orientation_x,orientation_y,orientation_z,practice,timed_out,"
+      "first_contact_time,onset_utc,device,simulated,missed_ticks,attempt,protocol_sha256,"
+      "program_version,participant_number,started_inside,ticks,longest_period,faults,max_force,"
+      "observer_sha256,before_contact,response_device\r\n");
+}
+
+TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
+  TrialRecord record = a_record(3);
+  record.block = 2;
+  record.response = "cube";
+  record.correct = record.practice = true;
+  record.response_time = 0.1 + 0.2;
+  record.first_contact_time = 1e-7;
+  record.orientation_wxyz = {0.5, -0.25, 1.0 / 3.0, 0};
+  record.onset_ns = a_run().clock.monotonic_ns + 1'000'000'000;
+  record.ticks = 1234;
+  record.missed_ticks = 5;
+  record.faults = 6;
+  record.started_inside = true;
+  record.max_force = 7.5;
+  show(record);
+  TrialRecord silent = a_record(4);
+  silent.timed_out = true;
+  silent.response = "";
+  silent.response_time = 60;
+  silent.first_contact_time.reset();
+  show(silent);
+  TrialRecord guessed = a_record(5);
+  guessed.first_contact_time.reset();
+  show(guessed);
+  EXPECT_EQ(export_csv(store_, out_, false).trials, 3);
+  const auto row = by_name(rows(), 1);
+  const std::map<std::string, std::string> expected{{"participant_id", "P1"},
+                                                    {"session", "1"},
+                                                    {"block", "2"},
+                                                    {"trial", "3"},
+                                                    {"renderer", "ray"},
+                                                    {"shape", "cube"},
+                                                    {"response", "cube"},
+                                                    {"correct", "1"},
+                                                    {"response_time", "0.30000000000000004"},
+                                                    {"orientation_w", "0.5"},
+                                                    {"orientation_x", "-0.25"},
+                                                    {"orientation_y", "0.3333333333333333"},
+                                                    {"orientation_z", "0"},
+                                                    {"practice", "1"},
+                                                    {"timed_out", "0"},
+                                                    {"first_contact_time", "1e-07"},
+                                                    {"onset_utc", "2023-11-14T22:13:21.123456Z"},
+                                                    {"device", "falcon"},
+                                                    {"simulated", "0"},
+                                                    {"missed_ticks", "5"},
+                                                    {"attempt", "1"},
+                                                    {"protocol_sha256", a_protocol().sha256},
+                                                    {"program_version", "0.1.0"},
+                                                    {"participant_number", "4"},
+                                                    {"started_inside", "1"},
+                                                    {"ticks", "1234"},
+                                                    {"longest_period", "0.001003"},
+                                                    {"faults", "6"},
+                                                    {"max_force", "7.5"},
+                                                    {"observer_sha256", ""},
+                                                    {"before_contact", "0"},
+                                                    {"response_device", ""}};
+  EXPECT_EQ(row, expected);
+  const auto second = by_name(rows(), 2);
+  EXPECT_EQ(second.at("timed_out"), "1");
+  EXPECT_EQ(second.at("response"), "");
+  EXPECT_EQ(second.at("correct"), "0");
+  EXPECT_EQ(second.at("response_time"), "60");
+  EXPECT_EQ(second.at("first_contact_time"), "");
+  EXPECT_EQ(second.at("before_contact"), "0") << "there was no answer";
+  EXPECT_EQ(by_name(rows(), 3).at("before_contact"), "1");
+}
+
+TEST_F(ExportCsv, NumbersReadBackExactly) {
+  const double values[] = {
+      0.1, 1.0 / 3.0, 59.999999999999993, 5e-324, 1.7976931348623157e308, 123456789.123456789};
+  int trial = 0;
+  for (const double value : values) {
+    TrialRecord record = a_record(++trial);
+    record.response_time = value;
+    show(record);
+  }
+  export_csv(store_, out_, false);
+  const Rows all = rows();
+  for (std::size_t i = 0; i < std::size(values); ++i) {
+    const std::string text = by_name(all, i + 1).at("response_time");
+    double back = 0;
+    std::from_chars(text.data(), text.data() + text.size(), back);
+    EXPECT_EQ(back, values[i]) << text;
+  }
+}
+
+TEST_F(ExportCsv, HostileTextsAreQuotedAndOnlyThose) {
+  const std::vector<std::string> texts{"a,b",
+                                       "say \"cube\"",
+                                       "\"",
+                                       "two\r\nlines",
+                                       "lf\nonly",
+                                       "=1+1",
+                                       "+cmd|' /C calc'!A0",
+                                       "Würfel",
+                                       " padded ",
+                                       "'); DROP TABLE attempts;--",
+                                       "a;b\tc",
+                                       "-5",
+                                       "@x",
+                                       "\tx",
+                                       "\rx",
+                                       "\nx",
+                                       "'=1",
+                                       "''+1",
+                                       "'quoted'",
+                                       "-"};
+  int trial = 0;
+  for (const auto& text : texts) {
+    TrialRecord record = a_record(++trial);
+    record.shape = record.response = text;
+    show(record);
+  }
+  export_csv(store_, out_, false);
+  const Rows all = rows();
+  ASSERT_EQ(all.size(), texts.size() + 1);
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::string shape = by_name(all, i + 1).at("shape");
+    EXPECT_EQ(unguarded(shape), texts[i]);
+    EXPECT_EQ(by_name(all, i + 1).at("response"), shape);
+    EXPECT_EQ(std::string("=+-@\t\r\n").find(shape[0]), std::string::npos) << shape;
+  }
+  const std::string raw = contents_of(out_);
+  EXPECT_TRUE(contains(raw, ",\"say \"\"cube\"\"\","));
+  EXPECT_TRUE(contains(raw, ",'=1+1,"));
+  EXPECT_TRUE(contains(raw, ",''=1,")) << "not to be taken for =1";
+  EXPECT_TRUE(contains(raw, ",'quoted',"));
+  EXPECT_TRUE(contains(raw, ",0.5,-0.5,0.1,")) << "negative numbers stay numbers";
+  EXPECT_TRUE(contains(raw, ", padded ,"));
+}
+
+TEST_F(ExportCsv, RelativeTimesTellNoDateButTheIntervals) {
+  store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
+  store_.cut_off_attempt(run_, "device fault");
+  for (const int trial : {1, 2}) {
+    TrialRecord record = a_record(trial);
+    record.attempt = store_.begin_attempt(run_, record, record.onset_ns);
+    store_.finish_attempt(run_, record);
+  }
+  export_csv(store_, out_, ExportSettings{.times = Times::relative});
+  const Rows all = rows();
+  EXPECT_EQ(by_name(all, 1).at("onset_utc"), "1900-01-01T00:00:00.000000Z");
+  EXPECT_EQ(by_name(all, 1).at("elapsed"), "0");
+  EXPECT_EQ(by_name(all, 2).at("onset_utc"), "1900-01-01T00:00:20.000000Z");
+  EXPECT_EQ(by_name(all, 2).at("elapsed"), "20");
+  EXPECT_EQ(all[0].back(), "elapsed") << "the other columns as ever";
+  const auto cut_off = by_name(parse_rfc4180(contents_of(out_folder_ / "attempts.csv")), 1);
+  EXPECT_EQ(cut_off.at("began_utc"), "1899-12-31T23:59:39.000000Z");
+  EXPECT_EQ(cut_off.at("elapsed"), "-21");
+}
+
+TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
+  TrialRecord record = a_record(1);
+  record.shape = record.response = "-cube";
+  show(record);
+  ExportSettings settings;
+  settings.codebook = out_folder_ / "codebook.csv";
+  settings.fault_bits = {{16, "force-limited: ..."}, {2048, "old-reading: ..."}};
+  settings.facts = [](const ProtocolInfo&) {
+    return ProtocolFacts{.stimuli = {{"-cube", "{}"}, {"cone", "{}"}}};
+  };
+  export_csv(store_, out_, settings);
+  const Rows book = parse_rfc4180(contents_of(settings.codebook));
+  EXPECT_EQ(book[0], (std::vector<std::string>{"table", "column", "unit", "value", "meaning"}));
+  std::vector<std::string> described;
+  std::map<std::string, std::string> bits, shapes;
+  for (std::size_t i = 1; i < book.size(); ++i) {
+    const auto row = by_name(book, i);
+    EXPECT_NE(row.at("meaning"), "");
+    if (row.at("table") != "trials") continue;
+    if (row.at("value").empty()) described.push_back(row.at("column"));
+    if (row.at("column") == "faults") bits[row.at("value")] = row.at("meaning");
+    if (row.at("column") == "shape") shapes[row.at("value")] = row.at("meaning");
+  }
+  EXPECT_EQ(described, rows()[0]);
+  EXPECT_EQ(bits.at("16"), "force-limited: ...");
+  EXPECT_EQ(bits.at("2048"), "old-reading: ...");
+  EXPECT_TRUE(shapes.contains("'-cube")) << "as it stands in the table";
+  EXPECT_EQ(by_name(rows(), 1).at("shape"), "'-cube");
+}
+
+TEST_F(ExportCsv, TheCodebookTakesNoOtherFilesPlace) {
+  show(a_record(1));
+  ExportSettings settings;
+  for (const std::string& taken :
+       {out_, out_folder_ / "attempts.csv", folder_ / "study.db", out_folder_.path()}) {
+    settings.codebook = taken;
+    EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused) << taken;
+  }
+  settings.codebook = out_folder_ / "mine.csv";
+  write_file(settings.codebook, "mine");
+  EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused);
+  EXPECT_EQ(contents_of(settings.codebook), "mine");
+  EXPECT_EQ(files(), 1) << "nothing else was written";
+}
+
+TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {
+  store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
+  store_.cut_off_attempt(run_, "device fault, reconnected");
+  TrialRecord record = a_record(1);
+  record.attempt = store_.begin_attempt(run_, record, 2);
+  store_.finish_attempt(run_, record);
+  const ExportResult done = export_csv(store_, out_, false);
+  EXPECT_EQ(done.trials, 1);
+  EXPECT_EQ(done.attempts, 1);
+  EXPECT_EQ(done.attempts_path, out_folder_ / "attempts.csv");
+  EXPECT_EQ(by_name(rows(), 1).at("attempt"), "2");
+  const auto row = by_name(parse_rfc4180(contents_of(done.attempts_path)), 1);
+  const std::map<std::string, std::string> expected{{"participant_id", "P1"},
+                                                    {"session", "1"},
+                                                    {"block", "1"},
+                                                    {"trial", "1"},
+                                                    {"attempt", "1"},
+                                                    {"renderer", "ray"},
+                                                    {"shape", "cube"},
+                                                    {"orientation_w", "0.5"},
+                                                    {"orientation_x", "-0.5"},
+                                                    {"orientation_y", "0.1"},
+                                                    {"orientation_z", "0.3333333333333333"},
+                                                    {"practice", "0"},
+                                                    {"began_utc", "2023-11-14T22:13:20.123456Z"},
+                                                    {"reason", "device fault, reconnected"},
+                                                    {"device", "falcon"},
+                                                    {"simulated", "0"},
+                                                    {"protocol_sha256", a_protocol().sha256},
+                                                    {"program_version", "0.1.0"},
+                                                    {"participant_number", "4"}};
+  EXPECT_EQ(row, expected);
+}
+
+TEST_F(ExportCsv, NothingIsOverwrittenWithoutForce) {
+  show(a_record(1));
+  export_csv(store_, out_, false);
+  EXPECT_EQ(files(), 1) << "no attempts, no file for them, no temporary file";
+  write_file(out_, "mine");
+  EXPECT_TRUE(contains(error_of([&] { export_csv(store_, out_, false); }), "--force"));
+  EXPECT_EQ(contents_of(out_), "mine");
+  export_csv(store_, out_, true);
+  EXPECT_EQ(rows().size(), 2u);
+
+  fs::remove(out_);
+  store_.begin_attempt(run_, a_plan(2), 1);
+  store_.cut_off_attempt(run_, "x");
+  write_file(out_folder_ / "attempts.csv", "mine");
+  EXPECT_THROW(export_csv(store_, out_, false), StoreRefused);
+  EXPECT_EQ(contents_of(out_folder_ / "attempts.csv"), "mine");
+  EXPECT_FALSE(fs::exists(out_)) << "half an export";
+  export_csv(store_, out_, true);
+  EXPECT_EQ(parse_rfc4180(contents_of(out_folder_ / "attempts.csv")).size(), 2u);
+  EXPECT_EQ(files(), 2);
+}
+
+TEST_F(ExportCsv, PlacesThatAreNoneAreRefused) {
+  EXPECT_THROW(export_csv(store_, out_folder_.path(), true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, out_folder_ / "", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, "", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, "/dev/null", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, out_folder_ / "attempts.csv", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, folder_ / "study.db", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, folder_ / "study.db-wal", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, out_folder_ / "none/trials.csv", false), StoreError);
+  EXPECT_EQ(files(), 0);
+}
+
+TEST_F(ExportCsv, IsForItsOwnerOnly) {
+  export_csv(store_, out_, false);
+  struct stat found {};
+  ASSERT_EQ(::stat(out_.c_str(), &found), 0);
+  EXPECT_EQ(found.st_mode & 0777, 0600u);
+}
+
+TEST_F(ExportCsv, DuringASessionOnlyCommittedTrialsAreSeen) {
+  show(a_record(1));
+  store_.begin_attempt(run_, a_plan(2), 1);
+  Store reader = Store::open(store_.path(), Store::Mode::read_only);
+  EXPECT_EQ(export_csv(reader, out_, false).trials, 1);
+  EXPECT_EQ(files(), 1) << "an open attempt is not cut off";
+}
+
+}  // namespace
+}  // namespace palpate::data

@@ -1,0 +1,202 @@
+// The disk fails in the ways disks fail: the trial in hand is never reported as saved.
+
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <functional>
+
+#include "data/export/csv.h"
+#include "data/store/store.h"
+#include "tests/data/store/store_fixture.h"
+
+namespace palpate::data {
+namespace {
+
+using namespace palpate::data::testing;
+namespace fs = std::filesystem;
+
+Store open_to_write(const std::string& path) {
+  return Store::open(path, Store::Mode::write_or_create);
+}
+
+/// Shows trials with samples until the store throws. \return the trial that was not saved.
+int show_until_full(Store& store, const Run& run, std::string& error) {
+  for (int trial = 1; trial < 1000; ++trial) {
+    TrialRecord record = a_record(trial);
+    record.samples.resize(2000);
+    for (std::uint32_t i = 0; i < 2000; ++i) record.samples[i].depth = 1.0 / (i + 1.0);
+    try {
+      record.attempt = store.begin_attempt(run, record, 1);
+      store.finish_attempt(run, record);
+    } catch (const StoreError& full) {
+      error = full.what();
+      return trial;
+    }
+  }
+  ADD_FAILURE() << "never full";
+  return 0;
+}
+
+/// Runs `body` in a process of its own where `folder` is a disk of 1 MiB. \return false where this
+/// machine does not let us mount one.
+bool on_a_small_disk(const std::string& folder, const std::function<void()>& body) {
+  constexpr int kImpossible = 77;
+  const uid_t user = ::getuid();
+  const gid_t group = ::getgid();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::unshare(CLONE_NEWNS) != 0) {
+      if (::unshare(CLONE_NEWUSER | CLONE_NEWNS) != 0) ::_exit(kImpossible);
+      write_file("/proc/self/setgroups", "deny");
+      write_file("/proc/self/uid_map", "0 " + std::to_string(user) + " 1");
+      write_file("/proc/self/gid_map", "0 " + std::to_string(group) + " 1");
+    }
+    if (::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        ::mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=1m") != 0) {
+      ::_exit(kImpossible);
+    }
+    body();
+    std::fflush(nullptr);
+    ::_exit(::testing::Test::HasFailure() ? 1 : 0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == kImpossible) return false;
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << "see above, status " << status;
+  return true;
+}
+
+TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionGoesOnAfterwards) {
+  const TemporaryFolder folder;
+  const bool possible = on_a_small_disk(folder.path(), [&] {
+    const std::string path = folder / "study.db";
+    write_file(folder / "ballast", std::string(300'000, 'x'));
+    Store store = open_to_write(path);
+    const Participant person = store.enrol(a_protocol(), "A");
+    const palpate::data::Run run = store.begin_run(person, a_run());
+    std::string error;
+    const int lost = show_until_full(store, run, error);
+    EXPECT_GT(lost, 1);
+    EXPECT_TRUE(contains(error, "disk is full")) << error;
+    EXPECT_TRUE(contains(error, path)) << error;
+    EXPECT_EQ(store.progress(person, 1).completed.size(), static_cast<std::size_t>(lost - 1));
+    EXPECT_TRUE(
+        contains(error_of([&] { export_csv(store, folder / "t.csv", false); }) + error_of([&] {
+                   write_file(folder / "more", std::string(2'000'000, 'x'));
+                   export_csv(store, folder / "t.csv", false);
+                 }),
+                 "nothing was exported"));
+    fs::remove(folder / "ballast");
+    fs::remove(folder / "more");
+    store.end_run(run, RunEnd::aborted, 1);
+    const palpate::data::Run again = store.begin_run(person, a_run());
+    TrialRecord record = a_record(lost);
+    record.attempt = store.begin_attempt(again, record, 1);
+    store.finish_attempt(again, record);
+    EXPECT_EQ(store.progress(person, 1).completed.size(), static_cast<std::size_t>(lost));
+  });
+  if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
+}
+
+TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
+  const TemporaryFolder folder;
+  const bool possible = on_a_small_disk(folder.path(), [&] {
+    const std::string path = folder / "study.db";
+    {
+      Store store = open_to_write(path);
+      const palpate::data::Run run =
+          store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+      store.record_simulated(run, {a_record(1)});
+    }
+    ASSERT_EQ(::mount("none", folder.path().c_str(), nullptr, MS_REMOUNT | MS_RDONLY, nullptr), 0);
+    Store reader = Store::open(path, Store::Mode::read_only);
+    EXPECT_EQ(reader.counts().completed, 1);
+    EXPECT_TRUE(contains(error_of([&] { open_to_write(path); }), "may write there"));
+    EXPECT_TRUE(contains(error_of([&] { open_to_write(folder / "new.db"); }), "may write there"));
+    EXPECT_TRUE(contains(error_of([&] { export_csv(reader, folder / "t.csv", false); }),
+                         "cannot be created"));
+  });
+  if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
+}
+
+TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
+  const TemporaryFolder folder;
+  Store store = open_to_write(folder / "study.db");
+  const Participant person = store.enrol(a_protocol(), "A");
+  const palpate::data::Run run = store.begin_run(person, a_run());
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = ::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{400'000, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::string error;
+  const int lost = show_until_full(store, run, error);
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  ::signal(SIGXFSZ, handler);
+  EXPECT_GT(lost, 1);
+  EXPECT_TRUE(contains(error, "not saved")) << error;
+  EXPECT_EQ(store.progress(person, 1).completed.size(), static_cast<std::size_t>(lost - 1));
+  EXPECT_EQ(store.counts().completed, lost - 1);
+}
+
+/// What happens to the files while a trial is shown must not end in "saved".
+void expect_not_saved_after(const std::function<void(const std::string& path)>& mishap) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "study.db";
+  Store store = open_to_write(path);
+  const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  store.begin_attempt(run, a_record(1), 1);
+  mishap(path);
+  const std::string error = error_of([&] { store.finish_attempt(run, a_record(1)); });
+  EXPECT_TRUE(contains(error, path)) << error;
+  EXPECT_TRUE(contains(error, "moved, replaced or deleted")) << error;
+}
+
+TEST(StoreFault, AVanishedFileIsNoticed) {
+  expect_not_saved_after([](const std::string& path) { fs::remove(path); });
+  expect_not_saved_after([](const std::string& path) { fs::remove(path + "-wal"); });
+  expect_not_saved_after([](const std::string& path) { fs::rename(path, path + ".moved"); });
+  expect_not_saved_after(
+      [](const std::string& path) { fs::remove_all(fs::path(path).parent_path()); });
+  expect_not_saved_after([](const std::string& path) {
+    fs::copy_file(path, path + ".copy");
+    fs::rename(path + ".copy", path);
+  });
+}
+
+/// Root may write everything: while this lives, the test is nobody, who owns the folder.
+class Unprivileged {
+ public:
+  explicit Unprivileged(const fs::path& folder) : was_root_(::geteuid() == 0) {
+    constexpr ::uid_t kNobody = 65534;
+    if (was_root_ && (::chown(folder.c_str(), kNobody, kNobody) != 0 || ::seteuid(kNobody) != 0)) {
+      throw std::runtime_error("cannot become an unprivileged user");
+    }
+  }
+  ~Unprivileged() {
+    if (was_root_ && ::seteuid(0) != 0) std::abort();
+  }
+  Unprivileged(const Unprivileged&) = delete;
+  Unprivileged& operator=(const Unprivileged&) = delete;
+
+ private:
+  bool was_root_;
+};
+
+TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
+  const TemporaryFolder folder;
+  const Unprivileged unprivileged(folder.path());
+  open_to_write(folder / "study.db");
+  fs::permissions(folder / "study.db", fs::perms::owner_read);
+  EXPECT_TRUE(
+      contains(error_of([&] { open_to_write(folder / "study.db"); }), "may not be written"));
+  EXPECT_EQ(Store::open(folder / "study.db", Store::Mode::read_only).counts().runs, 0);
+}
+
+}  // namespace
+}  // namespace palpate::data
