@@ -8,6 +8,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 ROOMS = ["stimuli", "rendering", "protocols", "data", "analysis", "runner", "tests"]
 READMES = ["README.md"] + [f"{room}/README.md" for room in ROOMS] + ["runner/participants/README.md"]
 
+SHELL = ("sh", "bash", "shell", "console")
+RUN, NOT_RUN = "sh test", "sh not tested: "  # marks of blocks
+
 FENCE = re.compile(r"^( *)```([^\n]*)\n(.*?)^\1```$", re.M | re.S)
 
 
@@ -73,6 +76,9 @@ class Page:
         if level is None:
             raise AssertionError(f"{self.name} has no heading '{heading}'")
         return "\n".join(out)
+
+
+PAGES = {name: Page(name) for name in READMES}
 
 
 def cells(section):
