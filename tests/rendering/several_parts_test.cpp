@@ -135,6 +135,67 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
   }
 }
 
+// The parts of one object share the probe's way out, other objects know nothing of it: wherever a
+// compound stands among the scene's objects, the forces are those of each object alone.
+TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
+  const auto slab = [](int object, double top, double spring) {
+    std::vector<SceneObject> parts;
+    for (const double from : {-0.05, -0.01, 0.02}) {
+      parts.push_back(placed_object(box({from, -0.05, -0.04}, {from + 0.04, 0.05, top}), {}, spring,
+                                    object));
+    }
+    return parts;
+  };
+  const auto block = [](int object, double top, double spring) {
+    return std::vector<SceneObject>{
+        placed_object(box({-0.03, -0.03, -0.03}, {0.03, 0.02, top}), {}, spring, object)};
+  };
+  const std::vector<std::vector<std::vector<SceneObject>>> scenes{
+      {slab(0, 0, 800), block(1, 0.001, 300)},
+      {block(0, 0, 300), slab(1, 0.001, 800)},
+      {slab(0, 0.001, 500), slab(1, 0, 700)},
+      {block(0, 0, 300), slab(1, 0.001, 800), block(2, 0.0005, 200)},
+      {slab(0, 0, 800), block(1, 0.001, 300), slab(2, 0.0003, 100)},
+  };
+  for (std::size_t which = 0; which < scenes.size(); ++which) {
+    std::vector<SceneObject> all;
+    std::vector<Scene> alone;
+    for (std::vector<SceneObject> parts : scenes[which]) {
+      all.insert(all.end(), parts.begin(), parts.end());
+      for (SceneObject& part : parts) part.object = 0;
+      alone.emplace_back(parts);
+    }
+    const Scene together(all);
+    RenderState state = together.initial_state();
+    std::vector<RenderState> states;
+    for (const Scene& scene : alone) states.push_back(scene.initial_state());
+    int all_touched = 0;
+    Random random(which, {43});
+    const testing::Wave x(random), y(random), z(random);
+    for (int i = 0; i < 1500; ++i) {
+      const double travelled = 0.02 * i;
+      const Vec3 tip(0.06 * x(travelled), 0.04 * y(travelled),
+                     i == 0 ? 0.01 : 0.003 * (z(travelled) - 0.3));
+      const LineProbe probe{tip, tip + Vec3(0.01, -0.005, 0.1)};
+      const Rendering sum = tick(together, state, probe);
+      Vec3 force, torque;
+      int contacts = 0, touched = 0;
+      for (std::size_t k = 0; k < alone.size(); ++k) {
+        const Rendering r = tick(alone[k], states[k], probe);
+        force += r.force;
+        torque += r.torque;
+        contacts += r.contacts;
+        touched += r.contacts > 0;
+      }
+      ASSERT_EQ(sum.contacts, contacts) << "scene " << which << " tick " << i;
+      ASSERT_LE(glm::length(sum.force - force), 1e-12) << "scene " << which << " tick " << i;
+      ASSERT_LE(glm::length(sum.torque - torque), 1e-13) << "scene " << which << " tick " << i;
+      all_touched += touched == static_cast<int>(alone.size());
+    }
+    EXPECT_GT(all_touched, 200) << "scene " << which;
+  }
+}
+
 TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
   constexpr int kObjects = 300;
   constexpr double kPressed = 1e-3, kSoft = 2;  // m, N/m

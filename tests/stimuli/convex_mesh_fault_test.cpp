@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
+#include <sstream>
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
@@ -28,6 +30,25 @@ bool mentions(const std::vector<std::string>& faults, const std::string& text) {
   return std::any_of(faults.begin(), faults.end(), [&](const std::string& fault) {
     return fault.find(text) != std::string::npos;
   });
+}
+
+/// The corners, sorted, of the two facets that a dent is between.
+std::vector<std::vector<std::uint32_t>> facets_of_the_dent(const std::vector<std::string>& faults) {
+  std::vector<std::vector<std::uint32_t>> named(1);
+  for (const std::string& fault : faults) {
+    if (fault.find("form a dent") == std::string::npos) continue;
+    std::istringstream words(fault.substr(fault.find("vertices ") + 9));
+    for (std::string word; words >> word && word != "form";) {
+      if (word == "and") {
+        named.emplace_back();
+      } else if (word != "...") {
+        named.back().push_back(static_cast<std::uint32_t>(std::stoul(word)));
+      }
+    }
+    break;
+  }
+  for (auto& corners : named) std::sort(corners.begin(), corners.end());
+  return named;
 }
 
 #define EXPECT_FAULT(soup, text)                                           \
@@ -185,6 +206,15 @@ TEST(ConvexMeshFaults, SeesAHollowOfFoldsTooFineToSee) {
   soup.faces.push_back({0, 4 + 2 * kStrips, 5 + 2 * kStrips, 3});
   EXPECT_FAULT(soup, "form a dent");
   EXPECT_FALSE(mentions(faults_of(soup), "not convex: edge"));
+  // The facets that are named meet in an edge.
+  const auto named = facets_of_the_dent(faults_of(soup));
+  ASSERT_EQ(named.size(), 2U);
+  EXPECT_EQ(named[0].size(), 4U);
+  EXPECT_EQ(named[1].size(), 4U);
+  std::vector<std::uint32_t> shared;
+  std::set_intersection(named[0].begin(), named[0].end(), named[1].begin(), named[1].end(),
+                        std::back_inserter(shared));
+  EXPECT_EQ(shared.size(), 2U) << ::testing::PrintToString(named);
 }
 
 TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
@@ -195,6 +225,20 @@ TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
     const Quat turn = uniform_rotation(random);
     EXPECT_FAULT(placed(double_star_pyramids(), turn, 0.05, Vec3(0.2)), "wound vertex");
     EXPECT_FAULT(placed(star_prism(), turn, 0.05, Vec3(0.2)), "wound facet");
+  }
+}
+
+// What is wrong with a face or a corner is found whichever comes first.
+TEST(ConvexMeshFaults, LooksAtEveryFacetAndVertex) {
+  PolygonSoup prism = star_prism();
+  for (std::size_t i = 0; i < prism.faces.size(); ++i) {
+    std::rotate(prism.faces.begin(), prism.faces.begin() + 1, prism.faces.end());
+    EXPECT_EQ(faults_of(prism).size(), 2U);  // stars
+  }
+  PolygonSoup pyramids = double_star_pyramids();
+  for (std::size_t i = 0; i < pyramids.faces.size(); ++i) {
+    std::rotate(pyramids.faces.begin(), pyramids.faces.begin() + 1, pyramids.faces.end());
+    EXPECT_EQ(faults_of(pyramids).size(), 2U);  // tips
   }
 }
 

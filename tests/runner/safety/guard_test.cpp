@@ -58,42 +58,46 @@ GuardSettings no_rights() {
   return settings;
 }
 
-/// The runner: a session's thread, a servo's, a guard. Once `end` returns, or a signal has asked
-/// for the end, it is over. Trials are begun again until one has had force for a while, since a
-/// busy machine may make one trip; then no fault is cleared any more.
-void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
+/// A session's thread and a servo's. Once `end` returns, or a signal has asked for the end, it is
+/// over. Trials are begun again until one has had force for a while, since a busy machine may make
+/// one trip; then no fault is cleared any more.
+void feel_a_cube(Shared& shared, Device& device, FaultSignals& signals,
+                 const std::function<void(ServoThread&)>& end) {
   const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
                                  Pose{}, stimuli::Material{}, 0, nullptr}},
                                false);
+  RealClock clock;
+  ServoSettings settings;
+  settings.realtime = {0, false, -1};
+  settings.ring = 1 << 17;
+  ServoThread servo(device, clock, settings);
+  signals.watch(&servo);
+  int felt = 0;
+  while (felt < 100) {
+    servo.clear_fault();
+    servo.prepare(scene, rendering::point_renderer(), {0.062, 0.05, 0.005});
+    std::uint32_t faults = 0;
+    for (felt = 0; felt < 100 && !(faults & servo_fault::kTripped);) {
+      const Sample& sample = servo.next();
+      faults = sample.faults & ~servo_fault::kTripped;
+      if (sample.tick > 0) faults = sample.faults;
+      felt = glm::length(sample.device1) > 0.3 ? felt + 1 : 0;
+    }
+  }
+  shared.felt = true;
+  end(servo);
+  while (signals.end_requested() == 0) nap(1);
+  signals.watch(static_cast<ServoThread*>(nullptr));
+}
+
+/// The runner: a session's thread, a servo's, a guard.
+void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
   FaultSignals signals;
   GuardedDevice device(
       [&shared] { return std::make_unique<RecordingDevice>(shared.record, visiting); },
       no_rights());
   signals.watch(&device);
-  RealClock clock;
-  ServoSettings settings;
-  settings.realtime = {0, false, -1};
-  settings.ring = 1 << 17;
-  {
-    ServoThread servo(device, clock, settings);
-    signals.watch(&servo);
-    int felt = 0;
-    while (felt < 100) {
-      servo.clear_fault();
-      servo.prepare(scene, rendering::point_renderer(), {0.062, 0.05, 0.005});
-      std::uint32_t faults = 0;
-      for (felt = 0; felt < 100 && !(faults & servo_fault::kTripped);) {
-        const Sample& sample = servo.next();
-        faults = sample.faults & ~servo_fault::kTripped;
-        if (sample.tick > 0) faults = sample.faults;
-        felt = glm::length(sample.device1) > 0.3 ? felt + 1 : 0;
-      }
-    }
-    shared.felt = true;
-    end(servo);
-    while (signals.end_requested() == 0) nap(1);
-    signals.watch(static_cast<ServoThread*>(nullptr));
-  }
+  feel_a_cube(shared, device, signals, end);
   signals.watch(static_cast<GuardedDevice*>(nullptr));
 }
 
@@ -200,6 +204,24 @@ INSTANTIATE_TEST_SUITE_P(
             [](ServoThread&) { throw std::runtime_error("the database is full"); }, 0},
         End{"emergency_key", 0, [](ServoThread& servo) { servo.emergency_zero(); }, SIGKILL}),
     [](const auto& end) { return std::string(end.param.name); });
+
+// Without a guard, nobody but the servo's own thread can send the zero: whoever dies must wait.
+TEST(FaultSignals, ADyingThreadWaitsForTheServosZeroForce) {
+  Stage stage;
+  const int runner = fork();
+  if (runner == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    FaultSignals signals;
+    RecordingDevice device(stage.shared->record, visiting);
+    feel_a_cube(*stage.shared, device, signals, [](ServoThread&) { std::abort(); });
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(runner, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  EXPECT_EQ(WTERMSIG(status), SIGABRT);
+  EXPECT_EQ(stage.shared->record.last_force(), 0);
+}
 
 TEST(Guard, AStoppedRunnerThatGoesOnFeelsNothingUntilCleared) {
   Stage stage;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -221,6 +222,28 @@ TEST(ServoThread, EmergencyZeroHoldsUntilCleared) {
   servo.clear_fault();
   while (servo.next().faults & servo_fault::kTripped) {
   }
+}
+
+// Who dies in the servo's thread cannot wait for it; who dies in another one must.
+TEST(ServoThread, KnowsWhetherItIsTheOneWhoAsks) {
+  std::atomic<const ServoThread*> servo_now{nullptr};
+  std::atomic<int> asked_inside{0}, answered_yes{0};
+  FakeDevice device([&](int) {
+    if (const ServoThread* const servo = servo_now) {
+      ++asked_inside;
+      answered_yes += servo->in_this_thread();
+    }
+    return stylus_at(0.1);
+  });
+  UnhurriedClock clock;
+  ServoThread servo(device, clock, fast());
+  servo_now = &servo;
+  while (asked_inside < 3) std::this_thread::yield();
+  EXPECT_FALSE(servo.in_this_thread());
+  servo_now = nullptr;
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
+  servo.next();
+  EXPECT_EQ(answered_yes, asked_inside);
 }
 
 /// Holds the servo in its transfer until told to go on.

@@ -110,6 +110,49 @@ TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
   EXPECT_EQ(record.response_time, 2);
 }
 
+/// A servo whose trials end with a verdict of their own.
+class Judging final : public TickSource {
+ public:
+  explicit Judging(Servo& servo) : servo_(servo) {}
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer, const HomeZone& home) override {
+    servo_.prepare(scene, renderer, home);
+  }
+  const Sample& next() noexcept override { return servo_.next(); }
+  ServoQuality stop() noexcept override {
+    servo_.stop();
+    return verdict;
+  }
+  ServoQuality verdict;
+
+ private:
+  Servo& servo_;
+};
+
+TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
+  for (const std::uint32_t faults : {rendering::render_fault::kStartedInside, rendering::render_fault::kWalkCapped, 0u}) {
+    Station station;
+    Judging servo(station.servo);
+    servo.verdict.ticks = 411;
+    servo.verdict.missed_ticks = 7;
+    servo.verdict.longest_period_ns = 1'234'567;
+    servo.verdict.max_force = 3.5;
+    servo.verdict.faults = faults;
+    Scripted respondent({});
+    Session session(
+        {station.protocol, station.library, servo, station.clock, respondent, station.log},
+        SessionPlan(station.protocol, 1, 1), {0, 0});
+    run(session);
+    for (const TrialRecord& record : station.log.finished) {
+      EXPECT_EQ(record.started_inside, faults == rendering::render_fault::kStartedInside);
+      EXPECT_EQ(record.faults, faults);
+      EXPECT_EQ(record.ticks, 411u);
+      EXPECT_EQ(record.missed_ticks, 7u);
+      EXPECT_EQ(record.longest_period_ns, 1'234'567);
+      EXPECT_EQ(record.max_force, 3.5);
+    }
+  }
+}
+
 TEST(Session, PracticeIsRepeatedUntilTheCriterionOrTheLastRound) {
   const struct {
     std::deque<int> right;

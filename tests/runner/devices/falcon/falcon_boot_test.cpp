@@ -2,11 +2,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "protocols/parse.h"
 #include "runner/devices/falcon/boot.h"
+#include "runner/devices/falcon/packets.h"
 #include "stimuli/random.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
@@ -36,6 +38,45 @@ struct Bench {
     return "";
   }
 };
+
+/// Answers everything with the same bytes.
+class Parrot final : public Transport {
+ public:
+  explicit Parrot(Packet answer) : answer_(answer) {}
+  const std::string& serial() const override { return serial_; }
+  void control(std::uint8_t /*request*/, std::uint16_t /*value*/) override { place_ = kSilent; }
+  void reopen() override {}
+  bool send(std::span<const std::uint8_t> /*bytes*/) noexcept override {
+    place_ = 0;
+    return true;
+  }
+  std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t wait_ns) noexcept override {
+    std::size_t count = 0;
+    while (count < bytes.size() && place_ < answer_.size()) bytes[count++] = answer_[place_++];
+    if (count == 0) now_ += wait_ns;
+    return count;
+  }
+  bool drain(std::int64_t /*wait_ns*/) noexcept override { return true; }
+  bool gone() const noexcept override { return false; }
+  std::int64_t now_ns() noexcept override { return now_; }
+
+ private:
+  static constexpr std::size_t kSilent = 1000;
+  std::string serial_ = "PARROT";
+  Packet answer_;
+  std::size_t place_ = kSilent;
+  std::int64_t now_ = 0;
+};
+
+// Only the firmware speaks in replies; what is merely framed like one may be anything on that line.
+TEST(FalconBoot, OnlyAReplyThatCanBeReadShowsRunningFirmware) {
+  Packet reply = encode(Reply{{1, -2, 3}, 0, 7});
+  Parrot firmware(reply);
+  EXPECT_TRUE(firmware_runs(firmware, {}));
+  reply[5] = '!';  // no digit
+  Parrot other(reply);
+  EXPECT_FALSE(firmware_runs(other, {}));
+}
 
 TEST(FalconBoot, UploadsTheImageToABareDevice) {
   Bench bench;

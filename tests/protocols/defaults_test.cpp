@@ -1,0 +1,188 @@
+// A key that is left out means what the schemas say: parsing with the documented default written
+// out gives the same values, parsing with another one does not.
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "protocols/parse.h"
+
+namespace palpate::protocols {
+namespace {
+
+using nlohmann::json;
+
+json schema(const std::string& name) {
+  std::ifstream stream(PALPATE_SOURCE_DIR "/protocols/" + name);
+  return json::parse(stream);
+}
+
+/// The keys of an object that have a documented default, by their place: what the schema says of
+/// each. \param root  what "#/..." refers to
+void collect(const json& object, const json& root, const std::string& place,
+             std::map<std::string, json>& out) {
+  const json keys = object.value("properties", json::object());
+  for (const auto& [key, value] : keys.items()) {
+    const std::string reference = value.value("$ref", "");
+    json resolved = value;
+    if (reference.rfind("#/", 0) == 0) {
+      resolved = root.at(json::json_pointer(reference.substr(1)));
+      resolved.update(value);
+    }
+    if (resolved.contains("default")) out[place + "/" + key] = resolved;
+    collect(resolved, root, place + "/" + key, out);
+  }
+  for (const json& branch : object.value("allOf", json::array()))
+    collect(branch.value("then", json::object()), root, place, out);
+}
+
+json values(const Vec3& v) { return {v.x, v.y, v.z}; }
+
+json values(const stimuli::Material& m) {
+  json layers;
+  for (const stimuli::Layer& layer : m.layers) layers.push_back({layer.depth, layer.stiffness});
+  return {m.stiffness, m.damping, m.friction_static, m.friction_dynamic, layers};
+}
+
+json values(const stimuli::ObjectSpec& o) {
+  const Quat& q = o.pose.orientation;
+  json parts;
+  for (const stimuli::ObjectSpec& part : o.parts) parts.push_back(values(part));
+  return {o.shape,
+          o.radius,
+          o.height,
+          o.edge,
+          o.segments,
+          o.subdivisions,
+          parts,
+          values(o.pose.position),
+          {q.w, q.x, q.y, q.z},
+          values(o.material)};
+}
+
+template <class T>
+json value_or_null(const std::optional<T>& value) {
+  return value ? json(*value) : json();
+}
+
+json values(const Protocol& p) {
+  json all = {p.renderer_order,
+              p.repetitions,
+              p.order.kind,
+              value_or_null(p.order.max_run),
+              value_or_null(p.order.min_distance),
+              p.blocks_per_renderer,
+              p.orientation,
+              p.practice.repetitions,
+              value_or_null(p.practice.criterion),
+              p.practice.max_rounds,
+              p.sessions.count,
+              value_or_null(p.sessions.max_minutes),
+              p.sessions.warm_up_trials,
+              value_or_null(p.breaks.every_trials),
+              p.breaks.min_seconds,
+              p.response.time_out,
+              p.response.feedback,
+              p.stylus.length,
+              p.stylus.grip,
+              values(p.workspace.centre),
+              p.workspace.scale,
+              values(p.material),
+              p.servo_rate,
+              p.passivity_controller,
+              p.material_limit,
+              p.home.rest,
+              p.home.margin,
+              p.texts.move_away,
+              p.texts.ready,
+              p.texts.go,
+              p.texts.wait,
+              p.texts.other_key,
+              p.samples,
+              p.seed};
+  if (p.masking_noise) all.push_back({p.masking_noise->kind, p.masking_noise->level_db});
+  for (const StimulusSpec& stimulus : p.stimuli) all.push_back(values(stimulus.object));
+  return all;
+}
+
+json parsed(const json& document) { return values(parse_protocol_text(document.dump(), "p.json")); }
+
+/// Some value that the schema allows and that is not the default.
+json other_value(const json& key) {
+  const json& usual = key["default"];
+  for (const json& word : key.value("enum", json::array()))
+    if (word != usual) return word;
+  if (usual.is_boolean()) return !usual.get<bool>();
+  if (usual.is_string()) return key.contains("anyOf") ? "fixed" : "another text";
+  if (usual.is_null()) return std::min(2, key.value("maximum", 2));
+  if (usual == json::array()) return json::parse(R"([{"depth_m": 0.001, "stiffness_n_per_m": 9}])");
+  if (usual.is_array()) return usual.size() == 4 ? json{0, 1, 0, 0} : json{0.5, 0, 0};
+  if (key["type"] == "integer" || usual == 0) return usual.get<int>() + 1;
+  return usual.get<double>() / 2;
+}
+
+const json kTwoShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
+  "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02},
+              {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03}],
+  "repetitions": 10, "practice": {"repetitions": 1}, "masking_noise": {},
+  "response": {"keys": {"1": "a", "2": "b"}}})");
+
+void expect_default(const std::string& place, const json& key) {
+  const json::json_pointer pointer(place);
+  json missing = kTwoShapes, written = kTwoShapes, other = kTwoShapes;
+  written[pointer] = key["default"];
+  other[pointer] = other_value(key);
+  missing[pointer] = 0;  // so that the section is there
+  missing[pointer.parent_pointer()].erase(pointer.back());
+  if (pointer.back() == "repetitions") missing.erase("practice");
+  EXPECT_EQ(parsed(missing), parsed(written)) << place << " is not " << key["default"];
+  EXPECT_NE(parsed(missing), parsed(other)) << place << " makes no difference";
+  const std::string words = key.value("description", "");
+  if (key["default"].is_null() || key["default"] == json::array()) return;
+  const std::string value =
+      key["default"].is_string() ? key["default"].get<std::string>() : key["default"].dump();
+  std::string spaced;  // [0,0,0] as it is written: [0, 0, 0]
+  for (const char c : value)
+    spaced += c == ',' && key["default"].is_array() ? ", " : std::string(1, c);
+  EXPECT_NE(words.find("efault"), std::string::npos) << place;
+  EXPECT_NE(words.find(spaced), std::string::npos) << place << ": " << words;
+}
+
+TEST(Defaults, OfAProtocolAreTheSchemas) {
+  const json root = schema("protocol.schema.json");
+  std::map<std::string, json> keys;
+  collect(root, root, "", keys);
+  EXPECT_GE(keys.size(), 33u);
+  for (const auto& [place, key] : keys) expect_default(place, key);
+}
+
+TEST(Defaults, OfAnObjectAreTheSchemas) {
+  const json root = schema("scene.schema.json");
+  std::map<std::string, json> keys;
+  collect(root.at("$defs").at("object"), root, "", keys);
+  EXPECT_GE(keys.size(), 9u);
+  for (const auto& [place, key] : keys)
+    expect_default((place == "/segments" ? "/stimuli/1" : "/stimuli/0") + place, key);
+}
+
+TEST(Defaults, OfASectionThatIsLeftOutAreThoseOfAnEmptyOne) {
+  for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
+                              "servo", "home", "texts"}) {
+    json empty = kTwoShapes;
+    empty[section] = json::object();
+    EXPECT_EQ(parsed(kTwoShapes), parsed(empty)) << section;
+  }
+}
+
+TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
+  json document = kTwoShapes;
+  EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 1);
+  document["practice"]["criterion"] = 0.8;
+  EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 5);
+}
+
+}  // namespace
+}  // namespace palpate::protocols
