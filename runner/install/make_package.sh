@@ -6,11 +6,12 @@ out="$PWD"
 "$here/runner/install_packages.sh" package
 cd "$here"
 echo "Building (a few minutes the first time) ..." >&2
+scratch="$(mktemp -d)"
+trap 'rm -r "$scratch"' EXIT
 cmake --preset portable -DPALPATE_TESTS=OFF > /dev/null
 cmake --build --preset portable --target palpate > .build/portable/build.log 2>&1 ||
   { tail -n 30 .build/portable/build.log >&2; echo "The build failed; all of its output: $here/.build/portable/build.log" >&2; exit 1; }
-cpack --preset portable -B "$out/.palpate-package" > .build/portable/cpack.log 2>&1 ||
+cpack --preset portable -B "$scratch" > .build/portable/cpack.log 2>&1 ||
   { cat .build/portable/cpack.log >&2; exit 1; }
-mv "$out"/.palpate-package/palpate_*.deb "$out"
-rm -r "$out/.palpate-package"
+mv "$scratch"/palpate_*.deb "$out"
 echo "Made $(ls "$out"/palpate_*.deb). Install it: sudo apt install ./palpate_*.deb" >&2

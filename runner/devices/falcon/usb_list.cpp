@@ -67,8 +67,7 @@ std::string usb_error(const std::string& what, int code) {
       return text +
              "no permission. Where palpate is installed as a package: sudo adduser NAME palpate, "
              "and log in again. Else put this line into /etc/udev/rules.d/60-falcon.rules and plug "
-             "the "
-             "device in again:\n  SUBSYSTEM==\"usb\", ATTR{idVendor}==\"0403\", "
+             "the device in again:\n  SUBSYSTEM==\"usb\", ATTR{idVendor}==\"0403\", "
              "ATTR{idProduct}==\"cb48\", MODE=\"0660\", GROUP=\"plugdev\", TAG+=\"uaccess\"";
     case LIBUSB_ERROR_BUSY:
       return text + "another program holds it; close that program";

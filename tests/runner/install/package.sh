@@ -28,7 +28,7 @@ for file in /etc/security/limits.d/palpate.conf /usr/lib/udev/rules.d/60-palpate
 done
 python3 tests/readme/links.py "$root/usr/share/doc/palpate"
 [ -z "$(find "$root" \( -perm /022 -o -type d ! -perm -755 -o ! -perm -444 \) -print)" ] || fail "wrong permissions"
-strings "$root/usr/bin/palpate" | grep -qF "$PWD" && fail "the program names the folder of its sources"
+grep -qaF -- "$PWD" "$root/usr/bin/palpate" && fail "the program names the folder of its sources"
 
 # `cmake --install` puts the same files into the same places.
 cmake --install "$build" --strip --prefix "$scratch/installed/usr" > /dev/null
