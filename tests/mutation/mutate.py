@@ -80,7 +80,7 @@ NOT_IN_STATEMENTS = re.compile(r"\b(static_assert|assert|using|operator|add_opti
 DELETABLE = re.compile(r"^\s*(?:[\w.:\[\]>*()-]+ (?:=|\+=|-=|\*=|/=|\|=|&=) .*|[\w.:\[\]>-]+\(.*\)|(?:\+\+|--)[\w.\[\]>-]+"
                        r"|break|continue|return|if \([^;]*\) (?:return|break|continue))\s*;\s*$")
 ARGUMENTS = re.compile(r"\b(\w+)\(([\w.\[\]>-]+), ([\w.\[\]>-]+)\)")
-SYMMETRIC = {"min", "max", "hypot", "dot", "if", "while", "for", "switch", "return", "swap"}
+SYMMETRIC = {"min", "max", "hypot", "dot", "if", "while", "for", "switch", "return", "swap", "distance", "min_element"}
 
 
 def tokens(text):
@@ -145,6 +145,8 @@ def sites(text):
         before, after = text[at - 1:at], text[at + len(token):at + len(token) + 1]
         neighbours = [code[i][0] for i in (index - 1, index + 1) if 0 <= i < len(code)]
         last = code[index - 1][2] if index else ""
+        declared = token not in ("true", "false", "break", "continue") and last != "return" and \
+            re.match(r"[\w>&*]", last[-1:])
         if kind == "operator":
             spaced = before in " \n" and after in " \n"
             if token in SPACED and spaced and "string" not in neighbours:
@@ -158,7 +160,7 @@ def sites(text):
         elif kind == "number" and after != ">":
             for new in number_mutants(token):
                 add(at, token, new)
-        elif kind == "word" and token in OTHER and (token not in ("left", "right") or before == "."):
+        elif kind == "word" and token in OTHER and not declared:
             add(at, token, OTHER[token])
         elif kind == "string" and last != "extern":
             add(at, token, '""' if len(token) > 2 else '"?"', True)
@@ -245,12 +247,12 @@ def key(mutant):
 
 # ---- The copy, its build and its tests ---------------------------------------------------------
 
-# Every target compiled file by file: a mutant then costs one object, not twelve sources.
+# Libraries compiled file by file: a mutant then costs one object, not twelve sources.
 APART = """function(palpate_apart folder)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target IN LISTS targets)
     get_target_property(type ${target} TYPE)
-    if(NOT type MATCHES "UTILITY|INTERFACE")
+    if(type STREQUAL "STATIC_LIBRARY")
       set_target_properties(${target} PROPERTIES UNITY_BUILD OFF)
     endif()
   endforeach()
@@ -274,8 +276,10 @@ class Copy:
     def __init__(self, folder, jobs):
         folder.mkdir(parents=True, exist_ok=True)
         self.folder, self.jobs = folder, jobs
-        self.source, self.build = folder / "source", folder / "build"
-        self.environment = dict(os.environ, CCACHE_DIR=str(folder / "ccache"), GTEST_BRIEF="1")
+        # Laid out like a working tree, so that ccache knows the objects of others with the same sources.
+        self.source = folder / "tree"
+        self.build = self.source / ".build/release"
+        self.environment = dict(os.environ, GTEST_BRIEF="1")
         self.sandbox = SANDBOX + [str(folder)]
         if self.run(["true"], 20)[0] != 0:
             print("No sandbox here (unshare and mount are refused): mutants run unconfined.", file=sys.stderr)
@@ -293,42 +297,41 @@ class Copy:
                 shutil.copy(here, there)
                 os.utime(there)
         for path in list(self.source.rglob("*")):
-            if path.is_file() and str(path.relative_to(self.source)) not in wanted:
+            name = str(path.relative_to(self.source))
+            if path.is_file() and name not in wanted and not name.startswith(".build/"):
                 path.unlink()
 
     def configure(self):
-        self.build.mkdir(parents=True, exist_ok=True)
         (self.folder / "apart.cmake").write_text(APART)
-        command = ["cmake", "-S", self.source, "-B", self.build, "-G", "Ninja", "-DPALPATE_TESTS=ON",
-                   "-DPALPATE_BENCHMARKS=OFF", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG",
+        command = ["cmake", "--preset", "release", "-DPALPATE_TESTS=ON",
                    f"-DCMAKE_PROJECT_palpate_INCLUDE={self.folder / 'apart.cmake'}"]
         if shutil.which("ccache"):
             command.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
         if shutil.which("ld.lld"):
             command.append("-DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=lld")
-        done = subprocess.run(command, capture_output=True, text=True)
+        done = subprocess.run(command, cwd=self.source, capture_output=True, text=True)
         if done.returncode != 0:
             raise Failed("The copy could not be configured:\n" + done.stderr)
 
     def make(self, targets):
         """Whether it could be built, and what was printed."""
-        done = subprocess.run(["nice", "ninja", "-C", self.build, "-j", str(self.jobs), *targets],
-                              env=self.environment, capture_output=True, text=True)
-        return done.returncode == 0, done.stdout
+        code, output = self.run(["ninja", "-C", self.build, "-j", str(self.jobs), *targets], None, confined=False)
+        return code == 0, output
 
     def dependants(self, targets):
         """How many objects the next build would compile."""
         done = subprocess.run(["ninja", "-C", self.build, "-n", *targets], capture_output=True, text=True)
         return done.stdout.count("Building CXX object")
 
-    def run(self, command, limit, folder=None):
+    def run(self, command, limit, folder=None, confined=True):
         """(exit code, output); the code is None when the time was up."""
         def confine():
             resource.setrlimit(resource.RLIMIT_FSIZE, (2 ** 31, 2 ** 31))
             resource.setrlimit(resource.RLIMIT_DATA, (2 ** 33, 2 ** 33))
-        process = subprocess.Popen(["nice", *self.sandbox, *map(str, command)], cwd=folder or self.folder,
+        sandbox = self.sandbox if confined else []
+        process = subprocess.Popen(["nice", *sandbox, *map(str, command)], cwd=folder or self.folder,
                                    env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=confine)
+                                   stderr=subprocess.STDOUT, start_new_session=True, preexec_fn=confine if confined else None)
         try:
             output, _ = process.communicate(timeout=limit)
             return process.returncode, output.decode(errors="replace")

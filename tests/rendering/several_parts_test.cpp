@@ -170,7 +170,7 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
     std::vector<RenderState> states;
     for (const Scene& scene : alone) states.push_back(scene.initial_state());
     int all_touched = 0;
-    Random random(which, {43});
+    stimuli::Random random(which, {43});
     const testing::Wave x(random), y(random), z(random);
     for (int i = 0; i < 1500; ++i) {
       const double travelled = 0.02 * i;

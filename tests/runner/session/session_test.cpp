@@ -142,7 +142,7 @@ TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
         {station.protocol, station.library, servo, station.clock, respondent, station.log},
         SessionPlan(station.protocol, 1, 1), {0, 0});
     run(session);
-    for (const TrialRecord& record : station.log.finished) {
+    for (const data::TrialRecord& record : station.log.finished) {
       EXPECT_EQ(record.started_inside, faults == rendering::render_fault::kStartedInside);
       EXPECT_EQ(record.faults, faults);
       EXPECT_EQ(record.ticks, 411u);

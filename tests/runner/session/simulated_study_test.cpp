@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -95,6 +96,48 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
   }
   EXPECT_GT(stops, 1) << "nothing was interrupted";
   EXPECT_EQ(csv_of(db), csv_of(folder_ / "whole.db"));
+}
+
+// The participant is frozen: whoever changes it gives it another version, and other trials here.
+// The file is what this test writes beside the study when it fails.
+TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
+  const protocols::Protocol p =
+      protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
+  simulate(p, folder_ / "frozen.db", 2);
+  data::Store store = data::Store::open(folder_ / "frozen.db", data::Store::Mode::read_only);
+  std::ifstream kept(PALPATE_SOURCE_DIR "/tests/runner/session/simulated_v2_trials.txt");
+  std::ostringstream found;
+  int trials = 0;
+  store.for_each_trial([&](const data::StoredTrial& trial) {
+    const data::TrialRecord& r = trial.record;
+    const std::string response = r.response.empty() ? "-" : r.response;
+    char line[200];
+    std::snprintf(line, sizeof line, "%s %d %s %s %s %.6f %.6f %.6f %.6f\n",
+                  trial.participant.code.c_str(), r.trial, r.renderer.c_str(), r.shape.c_str(),
+                  response.c_str(), r.response_time, r.first_contact_time.value_or(-1), r.max_force,
+                  r.start_tip[0]);
+    found << line;
+    ++trials;
+    struct {
+      std::string code, renderer, shape, response;
+      int trial = 0;
+      double time = 0, contact = 0, force = 0, start = 0;
+    } k;
+    kept >> k.code >> k.trial >> k.renderer >> k.shape >> k.response >> k.time >> k.contact >>
+        k.force >> k.start;
+    kept.ignore(20, '\n');
+    EXPECT_EQ(trial.participant.code, k.code);
+    EXPECT_EQ(r.trial, k.trial);
+    EXPECT_EQ(r.renderer, k.renderer);
+    EXPECT_EQ(r.shape, k.shape);
+    EXPECT_EQ(response, k.response) << line;
+    EXPECT_NEAR(r.response_time, k.time, 1e-6) << line;
+    EXPECT_NEAR(r.first_contact_time.value_or(-1), k.contact, 1e-6) << line;
+    EXPECT_NEAR(r.max_force, k.force, 2e-6) << line;
+    EXPECT_NEAR(r.start_tip[0], k.start, 1e-6) << line;
+  });
+  EXPECT_EQ(trials, 3 * 24);
+  if (HasFailure()) std::ofstream(::testing::TempDir() + "simulated_v2_trials.txt") << found.str();
 }
 
 TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {

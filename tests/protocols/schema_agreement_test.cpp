@@ -1,9 +1,12 @@
-// A key that is left out means what the schemas say: parsing with the documented default written
-// out gives the same values, parsing with another one does not.
+// The parser agrees with the published schemas, value by value. A key that is left out has the
+// documented default: written out it gives the same values, another one does not. Every number is
+// taken up to the documented bounds and no farther.
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,23 +23,47 @@ json schema(const std::string& name) {
   return json::parse(stream);
 }
 
-/// The keys of an object that have a documented default, by their place: what the schema says of
-/// each. \param root  what "#/..." refers to
+/// What the schema says of each key of an object, by the key's place; of an array's elements, those
+/// of the first. \param root  what "#/..." refers to
 void collect(const json& object, const json& root, const std::string& place,
              std::map<std::string, json>& out) {
+  const auto resolved = [&root](const json& value) {
+    const std::string reference = value.value("$ref", "");
+    if (reference.rfind("#/", 0) != 0) return value;
+    json whole = root.at(json::json_pointer(reference.substr(1)));
+    whole.update(value);
+    return whole;
+  };
   const json keys = object.value("properties", json::object());
   for (const auto& [key, value] : keys.items()) {
-    const std::string reference = value.value("$ref", "");
-    json resolved = value;
-    if (reference.rfind("#/", 0) == 0) {
-      resolved = root.at(json::json_pointer(reference.substr(1)));
-      resolved.update(value);
-    }
-    if (resolved.contains("default")) out[place + "/" + key] = resolved;
-    collect(resolved, root, place + "/" + key, out);
+    const json whole = resolved(value);
+    out[place + "/" + key] = whole;
+    collect(whole, root, place + "/" + key, out);
   }
   for (const json& branch : object.value("allOf", json::array()))
     collect(branch.value("then", json::object()), root, place, out);
+  const json element = object.contains("items") ? resolved(object["items"]) : json::object();
+  if (element.contains("type")) out[place + "/0"] = element;
+  if (element.contains("properties")) collect(element, root, place + "/0", out);
+}
+
+std::map<std::string, json> keys_of_a_protocol() {
+  const json root = schema("protocol.schema.json");
+  std::map<std::string, json> keys;
+  collect(root, root, "", keys);
+  return keys;
+}
+
+/// As keys of a stimulus that has them: see kThreeShapes.
+std::map<std::string, json> keys_of_an_object() {
+  const json root = schema("scene.schema.json");
+  std::map<std::string, json> keys, out;
+  collect(root.at("$defs").at("object"), root, "", keys);
+  for (const auto& [place, key] : keys) {
+    const bool cylinder = place == "/segments" || place == "/height_m";
+    out[(cylinder ? "/stimuli/1" : place == "/edge_m" ? "/stimuli/2" : "/stimuli/0") + place] = key;
+  }
+  return out;
 }
 
 json values(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -124,15 +151,16 @@ json other_value(const json& key) {
   return usual.get<double>() / 2;
 }
 
-const json kTwoShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
+const json kThreeShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
   "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02},
-              {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03}],
+              {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03},
+              {"name": "c", "shape": "cube", "edge_m": 0.02}],
   "repetitions": 10, "practice": {"repetitions": 1}, "masking_noise": {},
-  "response": {"keys": {"1": "a", "2": "b"}}})");
+  "response": {"keys": {"1": "a", "2": "b", "3": "c"}}})");
 
 void expect_default(const std::string& place, const json& key) {
   const json::json_pointer pointer(place);
-  json missing = kTwoShapes, written = kTwoShapes, other = kTwoShapes;
+  json missing = kThreeShapes, written = kThreeShapes, other = kThreeShapes;
   written[pointer] = key["default"];
   other[pointer] = other_value(key);
   missing[pointer] = 0;  // so that the section is there
@@ -151,38 +179,97 @@ void expect_default(const std::string& place, const json& key) {
   EXPECT_NE(words.find(spaced), std::string::npos) << place << ": " << words;
 }
 
-TEST(Defaults, OfAProtocolAreTheSchemas) {
-  const json root = schema("protocol.schema.json");
-  std::map<std::string, json> keys;
-  collect(root, root, "", keys);
-  EXPECT_GE(keys.size(), 33u);
-  for (const auto& [place, key] : keys) expect_default(place, key);
+int expect_defaults(const std::map<std::string, json>& keys) {
+  int count = 0;
+  for (const auto& [place, key] : keys) {
+    if (!key.contains("default")) continue;
+    expect_default(place, key);
+    ++count;
+  }
+  return count;
 }
 
-TEST(Defaults, OfAnObjectAreTheSchemas) {
-  const json root = schema("scene.schema.json");
-  std::map<std::string, json> keys;
-  collect(root.at("$defs").at("object"), root, "", keys);
-  EXPECT_GE(keys.size(), 9u);
-  for (const auto& [place, key] : keys)
-    expect_default((place == "/segments" ? "/stimuli/1" : "/stimuli/0") + place, key);
-}
+TEST(Defaults, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_a_protocol()), 33); }
+
+TEST(Defaults, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_an_object()), 8); }
 
 TEST(Defaults, OfASectionThatIsLeftOutAreThoseOfAnEmptyOne) {
   for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
                               "servo", "home", "texts"}) {
-    json empty = kTwoShapes;
+    json empty = kThreeShapes;
     empty[section] = json::object();
-    EXPECT_EQ(parsed(kTwoShapes), parsed(empty)) << section;
+    EXPECT_EQ(parsed(kThreeShapes), parsed(empty)) << section;
   }
 }
 
 TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
-  json document = kTwoShapes;
+  json document = kThreeShapes;
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 1);
   document["practice"]["criterion"] = 0.8;
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 5);
 }
+
+/// Whether the parser finds fault with this value at this place; of three numbers, of the first.
+bool refused(const std::string& place, const json& value) {
+  json document = kThreeShapes;
+  document["no such key"] = 1;  // so that nothing is looked at but the values themselves
+  document["stylus"] = {{"length_m", 10}};
+  const json::json_pointer pointer(place);
+  const bool element = pointer.back() == "0" && value.is_number();
+  document[element ? pointer.parent_pointer() : pointer] = element ? json{value, 0, 0} : value;
+  try {
+    parse_protocol_text(document.dump(), "p.json");
+  } catch (const InputError& error) {
+    for (const Fault& fault : error.faults())
+      if (fault.place == place || (element && fault.place == pointer.parent_pointer().to_string()))
+        return true;
+    return false;
+  }
+  ADD_FAILURE() << "an unknown key was taken";
+  return false;
+}
+
+/// \return the number of bounds
+int expect_bounds(const std::string& place, const json& key) {
+  int count = 0;
+  const bool whole = key.value("type", json()).dump().find("integer") != std::string::npos;
+  const auto expect = [&](const char* word, double sign, bool bound_itself) {
+    if (!key.contains(word)) return;
+    ++count;
+    const json& bound = key[word];
+    json beyond, within;
+    if (whole && bound.is_number_unsigned() && sign > 0) {
+      if (bound == std::numeric_limits<std::uint64_t>::max()) return;
+      beyond = bound.get<std::uint64_t>() + 1;
+      within = bound.get<std::uint64_t>() - 1;
+    } else if (whole) {
+      beyond = bound.get<std::int64_t>() - 1;
+      within = bound.get<std::int64_t>() + 1;
+    } else {
+      const double value = bound.get<double>(), far = sign * std::numeric_limits<double>::max();
+      beyond = std::nextafter(value, far);
+      within = std::nextafter(value, -far);
+    }
+    EXPECT_TRUE(refused(place, beyond)) << place << ": " << beyond;
+    EXPECT_FALSE(refused(place, within)) << place << ": " << within;
+    EXPECT_EQ(refused(place, bound), !bound_itself) << place << ": " << bound;
+  };
+  expect("minimum", -1, true);
+  expect("maximum", 1, true);
+  expect("exclusiveMinimum", -1, false);
+  return count;
+}
+
+int expect_bounds(const std::map<std::string, json>& keys) {
+  int count = 0;
+  for (const auto& [place, key] : keys)
+    if (place.find("orientation") == std::string::npos) count += expect_bounds(place, key);
+  return count;
+}
+
+TEST(Bounds, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_a_protocol()), 40); }
+
+TEST(Bounds, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_an_object()), 16); }
 
 }  // namespace
 }  // namespace palpate::protocols
