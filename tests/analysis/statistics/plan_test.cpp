@@ -193,5 +193,48 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
   EXPECT_NEAR(std::sqrt(plain_gain), 0.2, 0.02);
 }
 
+/// Eight people with gains of their own for each shape, and the same spread in every cell; with
+/// `one_more`, a ninth one whose times of one cell are all missing.
+Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
+  TrialTableBuilder builder;
+  stimuli::Random random(17);
+  for (int p = 0; p < (one_more ? 9 : 8); ++p) {
+    int trial = 0;
+    const std::string name = std::to_string(p);
+    const double gain = 0.1 * random.normal();
+    for (const std::string shape : {"sphere", "cone", "cube"}) {
+      const double own = 0.3 * random.normal();
+      for (const std::string renderer : {"point", "ray"}) {
+        const bool empty = p == 8 && shape == "cone" && renderer == missing_with;
+        for (int i = 0; i < 6; ++i) {
+          RawTrial raw;
+          raw.participant = name;
+          raw.renderer = renderer;
+          raw.shape = shape;
+          raw.response = empty ? "other" : shape;
+          raw.trial = ++trial;
+          raw.correct = !empty;
+          raw.response_time = std::exp(2 + (renderer == "ray" ? gain + own : 0) + 0.02 * (i - 2.5));
+          builder.add(raw);
+        }
+      }
+    }
+  }
+  return analyze(builder.finish({}), {}, "test");
+}
+
+// Who lacks a cell has no gain for that shape: the others say alone how much gains vary.
+TEST(Pilot, TheGainsOfShapesAreThoseOfParticipantsWithEveryCell) {
+  const Pilot complete = read_pilot(uneven_pilot(false));
+  ASSERT_EQ(complete.undefined, "");
+  EXPECT_GT(complete.model.shape_gain_sd, 0.1);
+  for (const char* renderer : {"point", "ray"}) {
+    const Pilot more = read_pilot(uneven_pilot(true, renderer));
+    ASSERT_EQ(more.undefined, "");
+    EXPECT_NEAR(more.model.shape_gain_sd, complete.model.shape_gain_sd, 1e-12) << renderer;
+    EXPECT_NEAR(more.model.residual_sd, complete.model.residual_sd, 1e-12) << renderer;
+  }
+}
+
 }  // namespace
 }  // namespace palpate::analysis

@@ -75,6 +75,26 @@ TEST(Learning, SlopesAreThoseOfTheTimesWithinShapes) {
   EXPECT_NE(practice.pairs[0].slope_difference.undefined, "");  // all alike
 }
 
+// With as many trials in every bin, the bins' mean is the mean over all participants.
+TEST(Learning, BinsAverageToTheMeanOfAllParticipants) {
+  const std::vector<Person> people{
+      {"A", "point", -0.6, -0.3}, {"B", "ray", 0.2, -0.1}, {"C", "point", 0.7, 0.5}};
+  double gains = 0, learning = 0;
+  for (const Person& person : people) {
+    gains += person.gain / 3;
+    learning += person.learning / 3;
+  }
+  const Analysis analysis = analysis_of(people);
+  for (std::size_t r = 0; r < 2; ++r) {
+    double sum = 0;
+    for (const LearningBin& bin : analysis.practice.learning[r].bins) sum += *bin.mean_log;
+    // Of 2, 0.5 in every second trial, and the slope at the middle of trials 0 to 39.
+    const double all = 2.25 + learning * 19.5 / 100;
+    const double gain = analysis.table.renderers[r] == "ray" ? gains : 0;
+    EXPECT_NEAR(sum / kLearningBins, all + gain, 1e-12) << analysis.table.renderers[r];
+  }
+}
+
 TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
   const Analysis analysis = analysis_of({{"A", "point", -0.5},
                                          {"B", "point", -0.3},
