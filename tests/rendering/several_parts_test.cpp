@@ -141,8 +141,8 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
   const auto slab = [](int object, double top, double spring) {
     std::vector<SceneObject> parts;
     for (const double from : {-0.05, -0.01, 0.02}) {
-      parts.push_back(placed_object(box({from, -0.05, -0.04}, {from + 0.04, 0.05, top}), {}, spring,
-                                    object));
+      parts.push_back(
+          placed_object(box({from, -0.05, -0.04}, {from + 0.04, 0.05, top}), {}, spring, object));
     }
     return parts;
   };

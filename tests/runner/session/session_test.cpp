@@ -114,7 +114,8 @@ TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
 class Judging final : public TickSource {
  public:
   explicit Judging(Servo& servo) : servo_(servo) {}
-  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer, const HomeZone& home) override {
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const HomeZone& home) override {
     servo_.prepare(scene, renderer, home);
   }
   const Sample& next() noexcept override { return servo_.next(); }
@@ -129,7 +130,8 @@ class Judging final : public TickSource {
 };
 
 TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
-  for (const std::uint32_t faults : {rendering::render_fault::kStartedInside, rendering::render_fault::kWalkCapped, 0u}) {
+  for (const std::uint32_t faults :
+       {rendering::render_fault::kStartedInside, rendering::render_fault::kWalkCapped, 0u}) {
     Station station;
     Judging servo(station.servo);
     servo.verdict.ticks = 411;
