@@ -1,4 +1,5 @@
 #pragma once
+// Bounding-volume hierarchy for continuous collision detection. Mesh frame, m.
 
 #include <cstdint>
 #include <span>
@@ -13,22 +14,22 @@ struct Box {
 };
 
 /// A binary tree of axis-aligned boxes over primitives (polygons or edges), split at the median of
-/// the longest side. Gottschalk, Lin & Manocha 1996; the paper's section 4(a).
+/// the longest side. Gottschalk, Lin & Manocha 1996; Ho, Basdogan & Srinivasan 2000,
+/// section 4(a).
 class BoundingTree {
  public:
   struct Node {
     Box box;
-    std::uint32_t
-        first;  ///< leaf: first primitive in order(); inner: right child (left is the next node)
-    std::uint32_t count;  ///< leaf: number of primitives; inner: 0
+    /// Leaf: first primitive in order(). Inner node: right child; the left one is the next node.
+    std::uint32_t first;
+    std::uint32_t count;  ///< leaf: number of primitives; inner node: 0
   };
 
   BoundingTree() = default;
   explicit BoundingTree(std::span<const Box> boxes);
 
-  const stimuli::LargeArray<Node>& nodes() const {
-    return nodes_;
-  }  ///< root first; empty without primitives
+  /// Root first; empty without primitives.
+  const stimuli::LargeArray<Node>& nodes() const { return nodes_; }
   const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
  private:

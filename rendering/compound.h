@@ -1,162 +1,175 @@
 #pragma once
-// Several convex parts of one object touched at once. Included by render.h alone.
+// Several convex parts of one object in contact at once. Included by tick.h alone.
 
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <span>
 
-#include "rendering/tick.h"
+#include "rendering/contact_detection.h"
+#include "rendering/render_fault.h"
 
 namespace palpate::rendering::tick {
 
-/// Each part is met where the others let the ideal probe be, so that the probe slides over a seam
-/// instead of running into the inner wall behind it.
-template <class Probe>
+/// One object of several convex parts has one ideal probe. Each part is tracked at the position
+/// where its siblings, the other parts of the object, let the ideal probe be, so that the probe
+/// slides over a seam instead of running into the inner wall behind it. World frame.
+template <class Tick>
 struct Compound {
-  Tick<Probe>& tick;
-  std::span<const std::uint32_t> group;  ///< parts of the scene, in reach
+  using Probe = typename Tick::Probe;
+  using Kind = ContactFeature::Kind;
 
-  /// Contact of one part where its siblings let the ideal probe be. Sets the part's share to what
-  /// it adds to their shift.
-  /// \param before  the probe that part.yielded belongs to; null at the first tick of all
-  bool follow(std::uint32_t index, const Vec3& shift, const LineProbe* before) {
-    const ScenePart& part = tick.scene.parts()[index];
-    PartState& memory = tick.state.parts[index];
-    const LineProbe local = to_local<Probe>(part, tick.probe, shift);
-    const WalkResult hit =
-        track<Probe>(part, memory, before, local.tip, local.tail - local.tip, tick.faults);
-    const bool touching = hit.facet.kind != MinkowskiFacet::Kind::none;
-    memory.yielded = shift;
-    memory.share = touching ? hit.depth * part.world_vector(hit.normal) : Vec3(0);
+  Tick& tick;
+  std::span<const std::uint32_t> group;  ///< indices of the object's parts that are near
+
+  const ScenePart& part(std::uint32_t index) const { return tick.scene.parts()[index]; }
+  PartState& memory(std::uint32_t index) const { return tick.state.parts[index]; }
+  bool in_contact(std::uint32_t index) const { return memory(index).feature.kind != Kind::none; }
+
+  LineProbe local_probe(std::uint32_t index, const Vec3& correction) const {
+    return Probe::to_local(part(index), translated(tick.probe, correction));
+  }
+
+  /// Contact of one part where its siblings let the ideal probe be. Sets what the part adds to the
+  /// ideal probe's displacement.
+  /// \param before  the probe that the part's sibling_correction belongs to; null at the first tick
+  /// of all
+  bool track(std::uint32_t index, const Vec3& correction, const LineProbe* before) {
+    PartState& state = memory(index);
+    const WalkResult hit = tick.track_part(index, before, local_probe(index, correction));
+    const bool touching = hit.feature.kind != Kind::none;
+    state.sibling_correction = correction;
+    state.displacement = touching ? hit.depth * part(index).world_vector(hit.normal) : Vec3(0);
     return touching;
   }
 
-  bool holds(std::uint32_t index) const {
-    return tick.state.parts[index].facet.kind != MinkowskiFacet::Kind::none;
-  }
-
-  /// What the other parts of the same compound move the ideal probe by, and a hair more: where two
-  /// parts abut, the ideal probe lies on a side of both facets, and rounding must not push it over.
-  Vec3 shift_of_siblings(std::uint32_t index) const {
-    Vec3 shift(0);
+  /// m; what the siblings displace the ideal probe by, and a hair more: where two parts abut, the
+  /// ideal probe lies on a side of both facets, and rounding must not push it over.
+  Vec3 correction_by_siblings(std::uint32_t index) const {
+    Vec3 correction(0);
     for (const std::uint32_t other : group) {
-      if (other == index || !holds(other)) continue;
-      const Vec3& share = tick.state.parts[other].share;
-      const double size = glm::length(share);
-      if (size > 0) shift += (1 + 4 * tick.scene.parts()[other].tolerance / size) * share;
+      if (other == index || !in_contact(other)) continue;
+      const Vec3& displacement = memory(other).displacement;
+      const double size = glm::length(displacement);
+      if (size > 0) correction += (1 + 4 * part(other).tolerance / size) * displacement;
     }
-    return shift;
+    return correction;
   }
 
-  /// The parts that hold the probe, each still on the facet of the last tick.
-  void slide() {
+  /// Displacements of the parts in contact, each still on the feature of the last tick.
+  void update_displacements() {
     for (const std::uint32_t index : group) {
-      if (!holds(index)) continue;
-      const ScenePart& part = tick.scene.parts()[index];
-      PartState& memory = tick.state.parts[index];
-      const LineProbe local = to_local<Probe>(part, tick.probe, shift_of_siblings(index));
+      if (!in_contact(index)) continue;
+      PartState& state = memory(index);
+      const LineProbe local = local_probe(index, correction_by_siblings(index));
       const WalkResult on =
-          same_facet<Probe>(*part.mesh, memory.facet, local.tip, local.tail - local.tip);
-      memory.share = std::max(0.0, on.depth) * part.world_vector(on.normal);
+          Probe::same_feature(*part(index).mesh, state.feature, local.tip, local.tail - local.tip);
+      state.displacement = std::max(0.0, on.depth) * part(index).world_vector(on.normal);
     }
   }
 
-  /// The parts that hold the probe walk to where it is. Those that seem to let go keep their facet
-  /// and lose their share: a sibling's share may be about to change.
-  void settle() {
+  /// The parts in contact walk to where the probe is. Those that seem to let go keep their feature
+  /// and lose their displacement: a sibling's may be about to change.
+  void walk_parts() {
     for (const std::uint32_t index : group) {
-      if (!holds(index)) continue;
-      PartState& memory = tick.state.parts[index];
-      const PartState kept = memory;
-      if (!follow(index, shift_of_siblings(index), tick.last())) {
-        memory = kept;
-        memory.share = Vec3(0);
+      if (!in_contact(index)) continue;
+      PartState& state = memory(index);
+      const PartState kept = state;
+      if (!track(index, correction_by_siblings(index), tick.last())) {
+        state = kept;
+        state.displacement = Vec3(0);
       }
     }
   }
 
-  /// A part that does not hold the probe yet: the facet by which it comes in between `before` and
-  /// now. Only looks.
-  FirstContact entry(std::uint32_t index, const Vec3& shift, const LineProbe& before) {
-    const ScenePart& part = tick.scene.parts()[index];
-    PartState& memory = tick.state.parts[index];
-    const LineProbe local = to_local<Probe>(part, tick.probe, shift);
-    if (memory.plane.separates(local.tip, local.tail)) return {};
-    find_separating_plane(*part.mesh, local.tip, local.tail, part.tolerance, memory.plane,
-                          memory.support);
-    const LineProbe from = to_local<Probe>(part, before, memory.yielded);
-    if (memory.plane.separates(from.tip, from.tail)) return {};
-    FirstContact first = Probe::first_contact(*part.mesh, *part.trees, from, local, part.tolerance);
-    if (first.facet.kind != MinkowskiFacet::Kind::none || memory.plane.valid) return first;
-    const WalkResult nearest = nearest_facet<Probe>(*part.mesh, local.tip, local.tail - local.tip);
-    if (nearest.facet.kind != MinkowskiFacet::Kind::none && nearest.depth > part.tolerance)
-      first = {nearest.facet, 1};
-    return first;
+  /// Of a part that is not in contact: the feature by which the probe enters between `before` and
+  /// now. Changes nothing but the part's separating plane.
+  FirstContact entry(std::uint32_t index, const Vec3& correction, const LineProbe& before) {
+    const stimuli::ConvexMesh& mesh = *part(index).mesh;
+    const double tolerance = part(index).tolerance;
+    PartState& state = memory(index);
+    const LineProbe local = local_probe(index, correction);
+    if (state.plane.separates(local.tip, local.tail)) return {};
+    find_separating_plane(mesh, local.tip, local.tail, tolerance, state.plane, state.support);
+    const LineProbe from =
+        Probe::to_local(part(index), translated(before, state.sibling_correction));
+    if (state.plane.separates(from.tip, from.tail)) return {};
+    const FirstContact first =
+        Probe::first_contact(mesh, *part(index).trees, from, local, tolerance);
+    if (first.feature.kind != Kind::none || state.plane.valid) return first;
+    // Rounding hid the entry: the least penetration depth decides.
+    const WalkResult nearest = Probe::nearest_feature(mesh, local.tip, local.tail - local.tip);
+    if (nearest.feature.kind == Kind::none || nearest.depth <= tolerance) return first;
+    return {nearest.feature, 1};
   }
 
-  /// The parts that do not hold the probe are met on the way to where the others let it be, the
-  /// earliest first: it changes where the others let it be. True when one is met.
-  bool meet(const LineProbe* before) {
-    bool met = false;
+  /// The earliest entry into a part that is not in contact, of kind none where there is none.
+  FirstContact earliest_entry(const LineProbe& before, std::uint32_t& entered) {
+    FirstContact earliest;
+    for (const std::uint32_t index : group) {
+      if (in_contact(index) || memory(index).started_inside) continue;
+      const FirstContact first = entry(index, correction_by_siblings(index), before);
+      if (first.feature.kind != Kind::none && first.time < earliest.time) {
+        earliest = first;
+        entered = index;
+      }
+    }
+    return earliest;
+  }
+
+  /// Parts that are not in contact are entered one by one, the earliest first: each changes where
+  /// the ideal probe of the others may be. True when one is.
+  bool enter_parts(const LineProbe* before) {
+    bool any = false;
     if (before) {
       for (std::size_t round = 0; round < group.size(); ++round) {
-        FirstContact earliest;
-        std::uint32_t at = 0;
-        for (const std::uint32_t index : group) {
-          if (holds(index) || tick.state.parts[index].blocked) continue;
-          const FirstContact first = entry(index, shift_of_siblings(index), *before);
-          if (first.facet.kind != MinkowskiFacet::Kind::none && first.time < earliest.time) {
-            earliest = first;
-            at = index;
-          }
-        }
-        if (earliest.facet.kind == MinkowskiFacet::Kind::none) break;
-        tick.state.parts[at].facet = earliest.facet;
-        tick.state.parts[at].plane.valid = false;
-        slide();
-        slide();
-        met = true;
+        std::uint32_t entered = 0;
+        const FirstContact earliest = earliest_entry(*before, entered);
+        if (earliest.feature.kind == Kind::none) break;
+        memory(entered).feature = earliest.feature;
+        memory(entered).plane.valid = false;
+        update_displacements();
+        update_displacements();
+        any = true;
       }
     }
     for (const std::uint32_t index : group) {
-      PartState& memory = tick.state.parts[index];
-      if (holds(index)) continue;
-      const Vec3 shift = shift_of_siblings(index);
-      if (!before || memory.blocked) follow(index, shift, before);
-      memory.yielded = shift;
+      PartState& state = memory(index);
+      if (in_contact(index)) continue;
+      const Vec3 correction = correction_by_siblings(index);
+      if (!before || state.started_inside) track(index, correction, before);
+      state.sibling_correction = correction;
     }
-    return met;
+    return any;
   }
 
-  /// Parts of one compound: each is met where the others let the ideal probe be, so that the probe
-  /// slides over a seam instead of running into the inner wall behind it. The ideal probe moves in
-  /// two strokes, first on the facets of the last tick, then to those that it belongs on now: when
-  /// a part lets go or is left over an edge, what the probe has slid over takes it up.
-  void touch() {
-    slide();
-    slide();
-    meet(tick.last());
-    settle();
-    settle();
-    for (int round = 0; round < 4 && meet(&tick.probe); ++round) {
-      settle();
-      settle();
+  /// Adds the object's contacts to the tick's. The ideal probe moves in two strokes, first on the
+  /// features of the last tick, then to those that it belongs on now: when a part lets go or is
+  /// left over an edge, the part that the probe has slid onto takes it up.
+  void add_contacts() {
+    update_displacements();
+    update_displacements();
+    enter_parts(tick.last());
+    walk_parts();
+    walk_parts();
+    for (int round = 0; round < 4 && enter_parts(&tick.probe); ++round) {
+      walk_parts();
+      walk_parts();
     }
-    // Reporting walks once more, where all shares are known. A part that lets go only now gives the
-    // others another chance to be met.
+    // Reporting walks once more, where all displacements are known. A part that lets go only now
+    // gives the others another chance to be entered.
     const std::size_t reported = tick.state.contacts.size();
     for (int round = 0; round < 4; ++round) {
       tick.state.contacts.resize(reported);
       bool let_go = false;
       for (const std::uint32_t index : group) {
-        if (!holds(index)) continue;
-        tick.template touch<true>(index, shift_of_siblings(index));
-        let_go |= !holds(index);
+        if (!in_contact(index)) continue;
+        tick.template add_contact_of<true>(index, correction_by_siblings(index));
+        let_go |= !in_contact(index);
       }
-      if (!let_go || !meet(&tick.probe)) break;
+      if (!let_go || !enter_parts(&tick.probe)) break;
     }
     for (const std::uint32_t index : group) {
-      if (tick.state.parts[index].blocked) tick.faults |= render_fault::kStartedInside;
+      if (memory(index).started_inside) tick.faults |= render_fault::kStartedInside;
     }
   }
 };

@@ -1,6 +1,15 @@
 #pragma once
-// Neighbourhood watch: the next contact is looked for among the neighbours of the last one, so a
-// tick costs the same whatever the number of polygons.
+// The walk that keeps a god-object: from the contact feature of the last tick to its neighbours,
+// downhill in penetration depth, so that a tick costs the same whatever the number of polygons
+// (the "neighborhood watch" of Ho, Basdogan & Srinivasan 2000, section 4(b)).
+//
+// For a fixed orientation of the probe, the translations that bring the segment S into touch with
+// the convex object C are the boundary of their Minkowski sum M = C (+) (-S). M is convex. Its
+// facets, here "facets of M", are contact features of two kinds: a facet of C with the deeper end
+// of S, and a silhouette edge of C (seen along S) with the direction of S. The ideal probe
+// (god-object) is the virtual probe moved along the normal of one facet of M onto its plane.
+//
+// Mesh frame, SI units throughout.
 
 #include <bit>
 #include <cstdint>
@@ -9,70 +18,76 @@
 
 namespace palpate::rendering {
 
-/// A facet of M, the Minkowski sum of the object and the mirrored probe: a facet of the object with
-/// the deeper end of the probe, or a silhouette edge of the object with the probe's direction. One
-/// word: it is copied at every step, and a word that was written in parts is slow to read back.
-struct MinkowskiFacet {
-  enum class Kind : std::uint32_t { none, face, edge };
-  MinkowskiFacet() = default;
-  MinkowskiFacet(Kind k, bool ahead, std::uint32_t i)
-      : MinkowskiFacet(std::bit_cast<MinkowskiFacet>(static_cast<std::uint32_t>(k) |
+/// A facet of M, by the feature of the object that it comes from. One word: it is copied at every
+/// step, and a word that was written in parts is slow to read back.
+struct ContactFeature {
+  enum class Kind : std::uint32_t {
+    none,   ///< no contact
+    facet,  ///< of the object, with the deeper end of the probe
+    edge,   ///< silhouette edge of the object, with the direction of the probe
+  };
+  ContactFeature() = default;
+  ContactFeature(Kind k, bool ahead, std::uint32_t i)
+      : ContactFeature(std::bit_cast<ContactFeature>(static_cast<std::uint32_t>(k) |
                                                      std::uint32_t{ahead} << 2 | i << 3)) {}
 
   Kind kind : 2 = Kind::none;
-  /// Edge only: which of its two faces turned towards the tail (dot(normal, d) >= 0) at the last
-  /// tick.
+  /// Edge only: which of its two facets faced the tail (dot(normal, d) >= 0, d = tail - tip) at the
+  /// last tick.
   bool left_ahead : 1 = false;
-  std::uint32_t index : 29 = 0;  ///< of the facet or edge in the mesh
+  std::uint32_t index : 29 = 0;  ///< of the facet or edge, in the mesh
 
-  friend bool operator==(MinkowskiFacet a, MinkowskiFacet b) {
+  friend bool operator==(ContactFeature a, ContactFeature b) {
     return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
   }
 };
 
-/// Where a walk ended. Mesh frame.
+/// Where a walk ended.
 struct WalkResult {
-  MinkowskiFacet facet;      ///< kind none: the probe has left the object
-  MinkowskiFacet separates;  ///< where it has left: the facet of M whose plane is between
-  Vec3 normal;               ///< unit, outward, of `facet`; when left: of the plane that separates
-  double depth = 0;          ///< m, along normal; negative when left
-  double place = 0;       ///< fraction of the probe from the tip: 0 tip, 1 tail, between on an edge
-  double along_edge = 0;  ///< edge only: where on it, as a fraction from v0
-  /// No step helped, yet the ideal probe is off the facet: the probe has left the object, or edges
-  /// nearly parallel to it hide the way. Look at all facets.
-  bool unsure = false;
-  bool capped = false;  ///< the limit of steps was met; the facet is valid but perhaps not the last
+  ContactFeature feature;             ///< kind none: the probe has left the object
+  ContactFeature separating_feature;  ///< when left: the facet of M whose plane separates
+  Vec3 normal;                ///< unit, outward, of `feature`; when left: of the separating plane
+  double depth = 0;           ///< m, penetration along normal; negative when left
+  double probe_fraction = 0;  ///< of the contact point on the probe: 0 tip to 1 tail
+  double edge_fraction = 0;   ///< edge only: of the contact point on it: 0 at v0 to 1 at v1
+  /// No step lowered the depth, yet the ideal probe is off the facet of M: the probe has left the
+  /// object, or edges nearly parallel to it hide the next step. Look at all features.
+  bool not_converged = false;
+  bool capped = false;  ///< stopped at the limit of steps; the feature may not be the final one
 };
 
-/// Walks from `start` to the facet of M that the probe is held by. Mesh frame.
+/// Walks from `start` to the facet of M that holds the ideal probe.
 /// \param tip   the virtual probe's tip, m
 /// \param d     tail - tip, m; zero for a point
-WalkResult walk_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
+WalkResult walk_segment(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip,
                         const Vec3& d);
 
-/// The same walk with the probe shrunk to its tip: faces only.
-WalkResult walk_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+/// The same walk with the probe shrunk to its tip: facets of the object only.
+WalkResult walk_point(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip);
 
-/// Asks for the memory two steps from a facet that the walk has come to, so that later walks need
-/// not wait for it; changes nothing. What is one step away was asked for one facet before.
-/// Neighbours of triangles only: other facets are few.
-void fetch_ahead(const stimuli::ConvexMesh& mesh, MinkowskiFacet at);
+/// Prefetches the memory two steps from a feature that the walk has come to; changes nothing. What
+/// is one step away was prefetched one feature before. Neighbours of triangles only: other facets
+/// are few.
+void prefetch_neighbours(const stimuli::ConvexMesh& mesh, ContactFeature at);
 
-/// The facet of M of least depth, by looking at all of them: where there is no history to walk
-/// from. Costs O(facets + edges). Negative depth, kind none: the probe is outside.
-WalkResult nearest_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
-WalkResult nearest_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip);
+/// The penetration depth: the least over all facets of M, where there is no history to walk from.
+/// Costs O(facets + edges). Negative depth, kind none: the probe is outside.
+WalkResult nearest_feature_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
+WalkResult nearest_feature_point(const stimuli::ConvexMesh& mesh, const Vec3& tip);
 
-/// Of the facets of M that hold the probe (with the ideal probe on them), the one whose ideal probe
-/// is nearest to the virtual probe moved by `shift`; kind none: there is none. For walks that are
-/// unsure. Costs O(facets + edges).
-WalkResult holding_facet_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+/// Of the facets of M that the ideal probe can lie on, the one whose ideal probe is nearest to the
+/// virtual probe moved by `shift`; kind none: there is none. For walks that did not converge. Costs
+/// O(facets + edges).
+WalkResult holding_feature_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                                   const Vec3& shift);
+WalkResult holding_feature_point(const stimuli::ConvexMesh& mesh, const Vec3& tip,
                                  const Vec3& shift);
-WalkResult holding_facet_point(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& shift);
 
-/// The plane of the facet of the last tick, wherever on it the probe is now: a walk of no steps.
-WalkResult same_facet_segment(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
-                              const Vec3& tip, const Vec3& d);
-WalkResult same_facet_point(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip);
+/// Depth below the plane of the feature of the last tick, wherever on it the probe is now: a walk
+/// of no steps.
+WalkResult same_feature_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                const Vec3& tip, const Vec3& d);
+WalkResult same_feature_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                              const Vec3& tip);
 
 }  // namespace palpate::rendering

@@ -13,9 +13,9 @@ namespace {
 // motions only; here the time of crossing is the root of a quadratic, so a fast hand is caught as
 // well.
 
-using Kind = MinkowskiFacet::Kind;
+using Kind = ContactFeature::Kind;
 
-/// Whether the segment a -> a + d comes into the box enlarged by low_margin and high_margin.
+/// Whether the segment a .. a + d meets the box low .. high.
 bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3& high) {
   double enter = 0, leave = 1;
   for (int k = 0; k < 3; ++k) {
@@ -33,11 +33,11 @@ bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3
   return true;
 }
 
-/// Calls visit(primitive) for all primitives whose box the segment a -> a + d can touch while it is
-/// shifted by anything between `low_margin` and `high_margin`.
+/// Calls visit(primitive) for all primitives whose box the segment a .. a + d can meet while it is
+/// translated by anything between `low_shift` and `high_shift`.
 template <class Visit>
 void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a, const Vec3& d,
-                const Vec3& low_margin, const Vec3& high_margin, Visit visit) {
+                const Vec3& low_shift, const Vec3& high_shift, Visit visit) {
   if (!tree) {
     for (std::uint32_t i = 0; i < primitives; ++i) visit(i);
     return;
@@ -48,7 +48,7 @@ void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a,
   while (top > 0) {
     const std::uint32_t index = stack[--top];
     const BoundingTree::Node& node = tree->nodes()[index];
-    if (!segment_meets_box(a, d, node.box.low - high_margin, node.box.high - low_margin)) continue;
+    if (!segment_meets_box(a, d, node.box.low - high_shift, node.box.high - low_shift)) continue;
     if (node.count > 0) {
       for (std::uint32_t i = 0; i < node.count; ++i) visit(tree->order()[node.first + i]);
     } else {
@@ -71,10 +71,10 @@ void meet_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Ve
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
     if (glm::dot(mesh.sides()[i].inward, p) < mesh.sides()[i].offset - tolerance) return;
   }
-  first = {{Kind::face, false, index}, time};
+  first = {{Kind::facet, false, index}, time};
 }
 
-/// The moving segment, read as functions of the time t in [0, 1].
+/// The moving segment as linear functions of the time t in [0, 1]; d = tail - tip.
 struct MovingSegment {
   Vec3 tip, tip_motion, d, d_motion;
 };
@@ -99,7 +99,7 @@ void meet_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Movin
   if (c2 != 0) roots[count++] = q / c2;
   if (q != 0) roots[count++] = c0 / q;
   for (int k = 0; k < count; ++k) {
-    constexpr double kEarly = 1e-9;  // a probe that left by rounding alone is still at the surface
+    constexpr double kEarly = 1e-9;  // of a tick; a probe that left by rounding is at the surface
     if (!(roots[k] >= -kEarly && roots[k] <= 1)) continue;
     const double time = std::max(0.0, roots[k]);
     if (time >= first.time) continue;
@@ -109,18 +109,19 @@ void meet_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Movin
     const double right = glm::dot(mesh.facets()[edge.right].normal, d);
     if ((left >= 0) == (right >= 0)) continue;
     const bool left_ahead = left >= 0;
-    // Height over the edge is -(w x d).e / |e x d| for left_ahead, else its negative: going in.
+    // Entering: the height over the edge, -(w x d).e / |e x d| for left_ahead, else its negative,
+    // must fall.
     const double rate = c1 + 2 * c2 * time;
     if (!(left_ahead ? rate > 0 : rate < 0)) continue;
     const Vec3 c = glm::cross(e, d);
     const double n2 = glm::dot(c, c);
     const double e2 = glm::dot(e, e), d2 = glm::dot(d, d);
     if (n2 <= 1e-18 * e2 * d2) continue;
-    const double along_probe = glm::dot(glm::cross(at, e), c) / n2;
-    const double along_edge = glm::dot(glm::cross(at, d), c) / n2;
-    const double slack_probe = tolerance / std::sqrt(d2), slack_edge = tolerance / std::sqrt(e2);
-    if (along_probe < -slack_probe || along_probe > 1 + slack_probe) continue;
-    if (along_edge < -slack_edge || along_edge > 1 + slack_edge) continue;
+    const double probe_fraction = glm::dot(glm::cross(at, e), c) / n2;
+    const double edge_fraction = glm::dot(glm::cross(at, d), c) / n2;
+    const double probe_slack = tolerance / std::sqrt(d2), edge_slack = tolerance / std::sqrt(e2);
+    if (probe_fraction < -probe_slack || probe_fraction > 1 + probe_slack) continue;
+    if (edge_fraction < -edge_slack || edge_fraction > 1 + edge_slack) continue;
     first = {{Kind::edge, left_ahead, index}, time};
   }
 }
@@ -133,9 +134,9 @@ void meet_polygons(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, c
 
 }  // namespace
 
-ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scanned)
+ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scan_limit)
     : support_map_(mesh) {
-  if (mesh.facets().size() > scanned) {
+  if (mesh.facets().size() > scan_limit) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
@@ -152,7 +153,7 @@ ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std
     }
     polygons_ = BoundingTree(boxes);
   }
-  if (with_edges && mesh.edges().size() > scanned) {
+  if (with_edges && mesh.edges().size() > scan_limit) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.edges().size());
     for (const stimuli::Edge& edge : mesh.edges()) {

@@ -1,5 +1,6 @@
 #pragma once
-// Continuous detection of the first contact: the facet of M by which the probe came in.
+// Continuous collision detection: at which time of a tick, and through which facet of M
+// (facet_walk.h), the probe enters an object. Mesh frame, SI units.
 
 #include <memory>
 
@@ -11,15 +12,16 @@
 
 namespace palpate::rendering {
 
-/// The two hierarchies of the paper's section 4(a). A mesh that is small enough to scan has none,
-/// and where only points are shown there is no tree of edges.
+/// The bounding-volume hierarchies of one mesh: of polygons and of edges, as in section 4(a) of the
+/// paper. A mesh that is small enough to scan has none, and the point renderer needs no edges.
 class ContactTrees {
  public:
-  /// Facets or edges; so few are scanned faster than any tree is climbed.
-  static constexpr std::size_t kScan = 64;
+  /// Facets or edges; up to so many are scanned faster than any tree is descended.
+  static constexpr std::size_t kScanLimit = 64;
 
-  /// \param scanned  for measurements: so many primitives get no tree
-  ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scanned = kScan);
+  /// \param scan_limit  for measurements: up to so many facets or edges get no tree
+  ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges,
+               std::size_t scan_limit = kScanLimit);
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
@@ -30,16 +32,16 @@ class ContactTrees {
   SupportMap support_map_;
 };
 
-/// Where and when the probe came in.
+/// Where and when the probe entered.
 struct FirstContact {
-  MinkowskiFacet facet;  ///< kind none: it did not
-  double time = 2;       ///< fraction of the tick, 0 to 1
+  ContactFeature feature;  ///< kind none: it did not
+  double time = 2;         ///< time of impact, as a fraction of the tick: 0 to 1
 };
 
-/// The earliest entry while both ends move linearly from `before` to `after`. Mesh frame.
-/// Exact for any length of motion and any rotation within the tick: an end point meets a facet's
-/// plane at the root of a linear equation, the segment meets an edge at a root of a quadratic one.
-/// \param tolerance  m; how far outside of a polygon's or edge's rim still counts, against rounding
+/// The earliest entry while both ends move linearly from `before` to `after`. Exact for any length
+/// of motion and any rotation within the tick: an end point meets a facet's plane at the root of a
+/// linear equation, the segment meets an edge at a root of a quadratic one.
+/// \param tolerance  m; so far past the end of an edge or the side of a polygon counts as on it
 FirstContact first_contact_segment(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                    const LineProbe& before, const LineProbe& after,
                                    double tolerance);

@@ -1,6 +1,7 @@
 #pragma once
-// The facets of M, the Minkowski sum of the object and the mirrored probe, measured against a
-// probe, and what adjoins them. Internal to the walks: facet_walk.cpp and approach.cpp.
+// The facets of M, the Minkowski sum of the object and the mirrored probe (facet_walk.h): normal,
+// penetration depth and contact point for a given probe, and which ones are adjacent. Mesh frame,
+// SI units; d = tail - tip. Internal to the walks: facet_walk.cpp and approach.cpp.
 
 #include <algorithm>
 #include <array>
@@ -13,10 +14,10 @@
 
 namespace palpate::rendering::minkowski {
 
-using Kind = MinkowskiFacet::Kind;
+using Kind = ContactFeature::Kind;
 
 inline constexpr std::uint32_t kNone = ~0u;
-inline constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by halving
+inline constexpr std::uint32_t kScanSides = 12;  // more sides than this are searched by bisection
 inline constexpr double kParallel = 1e-9;        // |e x d| / (|e| |d|) below this: no contact edge
 inline constexpr double kNearlyParallel =
     1e-3;  // below this the direction of e x d has lost digits
@@ -32,7 +33,7 @@ inline bool outside(const stimuli::Side& side, const Vec3& p) {
   return glm::dot(side.inward, p) < side.offset;
 }
 
-/// What p, a point of the plane of a polygon with many sides, lies over: halving over the fan of
+/// What p, a point of the plane of a polygon with many sides, lies over: bisection over the fan of
 /// triangles at corner 0, so that a cap of a thousand sides costs ten comparisons.
 inline stimuli::Neighbour beyond_many(const stimuli::ConvexMesh& mesh, std::uint32_t index,
                                       const Vec3& p) {
@@ -94,30 +95,30 @@ inline stimuli::Neighbour beyond_side(const stimuli::ConvexMesh& mesh, std::uint
 
 /// One facet of M measured against the probe.
 struct Measured {
-  bool edge = false;        ///< else a face
-  bool left_ahead = false;  ///< edge only
-  bool slender = false;     ///< edge only: nearly parallel to the probe
-  bool within = false;      ///< edge only: the probe crosses it between its ends and the probe's
+  bool edge = false;             ///< else a facet of the object
+  bool left_ahead = false;       ///< edge only, as in ContactFeature
+  bool nearly_parallel = false;  ///< edge only: nearly parallel to the probe
+  bool within = false;           ///< edge only: the contact point is between the ends of both
   std::uint32_t index = 0;
-  Vec3 normal;
-  double depth = 0;
-  double rise = 0;        ///< face only: dot(normal, d), m
-  double place = 0;       ///< along the probe, 0 tip to 1 tail
-  double along_edge = 0;  ///< edge only: 0 at v0 to 1 at v1
+  Vec3 normal;                ///< unit, outward
+  double depth = 0;           ///< m; negative: the plane separates
+  double slope = 0;           ///< facet only: dot(normal, d), m
+  double probe_fraction = 0;  ///< of the contact point: 0 tip to 1 tail, unclamped
+  double edge_fraction = 0;   ///< edge only: of the contact point: 0 at v0 to 1 at v1, unclamped
 };
 
 template <bool kSegment>
-Measured measure_face(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& tip,
-                      const Vec3& d) {
+Measured measure_facet(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& tip,
+                       const Vec3& d) {
   const stimuli::Facet& facet = mesh.facets()[index];
   Measured m;
   m.index = index;
   m.normal = facet.normal;
   const double height = facet.offset - glm::dot(facet.normal, tip);
   if constexpr (kSegment) {
-    m.rise = glm::dot(facet.normal, d);
-    m.place = m.rise >= 0 ? 0.0 : 1.0;
-    m.depth = m.rise >= 0 ? height : height - m.rise;
+    m.slope = glm::dot(facet.normal, d);
+    m.probe_fraction = m.slope >= 0 ? 0.0 : 1.0;
+    m.depth = m.slope >= 0 ? height : height - m.slope;
   } else {
     m.depth = height;
   }
@@ -125,7 +126,7 @@ Measured measure_face(const stimuli::ConvexMesh& mesh, std::uint32_t index, cons
 }
 
 struct Slopes {
-  double left, right;  ///< dot(normal, d) of the edge's two faces
+  double left, right;  ///< m, dot(normal, d) of the edge's two facets
   bool silhouette() const { return (left >= 0) != (right >= 0); }
 };
 
@@ -134,8 +135,8 @@ inline Slopes slopes_at(const stimuli::ConvexMesh& mesh, const stimuli::Edge& ed
           glm::dot(mesh.facets()[edge.right].normal, d)};
 }
 
-/// The normal of an edge as the mixture of its faces' normals that is at right angles to d: however
-/// small e x d is, it stays between the two.
+/// The normal of an edge as the mixture of its facets' normals that is at right angles to d:
+/// however small e x d is, it stays between the two.
 [[gnu::cold, gnu::noinline]] inline Vec3 mixed_normal(const stimuli::ConvexMesh& mesh,
                                                       const stimuli::Edge& edge, const Vec3& d) {
   const Slopes slopes = slopes_at(mesh, edge, d);
@@ -159,39 +160,40 @@ inline bool measure_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, b
   m.edge = true;
   m.left_ahead = left_ahead;
   m.index = index;
-  m.normal = scale * c;  // outward: the face ahead leans to the tail, the other to the tip
+  m.normal = scale * c;  // outward: the facet ahead faces the tail, the other one the tip
   if (c2 < kNearlyParallel * kNearlyParallel * right_angle2) [[unlikely]] {
-    m.slender = true;
+    m.nearly_parallel = true;
     m.normal = mixed_normal(mesh, edge, d);
   }
   m.depth = -glm::dot(m.normal, w);
-  // w + depth n + place d = along_edge e, crossed with e and with d
-  const double place = glm::dot(glm::cross(w, e), c), along_edge = glm::dot(glm::cross(w, d), c);
+  // w + depth n + s d = u e, with s and u the fractions, crossed with e and with d
+  const double s = glm::dot(glm::cross(w, e), c), u = glm::dot(glm::cross(w, d), c);
   // Compared before they are divided: whether to step need not wait for a division.
-  m.within = (place >= 0) & (place <= c2) & (along_edge >= 0) & (along_edge <= c2);
-  m.place = place * inverse;
-  m.along_edge = along_edge * inverse;
+  m.within = (s >= 0) & (s <= c2) & (u >= 0) & (u <= c2);
+  m.probe_fraction = s * inverse;
+  m.edge_fraction = u * inverse;
   return true;
 }
 
-/// A silhouette edge and its face ahead.
+/// A silhouette edge and which of its facets is ahead.
 struct SilhouetteEdge {
   std::uint32_t edge = kNone;
   bool left_ahead = false;
 };
 
-/// The other silhouette edge at one end of `from`, which is one; the faces around a vertex change
-/// sides exactly twice. Turns about the vertex counter-clockwise, from face to face, until they do.
-/// Edge kNone when rounding hides the second one, or where not all faces are triangles.
+/// The other silhouette edge at one end of `from`, which is one: around a vertex the sign of
+/// dot(normal, d) changes exactly twice. Turns about the vertex counter-clockwise, from facet to
+/// facet, until it does. Edge kNone when rounding hides the second one, or where not all facets are
+/// triangles.
 inline SilhouetteEdge turn_about(const stimuli::ConvexMesh& mesh, std::uint32_t from, bool about_v1,
                                  bool left_ahead, const Vec3& d) {
-  // Out of the face on the left the next side starts at v1, out of the one on the right at v0.
+  // Out of the facet on the left the next side starts at v1, out of the one on the right at v0.
   const bool ahead = about_v1 == left_ahead;
   std::uint32_t edge = from;
-  const stimuli::Facet* face =
+  const stimuli::Facet* facet =
       &mesh.facets()[about_v1 ? mesh.edges()[from].left : mesh.edges()[from].right];
-  while (face->side_count == 3) {
-    const auto& sides = face->triangle;
+  while (facet->side_count == 3) {
+    const auto& sides = facet->triangle;
     const stimuli::Neighbour& next = sides[edge == sides[0].edge   ? 1
                                            : edge == sides[1].edge ? 2
                                                                    : 0];
@@ -199,10 +201,10 @@ inline SilhouetteEdge turn_about(const stimuli::ConvexMesh& mesh, std::uint32_t 
     if (edge == from) return {};
     const stimuli::Facet* across = &mesh.facets()[next.across];
     if ((glm::dot(across->normal, d) >= 0) != ahead) {
-      const bool face_is_left = face == &mesh.facets()[mesh.edges()[edge].left];
-      return {edge, face_is_left == ahead};
+      const bool facet_is_left = facet == &mesh.facets()[mesh.edges()[edge].left];
+      return {edge, facet_is_left == ahead};
     }
-    face = across;
+    facet = across;
   }
   return {};
 }
@@ -219,26 +221,26 @@ inline SilhouetteEdge search_fan(const stimuli::ConvexMesh& mesh, std::uint32_t 
   return {};
 }
 
-/// The other silhouette edge at one end of the silhouette edge `from`: the faces around a vertex
-/// change sides exactly twice. Edge kNone where rounding hides it.
+/// The other silhouette edge at one end of the silhouette edge `from`. Edge kNone where rounding
+/// hides it.
 inline SilhouetteEdge other_silhouette(const stimuli::ConvexMesh& mesh, std::uint32_t from,
                                        bool about_v1, bool left_ahead, const Vec3& d) {
   const SilhouetteEdge other = turn_about(mesh, from, about_v1, left_ahead, d);
   return other.edge != kNone ? other : search_fan(mesh, from, about_v1, d);
 }
 
-/// From p to the segment from a, m.
+/// m, from p to the segment a .. a + along.
 inline double distance_to(const Vec3& p, const Vec3& a, const Vec3& along) {
-  const double share = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
-  return glm::length(a + share * along - p);
+  const double fraction = std::clamp(glm::dot(p - a, along) / glm::dot(along, along), 0.0, 1.0);
+  return glm::length(a + fraction * along - p);
 }
 
-/// How far the ideal probe is off a polygon that it should lie on, m.
+/// m, from the ideal probe to the polygon that it should touch.
 template <bool kSegment>
-double off_face(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
-                const Vec3& d) {
+double distance_off_facet(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
+                          const Vec3& d) {
   const stimuli::Facet& facet = mesh.facets()[at.index];
-  const bool tail = kSegment && at.place > 0;
+  const bool tail = kSegment && at.probe_fraction > 0;
   const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
   const Vec3 along = tail ? -d : d;
   double past = 0, enter = 0, leave = 1;
@@ -251,28 +253,30 @@ double off_face(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3&
     if (slope < 0) leave = std::min(leave, inside / -slope);
     if (slope == 0 && inside < 0) leave = -1;
   }
-  // A probe that lies flat on the face may touch it where its end is past a side.
+  // A probe parallel to the facet may touch it although its end is past a side.
   if (enter <= leave) past = std::min(past, enter * std::abs(glm::dot(facet.normal, along)));
   return past;
 }
 
-/// How far the ideal probe is off an edge that it should cross, m.
-inline double off_edge(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
-                       const Vec3& d) {
+/// m, from the ideal probe to the edge that it should touch.
+inline double distance_off_edge(const stimuli::ConvexMesh& mesh, const Measured& at,
+                                const Vec3& tip, const Vec3& d) {
   const stimuli::Edge& edge = mesh.edges()[at.index];
   const Vec3& v0 = edge.from;
   const Vec3 e = edge.to - v0;
   const Vec3 ideal = tip + at.depth * at.normal;
-  return std::min(distance_to(ideal + std::clamp(at.place, 0.0, 1.0) * d, v0, e),
-                  distance_to(v0 + std::clamp(at.along_edge, 0.0, 1.0) * e, ideal, d));
+  return std::min(distance_to(ideal + std::clamp(at.probe_fraction, 0.0, 1.0) * d, v0, e),
+                  distance_to(v0 + std::clamp(at.edge_fraction, 0.0, 1.0) * e, ideal, d));
 }
 
-/// How far the ideal probe is off the facet of M that it should be on, m.
+/// m, from the ideal probe to the feature that it should touch: above rounding it is off the
+/// facet of M.
 template <bool kSegment>
-[[gnu::cold, gnu::noinline]] double off_facet(const stimuli::ConvexMesh& mesh, const Measured& at,
-                                              const Vec3& tip, const Vec3& d) {
-  if (kSegment && at.edge) return off_edge(mesh, at, tip, d);
-  return off_face<kSegment>(mesh, at, tip, d);
+[[gnu::cold, gnu::noinline]] double distance_off(const stimuli::ConvexMesh& mesh,
+                                                 const Measured& at, const Vec3& tip,
+                                                 const Vec3& d) {
+  if (kSegment && at.edge) return distance_off_edge(mesh, at, tip, d);
+  return distance_off_facet<kSegment>(mesh, at, tip, d);
 }
 
 }  // namespace palpate::rendering::minkowski

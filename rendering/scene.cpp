@@ -19,7 +19,7 @@ double distance_to_segment(const Vec3& p, const LineProbe& probe) {
 }  // namespace
 
 Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
-  Needs needs;
+  TickFeatures features;
   parts_.reserve(objects.size());
   for (auto& object : objects) {
     if (!object.mesh) throw std::invalid_argument("a scene's object has no mesh");
@@ -34,40 +34,39 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
     part.tolerance = 1e-12 * part.mesh->size() +
                      8 * std::numeric_limits<double>::epsilon() * glm::length(part.sphere_centre);
     part.material = object.material;
-    needs.damping |= part.material.damping != 0;
-    needs.friction |= part.material.has_friction();
-    needs.layers |= !part.material.layers.empty();
+    features.damping |= part.material.damping != 0;
+    features.friction |= part.material.has_friction();
+    features.layers |= !part.material.layers.empty();
     part.object = object.object;
     parts_.push_back(std::move(part));
   }
-  needs.several_parts = parts_.size() != 1;
-  needs_index_ = needs.index();
+  features.several_parts = parts_.size() != 1;
+  features_index_ = features.index();
 }
 
 RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
-  if (!needs().several_parts) state.near_parts.push_back(0);  // and stays: one part is not surveyed
+  if (!features().several_parts) state.near_parts.push_back(0);  // a single part is always near
   state.contacts.reserve(parts_.size());
   return state;
 }
 
-void list_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  // How far the probe came in this tick: what it may have passed on the way counts as near.
+void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
+  // How far the probe moved in this tick: what it may have passed counts as near.
   const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
                                                 glm::length(probe.tail - state.last.tail))
                                      : 0;
   state.near_parts.clear();
-  state.surveyed = probe;
+  state.near_parts_pose = probe;
   state.clearance = std::numeric_limits<double>::infinity();
   for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
     const ScenePart& part = scene.parts()[i];
     const double gap = distance_to_segment(part.sphere_centre, probe) - part.sphere_radius;
-    // A part that is held stays: through a thin plate the probe may be far from it and yet in
-    // contact.
-    const bool held = state.parts[i].facet.kind != MinkowskiFacet::Kind::none;
-    if (held || in_reach(part, gap, step)) {
+    // A part in contact stays: pressed through a thin plate, the virtual probe may be far from it.
+    const bool in_contact = state.parts[i].feature.kind != ContactFeature::Kind::none;
+    if (in_contact || in_reach(part, gap, step)) {
       state.near_parts.push_back(i);
     } else {
       state.clearance = std::min(state.clearance, gap);

@@ -1,5 +1,6 @@
 #pragma once
-// What stands in the world, compiled once per trial into the least work that shows it.
+// The objects of a trial, compiled once into the least work a tick needs, and the state that a
+// renderer keeps between ticks. World frame and SI units unless said otherwise.
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace palpate::rendering {
 
-/// One convex part to be placed in a scene.
+/// One convex part to be put into a scene.
 struct SceneObject {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
   Pose pose;
@@ -28,7 +29,7 @@ struct SceneObject {
   std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
 };
 
-/// One convex part as the tick sees it. World frame unless said otherwise.
+/// One convex part as the tick uses it.
 struct ScenePart {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
   std::shared_ptr<const ContactTrees> trees;
@@ -36,7 +37,7 @@ struct ScenePart {
   Vec3 position;             ///< m, of the mesh frame's origin
   Vec3 sphere_centre;        ///< m
   double sphere_radius = 0;  ///< m
-  double tolerance = 0;      ///< m; below it a length is rounding, for this size and distance
+  double tolerance = 0;      ///< m; shorter is rounding, at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
 
@@ -53,16 +54,16 @@ struct ScenePart {
   }
 };
 
-/// What a tick over a scene must do beyond one convex part that is a plain spring. A tick is
-/// compiled for each combination, so that what is not needed costs nothing.
-struct Needs {
-  bool several_parts = false;  ///< a survey of what is in reach, a list of contacts, sums over it
-  bool damping = false;        ///< of some material
+/// What a tick over a scene does beyond one convex part that is a plain spring. A tick is compiled
+/// for each combination, so that what is not needed costs nothing.
+struct TickFeatures {
+  bool several_parts = false;  ///< broad phase, a list of contacts, sums over it
+  bool damping = false;        ///< some material has it; so the others
   bool friction = false;
   bool layers = false;
 
   static constexpr std::size_t kCount = 16;  ///< combinations
-  static constexpr Needs of(std::size_t index) {
+  static constexpr TickFeatures of(std::size_t index) {
     return {(index & 1) != 0, (index & 2) != 0, (index & 4) != 0, (index & 8) != 0};
   }
   constexpr std::size_t index() const {
@@ -74,25 +75,27 @@ struct Needs {
 
 /// What is remembered of one part from tick to tick.
 struct PartState {
-  MinkowskiFacet facet;       ///< kind none: not in contact
+  ContactFeature feature;     ///< in contact: that the ideal probe is on; kind none: no contact
   SeparatingPlane plane;      ///< mesh frame; where valid, the last pose was beyond it
-  MinkowskiFacet watch;       ///< not in contact: of a plane that lately separated, if any
-  std::uint32_t support = 0;  ///< vertex that the last search for a plane ended on
-  bool blocked = false;       ///< the trial began inside: no force until it has been left once
-  Vec3 share;    ///< m; its part of the ideal probe's translation, where parts share one
-  Vec3 yielded;  ///< m; the translation that its siblings' shares gave it at the last tick
-  Grip grip;     ///< where the material has friction
+  ContactFeature nearby;      ///< not in contact: the feature of a recent separating plane, if any
+  std::uint32_t support = 0;  ///< vertex that the last search for a separating plane ended on
+  bool started_inside = false;  ///< the trial began inside: no force until the probe has left once
+  /// m, what this part adds to the displacement of the ideal probe, where parts share one
+  Vec3 displacement;
+  /// m, how far the other parts of the same object displaced the ideal probe at the last tick
+  Vec3 sibling_correction;
+  FrictionState friction;  ///< where the material has friction
 };
 
-/// A renderer's whole memory. Copy it to replay from here.
+/// A renderer's whole memory between ticks. Copy it to replay from here.
 struct RenderState {
   std::vector<PartState> parts;
   std::vector<std::uint32_t> near_parts;  ///< in order; the others are out of reach for now
-  LineProbe surveyed;                     ///< where the probe was when near_parts was drawn up
-  double clearance = 0;  ///< m; that far from `surveyed` the other parts are out of reach
-  LineProbe last;        ///< last good pose
+  LineProbe near_parts_pose;              ///< the probe when near_parts was last rebuilt
+  double clearance = 0;  ///< m; within it of near_parts_pose the other parts are out of reach
+  LineProbe last;        ///< last valid pose
   bool has_last = false;
-  std::vector<LoadedContact> contacts;  ///< of the last tick; with room for all
+  std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
 };
 
 /// Immutable; shared by the servo and the display.
@@ -102,33 +105,35 @@ class Scene {
   explicit Scene(std::vector<SceneObject> objects, bool side_contact = true);
 
   const std::vector<ScenePart>& parts() const { return parts_; }
-  /// Chooses the tick that both renderers run.
-  Needs needs() const { return Needs::of(needs_index_); }
-  std::size_t needs_index() const { return needs_index_; }
+  /// Selects the tick that a renderer runs.
+  TickFeatures features() const { return TickFeatures::of(features_index_); }
+  std::size_t features_index() const { return features_index_; }
   RenderState initial_state() const;
 
  private:
   std::vector<ScenePart> parts_;
-  std::size_t needs_index_ = 0;
+  std::size_t features_index_ = 0;
 };
 
-/// Whether the probe can touch the part soon, or may have passed it on the way here.
+/// Broad phase: whether the probe can touch the part soon, or may have passed it in this tick.
 /// \param gap   m, between the probe and the part's bounding sphere
-/// \param step  m, how far the probe came in this tick
+/// \param step  m, how far the probe moved in this tick
 inline bool in_reach(const ScenePart& part, double gap, double step) {
-  // A quarter of the radius of room to move before the list must be drawn up again.
+  // The margin, a quarter of the radius, is room to move before the list must be rebuilt.
   return gap - step <= 0.25 * part.sphere_radius;
 }
 
-/// Lists the parts that the probe can reach soon. No allocation.
-void list_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe);
+/// Lists the parts that the probe can reach soon (bounding spheres). No allocation.
+void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe);
 
-/// The same, unless the last list still holds.
-inline void survey(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  if (state.clearance == std::numeric_limits<double>::infinity()) return;  // all are near, for good
-  const Vec3 tip_way = probe.tip - state.surveyed.tip, tail_way = probe.tail - state.surveyed.tail;
-  const double moved2 = std::max(glm::dot(tip_way, tip_way), glm::dot(tail_way, tail_way));
-  if (moved2 >= state.clearance * state.clearance) list_near_parts(scene, state, probe);
+/// The same, unless the last list is still valid.
+inline void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
+  if (state.clearance == std::numeric_limits<double>::infinity())
+    return;  // all parts are always near
+  const Vec3 tip = probe.tip - state.near_parts_pose.tip;
+  const Vec3 tail = probe.tail - state.near_parts_pose.tail;
+  const double moved2 = std::max(glm::dot(tip, tip), glm::dot(tail, tail));
+  if (moved2 >= state.clearance * state.clearance) rebuild_near_parts(scene, state, probe);
 }
 
 }  // namespace palpate::rendering

@@ -1,5 +1,6 @@
 #pragma once
-// The whole segment as what touches: tip and side. Included by what instantiates ticks.
+// The whole segment as what touches, tip and side: ray-based rendering. Mesh frame. Included by
+// what instantiates ticks.
 
 #include <algorithm>
 #include <array>
@@ -7,29 +8,32 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rendering/tick.h"
+#include "rendering/approach.h"
+#include "rendering/facet_walk.h"
+#include "rendering/first_contact.h"
+#include "rendering/force.h"
+#include "rendering/scene.h"
 
 namespace palpate::rendering::tick {
 
-inline constexpr double kEpsilon =
-    std::numbers::pi / 180;  // 1 degree: the paper's choice for segment-face
-inline constexpr double kSinEpsilon = 0.01745240643728351;  // std::sin is no constexpr
+// rad, epsilon of equation (2), within which a contact is segment-face: 1 degree, as in the paper.
+inline constexpr double kBlendAngle = std::numbers::pi / 180;
+inline constexpr double kSinBlendAngle = 0.01745240643728351;  // std::sin is not constexpr
 
-/// asin by its series: exact to rounding up to epsilon, and much faster than the library's.
+/// asin by its series: exact to rounding up to the blend angle, and much faster than std::asin.
 inline double small_asin(double x) {
   const double x2 = x * x;
   return x * (1 + x2 * (1.0 / 6 + x2 * (3.0 / 40 + x2 * (5.0 / 112))));
 }
 
-/// Part of a segment a + t d, 0 <= t <= 1.
+/// Part of a segment a + t d, 0 <= t <= 1: clipped by half-spaces.
 struct Portion {
   double enter = 0, leave = 1;
 
-  /// Keeps what has height + (t - at) slope >= 0. Written as selections: on a fine mesh the signs
-  /// change from tick to tick, and a branch that is guessed wrong costs more than the whole clip.
+  /// Keeps what has height + (t - at) slope >= 0. Branch-free: on a fine mesh the signs change from
+  /// tick to tick, and a mispredicted branch costs more than the whole clip.
   void clip(double height, double slope, double at = 0) {
-    const double t =
-        at - height / slope;  // of a slope of 0 infinite or undefined, and not selected
+    const double t = at - height / slope;  // of a slope of 0 infinite or NaN, and not selected
     const double from = slope > 0 ? t : 0.0;
     const double to = slope < 0 ? t : 1.0;
     enter = from > enter ? from : enter;
@@ -39,14 +43,14 @@ struct Portion {
   }
 };
 
-/// Where a probe that lies on a face enters and leaves its polygon, as fractions of the probe;
-/// enter > leave when rounding leaves nothing of it on the polygon.
+/// The portion of a probe lying on a facet that is over its polygon; enter > leave when rounding
+/// leaves nothing of it.
 inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t index,
                                 const Vec3& ideal_tip, const Vec3& d) {
   const stimuli::Facet& facet = mesh.facets()[index];
   Portion portion;
   if (facet.side_count == 3) {
-    // In the face's plane, inside of a side is below the plane of the facet beyond it.
+    // Within the facet's plane, inside of a side is below the plane of the facet beyond it.
     const Vec3 a = ideal_tip - (glm::dot(facet.normal, ideal_tip) - facet.offset) * facet.normal;
     const Vec3 along = d - glm::dot(facet.normal, d) * facet.normal;
     for (const stimuli::Neighbour& next : facet.triangle) {
@@ -62,26 +66,27 @@ inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t i
   return portion;
 }
 
-/// The same for a probe that crosses an edge of the face, a triangle: there it enters or leaves.
+/// The same for a probe that crosses an edge of the facet, a triangle: there it enters or leaves.
 /// The other two sides are measured from the crossing, which is known sooner than the ideal tip.
-/// No branches: from edge to edge they could not be guessed.
-/// \param on_left  whether the face is the one on the edge's left; \param rise  dot(its normal, d)
+/// Branch-free, as above.
+/// \param on_left  whether the facet is the one on the edge's left; \param slope  dot(its normal,
+/// d)
 inline Portion portion_from_edge(const stimuli::ConvexMesh& mesh, const WalkResult& hit,
-                                 bool on_left, double rise, const Vec3& d) {
-  const stimuli::Edge& edge = mesh.edges()[hit.facet.index];
+                                 bool on_left, double slope, const Vec3& d) {
+  const stimuli::Edge& edge = mesh.edges()[hit.feature.index];
   const stimuli::Facet& facet = mesh.facets()[on_left ? edge.left : edge.right];
-  const Vec3 crossing = edge.from + hit.along_edge * (edge.to - edge.from);
-  const Vec3 along = d - rise * facet.normal;
-  const double enters = on_left == hit.facet.left_ahead ? 1 : 0;
-  Portion portion{std::min(hit.place, enters), std::max(hit.place, enters)};
+  const Vec3 crossing = edge.from + hit.edge_fraction * (edge.to - edge.from);
+  const Vec3 along = d - slope * facet.normal;
+  const double enters = on_left == hit.feature.left_ahead ? 1 : 0;
+  Portion portion{std::min(hit.probe_fraction, enters), std::max(hit.probe_fraction, enters)};
   const auto& sides = facet.triangle;
-  const unsigned here =
-      unsigned{sides[1].edge == hit.facet.index} + 2 * unsigned{sides[2].edge == hit.facet.index};
+  const unsigned here = unsigned{sides[1].edge == hit.feature.index} +
+                        2 * unsigned{sides[2].edge == hit.feature.index};
   constexpr std::array<std::uint8_t, 4> kSides{1, 2, 0, 1};
   for (const unsigned other : {kSides[here], kSides[here + 1]}) {
     const stimuli::Facet& across = mesh.facets()[sides[other].across];
     portion.clip(across.offset - glm::dot(across.normal, crossing), -glm::dot(across.normal, along),
-                 hit.place);
+                 hit.probe_fraction);
   }
   return portion;
 }
@@ -90,7 +95,32 @@ inline Portion portion_from_edge(const stimuli::ConvexMesh& mesh, const WalkResu
 struct SegmentProbe {
   static constexpr bool kSegment = true;
 
-  static Approach approach(const stimuli::ConvexMesh& mesh, MinkowskiFacet start,
+  /// \param probe  world frame
+  [[gnu::always_inline]] static LineProbe to_local(const ScenePart& part, const LineProbe& probe) {
+    return {part.local_point(probe.tip), part.local_point(probe.tail)};
+  }
+
+  static WalkResult walk(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip,
+                         const Vec3& d) {
+    return walk_segment(mesh, start, tip, d);
+  }
+
+  static WalkResult same_feature(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                 const Vec3& tip, const Vec3& d) {
+    return same_feature_segment(mesh, start, tip, d);
+  }
+
+  static WalkResult nearest_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip,
+                                    const Vec3& d) {
+    return nearest_feature_segment(mesh, tip, d);
+  }
+
+  static WalkResult holding_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
+                                    const Vec3& shift) {
+    return holding_feature_segment(mesh, tip, d, shift);
+  }
+
+  static Approach approach(const stimuli::ConvexMesh& mesh, ContactFeature start,
                            const LineProbe& before, const LineProbe& after) {
     return approach_segment(mesh, start, before, after);
   }
@@ -101,38 +131,39 @@ struct SegmentProbe {
     return first_contact_segment(mesh, trees, before, after, tolerance);
   }
 
-  /// Type of the contact and its place along the probe. Frame of the mesh.
-  [[gnu::always_inline]] static void describe(const stimuli::ConvexMesh& mesh,
+  /// Type of the contact, and where on the probe it is.
+  [[gnu::always_inline]] static void classify(const stimuli::ConvexMesh& mesh,
                                               const WalkResult& hit, const Vec3& tip, const Vec3& d,
                                               double length, LoadedContact& c) {
-    const bool edge = hit.facet.kind == MinkowskiFacet::Kind::edge;
+    const bool edge = hit.feature.kind == ContactFeature::Kind::edge;
     c.contact.type = edge ? ContactType::segment_edge : ContactType::point_polygon;
-    c.place = hit.place;
-    std::uint32_t face = hit.facet.index;
-    double rise = 0;
+    c.probe_fraction = hit.probe_fraction;
+    std::uint32_t facet = hit.feature.index;
+    double slope = 0;
     bool on_left = false;
     if (edge) {
-      // Of its two faces the one that the probe is nearer to parallel with.
-      const stimuli::Edge& e = mesh.edges()[hit.facet.index];
+      // Of its two facets the one that the probe is closer to parallel with.
+      const stimuli::Edge& e = mesh.edges()[hit.feature.index];
       const double left = glm::dot(mesh.facets()[e.left].normal, d);
       const double right = glm::dot(mesh.facets()[e.right].normal, d);
       on_left = std::abs(left) <= std::abs(right);
-      // A selection; as ?: it would become a branch, which cannot be guessed.
-      face = e.right ^ ((e.left ^ e.right) & (0u - unsigned{on_left}));
-      rise = on_left ? left : right;
+      // A selection without a branch, which could not be predicted; ?: would become one.
+      facet = e.right ^ ((e.left ^ e.right) & (0u - unsigned{on_left}));
+      slope = on_left ? left : right;
     } else {
-      rise = glm::dot(mesh.facets()[face].normal, d);
+      slope = glm::dot(mesh.facets()[facet].normal, d);
     }
-    if (std::abs(rise) > kSinEpsilon * length || length == 0) return;
-    // Equation (2): the contact point glides from one end of the touching portion to the other
-    // while the probe turns through the face, instead of jumping. Depth and normal stay those of
-    // the facet.
-    const auto [enter, leave] = edge && mesh.facets()[face].side_count == 3
-                                    ? portion_from_edge(mesh, hit, on_left, rise, d)
-                                    : touching_portion(mesh, face, tip + hit.depth * hit.normal, d);
+    if (std::abs(slope) > kSinBlendAngle * length || length == 0) return;
+    // Equation (2) of the paper, section 4(b): the contact point moves from one end of the touching
+    // portion to the other while the probe turns through the facet's plane, instead of jumping.
+    // Depth and normal stay those of the feature.
+    const auto [enter, leave] =
+        edge && mesh.facets()[facet].side_count == 3
+            ? portion_from_edge(mesh, hit, on_left, slope, d)
+            : touching_portion(mesh, facet, tip + hit.depth * hit.normal, d);
     if (!(enter <= leave)) return;
-    const double turned = small_asin(rise / length) * (0.5 / kEpsilon);  // -0.5 to 0.5
-    c.place = std::clamp((0.5 + turned) * enter + (0.5 - turned) * leave, enter, leave);
+    const double turned = small_asin(slope / length) * (0.5 / kBlendAngle);  // -0.5 to 0.5
+    c.probe_fraction = std::clamp((0.5 + turned) * enter + (0.5 - turned) * leave, enter, leave);
     c.contact.type = ContactType::segment_face;
   }
 };

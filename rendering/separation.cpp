@@ -9,13 +9,13 @@
 namespace palpate::rendering {
 namespace {
 
-/// The point of a simplex (1 to 4 corners) nearest the origin; keeps only the corners that carry
-/// it.
+/// 1 to 4 corners in the Minkowski difference of segment and mesh.
 struct Simplex {
   std::array<Vec3, 4> corners;
   int count = 0;
 };
 
+/// The point of a simplex nearest the origin, and the corners that span it.
 struct Nearest {
   Simplex carrier;
   Vec3 point;
@@ -118,8 +118,8 @@ void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
   if (!(glm::dot(direction, direction) > 0)) direction = Vec3(1, 0, 0);
   plane.valid = false;
   double best_gap = -tolerance;
-  double distance =
-      0;  // upper bound: to the nearest point of the current simplex; 0 before there is one
+  // Upper bound: to the nearest point of the current simplex; 0 before there is one.
+  double distance = 0;
   Simplex simplex;
   for (int i = 0; i < kIterations; ++i) {
     const double length = glm::length(direction);
@@ -130,8 +130,8 @@ void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
       if (glm::dot(n, vertices[near]) > glm::dot(n, vertices[support])) support = near;
     }
     support = support_vertex(mesh, n, support);
-    const Vec3& lowest = glm::dot(n, tip) <= glm::dot(n, tail) ? tip : tail;
-    const Vec3 w = lowest - mesh.vertices()[support];
+    const Vec3& lower_end = glm::dot(n, tip) <= glm::dot(n, tail) ? tip : tail;
+    const Vec3 w = lower_end - mesh.vertices()[support];
     const double gap = glm::dot(n, w);
     if (gap > best_gap) {
       best_gap = gap;
@@ -139,7 +139,7 @@ void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
     }
     if (best_gap > 0 && best_gap >= 0.5 * distance && simplex.count > 0) return;
     for (int k = 0; k < simplex.count; ++k) {
-      if (simplex.corners[k] == w) return;  // no progress: rounding has the last word
+      if (simplex.corners[k] == w) return;  // no progress beyond rounding
     }
     simplex.corners[simplex.count++] = w;
     const Nearest nearest = nearest_to_origin(simplex);

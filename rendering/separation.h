@@ -1,5 +1,6 @@
 #pragma once
-// Planes between probe and object: while one holds, nothing else need be computed for that object.
+// Separating planes between probe and object: while one is valid, nothing else need be computed for
+// that object. Mesh frame, SI units.
 
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -10,28 +11,29 @@ namespace palpate::rendering {
 
 class SupportMap;
 
-/// The object lies within dot(normal, p) <= offset; mesh frame.
+/// The object lies within dot(normal, p) <= offset.
 struct SeparatingPlane {
   Vec3 normal;        ///< unit, from the object to the probe
   double offset = 0;  ///< m
   bool valid = false;
 
-  /// Both ends, hence the whole probe, beyond the plane (and all poses between two such poses).
+  /// Both ends, hence the whole probe, are beyond the plane (and so all poses between two such).
   bool separates(const Vec3& tip, const Vec3& tail) const {
     return valid && glm::dot(normal, tip) > offset && glm::dot(normal, tail) > offset;
   }
 };
 
-/// The vertex farthest along `direction`, climbed to from `start`. Exact on a convex mesh.
+/// Support function of the mesh: the vertex farthest along `direction`, by hill climbing from
+/// `start`. Exact on a convex mesh.
 std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
                              std::uint32_t start);
 
-/// Looks for a plane between the mesh and the segment, starting from `plane.normal` (any direction
-/// where there is none) and the vertex `support`; both are updated. Gilbert, Johnson & Keerthi
-/// 1988, stopped at the first direction that shows at least half of the distance. plane.valid says
-/// whether one was found. \param tolerance  m; a probe that is no deeper than this is at the
-/// surface: the plane it touches counts, although it does not separate strictly \param map  of the
-/// mesh, or null: where to begin to climb
+/// Looks for a separating plane between the mesh and the segment, starting from `plane.normal` (any
+/// direction where there is none) and the vertex `support`; both are updated. plane.valid says
+/// whether one was found. Gilbert, Johnson & Keerthi 1988 (GJK), stopped at the first direction
+/// that shows at least half of the distance. \param tolerance  m; a probe that is no deeper than
+/// this is at the surface: the plane it touches counts, although it does not separate strictly
+/// \param map  of the mesh, or null: where hill climbing begins
 void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
                            const SupportMap* map = nullptr);

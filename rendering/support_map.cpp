@@ -9,17 +9,17 @@
 namespace palpate::rendering {
 namespace {
 
-/// The cell of coordinate c in [-1, 1].
+/// The index of the cell that coordinate c in [-1, 1] lies in.
 int cell_of(double c, int resolution) {
   return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution), 0, resolution - 1);
 }
 
 }  // namespace
 
-SupportMap::SupportMap(const stimuli::ConvexMesh& mesh, std::size_t climbed,
+SupportMap::SupportMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
                        double vertices_per_cell) {
   const std::size_t vertices = mesh.vertices().size();
-  if (vertices <= climbed) return;
+  if (vertices <= small_mesh) return;
   const double cells = static_cast<double>(vertices) / (6 * vertices_per_cell);
   resolution_ = std::max(1, static_cast<int>(std::sqrt(cells)));
   const auto side = static_cast<std::size_t>(resolution_);

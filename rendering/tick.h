@@ -1,269 +1,244 @@
 #pragma once
-// How one convex part is touched, found or followed, by either kind of probe.
+// One tick of the servo: from the pose of the virtual probe to the force on the hand. The way of a
+// force: renderer.cpp > tick.h > facet_walk.cpp > minkowski_facets.h.
+//
+// A template over what touches (the tip or the whole segment: point_probe.h, segment_probe.h) and
+// over what the scene needs (TickFeatures). World frame, SI units. Nothing here throws, allocates,
+// locks or does I/O. Included by what instantiates ticks.
 
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <span>
 
-#include "rendering/approach.h"
+#include "rendering/compound.h"
+#include "rendering/contact_detection.h"
 #include "rendering/force.h"
+#include "rendering/material_forces.h"
 #include "rendering/renderer.h"
 
 namespace palpate::rendering::tick {
 
-// Farther off (m) than any device or hand: a reading beyond it is a fault, like NaN, and sums of
+// m. Farther off than any device or hand: a reading beyond it is a fault, like NaN, and sums of
 // squares below it are exact enough to separate objects.
 constexpr double kFarthest = 1e6;
 
-inline bool plausible(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
+inline bool within_range(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
-template <class Probe>
-WalkResult walk(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
-                const Vec3& d) {
-  if constexpr (Probe::kSegment) return walk_segment(mesh, start, tip, d);
-  return walk_point(mesh, start, tip);
-}
-
-template <class Probe>
-WalkResult nearest_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d) {
-  if constexpr (Probe::kSegment) return nearest_facet_segment(mesh, tip, d);
-  return nearest_facet_point(mesh, tip);
-}
-
-template <class Probe>
-WalkResult same_facet(const stimuli::ConvexMesh& mesh, MinkowskiFacet start, const Vec3& tip,
-                      const Vec3& d) {
-  if constexpr (Probe::kSegment) return same_facet_segment(mesh, start, tip, d);
-  return same_facet_point(mesh, start, tip);
-}
-
-/// The probe in the frame of the part's mesh.
-template <class Probe>
-[[gnu::always_inline]] inline LineProbe to_local(const ScenePart& part, const LineProbe& probe) {
-  const Vec3 tip = part.local_point(probe.tip);
-  return {tip, Probe::kSegment ? part.local_point(probe.tail) : tip};
-}
-
-/// The same, translated by `shift` in the world.
-template <class Probe>
-LineProbe to_local(const ScenePart& part, const LineProbe& probe, const Vec3& shift) {
-  return to_local<Probe>(part, {probe.tip + shift, probe.tail + shift});
-}
-
-/// A facet of M near the probe to watch it from, outside of the object: the one of an earlier tick,
-/// or one under the part of the probe that is nearest to the middle. Kind none: none is known.
-template <class Probe>
-MinkowskiFacet facet_near(const ScenePart& part, MinkowskiFacet known, const LineProbe& probe) {
-  using Kind = MinkowskiFacet::Kind;
-  const stimuli::ConvexMesh& mesh = *part.mesh;
-  const SupportMap* const map = part.trees->support_map();
-  if (map == nullptr) return known;
-  const Vec3 d = probe.tail - probe.tip, to_tip = probe.tip - mesh.centre();
-  const double d2 = glm::dot(d, d);
-  const double place = d2 > 0 ? std::clamp(-glm::dot(to_tip, d) / d2, 0.0, 1.0) : 0;
-  const std::uint32_t vertex = map->near_support(to_tip + place * d);
-  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[vertex]];
-  const MinkowskiFacet under(Kind::face, false, mesh.edges()[edge].left);
-  if (known.kind == Kind::none) return under;
-  return same_facet<Probe>(mesh, known, probe.tip, d).depth <=
-                 same_facet<Probe>(mesh, under, probe.tip, d).depth
-             ? known
-             : under;
-}
-
-/// Where the probe has left the part: from now on the facet that it left by separates them.
-inline void leave(PartState& state, const WalkResult& left, const LineProbe& probe) {
-  const double lower =
-      std::min(glm::dot(left.normal, probe.tip), glm::dot(left.normal, probe.tail));
-  state.plane = {left.normal, lower + left.depth, true};
-  state.watch = left.separates;
-}
-
-template <class Probe>
-WalkResult holding_facet(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
-                         const Vec3& shift) {
-  if constexpr (Probe::kSegment) return holding_facet_segment(mesh, tip, d, shift);
-  return holding_facet_point(mesh, tip, shift);
-}
-
-/// A walk that was unsure, where no plane was found between object and probe: all facets are looked
-/// at. False when the probe touches the surface at most; else `hit` becomes the facet that holds
-/// it, of several the nearest to where the walk ended. Rare.
-template <class Probe>
-[[gnu::cold, gnu::noinline]] bool make_sure(const ScenePart& part, const Vec3& tip, const Vec3& d,
-                                            WalkResult& hit) {
-  const WalkResult nearest = nearest_facet<Probe>(*part.mesh, tip, d);
-  if (nearest.facet.kind == MinkowskiFacet::Kind::none || nearest.depth <= part.tolerance) {
-    return false;
-  }
-  const WalkResult holding = holding_facet<Probe>(*part.mesh, tip, d, hit.depth * hit.normal);
-  hit = holding.facet.kind != MinkowskiFacet::Kind::none ? holding : nearest;
-  return true;
-}
-
-/// Looks for a plane between the part and the probe, with no history; state.plane says whether
-/// there is one.
-inline void separate(const ScenePart& part, PartState& state, const LineProbe& probe) {
-  const stimuli::ConvexMesh& mesh = *part.mesh;
-  find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
-                        part.trees->support_map());
-  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
-  state.watch = {MinkowskiFacet::Kind::face, false, mesh.edges()[edge].left};
-}
-
-/// A part that was not in contact at the last tick: its contact now, of kind none where there is
-/// none. Frame of the part's mesh.
-/// \param before  the probe at the last tick; null at the first tick of all
-template <class Probe>
-WalkResult meet(const ScenePart& part, PartState& state, const LineProbe* before,
-                const LineProbe& probe) {
-  using Kind = MinkowskiFacet::Kind;
-  const stimuli::ConvexMesh& mesh = *part.mesh;
-  const Vec3 d = probe.tail - probe.tip;
-  LineProbe from = probe;
-  FirstContact first;
-  bool decided = false;
-  if (before && !state.blocked) {
-    from = to_local<Probe>(part, *before, state.yielded);
-    const MinkowskiFacet near = facet_near<Probe>(part, state.watch, from);
-    if (near.kind != Kind::none) {
-      const WalkResult was = walk<Probe>(mesh, near, from.tip, from.tail - from.tip);
-      if (was.facet.kind == Kind::none) {
-        const Approach way = Probe::approach(mesh, was.separates, from, probe);
-        if (way.end == Approach::End::separated) {
-          state.plane = way.plane;
-          state.watch = way.facet;
-          return {};
-        }
-        decided = way.end == Approach::End::entered;
-        if (decided) first = {way.facet, way.time};
-      }
-    }
-  }
-  if (!decided) {
-    separate(part, state, probe);
-    if (state.blocked || !before) {
-      state.blocked =
-          !state.plane.valid &&
-          (state.blocked || nearest_facet<Probe>(mesh, probe.tip, d).depth > part.tolerance);
-      return {};
-    }
-    if (state.plane.separates(from.tip, from.tail)) return {};  // so was the whole way between
-    first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
-  }
-  WalkResult hit;
-  if (first.facet.kind != Kind::none) hit = walk<Probe>(mesh, first.facet, probe.tip, d);
-  if (hit.unsure) [[unlikely]] {
-    if (decided) separate(part, state, probe);
-    if (state.plane.valid || !make_sure<Probe>(part, probe.tip, d, hit)) return {};
-  }
-  if (hit.facet.kind == Kind::none) {
-    if (decided) {  // in and out again
-      leave(state, hit, probe);
-      return {};
-    }
-    if (state.plane.valid) return {};
-    // Neither a plane nor a crossing: rounding hid the way in, so the nearest way out it is. Rare.
-    hit = nearest_facet<Probe>(mesh, probe.tip, d);
-    if (hit.facet.kind == Kind::none || hit.depth <= part.tolerance) return {};
-  }
-  state.facet = hit.facet;
-  state.plane.valid = false;
-  fetch_ahead(mesh, state.facet);
-  return hit;
-}
-
-/// Contact of one part, found or followed; of kind none where there is none. Frame of the part's
-/// mesh.
-/// \param before  the probe at the last tick; null at the first tick of all
+/// Contact of one part, followed from the last tick or newly detected; of kind none where there is
+/// none. Mesh frame.
+/// \param before  the probe at the last tick, world frame; null at the first tick of all
+/// \param tip     m
 /// \param d       tail - tip of the probe, m
 template <class Probe>
 [[gnu::always_inline]] inline WalkResult track(const ScenePart& part, PartState& state,
                                                const LineProbe* before, const Vec3& tip,
                                                const Vec3& d, std::uint32_t& faults) {
-  using Kind = MinkowskiFacet::Kind;
+  using Kind = ContactFeature::Kind;
   const stimuli::ConvexMesh& mesh = *part.mesh;
-  const bool held = state.facet.kind != Kind::none;
-  // In free space the plane of an earlier tick mostly still stands between them. Written so that
-  // the result is built in place: a copy of it costs as much as a dot product or five.
-  WalkResult hit = held ? walk<Probe>(mesh, state.facet, tip, d)
+  const bool in_contact = state.feature.kind != Kind::none;
+  // In free space the separating plane of an earlier tick mostly still holds. Written so that the
+  // result is built in its place: a copy costs as much as a dot product or five.
+  WalkResult hit = in_contact ? Probe::walk(mesh, state.feature, tip, d)
                    : state.plane.separates(tip, tip + d)
                        ? WalkResult()
-                       : meet<Probe>(part, state, before, {tip, tip + d});
-  if (!held) return hit;
+                       : detect_contact<Probe>(part, state, before, {tip, tip + d});
+  if (!in_contact) return hit;
   if (hit.capped) faults |= render_fault::kWalkCapped;
-  if (hit.unsure) [[unlikely]] {
-    separate(part, state, {tip, tip + d});
-    if (state.plane.valid || !make_sure<Probe>(part, tip, d, hit)) {
-      state.facet = hit.facet = {};
+  if (hit.not_converged) [[unlikely]] {
+    search_separating_plane(part, state, {tip, tip + d});
+    if (state.plane.valid || !search_all_features<Probe>(part, tip, d, hit)) {
+      state.feature = hit.feature = {};
       return hit;
     }
   }
-  const bool moved = !(hit.facet == state.facet);
-  state.facet = hit.facet;
-  if (hit.facet.kind == Kind::none) {
-    leave(state, hit, {tip, tip + d});
+  const bool moved = !(hit.feature == state.feature);
+  state.feature = hit.feature;
+  if (hit.feature.kind == Kind::none) {
+    record_separation(state, hit, {tip, tip + d});
   } else if (moved) {
-    fetch_ahead(mesh, state.facet);
+    prefetch_neighbours(mesh, state.feature);
   }
   return hit;
 }
 
-/// One tick under way: the contacts found so far.
-template <class Probe>
+/// One tick in progress: the contacts found so far.
+template <class ProbeKind>
 struct Tick {
+  using Probe = ProbeKind;
+
   const Scene& scene;
   RenderState& state;
-  const LineProbe& probe;
-  double length;  ///< m, of the probe; 0 for a point
+  const LineProbe& probe;  ///< the virtual probe
+  double length;           ///< m, of the probe; 0 for a point
   std::uint32_t faults = 0;
 
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
-  /// Follows one part. True when it is in contact; then that is filled in.
-  /// \tparam kShares  whether siblings of the part move the ideal probe by `shift` (m, world)
-  template <bool kShares>
-  [[gnu::always_inline]] bool contact(std::uint32_t index, const Vec3& shift, LoadedContact& c) {
+  WalkResult track_part(std::uint32_t index, const LineProbe* before, const LineProbe& local) {
+    return track<Probe>(scene.parts()[index], state.parts[index], before, local.tip,
+                        local.tail - local.tip, faults);
+  }
+
+  /// Contact of one part. True when it is in contact; then `c` is filled in.
+  /// \tparam kHasSiblings  whether the other parts of the same object move the ideal probe
+  /// \param correction     m, world: by how much they do
+  template <bool kHasSiblings>
+  [[gnu::always_inline]] bool contact_of(std::uint32_t index, const Vec3& correction,
+                                         LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
-    const Vec3 tip = part.local_point(kShares ? probe.tip + shift : probe.tip);
+    const Vec3 tip = part.local_point(kHasSiblings ? probe.tip + correction : probe.tip);
     const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
     const WalkResult hit = track<Probe>(part, memory, last(), tip, d, faults);
-    if constexpr (kShares) memory.yielded = shift;
-    if (memory.blocked) faults |= render_fault::kStartedInside;
-    if (hit.facet.kind == MinkowskiFacet::Kind::none) return false;
+    if constexpr (kHasSiblings) memory.sibling_correction = correction;
+    if (memory.started_inside) faults |= render_fault::kStartedInside;
+    if (hit.feature.kind == ContactFeature::Kind::none) return false;
     c.part = index;
-    Probe::describe(*part.mesh, hit, tip, d, length, c);
+    Probe::classify(*part.mesh, hit, tip, d, length, c);
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth;
-    if constexpr (kShares) c.contact.depth += glm::dot(c.contact.normal, shift);
+    if constexpr (kHasSiblings) c.contact.depth += glm::dot(c.contact.normal, correction);
     c.stiffness = part.material.stiffness;
     c.object = part.object;
     return true;
   }
 
-  /// Where a loaded contact stands: on the ideal probe.
-  /// \param shift  m, of the ideal probe, without its lag by friction. \return with it
+  /// Adds the contact of one part, if there is one, to the tick's.
+  template <bool kHasSiblings>
+  void add_contact_of(std::uint32_t index, const Vec3& correction) {
+    LoadedContact found;
+    // There is room for a contact of every part (Scene::initial_state): nothing is allocated.
+    if (contact_of<kHasSiblings>(index, correction, found)) state.contacts.push_back(found);
+  }
+
+  /// Adds the contacts of all parts that are near.
+  void add_contacts() {
+    state.contacts.clear();
+    const std::span<const std::uint32_t> near(state.near_parts);
+    for (std::size_t begin = 0, end = 0; begin < near.size(); begin = end) {
+      const int object = scene.parts()[near[begin]].object;
+      for (end = begin + 1; end < near.size() && scene.parts()[near[end]].object == object;) ++end;
+      if (end - begin == 1) {
+        state.parts[near[begin]].sibling_correction = Vec3(0);
+        add_contact_of<false>(near[begin], Vec3(0));
+      } else {
+        Compound<Tick>{*this, near.subspan(begin, end - begin)}.add_contacts();
+      }
+    }
+  }
+
+  /// Puts the point of a loaded contact on the ideal probe.
+  /// \param shift  m, from the virtual to the ideal probe, without friction \return with friction
   template <bool kFriction>
-  Vec3 place(LoadedContact& c, Vec3 shift) const {
-    if constexpr (kFriction) shift += c.lag;
+  Vec3 place_on_ideal_probe(LoadedContact& c, Vec3 shift) const {
+    if constexpr (kFriction) shift += c.tangential_offset;
     c.contact.point = probe.tip + shift;
     if constexpr (Probe::kSegment) {
-      c.contact.along = c.place * length;
-      c.contact.point += c.place * (probe.tail - probe.tip);
+      c.contact.along = c.probe_fraction * length;
+      c.contact.point += c.probe_fraction * (probe.tail - probe.tip);
     }
     c.shift = shift;
     return shift;
   }
-
-  /// Follows one part and adds its contact, if there is one, to the tick's.
-  template <bool kShares>
-  void touch(std::uint32_t index, const Vec3& shift) {
-    LoadedContact found;
-    // There is room for a contact of every part (Scene::initial_state): nothing is allocated.
-    if (contact<kShares>(index, shift, found)) state.contacts.push_back(found);
-  }
 };
+
+inline Rendering no_contact(const LineProbe& ideal, std::uint32_t faults) {
+  Rendering none;
+  none.ideal = ideal;
+  none.faults = faults;
+  return none;
+}
+
+/// The result of a tick in contact; zero force and a fault bit where it is not finite.
+/// \param shift  m, from the virtual to the ideal probe of the deepest contact
+template <class Probe>
+[[gnu::always_inline]] inline Rendering make_result(const Tick<Probe>& tick, const Loads& loads,
+                                                    const LoadedContact& deepest, const Vec3& shift,
+                                                    std::size_t contacts) {
+  const Vec3 all = loads.force + loads.torque;
+  if (!std::isfinite(all.x + all.y + all.z))
+    return no_contact(tick.probe, tick.faults | render_fault::kNonFinite);
+  return {.force = loads.force,
+          .torque = loads.torque,
+          .device1 = loads.device1,
+          .device2 = loads.device2,
+          .deepest = deepest.contact,
+          .ideal = {tick.probe.tip + shift, tick.probe.tail + shift},
+          .contacts = static_cast<int>(contacts),
+          .object = deepest.object,
+          .faults = tick.faults};
+}
+
+/// Places the ideal probe and sums the forces of all contacts.
+template <class Probe, bool kFriction>
+Rendering sum_contacts(const Tick<Probe>& tick, std::span<LoadedContact> contacts) {
+  std::size_t deepest = 0;
+  Vec3 deepest_shift(0), object_shift(0);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    // The contacts of one object stand side by side, and together they move its ideal probe.
+    const int object = contacts[i].object;
+    if (i == 0 || object != contacts[i - 1].object) {
+      object_shift = Vec3(0);
+      for (std::size_t k = i; k < contacts.size() && contacts[k].object == object; ++k)
+        object_shift += contacts[k].normal_displacement * contacts[k].contact.normal;
+    }
+    Vec3 shift = object_shift;
+    tick.state.parts[contacts[i].part].displacement =
+        contacts[i].normal_displacement * contacts[i].contact.normal;
+    shift = tick.template place_on_ideal_probe<kFriction>(contacts[i], shift);
+    if (i == 0 || contacts[i].contact.depth > contacts[deepest].contact.depth) {
+      deepest = i;
+      deepest_shift = shift;
+    }
+  }
+  const Loads loads =
+      sum_loads<Probe::kSegment, kFriction>(std::span<const LoadedContact>(contacts), tick.probe);
+  return make_result(tick, loads, contacts[deepest], deepest_shift, contacts.size());
+}
+
+/// The same for a single contact.
+template <class Probe, bool kFriction>
+[[gnu::always_inline]] inline Rendering sum_contacts(const Tick<Probe>& tick,
+                                                     LoadedContact& contact) {
+  const Vec3 shift = tick.template place_on_ideal_probe<kFriction>(
+      contact, contact.normal_displacement * contact.contact.normal);
+  const Loads loads = sum_loads<Probe::kSegment, kFriction>(
+      std::span<const LoadedContact, 1>(&contact, 1), tick.probe);
+  return make_result(tick, loads, contact, shift, 1);
+}
+
+/// One tick that does what kFeatures says and no more.
+/// \param dt  s since the last tick; only damping needs it
+template <class Probe, TickFeatures kFeatures>
+Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                      double dt) noexcept {
+  if (!within_range(probe.tip) || !within_range(probe.tail))
+    return no_contact(state.last, render_fault::kNonFinite);
+  Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
+  const auto finish = [&](std::span<LoadedContact> contacts) {
+    if constexpr (!kFeatures.plain_springs())
+      apply_material_forces<kFeatures>(scene, state, probe, contacts, dt > 0 ? 1 / dt : 0);
+    state.last = probe;
+    state.has_last = true;
+  };
+  if constexpr (kFeatures.several_parts) {
+    update_near_parts(scene, state, probe);
+    tick.add_contacts();
+    const std::span<LoadedContact> contacts(state.contacts);
+    load(contacts);
+    finish(contacts);
+    if (!contacts.empty()) return sum_contacts<Probe, kFeatures.friction>(tick, contacts);
+  } else {
+    LoadedContact contact;
+    if (tick.template contact_of<false>(0, Vec3(0), contact)) {
+      const std::span<LoadedContact, 1> contacts(&contact, 1);
+      load(contacts);
+      finish(contacts);
+      return sum_contacts<Probe, kFeatures.friction>(tick, contact);
+    }
+    finish({});
+  }
+  return no_contact(probe, tick.faults);
+}
 
 }  // namespace palpate::rendering::tick

@@ -15,12 +15,12 @@
 namespace palpate::rendering {
 namespace {
 
-using Kind = MinkowskiFacet::Kind;
+using Kind = ContactFeature::Kind;
 
 Answer answer_of(const WalkResult& hit, const LineProbe& probe) {
-  if (hit.facet.kind == Kind::none) return {};
+  if (hit.feature.kind == Kind::none) return {};
   return {true, hit.depth, hit.normal,
-          probe.tip + hit.place * (probe.tail - probe.tip) + hit.depth * hit.normal};
+          probe.tip + hit.probe_fraction * (probe.tail - probe.tip) + hit.depth * hit.normal};
 }
 
 /// The product: a whole tick of a renderer, force and torque included.
@@ -47,7 +47,7 @@ class WholeTick final : public Method {
 
 struct ProductWalk {
   explicit ProductWalk(const stimuli::ConvexMesh& m) : mesh(m) {}
-  WalkResult walk(MinkowskiFacet start, const Vec3& tip, const Vec3& d) const {
+  WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
     return d == Vec3() ? walk_point(mesh, start, tip) : walk_segment(mesh, start, tip, d);
   }
   const stimuli::ConvexMesh& mesh;
@@ -63,20 +63,20 @@ class WarmWalk final : public Method {
   Answer tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
     WalkResult hit;
-    if (facet_.kind != Kind::none) {
-      hit = walk_.walk(facet_, probe.tip, d);
+    if (feature_.kind != Kind::none) {
+      hit = walk_.walk(feature_, probe.tip, d);
     } else if (has_last_) {
-      const MinkowskiFacet first =
-          d == Vec3() ? first_contact_point(mesh_, trees_, last_.tip, probe.tip, tolerance_).facet
-                      : first_contact_segment(mesh_, trees_, last_, probe, tolerance_).facet;
+      const ContactFeature first =
+          d == Vec3() ? first_contact_point(mesh_, trees_, last_.tip, probe.tip, tolerance_).feature
+                      : first_contact_segment(mesh_, trees_, last_, probe, tolerance_).feature;
       if (first.kind != Kind::none) hit = walk_.walk(first, probe.tip, d);
-      if (hit.facet.kind == Kind::none) {
+      if (hit.feature.kind == Kind::none) {
         // Lost to rounding, maybe: then there is no plane between them.
         find_separating_plane(mesh_, probe.tip, probe.tail, tolerance_, plane_, support_);
-        if (!plane_.valid) hit = nearest_facet_segment(mesh_, probe.tip, d);
+        if (!plane_.valid) hit = nearest_feature_segment(mesh_, probe.tip, d);
       }
     }
-    facet_ = hit.facet;
+    feature_ = hit.feature;
     last_ = probe;
     has_last_ = true;
     return answer_of(hit, probe);
@@ -87,7 +87,7 @@ class WarmWalk final : public Method {
   Walk walk_;
   ContactTrees trees_;
   double tolerance_;
-  MinkowskiFacet facet_;
+  ContactFeature feature_;
   LineProbe last_;
   bool has_last_ = false;
   SeparatingPlane plane_;
@@ -99,7 +99,7 @@ class ColdWalk final : public Method {
  public:
   ColdWalk(const stimuli::ConvexMesh& mesh, bool) : walk_(mesh) {}
   Answer tick(const LineProbe& probe) override {
-    return answer_of(walk_.walk({Kind::face, false, 0}, probe.tip, probe.tail - probe.tip), probe);
+    return answer_of(walk_.walk({Kind::facet, false, 0}, probe.tip, probe.tail - probe.tip), probe);
   }
 
  private:
@@ -111,8 +111,8 @@ class FullScan final : public Method {
   FullScan(const stimuli::ConvexMesh& mesh, bool) : mesh_(mesh) {}
   Answer tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
-    return answer_of(d == Vec3() ? nearest_facet_point(mesh_, probe.tip)
-                                 : nearest_facet_segment(mesh_, probe.tip, d),
+    return answer_of(d == Vec3() ? nearest_feature_point(mesh_, probe.tip)
+                                 : nearest_feature_segment(mesh_, probe.tip, d),
                      probe);
   }
 

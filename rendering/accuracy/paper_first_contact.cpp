@@ -164,8 +164,8 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
       break;
     }
     const LineProbe before = way.at(*entry - 1), after = way.at(*entry);
-    if (first_contact_segment(mesh, trees, before, after, tolerance).facet.kind ==
-        MinkowskiFacet::Kind::none) {
+    if (first_contact_segment(mesh, trees, before, after, tolerance).feature.kind ==
+        ContactFeature::Kind::none) {
       ++loss.exact_missed;
     }
     if (paper(*entry)) continue;

@@ -41,7 +41,7 @@ class PlainWalk {
   }
 
   /// As walk_segment; the answer is widened to double.
-  WalkResult walk(MinkowskiFacet start, const Vec3& tip, const Vec3& d) const {
+  WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
     const Vector t(tip), v(d);
     // As many last places as the walk in double precision allows for.
     const Real gain = Real(4.5) * std::numeric_limits<Real>::epsilon() * size_;
@@ -54,13 +54,13 @@ class PlainWalk {
     WalkResult result;
     result.normal = Vec3(at.normal);
     result.depth = static_cast<double>(at.depth);
-    result.place = std::clamp(static_cast<double>(at.place), 0.0, 1.0);
-    if (at.depth >= 0) result.facet = at.facet;
+    result.probe_fraction = std::clamp(static_cast<double>(at.place), 0.0, 1.0);
+    if (at.depth >= 0) result.feature = at.feature;
     return result;
   }
 
  private:
-  using Kind = MinkowskiFacet::Kind;
+  using Kind = ContactFeature::Kind;
   struct PlainFacet {
     Vector normal;
     Real offset;
@@ -72,7 +72,7 @@ class PlainWalk {
     std::uint32_t edge, across, corner;
   };
   struct At {
-    MinkowskiFacet facet;
+    ContactFeature feature;
     Vector normal;
     Real depth = 0, place = 0, along = 0;
   };
@@ -81,7 +81,7 @@ class PlainWalk {
     const PlainFacet& f = facets_[index];
     const Real slope = glm::dot(f.normal, d), height = f.offset - glm::dot(f.normal, tip);
     At at;
-    at.facet = {Kind::face, false, index};
+    at.feature = {Kind::facet, false, index};
     at.normal = f.normal;
     at.place = slope >= 0 ? Real(0) : Real(1);
     at.depth = slope >= 0 ? height : height - slope;
@@ -101,7 +101,7 @@ class PlainWalk {
     const Real c2 = glm::dot(c, c);
     constexpr Real kParallel = sizeof(Real) == 8 ? Real(1e-9) : Real(1e-5);
     if (c2 <= kParallel * kParallel * glm::dot(line, line) * glm::dot(d, d)) return false;
-    at.facet = {Kind::edge, left, index};
+    at.feature = {Kind::edge, left, index};
     at.normal = (left ? c : -c) / std::sqrt(c2);
     at.depth = -glm::dot(at.normal, w);
     at.place = glm::dot(glm::cross(w, line), c) / c2;
@@ -109,7 +109,7 @@ class PlainWalk {
     return true;
   }
 
-  At resume(MinkowskiFacet start, const Vector& tip, const Vector& d) const {
+  At resume(ContactFeature start, const Vector& tip, const Vector& d) const {
     if (start.kind != Kind::edge) return face(start.index, tip, d);
     At at;
     if (edge(start.index, tip, d, at)) return at;
@@ -148,23 +148,23 @@ class PlainWalk {
   }
 
   bool step(const At& at, const Vector& tip, const Vector& d, At& next) const {
-    if (at.facet.kind == Kind::face) {
-      const PlainFacet& f = facets_[at.facet.index];
+    if (at.feature.kind == Kind::facet) {
+      const PlainFacet& f = facets_[at.feature.index];
       const PlainSide* side = beyond(f, tip + at.place * d + at.depth * at.normal);
       if (!side) return false;
       if (!edge(side->edge, tip, d, next)) next = face(side->across, tip, d);
       return true;
     }
-    const stimuli::Edge& e = edges_[at.facet.index];
+    const stimuli::Edge& e = edges_[at.feature.index];
     if (at.place < 0 || at.place > 1) {
-      next = face((at.place < 0) == at.facet.left_ahead ? e.left : e.right, tip, d);
+      next = face((at.place < 0) == at.feature.left_ahead ? e.left : e.right, tip, d);
       return true;
     }
     if (at.along >= 0 && at.along <= 1) return false;
     const std::uint32_t vertex = at.along > 1 ? e.v1 : e.v0;
     for (std::uint32_t i = fan_first_[vertex]; i < fan_first_[vertex + 1]; ++i) {
       const std::uint32_t other = fan_edges_[i];
-      if (other == at.facet.index) continue;
+      if (other == at.feature.index) continue;
       if (ahead(edges_[other].left, d) == ahead(edges_[other].right, d)) continue;
       if (!edge(other, tip, d, next)) next = face(edges_[other].left, tip, d);
       return true;

@@ -49,19 +49,20 @@ void add_structures(const Scene& scene, const Renderer& renderer, std::vector<St
       structure("tree of polygons",
                 tally(
                     scene, [](const ContactTrees& t) { return t.polygons() != nullptr; }, facets),
-                "facets to scan", ContactTrees::kScan));
+                "facets to scan", ContactTrees::kScanLimit));
   const MeshTally with_edges = tally(
       scene, [](const ContactTrees& t) { return t.edges() != nullptr; }, edges);
   if (with_edges.with == 0 && !renderer.side_contact()) {
     stages.push_back({"tree of edges", StageTime::once, false, "a point meets no edges"});
   } else {
-    stages.push_back(structure("tree of edges", with_edges, "edges to scan", ContactTrees::kScan));
+    stages.push_back(
+        structure("tree of edges", with_edges, "edges to scan", ContactTrees::kScanLimit));
   }
   stages.push_back(structure(
       "support map",
       tally(
           scene, [](const ContactTrees& t) { return t.support_map() != nullptr; }, vertices),
-      "vertices to climb", SupportMap::kClimbed));
+      "vertices to climb", SupportMap::kSmallMesh));
 }
 
 /// Parts that are out of reach of a point anywhere on the first part's bounding sphere.
@@ -85,7 +86,7 @@ bool has_compound(const Scene& scene) {
 
 void add_parts(const Scene& scene, std::vector<Stage>& stages) {
   const std::size_t parts = scene.parts().size();
-  const bool several = scene.needs().several_parts;
+  const bool several = scene.features().several_parts;
   stages.push_back({"several parts", StageTime::tick, several,
                     several ? "which of them are in reach, a list of contacts, sums over it"
                             : "one part is always looked at; it has one contact at most"});
@@ -96,13 +97,13 @@ void add_parts(const Scene& scene, std::vector<Stage>& stages) {
                                    " while the first is touched"});
 }
 
-void add_materials(const Needs& needs, std::vector<Stage>& stages) {
+void add_materials(const TickFeatures& features, std::vector<Stage>& stages) {
   const auto add = [&](const char* name, bool runs, const char* what) {
     stages.push_back({name, StageTime::contact, runs, runs ? what : "no material asks for it"});
   };
-  add("layers", needs.layers, "the sum over the layers that the probe is in");
-  add("damping", needs.damping, "against the normal speed, never pulling");
-  add("friction", needs.friction, "Coulomb's, through the ideal probe's lag along the surface");
+  add("layers", features.layers, "the sum over the layers that the probe is in");
+  add("damping", features.damping, "against the normal speed, never pulling");
+  add("friction", features.friction, "Coulomb's, through the ideal probe's lag along the surface");
 }
 
 }  // namespace
@@ -146,7 +147,7 @@ std::vector<Stage> explain(const Scene& scene, const Renderer& renderer) {
                     compound ? "they share the shortest way out, so that seams are not felt"
                              : "no object has several"});
   stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
-  add_materials(scene.needs(), stages);
+  add_materials(scene.features(), stages);
   stages.push_back({"torque and second device", StageTime::contact, sides,
                     sides ? "the moment about the tip; equations (1), (4) and (5)"
                           : "a force at the tip has no lever"});

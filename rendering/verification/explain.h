@@ -25,7 +25,7 @@ struct Stage {
 };
 
 /// All stages there are, in the order in which they run. A stage runs if and only if the renderer's
-/// tick over this scene contains it: Scene::needs(), the trees that were built, the renderer.
+/// tick over this scene contains it: Scene::features(), the trees that were built, the renderer.
 std::vector<Stage> explain(const Scene& scene, const Renderer& renderer);
 
 /// A stage of explain(), or a whole tick, to be timed in isolation over recorded ticks.

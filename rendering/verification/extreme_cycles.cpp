@@ -75,13 +75,13 @@ class Track {
     Lap lap;
     const double step = 2 * std::numbers::pi / ticks, power_before = power_;
     const double friction_before = friction_energy();
-    const MinkowskiFacet first = state_.parts[0].facet;
-    lap.one_facet = first.kind != MinkowskiFacet::Kind::none;
+    const ContactFeature first = state_.parts[0].feature;
+    lap.one_facet = first.kind != ContactFeature::Kind::none;
     for (int i = 1; i <= ticks; ++i) {
       const LineProbe probe = cycle.at(i * step), rate = cycle.rate(i * step);
-      const MinkowskiFacet last = state_.parts[0].facet;
+      const ContactFeature last = state_.parts[0].feature;
       const Rendering r = tick(probe);
-      const MinkowskiFacet facet = state_.parts[0].facet;
+      const ContactFeature facet = state_.parts[0].feature;
       power_ = glm::dot(r.device1, rate.tip) + glm::dot(r.device2, rate.tail);
       lap.work += power_ * step;
       const bool blends = r.deepest.type == ContactType::segment_face;
@@ -90,7 +90,7 @@ class Track {
         lap.jumps += glm::length(r.force) * (glm::length(rate.tip) + glm::length(rate.tail)) * step;
       }
       lap.one_facet &= facet.kind == first.kind && facet.index == first.index;
-      lap.upwards &= facet.kind != MinkowskiFacet::Kind::none && !(r.deepest.normal.z < 0.99);
+      lap.upwards &= facet.kind != ContactFeature::Kind::none && !(r.deepest.normal.z < 0.99);
       lap.stored = std::max(lap.stored, stiffness_ * r.deepest.depth * r.deepest.depth / 2);
       lap.force = std::max(lap.force, glm::length(r.force));
       ++lap.ticks;
@@ -105,8 +105,8 @@ class Track {
  private:
   /// Of the spring that holds a sticking contact, J.
   double friction_energy() const {
-    const Vec3& lag = state_.parts[0].grip.lag;
-    return stiffness_ * glm::dot(lag, lag) / 2;
+    const Vec3& offset = state_.parts[0].friction.tangential_offset;
+    return stiffness_ * glm::dot(offset, offset) / 2;
   }
 
   const Renderer& renderer_;

@@ -4,15 +4,15 @@
 #include <memory>
 
 #include "rendering/point_probe.h"
-#include "rendering/render.h"
 #include "rendering/segment_probe.h"
+#include "rendering/tick.h"
 #include "rendering/verification/explain.h"
 #include "rendering/verification/stroking_hand.h"
 
 namespace palpate::rendering {
 namespace {
 
-using Kind = MinkowskiFacet::Kind;
+using Kind = ContactFeature::Kind;
 
 constexpr int kApproach = 2000;  // ticks until the hand has arrived
 constexpr int kTicks = 1000;     // recorded
@@ -42,17 +42,17 @@ void note(const Scene& scene, const RenderState& state, const PartState& before,
   Moment moment;
   moment.probe = probe;
   moment.last = last;
-  moment.local = tick::to_local<Probe>(part, probe, Vec3(0));
+  moment.local = Probe::to_local(part, probe);
   moment.before = before;
-  if (before.facet.kind == Kind::none) {
-    (after.facet.kind == Kind::none ? out.free : out.entry).push_back(moment);
+  if (before.feature.kind == Kind::none) {
+    (after.feature.kind == Kind::none ? out.free : out.entry).push_back(moment);
     return;
   }
   const Vec3 d = moment.local.tail - moment.local.tip;
-  moment.hit = tick::walk<Probe>(*part.mesh, before.facet, moment.local.tip, d);
-  if (moment.hit.facet.kind == Kind::none) return;
+  moment.hit = Probe::walk(*part.mesh, before.feature, moment.local.tip, d);
+  if (moment.hit.feature.kind == Kind::none) return;
   LoadedContact& c = moment.loaded;
-  Probe::describe(*part.mesh, moment.hit, moment.local.tip, d, glm::length(d), c);
+  Probe::classify(*part.mesh, moment.hit, moment.local.tip, d, glm::length(d), c);
   c.contact.normal = part.world_vector(moment.hit.normal);
   c.contact.depth = moment.hit.depth;
   c.stiffness = part.material.stiffness;
@@ -107,12 +107,12 @@ class Stages {
     add_whole(kTickInContact, touching_, true);
     add_whole(kTickInFreeSpace, hovering_, false);
     add("pose check", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
-      return tick::plausible(m.probe.tip) && tick::plausible(m.probe.tail) ? 1.0 : 0.0;
+      return tick::within_range(m.probe.tip) && tick::within_range(m.probe.tail) ? 1.0 : 0.0;
     });
-    if (scene_.needs().several_parts) add_survey();
+    if (scene_.features().several_parts) add_survey();
     add("frame of the part", touching_, &Recording::contact,
         [](const ScenePart& part, const Moment& m) {
-          const LineProbe local = tick::to_local<Probe>(part, m.probe, Vec3(0));
+          const LineProbe local = Probe::to_local(part, m.probe);
           return sum(local.tip) + sum(local.tail);
         });
     add("separating plane", hovering_, &Recording::free, [](const ScenePart&, const Moment& m) {
@@ -120,17 +120,16 @@ class Stages {
     });
     add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const Moment& m) {
       PartState state = m.before;
-      return tick::meet<Probe>(part, state, &m.last, m.local).depth;
+      return tick::detect_contact<Probe>(part, state, &m.last, m.local).depth;
     });
     add("neighbourhood watch", touching_, &Recording::contact,
         [](const ScenePart& part, const Moment& m) {
-          return tick::walk<Probe>(*part.mesh, m.before.facet, m.local.tip,
-                                   m.local.tail - m.local.tip)
+          return Probe::walk(*part.mesh, m.before.feature, m.local.tip, m.local.tail - m.local.tip)
               .depth;
         });
     if constexpr (Probe::kSegment) add_sides();
     add("spring", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
-      return sum(m.loaded.stiffness * m.loaded.share * m.loaded.contact.normal);
+      return sum(m.loaded.stiffness * m.loaded.normal_displacement * m.loaded.contact.normal);
     });
     add_materials();
     return std::move(made_);
@@ -183,7 +182,7 @@ class Stages {
                      [scene = &scene_, state, recording = touching_] {
                        double total = 0;
                        for (const LineProbe& pose : recording->poses) {
-                         survey(*scene, *state, pose);
+                         update_near_parts(*scene, *state, pose);
                          total += static_cast<double>(state->near_parts.size());
                        }
                        return total;
@@ -194,19 +193,20 @@ class Stages {
     add("side contact", touching_, &Recording::contact, [](const ScenePart& part, const Moment& m) {
       LoadedContact c;
       const Vec3 d = m.local.tail - m.local.tip;
-      Probe::describe(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
-      return c.place;
+      Probe::classify(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
+      return c.probe_fraction;
     });
     add("torque and second device", touching_, &Recording::contact,
         [](const ScenePart&, const Moment& m) {
           const Vec3 force = m.loaded.force * m.loaded.contact.normal;
-          const Vec3 torque = glm::cross(m.loaded.place * (m.probe.tail - m.probe.tip), force);
-          return sum(torque) + sum(m.loaded.place * force);
+          const Vec3 torque =
+              glm::cross(m.loaded.probe_fraction * (m.probe.tail - m.probe.tip), force);
+          return sum(torque) + sum(m.loaded.probe_fraction * force);
         });
   }
 
   /// One material's share of the tick, by the tick's own code.
-  template <Needs kNeeds>
+  template <TickFeatures kFeatures>
   void add_material(const char* name) {
     const auto state = std::make_shared<RenderState>();
     made_.push_back({name, touching_->contact.size(),
@@ -216,18 +216,19 @@ class Stages {
                        for (const Moment& moment : recording->contact) {
                          LoadedContact contact = moment.loaded;
                          state->last = moment.last;
-                         tick::feel<kNeeds>(*scene, *state, moment.probe,
-                                            std::span<LoadedContact, 1>(&contact, 1), 1000);
-                         total += contact.force + contact.lag.x;
+                         tick::apply_material_forces<kFeatures>(
+                             *scene, *state, moment.probe, std::span<LoadedContact, 1>(&contact, 1),
+                             1000);
+                         total += contact.force + contact.tangential_offset.x;
                        }
                        return total;
                      }});
   }
 
   void add_materials() {
-    if (scene_.needs().layers) add_material<Needs{.layers = true}>("layers");
-    if (scene_.needs().damping) add_material<Needs{.damping = true}>("damping");
-    if (scene_.needs().friction) add_material<Needs{.friction = true}>("friction");
+    if (scene_.features().layers) add_material<TickFeatures{.layers = true}>("layers");
+    if (scene_.features().damping) add_material<TickFeatures{.damping = true}>("damping");
+    if (scene_.features().friction) add_material<TickFeatures{.friction = true}>("friction");
   }
 
   const Scene& scene_;

@@ -185,7 +185,7 @@ class Walk {
         renderer_.side_contact()
             ? first_contact_segment(*mesh_, *part.trees, last_, felt, part.tolerance)
             : first_contact_point(*mesh_, *part.trees, last_.tip, felt.tip, part.tolerance);
-    counts_.fallbacks += first.facet.kind == MinkowskiFacet::Kind::none;
+    counts_.fallbacks += first.feature.kind == ContactFeature::Kind::none;
   }
 
   /// How far the probe has turned in the tick, rad.

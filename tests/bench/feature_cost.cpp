@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "rendering/point_probe.h"
-#include "rendering/render.h"
 #include "rendering/segment_probe.h"
+#include "rendering/tick.h"
 #include "rendering/verification/stroking_hand.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
@@ -42,30 +42,32 @@ class Only final : public rendering::Renderer {
   Tick tick_;
 };
 
-/// Two parts or more that are all in reach all the time: no survey.
+/// Two parts or more that are all in reach all the time: no broad phase.
 template <class Probe>
-rendering::Rendering without_survey(const rendering::Scene& scene, rendering::RenderState& state,
-                                    const rendering::LineProbe& probe, double) noexcept {
+rendering::Rendering without_broad_phase(const rendering::Scene& scene,
+                                         rendering::RenderState& state,
+                                         const rendering::LineProbe& probe, double) noexcept {
   rendering::tick::Tick<Probe> under_way{scene, state, probe,
                                          Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
-  if (!rendering::tick::plausible(probe.tip) || !rendering::tick::plausible(probe.tail))
-    return rendering::tick::nothing(state.last, rendering::render_fault::kNonFinite);
-  rendering::tick::touch_listed(under_way);
+  if (!rendering::tick::within_range(probe.tip) || !rendering::tick::within_range(probe.tail))
+    return rendering::tick::no_contact(state.last, rendering::render_fault::kNonFinite);
+  under_way.add_contacts();
   const std::span<rendering::LoadedContact> contacts(state.contacts);
   rendering::load(contacts);
   state.last = probe;
   state.has_last = true;
-  if (!contacts.empty()) return rendering::tick::add_up<Probe, false>(under_way, contacts);
-  return rendering::tick::nothing(probe, under_way.faults);
+  if (!contacts.empty()) return rendering::tick::sum_contacts<Probe, false>(under_way, contacts);
+  return rendering::tick::no_contact(probe, under_way.faults);
 }
 
 /// A scene as a trial would make it.
 struct World {
   stimuli::PolygonSoup shape = stimuli::icosphere(0.03, 0);
   stimuli::Material material;
-  int near = 1;                                          ///< objects side by side, all in reach
-  int far = 0;                                           ///< objects that are never in reach
-  std::size_t scanned = rendering::ContactTrees::kScan;  ///< so many facets or edges get no tree
+  int near = 1;  ///< objects side by side, all in reach
+  int far = 0;   ///< objects that are never in reach
+  std::size_t scanned =
+      rendering::ContactTrees::kScanLimit;  ///< so many facets or edges get no tree
   bool side_contact = true;
 
   rendering::Scene build() const {
@@ -143,15 +145,15 @@ std::vector<Case> cases() {
     add("plain", plain);
     add("plain-least", plain, pick(&least_tick<SegmentProbe>, &least_tick<PointProbe>));
     add("plain-alone", plain,
-        pick(&rendering::tick::render<SegmentProbe, rendering::Needs{}>,
-             &rendering::tick::render<PointProbe, rendering::Needs{}>));
+        pick(&rendering::tick::render_tick<SegmentProbe, rendering::TickFeatures{}>,
+             &rendering::tick::render_tick<PointProbe, rendering::TickFeatures{}>));
     if (ray) add("torqueless", plain, &least_tick<SegmentProbe, false>);
     add("large", large);
     add("large-bare", bare);
     add("forced-trees", forced);
     add("near", near);
-    add("near-without-survey", near,
-        pick(&without_survey<SegmentProbe>, &without_survey<PointProbe>));
+    add("near-without-broad-phase", near,
+        pick(&without_broad_phase<SegmentProbe>, &without_broad_phase<PointProbe>));
     add("far", far);
     World damped = plain, rough = plain, layered = plain;
     damped.material = with(2, 0, false);
@@ -161,7 +163,7 @@ std::vector<Case> cases() {
     add("friction", rough);
     add("layers", layered);
     // All but one, and a tick in which the one is not even compiled.
-    constexpr rendering::Needs kNoDamping{.friction = true, .layers = true},
+    constexpr rendering::TickFeatures kNoDamping{.friction = true, .layers = true},
         kNoFriction{.damping = true, .layers = true}, kNoLayers{.damping = true, .friction = true};
     World no_damping = plain, no_friction = plain, no_layers = plain;
     no_damping.material = with(0, 0.3, true);
@@ -169,16 +171,16 @@ std::vector<Case> cases() {
     no_layers.material = with(2, 0.3, false);
     add("all-but-damping", no_damping);
     add("all-but-damping-least", no_damping,
-        pick(&rendering::tick::render<SegmentProbe, kNoDamping>,
-             &rendering::tick::render<PointProbe, kNoDamping>));
+        pick(&rendering::tick::render_tick<SegmentProbe, kNoDamping>,
+             &rendering::tick::render_tick<PointProbe, kNoDamping>));
     add("all-but-friction", no_friction);
     add("all-but-friction-least", no_friction,
-        pick(&rendering::tick::render<SegmentProbe, kNoFriction>,
-             &rendering::tick::render<PointProbe, kNoFriction>));
+        pick(&rendering::tick::render_tick<SegmentProbe, kNoFriction>,
+             &rendering::tick::render_tick<PointProbe, kNoFriction>));
     add("all-but-layers", no_layers);
     add("all-but-layers-least", no_layers,
-        pick(&rendering::tick::render<SegmentProbe, kNoLayers>,
-             &rendering::tick::render<PointProbe, kNoLayers>));
+        pick(&rendering::tick::render_tick<SegmentProbe, kNoLayers>,
+             &rendering::tick::render_tick<PointProbe, kNoLayers>));
   }
   return all;
 }
@@ -190,9 +192,9 @@ double run(const Case& chosen, std::size_t ticks) {
   const Only only(chosen.pipeline);
   const rendering::Renderer& renderer = chosen.pipeline ? only : shipped(chosen.ray);
   rendering::RenderState state = scene.initial_state();
-  // The trial begins near the first two objects; not all pipelines take a survey later.
+  // The trial begins near the first two objects; not all pipelines have a broad phase.
   const rendering::LineProbe between{{0.03, 0, 0}, {0.03, 0, 0}};
-  if (scene.needs().several_parts) rendering::survey(scene, state, between);
+  if (scene.features().several_parts) rendering::update_near_parts(scene, state, between);
   for (std::size_t i = 0; i < kApproach; ++i) renderer.tick(scene, state, poses[i], 1e-3);
   double total = 0;
   for (std::size_t i = kApproach; i < poses.size(); ++i)

@@ -8,11 +8,11 @@ where it is used.
 The pipelines that lack features (tests/bench/least_tick.h, unlogged_trial.h and instantiations of
 the tick in feature_cost.cpp):
   alone           the general tick, compiled for one convex part that is a plain spring, and no other
-  least           the same by hand: one convex part, a plain spring, a small mesh: no trees, survey, list of contacts,
+  least           the same by hand: one convex part, a plain spring, a small mesh: no trees, broad phase, list of contacts,
                   sums, materials; for the point no sides, no torque, no second device. The
                   leaner of these two is the yardstick
   without X       the general tick, compiled without X, over a scene that uses all other materials
-  without survey  all parts are always near
+  no broad phase  all parts are always near
   unlogged        a trial's loop in a session that cannot keep samples
 The path is the same in both: a hand over an icosphere of 20 triangles, a third of the time off it.
 
@@ -44,7 +44,7 @@ for probe in ("point", "ray"):
         ROWS.append((material, f"{probe}-all-but-{material}", [f"{probe}-all-but-{material}-least"],
                      f"{probe}-{material}", f"{probe}-plain"))
     ROWS.append(("several objects", f"{probe}-plain", [f"{probe}-plain-least", f"{probe}-plain-alone"], f"{probe}-near", f"{probe}-plain"))
-    ROWS.append(("far objects (1,000)", f"{probe}-near", [f"{probe}-near-without-survey"], f"{probe}-far",
+    ROWS.append(("far objects (1,000)", f"{probe}-near", [f"{probe}-near-without-broad-phase"], f"{probe}-far",
                  f"{probe}-near"))
 ROWS.append(("sample log", "session-off", ["session-least"], "session-on", "session-off"))
 

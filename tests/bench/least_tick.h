@@ -12,13 +12,6 @@
 
 namespace palpate::bench {
 
-template <class Probe>
-[[gnu::always_inline]] inline rendering::LineProbe in_frame(const rendering::ScenePart& part,
-                                                            const rendering::LineProbe& probe) {
-  const Vec3 tip = part.local_point(probe.tip);
-  return {tip, Probe::kSegment ? part.local_point(probe.tail) : tip};
-}
-
 /// A part without trees and map that was not in contact at the last tick: its contact now.
 /// \return nothing where the approach alone cannot tell
 template <class Probe>
@@ -26,29 +19,28 @@ std::optional<rendering::WalkResult> approached(const rendering::ScenePart& part
                                                 rendering::PartState& memory,
                                                 const rendering::LineProbe& from,
                                                 const rendering::LineProbe& to) {
-  using Kind = rendering::MinkowskiFacet::Kind;
+  using Kind = rendering::ContactFeature::Kind;
   const stimuli::ConvexMesh& mesh = *part.mesh;
-  if (memory.blocked || memory.watch.kind == Kind::none) return {};
+  if (memory.started_inside || memory.nearby.kind == Kind::none) return {};
   const rendering::WalkResult was =
-      rendering::tick::walk<Probe>(mesh, memory.watch, from.tip, from.tail - from.tip);
-  if (was.facet.kind != Kind::none) return {};
-  const rendering::Approach way = Probe::approach(mesh, was.separates, from, to);
+      Probe::walk(mesh, memory.nearby, from.tip, from.tail - from.tip);
+  if (was.feature.kind != Kind::none) return {};
+  const rendering::Approach way = Probe::approach(mesh, was.separating_feature, from, to);
   if (way.end == rendering::Approach::End::separated) {
     memory.plane = way.plane;
-    memory.watch = way.facet;
+    memory.nearby = way.feature;
     return rendering::WalkResult();
   }
   if (way.end != rendering::Approach::End::entered) return {};
-  const rendering::WalkResult hit =
-      rendering::tick::walk<Probe>(mesh, way.facet, to.tip, to.tail - to.tip);
-  if (hit.unsure) return {};
-  if (hit.facet.kind == Kind::none) {
-    rendering::tick::leave(memory, hit, to);
+  const rendering::WalkResult hit = Probe::walk(mesh, way.feature, to.tip, to.tail - to.tip);
+  if (hit.not_converged) return {};
+  if (hit.feature.kind == Kind::none) {
+    rendering::tick::record_separation(memory, hit, to);
     return hit;
   }
-  memory.facet = hit.facet;
+  memory.feature = hit.feature;
   memory.plane.valid = false;
-  rendering::fetch_ahead(mesh, memory.facet);
+  rendering::prefetch_neighbours(mesh, memory.feature);
   return hit;
 }
 
@@ -65,22 +57,22 @@ rendering::WalkResult met(const rendering::ScenePart& part, rendering::PartState
                           const rendering::RenderState& state, const rendering::LineProbe& local) {
   if (memory.plane.separates(local.tip, local.tail)) return {};
   if (state.has_last) {
-    const auto hit = approached<Probe>(part, memory, in_frame<Probe>(part, state.last), local);
+    const auto hit = approached<Probe>(part, memory, Probe::to_local(part, state.last), local);
     if (hit) return *hit;
   }
-  return rendering::tick::meet<Probe>(part, memory, state.has_last ? &state.last : nullptr, local);
+  return rendering::tick::detect_contact<Probe>(part, memory,
+                                                state.has_last ? &state.last : nullptr, local);
 }
 
 /// One convex part of few facets that is a plain spring, and nothing else in the world: no trees,
-/// no survey, no list of contacts, no sums, no materials. The point has no torque and no second
-/// device.
-/// \tparam kTorque  whether there are torque and a second device
+/// no broad phase, no list of contacts, no sums, no materials. The point has no torque and no
+/// second device. \tparam kTorque  whether there are torque and a second device
 template <class Probe, bool kTorque = Probe::kSegment>
 [[gnu::flatten]] rendering::Rendering least_tick(const rendering::Scene& scene,
                                                  rendering::RenderState& state,
                                                  const rendering::LineProbe& probe,
                                                  double) noexcept {
-  if (!rendering::tick::plausible(probe.tip) || !rendering::tick::plausible(probe.tail))
+  if (!rendering::tick::within_range(probe.tip) || !rendering::tick::within_range(probe.tail))
     return nothing(state.last, rendering::render_fault::kNonFinite);
   const rendering::ScenePart& part = scene.parts()[0];
   rendering::PartState& memory = state.parts[0];
@@ -88,26 +80,27 @@ template <class Probe, bool kTorque = Probe::kSegment>
   const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
   std::uint32_t faults = 0;
   const rendering::WalkResult hit =
-      memory.facet.kind != rendering::MinkowskiFacet::Kind::none
+      memory.feature.kind != rendering::ContactFeature::Kind::none
           ? rendering::tick::track<Probe>(part, memory, nullptr, tip, d, faults)
           : met<Probe>(part, memory, state, {tip, tip + d});
   state.last = probe;
   state.has_last = true;
-  if (hit.facet.kind == rendering::MinkowskiFacet::Kind::none)
-    return nothing(probe, faults | (memory.blocked ? rendering::render_fault::kStartedInside : 0));
+  if (hit.feature.kind == rendering::ContactFeature::Kind::none)
+    return nothing(probe,
+                   faults | (memory.started_inside ? rendering::render_fault::kStartedInside : 0));
   rendering::LoadedContact c;
   const double length = Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0;
-  Probe::describe(*part.mesh, hit, tip, d, length, c);
+  Probe::classify(*part.mesh, hit, tip, d, length, c);
   const Vec3 normal = part.world_vector(hit.normal);
   const Vec3 force = part.material.stiffness * hit.depth * normal;
   const Vec3 shift = hit.depth * normal;
   Vec3 point = probe.tip + shift, torque, device2;
   if constexpr (Probe::kSegment) {
-    point += c.place * (probe.tail - probe.tip);
+    point += c.probe_fraction * (probe.tail - probe.tip);
   }
   if constexpr (kTorque) {
-    torque = c.place * glm::cross(probe.tail - probe.tip, force);
-    device2 = c.place * force;
+    torque = c.probe_fraction * glm::cross(probe.tail - probe.tip, force);
+    device2 = c.probe_fraction * force;
   }
   const Vec3 all = force + torque;
   if (!std::isfinite(all.x + all.y + all.z))
@@ -116,7 +109,7 @@ template <class Probe, bool kTorque = Probe::kSegment>
           .torque = torque,
           .device1 = force - device2,
           .device2 = device2,
-          .deepest = {point, normal, hit.depth, c.place * length, c.contact.type},
+          .deepest = {point, normal, hit.depth, c.probe_fraction * length, c.contact.type},
           .ideal = {probe.tip + shift, probe.tail + shift},
           .contacts = 1,
           .object = part.object,

@@ -16,7 +16,7 @@ namespace palpate::rendering {
 namespace {
 
 using testing::uniform;
-using Kind = MinkowskiFacet::Kind;
+using Kind = ContactFeature::Kind;
 
 struct Counts {
   int entered = 0, separated = 0, undecided = 0;
@@ -37,13 +37,13 @@ void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                              glm::normalize(testing::middle_of(mesh) - near +
                                             size * testing::random_direction(random));
   const LineProbe after = testing::probe_at(to, turned, length, share);
-  const MinkowskiFacet any(Kind::face, false,
+  const ContactFeature any(Kind::facet, false,
                            static_cast<std::uint32_t>(random.below(mesh.facets().size())));
   const WalkResult was = segment ? walk_segment(mesh, any, before.tip, before.tail - before.tip)
                                  : walk_point(mesh, any, before.tip);
-  if (was.facet.kind != Kind::none || was.depth > -1e-9 * size) return;  // inside, or all but
-  const Approach way_in = segment ? approach_segment(mesh, was.separates, before, after)
-                                  : approach_point(mesh, was.separates, before, after);
+  if (was.feature.kind != Kind::none || was.depth > -1e-9 * size) return;  // inside, or all but
+  const Approach way_in = segment ? approach_segment(mesh, was.separating_feature, before, after)
+                                  : approach_point(mesh, was.separating_feature, before, after);
   const double tolerance = 1e-12 * size;
   const FirstContact first =
       segment ? first_contact_segment(mesh, trees, before, after, tolerance)
@@ -59,11 +59,11 @@ void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                 way_in.plane.offset - tolerance);
       for (const Vec3& vertex : mesh.vertices())
         ASSERT_LE(glm::dot(way_in.plane.normal, vertex), way_in.plane.offset + tolerance);
-      EXPECT_EQ(first.facet.kind, Kind::none);
+      EXPECT_EQ(first.feature.kind, Kind::none);
       return;
     case Approach::End::entered:
       ++counts.entered;
-      ASSERT_NE(first.facet.kind, Kind::none);
+      ASSERT_NE(first.feature.kind, Kind::none);
       EXPECT_NEAR(way_in.time, first.time, 1e-7);
   }
 }

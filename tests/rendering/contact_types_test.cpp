@@ -242,8 +242,8 @@ TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
       for (const LineProbe& probe : along_sphere(random, 2000)) {
         const Rendering r = bench.tick(probe);
         if (r.deepest.type != ContactType::segment_face) continue;
-        const MinkowskiFacet held = bench.state().parts[0].facet;
-        const bool edge = held.kind == MinkowskiFacet::Kind::edge;
+        const ContactFeature held = bench.state().parts[0].feature;
+        const bool edge = held.kind == ContactFeature::Kind::edge;
         const Vec3 d = r.ideal.tail - r.ideal.tip;
         std::uint32_t face = held.index;
         if (edge) {

@@ -38,10 +38,10 @@ struct Seen {
   int same = 0, adjacent = 0, farther = 0;
 };
 
-bool adjacent(const stimuli::ConvexMesh& mesh, MinkowskiFacet a, MinkowskiFacet b) {
-  using Of = MinkowskiFacet::Kind;
-  if (a.kind == Of::edge && b.kind == Of::face) std::swap(a, b);
-  if (a.kind == Of::face) {
+bool adjacent(const stimuli::ConvexMesh& mesh, ContactFeature a, ContactFeature b) {
+  using Of = ContactFeature::Kind;
+  if (a.kind == Of::edge && b.kind == Of::facet) std::swap(a, b);
+  if (a.kind == Of::facet) {
     if (b.kind == Of::edge) {
       const stimuli::Edge& edge = mesh.edges()[b.index];
       return edge.left == a.index || edge.right == a.index;
@@ -64,10 +64,10 @@ void slide_and_bound(const Renderer& renderer,
                      const testing::ProbePath& path, Seen& seen) {
   Bench bench(renderer, mesh);
   Rendering last;
-  MinkowskiFacet last_facet;
+  ContactFeature last_facet;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const Rendering r = bench.tick(path[i]);
-    const MinkowskiFacet facet = bench.state().parts[0].facet;
+    const ContactFeature facet = bench.state().parts[0].feature;
     if (i > 0 && last.contacts == 1 && r.contacts == 1) {
       const double m = way(path[i - 1], path[i]);
       const double depth = std::max(last.deepest.depth, r.deepest.depth);
@@ -83,10 +83,10 @@ void slide_and_bound(const Renderer& renderer,
         const double fold = same ? turned : obtuse ? 1 : sine;
         ASSERT_LE(change, kStiffness * (m + depth * fold) + kRounding)
             << "tick " << i << " depth " << depth << " m " << m << " fold " << fold;
-        if (same && facet.kind == MinkowskiFacet::Kind::face) {
+        if (same && facet.kind == ContactFeature::Kind::facet) {
           ASSERT_LE(change, kStiffness * m + kRounding) << "tick " << i;
         }
-        if (same && facet.kind == MinkowskiFacet::Kind::edge) {
+        if (same && facet.kind == ContactFeature::Kind::edge) {
           const stimuli::Edge& edge = mesh->edges()[facet.index];
           const Vec3 e = mesh->vertices()[edge.v1] - mesh->vertices()[edge.v0];
           const Vec3 d = path[i].tail - path[i].tip, d0 = path[i - 1].tail - path[i - 1].tip;

@@ -195,13 +195,14 @@ inline std::string faults_of_tick(const Bench& bench, const rendering::LineProbe
 class PathCheck {
  public:
   std::string follow(Bench& bench, const ProbePath& local_path) {
-    bool blocked = true;
+    bool started_inside = true;
     for (std::size_t i = 0; i < local_path.size(); ++i) {
       const rendering::LineProbe probe = to_world(bench.pose(), local_path[i]);
       const rendering::Rendering r = bench.tick(probe);
       // Only a probe that was inside from the first tick on may stay without force.
-      blocked = blocked && rendering::reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
-      const std::string faults = faults_of_tick(bench, probe, r, blocked);
+      started_inside =
+          started_inside && rendering::reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
+      const std::string faults = faults_of_tick(bench, probe, r, started_inside);
       if (!faults.empty()) return "tick " + std::to_string(i) + ": " + faults;
       ++ticks;
       (r.contacts ? in_contact : free) += 1;

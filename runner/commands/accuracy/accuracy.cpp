@@ -76,7 +76,7 @@ void time_first_contact(AccuracyReport& report) {
   report.exact_test_ns =
       time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
         return rendering::first_contact_segment(mesh, trees, before, after, 1e-12 * mesh.size())
-                   .facet.kind != rendering::MinkowskiFacet::Kind::none;
+                   .feature.kind != rendering::ContactFeature::Kind::none;
       });
   if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
 }

@@ -151,19 +151,19 @@ TEST(PlainWalk, InDoubleIsTheWalk) {
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(primitive(shape, 2)));
     const PlainWalk<double> plain(mesh);
     testing::ProbePath path = testing::sliding_path(random, mesh, 0.12, 2000, 0.02);
-    MinkowskiFacet facet;
+    ContactFeature facet;
     int compared = 0;
     for (const LineProbe& probe : path) {
       const Vec3 d = probe.tail - probe.tip;
-      if (facet.kind == MinkowskiFacet::Kind::none) {
-        facet = nearest_facet_segment(mesh, probe.tip, d).facet;
+      if (facet.kind == ContactFeature::Kind::none) {
+        facet = nearest_feature_segment(mesh, probe.tip, d).feature;
         continue;
       }
       const WalkResult ours = walk_segment(mesh, facet, probe.tip, d);
       const WalkResult theirs = plain.walk(facet, probe.tip, d);
-      facet = ours.facet;
-      ASSERT_EQ(ours.facet.kind, theirs.facet.kind);
-      if (facet.kind == MinkowskiFacet::Kind::none) continue;
+      facet = ours.feature;
+      ASSERT_EQ(ours.feature.kind, theirs.feature.kind);
+      if (facet.kind == ContactFeature::Kind::none) continue;
       EXPECT_NEAR(ours.depth, theirs.depth, 1e-15);
       EXPECT_NEAR(glm::length(ours.normal - theirs.normal), 0, 1e-9);
       ++compared;

@@ -32,7 +32,7 @@ class HardOfFeeling final : public Renderer {
   bool side_contact() const override { return true; }
   Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
                  double dt) const noexcept override {
-    const bool began_inside = state.parts[0].blocked;
+    const bool began_inside = state.parts[0].started_inside;
     Rendering r = ray_renderer().tick(scene, state, probe, dt);
     if (began_inside || (r.faults & render_fault::kNonFinite)) {
       r.force = Vec3(0, 0, 1);

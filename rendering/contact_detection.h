@@ -1,0 +1,132 @@
+#pragma once
+// Contact with one convex part that the probe did not touch at the last tick: separating plane,
+// approach, first contact. Mesh frame unless said otherwise. Included by tick.h alone.
+//
+// Probe is PointProbe or SegmentProbe.
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "rendering/approach.h"
+#include "rendering/scene.h"
+
+namespace palpate::rendering::tick {
+
+/// A feature near the probe to track it from, outside of the object: the one of an earlier tick, or
+/// one under the point of the probe that is nearest to the middle. Kind none: none is known.
+template <class Probe>
+ContactFeature nearby_feature(const ScenePart& part, ContactFeature known, const LineProbe& probe) {
+  using Kind = ContactFeature::Kind;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  const SupportMap* const map = part.trees->support_map();
+  if (map == nullptr) return known;
+  const Vec3 d = probe.tail - probe.tip, to_tip = probe.tip - mesh.centre();
+  const double d2 = glm::dot(d, d);
+  const double fraction = d2 > 0 ? std::clamp(-glm::dot(to_tip, d) / d2, 0.0, 1.0) : 0;
+  const std::uint32_t vertex = map->near_support(to_tip + fraction * d);
+  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[vertex]];
+  const ContactFeature under(Kind::facet, false, mesh.edges()[edge].left);
+  if (known.kind == Kind::none) return under;
+  return Probe::same_feature(mesh, known, probe.tip, d).depth <=
+                 Probe::same_feature(mesh, under, probe.tip, d).depth
+             ? known
+             : under;
+}
+
+/// The probe has left the part: from now on the feature that it left by separates them.
+inline void record_separation(PartState& state, const WalkResult& left, const LineProbe& probe) {
+  const double lower =
+      std::min(glm::dot(left.normal, probe.tip), glm::dot(left.normal, probe.tail));
+  state.plane = {left.normal, lower + left.depth, true};
+  state.nearby = left.separating_feature;
+}
+
+/// For a walk that did not converge, where no separating plane was found: looks at all features.
+/// False when the probe touches the surface at most; else `hit` becomes the feature that holds it,
+/// of several the nearest to where the walk ended. Rare.
+template <class Probe>
+[[gnu::cold, gnu::noinline]] bool search_all_features(const ScenePart& part, const Vec3& tip,
+                                                      const Vec3& d, WalkResult& hit) {
+  const WalkResult nearest = Probe::nearest_feature(*part.mesh, tip, d);
+  if (nearest.feature.kind == ContactFeature::Kind::none || nearest.depth <= part.tolerance) {
+    return false;
+  }
+  const WalkResult holding = Probe::holding_feature(*part.mesh, tip, d, hit.depth * hit.normal);
+  hit = holding.feature.kind != ContactFeature::Kind::none ? holding : nearest;
+  return true;
+}
+
+/// Looks for a separating plane between the part and the probe, with no history; state.plane.valid
+/// says whether there is one.
+inline void search_separating_plane(const ScenePart& part, PartState& state,
+                                    const LineProbe& probe) {
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  find_separating_plane(mesh, probe.tip, probe.tail, part.tolerance, state.plane, state.support,
+                        part.trees->support_map());
+  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[state.support]];
+  state.nearby = {ContactFeature::Kind::facet, false, mesh.edges()[edge].left};
+}
+
+/// Contact of a part that was not in contact at the last tick, of kind none where there is none.
+/// \param before  the probe at the last tick, world frame; null at the first tick of all
+template <class Probe>
+WalkResult detect_contact(const ScenePart& part, PartState& state, const LineProbe* before,
+                          const LineProbe& probe) {
+  using Kind = ContactFeature::Kind;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  const Vec3 d = probe.tail - probe.tip;
+  LineProbe from = probe;
+  FirstContact first;
+  bool decided = false;
+  if (before && !state.started_inside) {
+    from = Probe::to_local(part, translated(*before, state.sibling_correction));
+    const ContactFeature near = nearby_feature<Probe>(part, state.nearby, from);
+    if (near.kind != Kind::none) {
+      const WalkResult was = Probe::walk(mesh, near, from.tip, from.tail - from.tip);
+      if (was.feature.kind == Kind::none) {
+        const Approach approach = Probe::approach(mesh, was.separating_feature, from, probe);
+        if (approach.end == Approach::End::separated) {
+          state.plane = approach.plane;
+          state.nearby = approach.feature;
+          return {};
+        }
+        decided = approach.end == Approach::End::entered;
+        if (decided) first = {approach.feature, approach.time};
+      }
+    }
+  }
+  if (!decided) {
+    search_separating_plane(part, state, probe);
+    if (state.started_inside || !before) {
+      state.started_inside =
+          !state.plane.valid && (state.started_inside ||
+                                 Probe::nearest_feature(mesh, probe.tip, d).depth > part.tolerance);
+      return {};
+    }
+    if (state.plane.separates(from.tip, from.tail)) return {};  // so was the whole way between
+    first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
+  }
+  WalkResult hit;
+  if (first.feature.kind != Kind::none) hit = Probe::walk(mesh, first.feature, probe.tip, d);
+  if (hit.not_converged) [[unlikely]] {
+    if (decided) search_separating_plane(part, state, probe);
+    if (state.plane.valid || !search_all_features<Probe>(part, probe.tip, d, hit)) return {};
+  }
+  if (hit.feature.kind == Kind::none) {
+    if (decided) {  // in and out again
+      record_separation(state, hit, probe);
+      return {};
+    }
+    if (state.plane.valid) return {};
+    // Neither a plane nor a crossing: rounding hid the entry, so the least penetration depth
+    // decides. Rare.
+    hit = Probe::nearest_feature(mesh, probe.tip, d);
+    if (hit.feature.kind == Kind::none || hit.depth <= part.tolerance) return {};
+  }
+  state.feature = hit.feature;
+  state.plane.valid = false;
+  prefetch_neighbours(mesh, state.feature);
+  return hit;
+}
+
+}  // namespace palpate::rendering::tick

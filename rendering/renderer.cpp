@@ -1,0 +1,46 @@
+#include "rendering/renderer.h"
+
+#include <array>
+#include <utility>
+
+#include "rendering/point_probe.h"
+#include "rendering/segment_probe.h"
+#include "rendering/tick.h"
+
+namespace palpate::rendering {
+namespace {
+
+/// The two renderers are one tick over two kinds of probe, compiled for every combination of
+/// features that a scene may need.
+template <class Probe>
+class ProbeRenderer final : public Renderer {
+ public:
+  const char* name() const override { return Probe::kSegment ? "ray" : "point"; }
+  bool side_contact() const override { return Probe::kSegment; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    return kTicks[scene.features_index()](scene, state, probe, dt);
+  }
+
+ private:
+  using TickFunction = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
+  static constexpr auto kTicks = []<std::size_t... i>(std::index_sequence<i...>) {
+    return std::array<TickFunction, TickFeatures::kCount>{
+        &tick::render_tick<Probe, TickFeatures::of(i)>...};
+  }
+  (std::make_index_sequence<TickFeatures::kCount>());
+};
+
+}  // namespace
+
+const Renderer& point_renderer() {
+  static const ProbeRenderer<tick::PointProbe> renderer;
+  return renderer;
+}
+
+const Renderer& ray_renderer() {
+  static const ProbeRenderer<tick::SegmentProbe> renderer;
+  return renderer;
+}
+
+}  // namespace palpate::rendering
