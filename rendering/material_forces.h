@@ -34,8 +34,10 @@ inline void hand_over_friction(const Scene& scene, RenderState& state,
 /// \param probe  the virtual probe, world frame
 /// \param rate   1/s, ticks; 0 when unknown: no damping
 template <TickFeatures kFeatures>
-void apply_material_forces(const Scene& scene, RenderState& state, const LineProbe& probe,
-                           std::span<LoadedContact> contacts, double rate) {
+[[gnu::always_inline]] inline void apply_material_forces(const Scene& scene, RenderState& state,
+                                                         const LineProbe& probe,
+                                                         std::span<LoadedContact> contacts,
+                                                         double rate) {
   if constexpr (kFeatures.friction) hand_over_friction(scene, state, contacts);
   for (auto& c : contacts) {
     const stimuli::Material& material = scene.parts()[c.part].material;
