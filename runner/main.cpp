@@ -1,5 +1,5 @@
 // palpate: show a shape to a hand, time the answer, know what may be concluded.
-// From here to a force: session.cpp > servo.cpp > rendering/ray_renderer.cpp >
+// From here to a force: session.cpp > servo.cpp > rendering/renderer.cpp > rendering/tick.h >
 // rendering/facet_walk.cpp
 
 #include <fcntl.h>
