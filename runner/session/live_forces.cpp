@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "runner/session/session.h"
+#include "runner/session/session_end.h"
 
 namespace palpate::runner {
 namespace {
@@ -34,6 +35,11 @@ const Sample& LiveForces::newest() noexcept {
 
 bool LiveForces::device_is_gone() noexcept {
   return !is_well(newest()) && is_settled(sample_) && sample_.trouble != DeviceTrouble::guard_lost;
+}
+
+void LiveForces::end_without_guard() const {
+  if (sample_.trouble == DeviceTrouble::guard_lost)
+    throw EndOfSession(data::RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
 }
 
 /// Whether a sample of a tick from now on was as wished. The newest one stays.

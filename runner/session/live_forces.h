@@ -29,6 +29,9 @@ class LiveForces {
   const Sample& newest() noexcept;
   /// It gives no readings, not only in passing.
   bool device_is_gone() noexcept;
+  /// \throws EndOfSession where the watchdog has ended or hangs, by the sample that newest() gave
+  /// last: forces are zero and cannot come back.
+  void end_without_guard() const;
 
  private:
   template <class Wished>

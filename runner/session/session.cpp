@@ -16,7 +16,7 @@ std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
 
-bool SessionFault::passed() const {
+bool SessionFault::is_transient() const {
   if (faults & (servo_fault::kEmergency | rendering::render_fault::kNonFinite)) return false;
   if (faults & servo_fault::kDeviceLost)
     return trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded;
@@ -37,44 +37,47 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   return fault_row(kTripped).why;
 }
 
-Session::Session(const Parts& parts, SessionPlan plan, const data::ClockStamp& stamp)
-    : parts_(parts), plan_(std::move(plan)), stamp_(stamp) {}
+Session::Session(const Station& station, Respondent& participant, SessionEvents* events,
+                 double least_reach)
+    : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {}
 
 Session::State Session::before_trial() const {
-  if (plan_.finished()) return State::end;
-  if (plan_.block_begins()) return plan_.next().practice ? State::practice : State::block;
-  const auto& every = parts_.protocol.breaks.every_trials;
-  if (every && plan_.done() % static_cast<std::size_t>(*every) == 0) return State::rest;
+  if (station_.plan.finished()) return State::end;
+  if (station_.plan.block_begins())
+    return station_.plan.next().practice ? State::practice : State::block;
+  const auto& every = station_.protocol.breaks.every_trials;
+  if (every && station_.plan.done() % static_cast<std::size_t>(*every) == 0) return State::rest;
   return State::trial;
 }
 
 void Session::step() {
-  const auto& texts = parts_.protocol.texts;
+  const auto& texts = station_.protocol.texts;
   switch (state_) {
     case State::instruction:
-      parts_.participant.read(texts.instructions);
+      participant_.read(texts.instructions);
       state_ = before_trial();
       break;
     case State::practice:
-      parts_.participant.read(texts.practice);
+      participant_.read(texts.practice);
       state_ = State::trial;
       break;
     case State::block:
     case State::rest:
-      if (plan_.done() > 0) end_rest();
+      if (station_.plan.done() > 0) end_rest();
       state_ = State::trial;
       break;
     case State::trial:
       if (run_trial()) state_ = State::response;
       break;
     case State::response:
-      parts_.log.finish(record_);
-      if (parts_.events != nullptr) parts_.events->recorded(record_);
-      plan_.answered(record_.correct);  // first: whoever leaves during the feedback has answered
-      if (record_.practice || parts_.protocol.response.feedback)
-        parts_.participant.feedback(record_.correct);
+      station_.log.finish(record_);
+      if (events_ != nullptr) events_->recorded(record_);
+      station_.plan.answered(
+          record_.correct);  // first: whoever leaves during the feedback has answered
+      if (record_.practice || station_.protocol.response.feedback)
+        participant_.feedback(record_.correct);
       state_ = before_trial();
-      if (state_ == State::end) parts_.participant.read(texts.end);
+      if (state_ == State::end) participant_.read(texts.end);
       break;
     case State::end:
       break;
@@ -87,7 +90,7 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
   record.block = trial.block;
   record.trial = trial.trial;
   record.renderer = protocols::to_string(trial.renderer);
-  record.shape = parts_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
+  record.shape = station_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
   record.practice = trial.practice;
   const Quat& q = trial.orientation;
   record.orientation_wxyz = {q.w, q.x, q.y, q.z};
@@ -96,29 +99,29 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
 
 void Session::end_rest() {
   const std::int64_t until =
-      parts_.clock.now_ns() + std::llround(parts_.protocol.breaks.min_seconds * kPerSecond_ns);
-  parts_.participant.rest(parts_.protocol.texts.break_text, until);
-  parts_.clock.wait_until(until);
+      station_.clock.now_ns() + std::llround(station_.protocol.breaks.min_seconds * kPerSecond_ns);
+  participant_.rest(station_.protocol.texts.break_text, until);
+  station_.clock.wait_until(until);
 }
 
 void Session::cut_off(const std::string& reason) {
-  if (parts_.events != nullptr) parts_.events->cut_off(reason);
-  parts_.log.cut_off(reason);
+  if (events_ != nullptr) events_->cut_off(reason);
+  station_.log.cut_off(reason);
 }
 
-std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& trouble) {
-  const std::int64_t limit_ns = std::llround(parts_.protocol.response.time_out * kPerSecond_ns);
+std::optional<Answer> Session::wait_for_answer(std::uint32_t& faults, DeviceTrouble& trouble) {
+  const std::int64_t limit_ns = std::llround(station_.protocol.response.time_out * kPerSecond_ns);
   while (true) {
-    const Sample& sample = parts_.servo.next();
+    const Sample& sample = station_.servo.next();
     faults = sample.faults;
     trouble = sample.trouble;
     if (faults & servo_fault::kTripped) return std::nullopt;
     if (sample.phase == Phase::feeling) {
       note(sample);
-      if (parts_.protocol.samples) keep(sample);
+      if (station_.protocol.samples) keep(sample);
       record_.response_ns = sample.time_ns;
     }
-    const std::optional<Answer> answer = parts_.participant.step(sample);
+    const std::optional<Answer> answer = participant_.step(sample);
     if (answer && answer->time_ns - record_.onset_ns < limit_ns) return answer;
     record_.timed_out =
         sample.phase == Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
@@ -127,31 +130,31 @@ std::optional<Answer> Session::feel_trial(std::uint32_t& faults, DeviceTrouble& 
 }
 
 bool Session::run_trial() {
-  const protocols::Trial& trial = plan_.next();
-  const protocols::Protocol& protocol = parts_.protocol;
+  const protocols::Trial& trial = station_.plan.next();
+  const protocols::Protocol& protocol = station_.protocol;
   record_ = planned_record(trial);
-  record_.attempt = parts_.log.begin(record_, parts_.clock.now_ns());
-  if (parts_.events != nullptr) parts_.events->began(trial);
+  record_.attempt = station_.log.begin(record_, station_.clock.now_ns());
+  if (events_ != nullptr) events_->began(trial);
   const HomeZone home{
-      std::max(parts_.library.reach(trial.stimulus), parts_.least_reach) + protocol.home.margin,
+      std::max(station_.library.reach(trial.stimulus), least_reach_) + protocol.home.margin,
       protocol.home.rest};
   std::optional<Answer> answer;
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;
   try {
-    parts_.participant.begin_trial(trial);
-    parts_.servo.prepare(parts_.library.scene(trial), renderer_for(trial.renderer), home);
-    answer = feel_trial(faults, trouble);
+    participant_.begin_trial(trial);
+    station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
+    answer = wait_for_answer(faults, trouble);
   } catch (const TrialCutOff& again) {
-    parts_.servo.stop();
+    station_.servo.stop();
     cut_off(again.what());
     return false;
   } catch (const std::exception& error) {
-    parts_.servo.stop();
+    station_.servo.stop();
     cut_off(error.what());
     throw;
   }
-  const ServoQuality quality = parts_.servo.stop();
+  const ServoQuality quality = station_.servo.stop();
   if (faults & servo_fault::kTripped) {
     const std::string reason = trip_reason(faults, trouble);
     cut_off(reason);
@@ -176,23 +179,23 @@ bool Session::run_trial() {
   record_.faults = quality.faults;
   record_.started_inside = (quality.faults & rendering::render_fault::kStartedInside) != 0;
   record_.max_force = quality.max_force;
-  if (parts_.events != nullptr) parts_.events->answered(record_);
+  if (events_ != nullptr) events_->answered(record_);
   return true;
 }
 
 void Session::note(const Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
-    record_.onset_utc = data::format_utc(data::to_unix_ns(stamp_, sample.time_ns));
+    record_.onset_utc = data::format_utc(data::to_unix_ns(station_.utc, sample.time_ns));
     record_.start_tip = values(sample.probe.tip);
     record_.start_tail = values(sample.probe.tail);
-    if (parts_.events != nullptr) parts_.events->onset(record_);
+    if (events_ != nullptr) events_->onset(record_);
   }
   const rendering::Rendering& rendering = sample.rendering;
   if (rendering.contacts > 0 && !record_.first_contact_time) {
     record_.first_contact_time =
         static_cast<double>(sample.time_ns - record_.onset_ns) / kPerSecond_ns;
-    if (parts_.events != nullptr) parts_.events->first_contact(record_, sample.time_ns);
+    if (events_ != nullptr) events_->first_contact(record_, sample.time_ns);
   }
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// A session as a state machine, the same for simulated and live participants.
+// The trial loop: a session as a state machine, the same for simulated and live participants.
 
 #include <functional>
 #include <stdexcept>
@@ -8,10 +8,7 @@
 
 #include "data/record.h"
 #include "runner/participants/respondent.h"
-#include "runner/scene_builder.h"
-#include "runner/servo/tick_source.h"
-#include "runner/session/session_plan.h"
-#include "runner/session/trial_log.h"
+#include "runner/session/station.h"
 
 namespace palpate::runner {
 
@@ -22,7 +19,7 @@ class SessionFault : public std::runtime_error {
   SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
       : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
   /// It is over by itself: the machine was late, nothing is wrong with device or stylus.
-  bool passed() const;
+  bool is_transient() const;
   std::string reason;    ///< that forces are off
   std::uint32_t faults;  ///< of the tick
   DeviceTrouble trouble;
@@ -58,26 +55,15 @@ class Session {
     end,
   };
 
-  /// All of it must outlive the session.
-  struct Parts {
-    const protocols::Protocol& protocol;
-    const StimulusLibrary& library;
-    TickSource& servo;
-    Clock& clock;
-    Respondent& participant;
-    TrialLog& log;
-    SessionEvents* events = nullptr;  ///< may be none
-    /// m; the home zone leaves at least so much room, whichever the stimulus. A person whom the
-    /// screen tells to move away must not learn a shape from where that ends.
-    double least_reach = 0;
-  };
-
-  /// \param plan  already fed with what is on record
-  /// \param stamp  ties the clock to the calendar
-  Session(const Parts& parts, SessionPlan plan, const data::ClockStamp& stamp);
+  /// \param station      its parts must outlive the session
+  /// \param events       may be none
+  /// \param least_reach  m; the home zone leaves at least so much room, whichever the stimulus. A
+  /// person whom the screen tells to move away must not learn a shape from where that ends.
+  Session(const Station& station, Respondent& participant, SessionEvents* events = nullptr,
+          double least_reach = 0);
 
   State state() const { return state_; }
-  const SessionPlan& plan() const { return plan_; }
+  const SessionPlan& plan() const { return station_.plan; }
   /// Does what the state asks for and moves on. Between any two calls everything that happened is
   /// on record: whatever is thrown in a trial, forces are zero, the attempt is cut off, and the
   /// next call shows the trial again. \throws SessionFault; StoreError when a record could not be
@@ -88,15 +74,16 @@ class Session {
   State before_trial() const;
   data::TrialRecord planned_record(const protocols::Trial& trial) const;
   bool run_trial();  ///< false: it was cut off
-  std::optional<Answer> feel_trial(std::uint32_t& faults, DeviceTrouble& trouble);
+  std::optional<Answer> wait_for_answer(std::uint32_t& faults, DeviceTrouble& trouble);
   void cut_off(const std::string& reason);
   void end_rest();
   void note(const Sample& sample);
   void keep(const Sample& sample);  ///< among the record's samples
 
-  Parts parts_;
-  SessionPlan plan_;
-  data::ClockStamp stamp_;
+  Station station_;  ///< with the session's own plan
+  Respondent& participant_;
+  SessionEvents* events_;
+  double least_reach_;
   State state_ = State::instruction;
   data::TrialRecord record_;  ///< of the trial under way
 };

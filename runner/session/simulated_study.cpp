@@ -117,8 +117,9 @@ void run_session(const Shared& shared, const Work& work, std::size_t index, Queu
   SimulatedParticipant participant(own, shared.hypotheses, stylus, protocol, shared.seed,
                                    work.participant.enrolled_number);
   QueueLog log(queue, index);
-  Session session({protocol, shared.library, servo, clock, participant, log},
-                  plan_of(protocol, work), work.info.clock);
+  const Station station{
+      protocol, shared.library, plan_of(protocol, work), servo, clock, work.info.clock, log};
+  Session session(station, participant);
   // A trial that was shown is recorded, also when it is the last for now.
   while (session.state() != Session::State::end &&
          (!shared.halting() || session.state() == Session::State::response)) {

@@ -112,7 +112,7 @@ std::size_t run(const std::string& which, std::uint32_t ticks) {
     measured_unlogged_trial(trial);
     return 0;
   }
-  runner::Session session({protocol, library, stroke, clock, participant, log}, plan, {0, 0});
+  runner::Session session({protocol, library, plan, stroke, clock, {0, 0}, log}, participant);
   while (session.state() != runner::Session::State::trial) session.step();
   measured_trial(session);
   session.step();

@@ -13,13 +13,14 @@
 #include "data/store/store.h"
 #include "protocols/difference.h"
 #include "protocols/parse.h"
-#include "runner/commands/run/parts.h"
 #include "runner/commands/run/resumption.h"
+#include "runner/commands/run/settings.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/protocol_choice.h"
 #include "runner/session/clock_check.h"
 #include "runner/session/near_codes.h"
+#include "runner/session/protocol_info.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <optional>
 
+#include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
 
 namespace palpate::runner {
@@ -38,6 +39,48 @@ std::optional<data::StoredRun> newest_run(data::Store& store, Wanted wanted) {
       newest = run;
   }
   return newest;
+}
+
+/// As choose_session, but for withdrawals.
+int session_due(data::Store& store, const data::Participant& participant,
+                const protocols::Protocol& protocol, const RunSettings& settings) {
+  const int count = protocol.sessions.count;
+  if (settings.session && *settings.session > count)
+    throw UsageError("--session: the protocol has " + std::to_string(count));
+  int session = 1;
+  data::SessionProgress before;
+  for (; session <= count; ++session) {
+    const data::SessionProgress progress = store.progress(participant, session);
+    if (progress.last_end != data::RunEnd::done) break;
+    before = progress;
+  }
+  if (settings.session) {
+    if (*settings.session > session)
+      std::fprintf(stderr, "session %d is not finished; session %d was asked for\n", session,
+                   *settings.session);
+    return *settings.session;
+  }
+  if (session > count)
+    throw UsageError("participant " + participant.code + " has done every session");
+  const std::string day = data::format_utc(before.clock.utc_ns).substr(0, 10);
+  if (session > 1 && day == data::format_utc(utc_now()).substr(0, 10))
+    std::fprintf(stderr, "session %d was today as well\n", session - 1);
+  return session;
+}
+
+/// \throws UsageError: the participant has withdrawn, and nobody said that this is known.
+void check_withdrawal(data::Store& store, const data::Participant& participant, int session,
+                      const RunSettings& settings) {
+  const std::string& code = participant.code;
+  const std::string when = withdrawn_when(store, code);
+  const bool here = store.progress(participant, session).last_end == data::RunEnd::withdrawn;
+  if (!here && when.empty()) {
+    if (settings.after_withdrawal)
+      throw UsageError("--after-withdrawal: participant " + code +
+                       " has not withdrawn; leave the option out");
+  } else if (!settings.after_withdrawal) {
+    throw_withdrawn(code, when);
+  }
 }
 
 }  // namespace
@@ -85,6 +128,13 @@ void throw_withdrawn(const std::string& code, const std::string& when) {
 void refuse_withdrawn(data::Store& store, const std::string& code) {
   const std::string when = withdrawn_when(store, code);
   if (!when.empty()) throw_withdrawn(code, when);
+}
+
+int choose_session(data::Store& store, const data::Participant& participant,
+                   const protocols::Protocol& protocol, const RunSettings& settings) {
+  const int session = session_due(store, participant, protocol, settings);
+  check_withdrawal(store, participant, session, settings);
+  return session;
 }
 
 }  // namespace palpate::runner

@@ -1,12 +1,20 @@
 #pragma once
-// What is said of a session that goes on from where it was left, and of somebody who had left.
+// Which session is due, where it goes on, and whether its participant has withdrawn.
 
+#include <cstdint>
 #include <string>
 
 #include "data/store/store.h"
+#include "protocols/protocol.h"
+#include "runner/commands/run/settings.h"
 #include "runner/session/session_plan.h"
 
 namespace palpate::runner {
+
+/// The session that is due, or was asked for. \throws UsageError: none is due, the one asked for
+/// does not exist, or the participant has withdrawn.
+int choose_session(data::Store& store, const data::Participant& participant,
+                   const protocols::Protocol& protocol, const RunSettings& settings);
 
 /// "yesterday 15:02", "today 09:30", "2026-01-31 15:02", in local time.
 std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);

@@ -1,123 +1,252 @@
-// A live session: a person, a device, two displays, and nothing lost. Its command line.
+// `palpate run`: a live session with a person and a device. Opens the station, runs the session in
+// a thread of its own beside the display's loop, and reports. From here to a force:
+// live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
+// rendering.
 
-#include <cmath>
+#include <algorithm>
 #include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
-#include "data/record.h"
-#include "runner/commands/run/station.h"
-#include "runner/commands/shared/ask.h"
+#include "data/store/store.h"
+#include "runner/commands/run/admission.h"
+#include "runner/commands/run/opening.h"
+#include "runner/commands/run/report.h"
+#include "runner/commands/run/resumption.h"
+#include "runner/commands/run/run_info.h"
+#include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
+#include "runner/safety/fault_signals.h"
+#include "runner/session/device_check.h"
+#include "runner/session/live_session.h"
+#include "runner/session/preflight_dialogue.h"
+#include "runner/session/station.h"
 
 namespace palpate::runner {
 namespace {
 
-namespace po = boost::program_options;
+/// What is known before the session begins and belongs into its record or onto the console.
+struct Beforehand {
+  const RunSettings& settings;
+  const Admission& admission;
+  const std::vector<LimitedMaterial>& limited;
+  const data::SessionProgress& progress;  ///< what is on record of this session
+  std::int64_t servo_began_ns;            ///< session clock
+  std::vector<std::string> news;          ///< for the console, first of all
+};
 
-void check(RunSettings& settings) {
-  settings.participant = given_or_asked(settings.participant, "participant code");
-  if (!data::is_participant_code(settings.participant))
-    throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
-  if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
-  const std::string& changed = settings.changed_protocol;
-  if (!changed.empty() && changed != "stored" && changed != "texts")
-    throw UsageError("--changed-protocol: stored or texts was expected");
-  if (settings.session && *settings.session < 1)
-    throw UsageError("--session: 1 or more was expected");
-  if (!settings.hand.empty() && settings.hand != "left" && settings.hand != "right")
-    throw UsageError("--hand: left or right was expected");
-  if (settings.response_latency &&
-      !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
-    throw UsageError("--response-latency: seconds, 0 or more, were expected");
-  if (settings.device == "mouse" && settings.no_window)
-    throw UsageError("--device mouse needs the window: leave out --no-window");
+/// While it lives, signals turn these forces off.
+template <class Forces>
+class ZeroOnSignal {
+ public:
+  ZeroOnSignal(FaultSignals& signals, Forces* forces) : signals_(signals) {
+    signals_.watch(forces);
+  }
+  ZeroOnSignal(const ZeroOnSignal&) = delete;
+  ZeroOnSignal& operator=(const ZeroOnSignal&) = delete;
+  ~ZeroOnSignal() { signals_.watch(static_cast<Forces*>(nullptr)); }
+
+ private:
+  FaultSignals& signals_;
+};
+
+ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
+  ServoSettings settings;
+  settings.rate = protocol.servo_rate;
+  settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+  settings.passivity_controller = protocol.passivity_controller;
+  return settings;
+}
+
+ForceLimits limits_of(const ServoSettings& settings, const DeviceCapabilities& device) {
+  ForceLimits limits = settings.limits;
+  limits.max_force = std::min(limits.max_force, device.max_force);
+  return limits;
+}
+
+/// Before the first trial. Only what must not be lost begins a run: that somebody withdrew, and
+/// notes on somebody who has a number already.
+LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSession& end) {
+  RunRecord& record = station.record;
+  LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(), station.plan.size(),
+                               end.failed};
+  if (end.end == data::RunEnd::withdrawn ||
+      (record.participant().id != 0 && !record.waiting().empty()))
+    record.begin();
+  outcome.unkept = record.waiting();
+  const std::int64_t now = station.clock.now_ns();
+  if (record.begun()) record.note(now, "ended: " + outcome.reason);
+  record.end(end.end, now);
+  return outcome;
+}
+
+/// Onto the console and into the record, before the first trial.
+void tell(LiveSession& session, const LiveStation& station, const Beforehand& known,
+          const PreflightResult& preflight) {
+  const std::int64_t began_ns = station.utc.monotonic_ns;
+  RunRecord& record = station.record;
+  if (known.settings.after_withdrawal) record.note(began_ns, "begun again after a withdrawal");
+  for (const data::TrialRecord& trial : known.progress.completed) session.count(trial);
+  for (const std::string& warning : known.admission.warnings) session.say(warning);
+  for (const std::string& note : known.admission.notes) record.note(began_ns, note);
+  for (const std::string& message : preflight.messages) session.say(message);  // it shows on
+  if (station.guard != nullptr) {
+    std::string text = "pre-flight: ";
+    for (const std::string& finding : preflight.findings) text += finding + "; ";
+    const bool calibrated = !known.settings.without_calibration;
+    record.note(began_ns, text + (calibrated ? "calibration stored" : "WITHOUT calibration"));
+  }
+  if (!known.limited.empty())
+    record.note(began_ns, to_json_text(known.limited, station.device, station.protocol.servo_rate));
+  if (station.protocol.masking_noise && station.noise == nullptr) {
+    session.say("WITHOUT the protocol's masking noise");
+    record.note(began_ns, R"({"masking_noise":"left out"})");
+  }
+  const std::string& missing = station.servo_thread.rights().missing;
+  if (!missing.empty()) session.say(missing);
+}
+
+/// Pre-flight, then the trials that are not on record yet: the session's own thread.
+/// \throws as LiveSession::run
+LiveSession::Outcome run_session(const LiveStation& station, const Beforehand& known) {
+  PreflightResult preflight;
+  try {
+    preflight = run_preflight(station, known.news);
+  } catch (const EndOfSession& end) {
+    return end_before_trials(station, end);
+  }
+  if (station.record.participant().id != 0) station.record.begin();  // no number is taken by that
+  LiveSession session(station);
+  tell(session, station, known, preflight);
+  return session.run();
+}
+
+/// The session in its own thread, the display's loop in this one, until both have ended. Whatever
+/// either throws: zero force first.
+LiveSession::Outcome run_beside_display(const LiveStation& station, const Beforehand& known,
+                                        DisplayLoop& display,
+                                        const std::function<void()>& emergency) {
+  LiveSession::Outcome outcome;
+  std::exception_ptr failure, display_failure;
+  std::jthread session_thread([&] {
+    try {
+      outcome = run_session(station, known);
+    } catch (...) {
+      emergency();
+      failure = std::current_exception();
+    }
+    display.end();
+  });
+  try {
+    display.run();
+  } catch (...) {  // the session ends by itself: its participant sees nothing
+    emergency();
+    display_failure = std::current_exception();
+  }
+  session_thread.join();
+  const std::int64_t elapsed_ns = station.clock.now_ns() - known.servo_began_ns;
+  print_servo_health(station.servo_thread.health(), static_cast<double>(elapsed_ns) * 1e-9);
+  if (failure) std::rethrow_exception(failure);
+  if (display_failure) std::rethrow_exception(display_failure);
+  return outcome;
+}
+
+/// What the experimenter should know first of all.
+std::vector<std::string> news(const std::string& resumed, const DisplayLoop& display,
+                              const std::vector<LimitedMaterial>& limited) {
+  std::vector<std::string> out;
+  if (!resumed.empty()) out.push_back(resumed);
+  const std::string unreadable = display.unreadable();
+  if (!unreadable.empty()) out.push_back("WARNING: " + unreadable);
+  for (const LimitedMaterial& one : limited) out.push_back(one.text);
+  return out;
 }
 
 }  // namespace
 
 int run_command(const std::vector<std::string>& args) {
-  CommandLine line;
-  line.usage = "palpate run PROTOCOL.json --db FILE --participant CODE [--number N] --device NAME";
-  line.summary =
-      "A live session: resumes an unfinished one, else begins the next. Every trial is on disk "
-      "before\nthe next one starts. The participant answers with the protocol's keys; Escape or "
-      "F12 turns the\nforces off. 'palpate devices' lists the devices. Who is new is enrolled when "
-      "the first trial begins;\na code that was never seen before is asked about first.";
-  line.example =
-      "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
-      "--hand right --consent 2024-05\n"
-      "  palpate run protocols/quick.json --db try.db --participant T1 --device mouse\n"
-      "  palpate run protocols/quick.json --db try.db --participant T2 --device simulated "
-      "--no-window\n";
-  RunSettings settings;
-  int number = 0, session = 0;
-  double latency = 0, scale = 0;
-  line.options.add_options()  //
-      ("db", po::value(&settings.database)->required()->value_name("FILE"),
-       "database; created, or gone on with")  //
-      ("participant", po::value(&settings.participant)->required()->value_name("CODE"),
-       "pseudonym, 1 to 32 letters and digits; -: asked for, or a line of standard input, so that "
-       "no other user of this computer sees it")  //
-      ("new-participant", po::bool_switch(&settings.new_participant),
-       "CODE is somebody new: do not ask, whatever it looks like")  //
-      ("after-withdrawal", po::bool_switch(&settings.after_withdrawal),
-       "CODE has withdrawn and asks to take part again; recorded")  //
-      ("number", po::value(&number)->value_name("N"),
-       "orders the counterbalancing; default: the next unused one")  //
-      ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
-       "where CODE began with another text of the protocol: go on with it as it is stored (the "
-       "default), or, where only texts differ, with the new texts; without it a terminal is "
-       "asked")  //
-      ("device", po::value(&settings.device)->required()->value_name("NAME"),
-       "falcon, falcon2, mouse or simulated")  //
-      ("session", po::value(&session)->value_name("N"),
-       "default: the first that is not done")  //
-      ("consent", po::value(&settings.consent)->value_name("VERSION"),
-       "the consent that was given: version of its text; recorded with the time")           //
-      ("hand", po::value(&settings.hand)->value_name("left|right"), "hand used; recorded")  //
-      ("buttons", po::bool_switch(&settings.buttons),
-       "the device's buttons answer, in the order of the protocol's keys")  //
-      ("response-latency", po::value(&latency)->value_name("SECONDS"),
-       "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
-      ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
-       "udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]; may be given several times")  //
-      ("marker-codes", po::bool_switch(&settings.marker_codes),
-       "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
-       "in "
-       "clear; without it participant_id is null there")                //
-      ("no-window", po::bool_switch(&settings.no_window), "text only")  //
-      ("full-screen", po::bool_switch(&settings.full_screen),
-       "the participant's window, on a monitor of its own")  //
-      ("participant-monitor", po::value(&settings.participant_monitor)->value_name("N"),
-       "from 1")                                                                            //
-      ("console-monitor", po::value(&settings.console_monitor)->value_name("N"), "from 1")  //
-      ("ui-scale", po::value(&scale)->value_name("FACTOR"),
-       "of letters and buttons, 0.5 to 4; default: from each window's monitor")  //
-      ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
-       "which device; falcon2: twice, tip first")  //
-      ("firmware", po::value(&settings.firmware)->value_name("FILE"),
-       "uploaded where the device needs it")  //
-      ("calibration", po::value(&settings.calibration)->value_name("FILE"),
-       "what 'palpate devices --calibrate' stored")  //
-      ("without-calibration", po::bool_switch(&settings.without_calibration),
-       "run although the calibration is missing or stale")  //
-      ("sound-device", po::value(&settings.sound_device)->value_name("NAME"),
-       "ALSA device of the headphones, where the protocol has masking noise; default: default")  //
-      ("without-noise", po::bool_switch(&settings.without_noise),
-       "run without the protocol's masking noise");
-  line.positional_names = {"PROTOCOL.json"};
-  const auto values = line.parse(args);
-  if (!values) return 0;
-  settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
-  if (values->count("number") > 0) settings.number = number;
-  if (values->count("session") > 0) settings.session = session;
-  if (values->count("response-latency") > 0) settings.response_latency = latency;
-  if (values->count("ui-scale") > 0) {
-    if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: 0.5 to 4 was expected");
-    settings.ui_scale = scale;
-  }
-  check(settings);
+  std::optional<RunSettings> given = parse_run_settings(args);
+  if (!given) return 0;
+  RunSettings& settings = *given;
   std::signal(SIGPIPE, SIG_IGN);  // a reader that goes away does not end a session
-  return run_station(settings);
+
+  // Who takes part, in which protocol.
+  const DeviceKind& kind = find_device_kind(settings.device);
+  Admission admission = admit(settings);
+  settings.participant = admission.participant;
+  protocols::Protocol& protocol = admission.protocol;
+
+  // The device behind its watchdog, which is forked before markers and noise start their threads.
+  auto marker_sinks = open_markers(settings);
+  FaultSignals signals;
+  const OpenDevice open = open_device(kind, settings, protocol);
+  const ZeroOnSignal guard_on_signal(signals, open.guard);
+  Markers markers(std::move(marker_sinks));
+  const DeviceCapabilities& device = open.device->capabilities();
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
+  const StimulusLibrary library(protocol);
+  check_fitness(open, settings, protocol, library);
+  const auto noise = open_noise(settings, protocol);
+
+  // The record. What a simulated device gave is labelled simulated, whoever answered.
+  data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
+  warn_of_exposure(store.path());
+  RealClock clock;
+  const data::Participant participant =
+      store.look_up(admission.enrolled, settings.participant, admission.number, device.simulated);
+  const int session = choose_session(store, participant, protocol, settings);
+  print_participant(participant, session, protocol.sessions.count, device.simulated);
+  if (settings.consent.empty())
+    std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
+
+  // The servo loop, without forces until the first trial; the displays, of which each can end them.
+  const ServoSettings servo_settings = servo_settings_of(protocol);
+  const ForceDirectionCheck direction_check(limits_of(servo_settings, device),
+                                            device.sensed_freedom >= 5);
+  const std::int64_t servo_began_ns = clock.now_ns();
+  ServoThread servo(*open.device, clock, servo_settings);
+  const ZeroOnSignal servo_on_signal(signals, &servo);
+  const auto emergency = [&servo, guard = open.guard] {
+    if (guard != nullptr) guard->emergency_zero();
+    servo.emergency_zero();
+  };
+  const auto display = open_display(settings, protocol, clock, *open.device, emergency);
+
+  const data::ClockStamp began = stamp_now(clock);
+  RunRecord record(store, admission.enrolled, participant,
+                   run_info(settings, device, session, began), other_texts(admission));
+  const data::SessionProgress progress = store.progress(participant, session);
+  SessionPlan plan(protocol, participant.enrolled_number, session);
+  for (const data::TrialRecord& trial : progress.completed) plan.answered(trial.correct);
+  const std::string resumed = resumption(store, participant, session, plan);
+
+  const LiveStation station{{protocol, library, plan, servo, clock, began, record},
+                            record,
+                            device,
+                            open.guard,
+                            servo,
+                            open.guard != nullptr ? &direction_check : nullptr,
+                            [&signals] { return signals.end_requested(); },
+                            display->participant(),
+                            display->console(),
+                            settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
+                            markers,
+                            noise.get()};
+  const Beforehand known{settings, admission,      limited,
+                         progress, servo_began_ns, news(resumed, *display, limited)};
+  const LiveSession::Outcome outcome = run_beside_display(station, known, *display, emergency);
+  print_outcome(
+      station,
+      store.look_up(admission.enrolled, participant.code, std::nullopt, participant.simulated),
+      outcome);
+  return outcome.failed ? 1 : 0;
 }
 
 }  // namespace palpate::runner

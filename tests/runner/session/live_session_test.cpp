@@ -154,10 +154,19 @@ class LiveSessions : public ::testing::Test {
     Markers markers(std::move(sinks));
     RunRecord record(*store_, info_of(protocol_), participant_, info);
     record.begin();
-    LiveSession session({protocol_, library_, servo, nullptr, clock_, record, screen_, console_,
-                         markers, by, [this] { return signal_; }, noise_.get()},
-                        {0, 0}, plan);
-    return session.run();
+    const LiveStation station{{protocol_, library_, plan, servo, clock_, {0, 0}, record},
+                              record,
+                              device.capabilities(),
+                              nullptr,
+                              servo,
+                              nullptr,
+                              [this] { return signal_; },
+                              screen_,
+                              console_,
+                              by,
+                              markers,
+                              noise_.get()};
+    return LiveSession(station).run();
   }
 
   bool has_note(const std::string& text) {

@@ -61,7 +61,7 @@ class MemoryLog final : public TrialLog {
   std::vector<std::string> cut;
 };
 
-struct Station {
+struct Bench {
   protocols::Protocol protocol = protocols::parse_protocol_text(kTwoShapes, "two.json");
   StimulusLibrary library{protocol};
   FakeDevice device{[](int) { return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, false}; }};
@@ -70,7 +70,7 @@ struct Station {
   MemoryLog log;
 
   Session session(Respondent& respondent, SessionPlan plan) {
-    return Session({protocol, library, servo, clock, respondent, log}, std::move(plan), {0, 0});
+    return {{protocol, library, std::move(plan), servo, clock, {0, 0}, log}, respondent};
   }
 };
 
@@ -79,15 +79,15 @@ void run(Session& session) {
 }
 
 TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
-  Station station;
+  Bench bench;
   Scripted respondent({});
-  Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
   run(session);
   // Practice of 2, then blocks of 2: pages at the beginning of each, rest after every third trial.
   EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;rest;rest;bye;");
-  ASSERT_EQ(station.log.finished.size(), 6u);
+  ASSERT_EQ(bench.log.finished.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
-    const data::TrialRecord& record = station.log.finished[i];
+    const data::TrialRecord& record = bench.log.finished[i];
     EXPECT_EQ(record.trial, static_cast<int>(i) + 1);
     EXPECT_EQ(record.practice, i < 2);
     EXPECT_TRUE(record.correct);
@@ -95,15 +95,15 @@ TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
     EXPECT_DOUBLE_EQ(record.response_time, 0.3);
     EXPECT_EQ(record.onset_utc.substr(0, 11), "1970-01-01T");
   }
-  EXPECT_GE(station.log.finished[3].onset_ns - station.log.finished[2].response_ns, 20'000'000'000);
+  EXPECT_GE(bench.log.finished[3].onset_ns - bench.log.finished[2].response_ns, 20'000'000'000);
 }
 
 TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
-  Station station;
+  Bench bench;
   Scripted respondent({1, 1, -1});
-  Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
   run(session);
-  const data::TrialRecord& record = station.log.finished[2];
+  const data::TrialRecord& record = bench.log.finished[2];
   EXPECT_TRUE(record.timed_out);
   EXPECT_FALSE(record.correct);
   EXPECT_EQ(record.response, "");
@@ -132,19 +132,19 @@ class Judging final : public TickSource {
 TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
   for (const std::uint32_t faults :
        {rendering::render_fault::kStartedInside, rendering::render_fault::kWalkCapped, 0u}) {
-    Station station;
-    Judging servo(station.servo);
+    Bench bench;
+    Judging servo(bench.servo);
     servo.verdict.ticks = 411;
     servo.verdict.missed_ticks = 7;
     servo.verdict.longest_period_ns = 1'234'567;
     servo.verdict.max_force = 3.5;
     servo.verdict.faults = faults;
     Scripted respondent({});
-    Session session(
-        {station.protocol, station.library, servo, station.clock, respondent, station.log},
-        SessionPlan(station.protocol, 1, 1), {0, 0});
+    Session session({bench.protocol, bench.library, SessionPlan(bench.protocol, 1, 1), servo,
+                     bench.clock, {0, 0}, bench.log},
+                    respondent);
     run(session);
-    for (const data::TrialRecord& record : station.log.finished) {
+    for (const data::TrialRecord& record : bench.log.finished) {
       EXPECT_EQ(record.started_inside, faults == rendering::render_fault::kStartedInside);
       EXPECT_EQ(record.faults, faults);
       EXPECT_EQ(record.ticks, 411u);
@@ -161,36 +161,36 @@ TEST(Session, PracticeIsRepeatedUntilTheCriterionOrTheLastRound) {
     std::size_t trials;
   } cases[] = {{{}, 6}, {{0}, 8}, {{0, 1, 1, 0}, 10}, {{0, 0, 0, 0, 0, 0}, 10}};
   for (const auto& [right, trials] : cases) {
-    Station station;
+    Bench bench;
     Scripted respondent(right);
-    Session session = station.session(respondent, SessionPlan(station.protocol, 1, 1));
+    Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
     run(session);
-    ASSERT_EQ(station.log.finished.size(), trials);
+    ASSERT_EQ(bench.log.finished.size(), trials);
     for (std::size_t i = 0; i < trials; ++i) {
-      EXPECT_EQ(station.log.finished[i].trial, static_cast<int>(i) + 1);
-      EXPECT_EQ(station.log.finished[i].practice, i + 4 < trials);
+      EXPECT_EQ(bench.log.finished[i].trial, static_cast<int>(i) + 1);
+      EXPECT_EQ(bench.log.finished[i].practice, i + 4 < trials);
     }
   }
 }
 
 TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
   const std::deque<int> script = {0, 1, 1, 1, 0, -1, 1, 0};
-  Station whole;
+  Bench whole;
   Scripted respondent(script);
   Session session = whole.session(respondent, SessionPlan(whole.protocol, 1, 1));
   run(session);
   const auto& expected = whole.log.finished;
   for (std::size_t stop = 0; stop <= expected.size(); ++stop) {
-    Station station;
-    SessionPlan plan(station.protocol, 1, 1);
+    Bench bench;
+    SessionPlan plan(bench.protocol, 1, 1);
     for (std::size_t i = 0; i < stop; ++i) plan.answered(expected[i].correct);
     Scripted rest({script.begin() + static_cast<std::ptrdiff_t>(std::min(stop, script.size())),
                    script.end()});
-    Session resumed = station.session(rest, plan);
+    Session resumed = bench.session(rest, plan);
     run(resumed);
-    ASSERT_EQ(station.log.finished.size(), expected.size() - stop);
+    ASSERT_EQ(bench.log.finished.size(), expected.size() - stop);
     for (std::size_t i = stop; i < expected.size(); ++i) {
-      const data::TrialRecord& record = station.log.finished[i - stop];
+      const data::TrialRecord& record = bench.log.finished[i - stop];
       EXPECT_EQ(record.trial, expected[i].trial);
       EXPECT_EQ(record.shape, expected[i].shape);
       EXPECT_EQ(record.orientation_wxyz, expected[i].orientation_wxyz);
@@ -199,22 +199,27 @@ TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
 }
 
 TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
-  Station station;
+  Bench bench;
   FakeDevice failing([](int tick) {
     const double z = tick == 700 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
     return DeviceReading{{{0, 0, z}, {0, 0, 0.22}}, 0, false};
   });
-  Servo servo(failing, station.clock, 1000, ForceLimits{});
+  Servo servo(failing, bench.clock, 1000, ForceLimits{});
   Scripted respondent({-1});
-  Session session(
-      {station.protocol, station.library, servo, station.clock, respondent, station.log},
-      SessionPlan(station.protocol, 1, 1), {0, 0});
+  Session session({bench.protocol,
+                   bench.library,
+                   SessionPlan(bench.protocol, 1, 1),
+                   servo,
+                   bench.clock,
+                   {0, 0},
+                   bench.log},
+                  respondent);
   EXPECT_THROW(run(session), SessionFault);
   EXPECT_EQ(failing.force, Vec3(0));
-  EXPECT_EQ(station.log.began.size(), 1u);
-  EXPECT_TRUE(station.log.finished.empty());
-  ASSERT_EQ(station.log.cut.size(), 1u);
-  EXPECT_NE(station.log.cut[0].find("not finite"), std::string::npos);
+  EXPECT_EQ(bench.log.began.size(), 1u);
+  EXPECT_TRUE(bench.log.finished.empty());
+  ASSERT_EQ(bench.log.cut.size(), 1u);
+  EXPECT_NE(bench.log.cut[0].find("not finite"), std::string::npos);
 }
 
 // The way of a live session into the store: begun on disk, cut off by a fault, shown again.
@@ -222,8 +227,8 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
   std::string pattern = ::testing::TempDir() + "session-XXXXXX";
   const std::filesystem::path folder = mkdtemp(pattern.data());
   {
-    Station station;
-    const protocols::Protocol& protocol = station.protocol;
+    Bench bench;
+    const protocols::Protocol& protocol = bench.protocol;
     data::Store store = data::Store::open(folder / "live.db", data::Store::Mode::write_or_create);
     const data::Participant participant = store.enrol(info_of(protocol), "P01");
     data::RunInfo info;
@@ -232,14 +237,20 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     FakeDevice failing([](int tick) {
       return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
     });
-    Servo servo(failing, station.clock, 1000, ForceLimits{});
+    Servo servo(failing, bench.clock, 1000, ForceLimits{});
     RunRecord log(store, info_of(protocol), participant, info);
     Scripted respondent({});
-    Session session({protocol, station.library, servo, station.clock, respondent, log},
-                    SessionPlan(protocol, participant.number, 1), {0, 0});
+    Session session({protocol,
+                     bench.library,
+                     SessionPlan(protocol, participant.number, 1),
+                     servo,
+                     bench.clock,
+                     {0, 0},
+                     log},
+                    respondent);
     EXPECT_THROW(run(session), SessionFault);
     EXPECT_EQ(failing.force, Vec3(0));
-    log.end(data::RunEnd::aborted, station.clock.now_ns());
+    log.end(data::RunEnd::aborted, bench.clock.now_ns());
 
     const data::SessionProgress before = store.progress(participant, 1);
     EXPECT_EQ(before.completed.size(), 2u);
@@ -247,10 +258,10 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     SessionPlan plan(protocol, participant.number, 1);
     for (const data::TrialRecord& record : before.completed) plan.answered(record.correct);
     RunRecord again(store, info_of(protocol), participant, info);
-    Session resumed({protocol, station.library, station.servo, station.clock, respondent, again},
-                    plan, {0, 0});
+    Session resumed({protocol, bench.library, plan, bench.servo, bench.clock, {0, 0}, again},
+                    respondent);
     run(resumed);
-    again.end(data::RunEnd::done, station.clock.now_ns());
+    again.end(data::RunEnd::done, bench.clock.now_ns());
     const data::SessionProgress after = store.progress(participant, 1);
     ASSERT_EQ(after.completed.size(), 6u);
     for (const data::TrialRecord& record : after.completed) {

@@ -1,0 +1,115 @@
+#include "runner/commands/run/opening.h"
+
+#include <cstdio>
+#include <stdexcept>
+
+#include "runner/commands/shared/command.h"
+#include "runner/display/text_display.h"
+#include "runner/session/device_check.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+const DeviceKind& find_device_kind(const std::string& name) {
+  try {
+    return device_kind(name);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+}
+
+OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
+                       const protocols::Protocol& protocol) {
+  const DeviceConfig config{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
+                            settings.serials,    settings.firmware,      settings.calibration};
+  try {
+    kind.check(config);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--serial: ") + error.what());
+  }
+  if (!kind.has_force_feedback) return {kind.open(config), nullptr};
+  GuardSettings guard;
+  guard.rate = protocol.servo_rate;
+  auto guarded = std::make_unique<GuardedDevice>([&] { return kind.open(config); }, guard);
+  GuardedDevice* const itself = guarded.get();
+  return {std::move(guarded), itself};
+}
+
+void check_fitness(const OpenDevice& open, const RunSettings& settings,
+                   const protocols::Protocol& protocol, const StimulusLibrary& library) {
+  const DeviceCapabilities& able = open.device->capabilities();
+  std::string reasons;
+  for (const std::string& reason : incompatibilities(protocol, library, able))
+    reasons += "\n" + reason;
+  if (!reasons.empty()) throw UsageError("this protocol cannot be run with this device:" + reasons);
+  if (settings.buttons && protocol.response.keys.size() > 8)
+    throw UsageError("--buttons: a device has 8 buttons at most; the protocol has " +
+                     std::to_string(protocol.response.keys.size()) + " answers");
+  const bool unfit =
+      able.calibration.rfind("stale", 0) == 0 || able.calibration.rfind("implausible", 0) == 0;
+  if (open.guard == nullptr || settings.without_calibration ||
+      (!able.calibration.empty() && !unfit))
+    return;
+  throw UsageError("the calibration of '" + settings.device + "' is " +
+                   (unfit ? able.calibration : "missing") +
+                   "\n'palpate devices --calibrate' makes one, --calibration names its file, "
+                   "--without-calibration runs the session without");
+}
+
+std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings) {
+  const MarkerCodes codes =
+      settings.marker_codes ? MarkerCodes::everywhere : MarkerCodes::this_computer;
+  std::vector<std::unique_ptr<MarkerSink>> sinks;
+  for (const std::string& name : settings.markers) {
+    try {
+      sinks.push_back(open_marker_sink(name, codes));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--markers: ") + error.what());
+    }
+  }
+  return sinks;
+}
+
+std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
+                                        const protocols::Protocol& protocol) {
+  if (!protocol.masking_noise || settings.without_noise) return nullptr;
+  return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
+                                       settings.sound_device);
+}
+
+std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
+                                          const protocols::Protocol& protocol, Clock& clock,
+                                          Device& device, const std::function<void()>& emergency) {
+  if (!settings.no_window) {
+    WindowSettings window;
+    window.title = protocol.name + ", " + settings.participant;
+    window.full_screen = settings.full_screen;
+    window.ui_scale = settings.ui_scale;
+    window.participant_monitor = settings.participant_monitor;
+    window.console_monitor = settings.console_monitor;
+    const auto& texts = protocol.texts;
+    window.texts = {texts.instructions, texts.practice,  texts.break_text,
+                    texts.end,          texts.move_away, texts.ready,
+                    texts.go,           texts.wait,      texts.other_key};
+    for (const auto& [key, name] : protocol.response.keys)
+      window.texts.push_back(protocols::answer_label(protocol, name));
+    window.emergency = emergency;
+    window.mouse = dynamic_cast<MouseStylus*>(&device);
+    window.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+    window.clock = &clock;
+    try {
+      auto windows = make_windows(window);
+      const std::string missing = windows->unreadable();
+      if (!missing.empty()) std::fprintf(stderr, "%s\n", stimuli::printable_lines(missing).c_str());
+      const std::string warning = windows->warning();
+      if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
+      return windows;
+    } catch (const DisplayError& error) {
+      if (window.mouse != nullptr) throw;
+      std::fprintf(stderr, "%s; a text display instead\n",
+                   stimuli::printable(error.what()).c_str());
+    }
+  }
+  return make_text_display({&clock, emergency});
+}
+
+}  // namespace palpate::runner

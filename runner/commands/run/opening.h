@@ -1,0 +1,48 @@
+#pragma once
+// Opens the parts of a live station: device, markers, masking noise, displays.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "runner/commands/run/settings.h"
+#include "runner/devices/registry.h"
+#include "runner/display/window.h"
+#include "runner/safety/guarded_device.h"
+#include "runner/scene_builder.h"
+#include "runner/session/markers.h"
+#include "runner/sound/masking_noise.h"
+
+namespace palpate::runner {
+
+/// \throws UsageError: there is no such device
+const DeviceKind& find_device_kind(const std::string& name);
+
+struct OpenDevice {
+  std::unique_ptr<Device> device;  ///< in this process, or in the watchdog's
+  GuardedDevice* guard = nullptr;  ///< the same; none without force feedback
+};
+/// Forks the watchdog where the device has force feedback: before there are other threads.
+/// \throws UsageError; std::runtime_error: the device cannot be opened
+OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
+                       const protocols::Protocol& protocol);
+/// \throws UsageError where the device cannot or should not show the protocol.
+void check_fitness(const OpenDevice& open, const RunSettings& settings,
+                   const protocols::Protocol& protocol, const StimulusLibrary& library);
+
+/// \throws UsageError: no markers go there
+std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings);
+
+/// None where the protocol wants none, or the experimenter. \throws SoundError
+std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
+                                        const protocols::Protocol& protocol);
+
+/// Two windows, or text where there is no display. \throws DisplayError: the mouse needs a window
+/// \param emergency  commands zero force at once; called in the display's thread
+std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
+                                          const protocols::Protocol& protocol, Clock& clock,
+                                          Device& device, const std::function<void()>& emergency);
+
+}  // namespace palpate::runner

@@ -1,0 +1,120 @@
+#include "runner/commands/run/settings.h"
+
+#include <cmath>
+
+#include "data/record.h"
+#include "runner/commands/shared/ask.h"
+#include "runner/commands/shared/command.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace po = boost::program_options;
+
+void check(RunSettings& settings) {
+  settings.participant = given_or_asked(settings.participant, "participant code");
+  if (!data::is_participant_code(settings.participant))
+    throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
+  if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
+  const std::string& changed = settings.changed_protocol;
+  if (!changed.empty() && changed != "stored" && changed != "texts")
+    throw UsageError("--changed-protocol: stored or texts was expected");
+  if (settings.session && *settings.session < 1)
+    throw UsageError("--session: 1 or more was expected");
+  if (!settings.hand.empty() && settings.hand != "left" && settings.hand != "right")
+    throw UsageError("--hand: left or right was expected");
+  if (settings.response_latency &&
+      !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
+    throw UsageError("--response-latency: seconds, 0 or more, were expected");
+  if (settings.device == "mouse" && settings.no_window)
+    throw UsageError("--device mouse needs the window: leave out --no-window");
+}
+
+}  // namespace
+
+std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage = "palpate run PROTOCOL.json --db FILE --participant CODE [--number N] --device NAME";
+  line.summary =
+      "A live session: resumes an unfinished one, else begins the next. Every trial is on disk "
+      "before\nthe next one starts. The participant answers with the protocol's keys; Escape or "
+      "F12 turns the\nforces off. 'palpate devices' lists the devices. Who is new is enrolled when "
+      "the first trial begins;\na code that was never seen before is asked about first.";
+  line.example =
+      "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
+      "--hand right --consent 2024-05\n"
+      "  palpate run protocols/quick.json --db try.db --participant T1 --device mouse\n"
+      "  palpate run protocols/quick.json --db try.db --participant T2 --device simulated "
+      "--no-window\n";
+  RunSettings settings;
+  int number = 0, session = 0;
+  double latency = 0, scale = 0;
+  line.options.add_options()  //
+      ("db", po::value(&settings.database)->required()->value_name("FILE"),
+       "database; created, or gone on with")  //
+      ("participant", po::value(&settings.participant)->required()->value_name("CODE"),
+       "pseudonym, 1 to 32 letters and digits; -: asked for, or a line of standard input, so that "
+       "no other user of this computer sees it")  //
+      ("new-participant", po::bool_switch(&settings.new_participant),
+       "CODE is somebody new: do not ask, whatever it looks like")  //
+      ("after-withdrawal", po::bool_switch(&settings.after_withdrawal),
+       "CODE has withdrawn and asks to take part again; recorded")  //
+      ("number", po::value(&number)->value_name("N"),
+       "orders the counterbalancing; default: the next unused one")  //
+      ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
+       "where CODE began with another text of the protocol: go on with it as it is stored (the "
+       "default), or, where only texts differ, with the new texts; without it a terminal is "
+       "asked")  //
+      ("device", po::value(&settings.device)->required()->value_name("NAME"),
+       "falcon, falcon2, mouse or simulated")  //
+      ("session", po::value(&session)->value_name("N"),
+       "default: the first that is not done")  //
+      ("consent", po::value(&settings.consent)->value_name("VERSION"),
+       "the consent that was given: version of its text; recorded with the time")           //
+      ("hand", po::value(&settings.hand)->value_name("left|right"), "hand used; recorded")  //
+      ("buttons", po::bool_switch(&settings.buttons),
+       "the device's buttons answer, in the order of the protocol's keys")  //
+      ("response-latency", po::value(&latency)->value_name("SECONDS"),
+       "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
+      ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
+       "udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]; may be given several times")  //
+      ("marker-codes", po::bool_switch(&settings.marker_codes),
+       "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
+       "in "
+       "clear; without it participant_id is null there")                //
+      ("no-window", po::bool_switch(&settings.no_window), "text only")  //
+      ("full-screen", po::bool_switch(&settings.full_screen),
+       "the participant's window, on a monitor of its own")  //
+      ("participant-monitor", po::value(&settings.participant_monitor)->value_name("N"),
+       "from 1")                                                                            //
+      ("console-monitor", po::value(&settings.console_monitor)->value_name("N"), "from 1")  //
+      ("ui-scale", po::value(&scale)->value_name("FACTOR"),
+       "of letters and buttons, 0.5 to 4; default: from each window's monitor")  //
+      ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
+       "which device; falcon2: twice, tip first")  //
+      ("firmware", po::value(&settings.firmware)->value_name("FILE"),
+       "uploaded where the device needs it")  //
+      ("calibration", po::value(&settings.calibration)->value_name("FILE"),
+       "what 'palpate devices --calibrate' stored")  //
+      ("without-calibration", po::bool_switch(&settings.without_calibration),
+       "run although the calibration is missing or stale")  //
+      ("sound-device", po::value(&settings.sound_device)->value_name("NAME"),
+       "ALSA device of the headphones, where the protocol has masking noise; default: default")  //
+      ("without-noise", po::bool_switch(&settings.without_noise),
+       "run without the protocol's masking noise");
+  line.positional_names = {"PROTOCOL.json"};
+  const auto values = line.parse(args);
+  if (!values) return std::nullopt;
+  settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
+  if (values->count("number") > 0) settings.number = number;
+  if (values->count("session") > 0) settings.session = session;
+  if (values->count("response-latency") > 0) settings.response_latency = latency;
+  if (values->count("ui-scale") > 0) {
+    if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: 0.5 to 4 was expected");
+    settings.ui_scale = scale;
+  }
+  check(settings);
+  return settings;
+}
+
+}  // namespace palpate::runner

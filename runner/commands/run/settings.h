@@ -1,0 +1,26 @@
+#pragma once
+// What the command line of `palpate run` asks for.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::runner {
+
+struct RunSettings {
+  std::string protocol, database, participant, device;
+  std::optional<int> number, session;
+  std::string consent, hand, firmware, changed_protocol, calibration, sound_device = "default";
+  std::vector<std::string> serials, markers;
+  std::optional<double> response_latency;            ///< s, measured; recorded, never subtracted
+  int participant_monitor = 0, console_monitor = 0;  ///< from 1; 0: as it comes
+  double ui_scale = 0;                               ///< 0: from the monitors
+  bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
+       without_noise = false, new_participant = false, after_withdrawal = false,
+       marker_codes = false;
+};
+
+/// None where --help was asked for and printed. \throws UsageError
+std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args);
+
+}  // namespace palpate::runner

@@ -1,0 +1,80 @@
+#include "runner/session/session_hold.h"
+
+#include <algorithm>
+
+#include "runner/session/session.h"
+
+namespace palpate::runner {
+namespace {
+
+std::string emergency_reason() { return trip_reason(servo_fault::kEmergency, DeviceTrouble::none); }
+
+}  // namespace
+
+void SessionHold::pause() { kind_ = std::max(kind_, Kind::pause); }
+
+void SessionHold::hold(const std::string& reason, bool transient, DeviceTrouble trouble) {
+  kind_ = transient ? Kind::transient_fault : Kind::fault;
+  fault_state_ = trouble == DeviceTrouble::guard_late ? "paused" : "fault";
+  reason_ = reason + (reason == emergency_reason() ? zero_asked_by_ : "");
+  fault_ = reason_;
+}
+
+void SessionHold::emergency_zero(const std::string& by, bool in_trial) {
+  forces_.off();
+  zero_asked_by_ = " by " + by;
+  fault_ = emergency_reason() + zero_asked_by_;
+  if (!in_trial) hold(emergency_reason(), false, DeviceTrouble::none);
+}
+
+std::string SessionHold::ways_on() const {
+  const std::string go = station_.console.name_of(ConsoleCommand::Kind::go_on);
+  if (kind_ != Kind::fault) return go + " goes on";
+  return station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ", then " + go + ", goes on";
+}
+
+std::string SessionHold::held_by() const {
+  return reason_ + (reason_.empty() ? "" : "; ") + ways_on();
+}
+
+bool SessionHold::allow_forces() {
+  const DeviceTrouble before = forces_.newest().trouble;
+  if (station_.guard != nullptr &&
+      (before == DeviceTrouble::unplugged || before == DeviceTrouble::silent))
+    say_("opening the device again");
+  const std::string trouble = forces_.allow([this] { return station_.end_requested() != 0; });
+  const DeviceTrouble now = forces_.newest().trouble;
+  forces_.end_without_guard();
+  if (trouble.empty()) {
+    fault_.clear();
+    return true;
+  }
+  hold(trouble, false, now);
+  say_("not cleared, forces stay off: " + trouble + "; after that " + ways_on());
+  return false;
+}
+
+bool SessionHold::clear_fault() {
+  if (kind_ < Kind::transient_fault) {
+    say_("there is no fault to clear");
+    return false;
+  }
+  if (!allow_forces()) return false;
+  kind_ = Kind::pause;
+  reason_.clear();
+  return true;
+}
+
+void SessionHold::go_on() {
+  if (kind_ == Kind::none) {
+    say_("nothing is paused");
+  } else if (kind_ == Kind::fault) {
+    say_("forces are off: clear the fault first (" +
+         station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ")");
+  } else if (kind_ == Kind::pause || allow_forces()) {
+    kind_ = Kind::none;
+    say_("going on");
+  }
+}
+
+}  // namespace palpate::runner

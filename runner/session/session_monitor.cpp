@@ -1,0 +1,165 @@
+#include "runner/session/session_monitor.h"
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace palpate::runner {
+namespace {
+
+constexpr double kSecond_ns = 1e9;
+constexpr std::int64_t kFrame_ns = 33'000'000;  // of the console
+constexpr std::size_t kMostMessages = 200;
+
+/// For the console; null: as it was shown last.
+const char* in_words(Session::State state) {
+  switch (state) {
+    case Session::State::instruction:
+      return "instructions";
+    case Session::State::practice:
+      return "practice begins";
+    case Session::State::block:
+      return "block begins";
+    case Session::State::rest:
+      return "rest";
+    case Session::State::trial:
+    case Session::State::response:
+      return nullptr;
+    case Session::State::end:
+      return "end";
+  }
+  return "";
+}
+
+}  // namespace
+
+SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& sources)
+    : station_(station), sources_(sources), started_ns_(station.clock.now_ns()) {
+  state_.study = station.protocol.name;
+  state_.participant = marker_.participant = station.record.participant().code;
+  state_.session = marker_.session = station.record.session();
+  for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
+    state_.scores.push_back({stimulus.name, 0, 0});
+}
+
+double SessionMonitor::elapsed() const {
+  return static_cast<double>(station_.clock.now_ns() - started_ns_) / kSecond_ns;
+}
+
+void SessionMonitor::say(const std::string& message) {
+  if (state_.messages.size() >= kMostMessages) {
+    state_.messages.erase(state_.messages.begin());
+    ++state_.older_messages;
+  }
+  state_.messages.push_back(message);
+  show();
+}
+
+void SessionMonitor::show() {
+  shown_ns_ = station_.clock.now_ns();
+  const Session& session = sources_.session;
+  const SessionPlan& plan = session.plan();
+  state_.seconds_left = sources_.respondent.seconds_left();
+  state_.elapsed = static_cast<double>(shown_ns_ - started_ns_) / kSecond_ns;
+  state_.trials = static_cast<int>(plan.size());
+  state_.blocks = plan.blocks();
+  state_.remaining = seconds_per_trial_ * static_cast<double>(plan.size() - plan.done());
+  state_.sample = sources_.forces.newest();
+  state_.fault = sources_.hold.fault();
+  if (in_trial_) {
+    state_.state = feeling_ ? "trial" : "homing";
+  } else if (state_.held_by.empty() && in_words(session.state()) != nullptr) {
+    state_.state = in_words(session.state());
+  }
+  const ServoHealth& health = station_.servo_thread.health();
+  state_.ticks = health.ticks();
+  state_.missed_ticks = health.missed_ticks();
+  state_.longest_period_ns = health.longest_period_ns();
+  station_.console.show(state_);
+}
+
+void SessionMonitor::show_if_due() {
+  if (station_.clock.now_ns() - shown_ns_ >= kFrame_ns) show();
+}
+
+void SessionMonitor::held() {
+  state_.state = sources_.hold.state();
+  state_.held_by = sources_.hold.held_by();
+}
+
+void SessionMonitor::count(const data::TrialRecord& record) {
+  if (record.practice) return;
+  for (ShapeScore& score : state_.scores) {
+    if (score.shape != record.shape) continue;
+    ++score.shown;
+    score.right += record.correct ? 1 : 0;
+  }
+}
+
+void SessionMonitor::began(const protocols::Trial& trial) {
+  const protocols::StimulusSpec& stimulus =
+      station_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
+  in_trial_ = true;
+  feeling_ = false;
+  trial_began_ns_ = station_.clock.now_ns();
+  stimuli::ObjectSpec object = stimulus.object;
+  object.pose = {trial.orientation * object.pose.position,
+                 trial.orientation * object.pose.orientation};
+  state_.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, std::move(object));
+  state_.shape = stimulus.name;
+  state_.practice = trial.practice;
+  state_.renderer = protocols::to_string(trial.renderer);
+  state_.block = marker_.block = trial.block;
+  state_.trial = marker_.trial = trial.trial;
+  marker_.shape = state_.shape;
+  marker_.renderer = state_.renderer;
+  marker_.attempt = 0;
+  marker_.response.clear();
+  show();
+}
+
+void SessionMonitor::onset(const data::TrialRecord& so_far) {
+  feeling_ = true;
+  sources_.noise.go_tone();
+  marker_.kind = Marker::Kind::trial_start;
+  marker_.attempt = so_far.attempt;
+  marker_.time_ns = so_far.onset_ns;
+  station_.markers.send(marker_);
+}
+
+void SessionMonitor::first_contact(const data::TrialRecord&, std::int64_t time_ns) {
+  marker_.kind = Marker::Kind::first_contact;
+  marker_.time_ns = time_ns;
+  station_.markers.send(marker_);
+}
+
+void SessionMonitor::answered(const data::TrialRecord& record) {
+  in_trial_ = false;
+  marker_.kind = record.timed_out ? Marker::Kind::time_out : Marker::Kind::response;
+  marker_.response = record.response;
+  marker_.time_ns = record.response_ns;
+  station_.markers.send(marker_);
+}
+
+void SessionMonitor::cut_off(const std::string& reason) {
+  in_trial_ = false;
+  marker_.kind = Marker::Kind::cut_off;
+  marker_.time_ns = station_.clock.now_ns();
+  station_.markers.send(marker_);
+  say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
+}
+
+void SessionMonitor::recorded(const data::TrialRecord& record) {
+  state_.answer = record.timed_out ? "none in time"
+                                   : record.response + (record.correct ? ", right" : ", wrong");
+  count(record);
+  state_.times.push_back(record.response_time);
+  const double took = static_cast<double>(station_.clock.now_ns() - trial_began_ns_) / kSecond_ns;
+  ++timed_trials_;
+  seconds_per_trial_ += (took - seconds_per_trial_) / timed_trials_;
+  if (!record.response.empty() && !record.first_contact_time) {
+    say("trial " + std::to_string(record.trial) + " was answered before the first contact");
+  }
+}
+
+}  // namespace palpate::runner
