@@ -97,8 +97,8 @@ PUBLIC = {
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display text_display window",
     "runner/participants": "keyboard respondent simulated simulated_settings",
-    "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info replay session_plan "
-                      "simulated_study station",
+    "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
+                      "replay_comparison session_plan simulated_study station",
     "runner/stability": "boundary integrators",
     "runner/bench": "servo_timing tick_cost",
     "runner/commands": "shared/command",

@@ -221,13 +221,29 @@ std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) 
   return shapes;
 }
 
+SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
+                                 const SimulatedSettings& settings) {
+  return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
+          1 / protocol.servo_rate};
+}
+
 }  // namespace
+
+LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
+                                          const SimulatedSettings& settings) {
+  const SimulatedStylus stylus = simulated_stylus(protocol, settings);
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
+  LimitedForSimulation out;
+  for (const LimitedMaterial& one : limited) out.texts.push_back(one.text);
+  if (!limited.empty())
+    out.event = to_json_text(limited, stylus.capabilities(), protocol.servo_rate);
+  return out;
+}
 
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
                                            const SimulatedSettings& settings) {
-  SimulatedStylus device(settings.device, settings.hand, protocol.stylus.length,
-                         protocol.stylus.grip, 1 / protocol.servo_rate);
+  SimulatedStylus device = simulated_stylus(protocol, settings);
   std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
   bool known = true;
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {

@@ -29,6 +29,15 @@ struct StudyProgress {
   double simulated_seconds = 0;  ///< of session time since this call
 };
 
+struct LimitedForSimulation {
+  std::vector<std::string> texts;  ///< a sentence for each material that was scaled down
+  std::string event;               ///< for StudyPlan::event; empty: none was
+};
+/// Scales the protocol's materials down to what the simulated device can show, where the protocol
+/// asks for that (servo.material_limit).
+LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
+                                          const SimulatedSettings& settings);
+
 /// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,

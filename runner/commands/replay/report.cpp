@@ -1,0 +1,144 @@
+#include "runner/commands/replay/report.h"
+
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using stimuli::printable;
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+  std::array<char, 240> text{};
+  std::snprintf(text.data(), text.size(), format, values...);
+  return text.data();
+}
+
+std::string in_words(const ForceSummary& shown, const char* how) {
+  const std::string first =
+      shown.first_contact ? formatted("%.3f s", *shown.first_contact) : "never";
+  return formatted(
+      "  %-5s (%s): first contact %s, in contact %.1f %% of the time, force rms %.3f N, "
+      "at most %.3f N, %.2f mm deep\n",
+      shown.renderer.c_str(), how, first.c_str(), 100 * shown.time_in_contact, shown.rms_force,
+      shown.max_force, 1e3 * shown.max_depth);
+}
+
+std::string verdict(const RecordedTrial& trial, const ReplayComparison& found) {
+  const std::size_t ticks = found.ticks.size();
+  if (found.equal_ticks == ticks)
+    return "Rendered again: all " + std::to_string(ticks) +
+           " ticks equal the record, bit by bit.\n";
+  std::string text = "Rendered again: " + std::to_string(ticks - found.equal_ticks) + " of " +
+                     std::to_string(ticks) + " ticks differ from the record, the first is tick " +
+                     std::to_string(found.first_difference.value_or(0)) +
+                     ". Recorded with palpate " + printable(trial.stored.run.program_version) +
+                     ", replayed with " PALPATE_VERSION ".\n";
+  if (!found.periods_known)
+    text += "The record does not hold the ticks' periods, on which damping depends.\n";
+  return text;
+}
+
+Json to_json(const ForceSummary& shown) {
+  return {{"renderer", shown.renderer},
+          {"share_in_contact", shown.time_in_contact},
+          {"first_contact_s", shown.first_contact ? Json(*shown.first_contact) : Json()},
+          {"rms_force_n", shown.rms_force},
+          {"max_force_n", shown.max_force},
+          {"max_depth_m", shown.max_depth}};
+}
+
+void put(std::string& row, double value) {
+  row += formatted(",%.17g", value == 0 ? 0.0 : value);  // no minus before a zero
+}
+
+template <class Vector>
+void put_vector(std::string& row, const Vector& v) {
+  for (int i = 0; i < 3; ++i) put(row, v[i]);
+}
+
+void put(std::string& row, const RenderedForce& shown) {
+  put_vector(row, shown.force);
+  put_vector(row, shown.torque);
+  put(row, shown.depth);
+}
+
+std::string csv_header(bool with_other) {
+  std::string header = "tick,t";
+  const auto add = [&header](const std::string& vector) {
+    for (const char* axis : {"_x", "_y", "_z"}) header += "," + vector + axis;
+  };
+  for (const char* vector : {"tip", "tail", "recorded_force", "recorded_torque"}) add(vector);
+  header += ",recorded_depth";
+  for (const std::string whose : {"again", "other"}) {
+    if (whose == "other" && !with_other) break;
+    add(whose + "_force");
+    add(whose + "_torque");
+    header += "," + whose + "_depth";
+  }
+  return header + "\n";
+}
+
+}  // namespace
+
+std::string to_text(const std::string& name, const RecordedTrial& trial,
+                    const ReplayComparison& found) {
+  const data::TrialRecord& record = trial.stored.record;
+  std::string text = trial.stored.participant.simulated ? "SIMULATED " : "";
+  text += "trial " + printable(name) + " of " + printable(trial.stored.protocol_name) + ": " +
+          printable(record.shape) + ", " + printable(record.renderer) + ", " +
+          (record.timed_out ? "no answer" : "answered " + printable(record.response)) +
+          formatted(" after %.3f s", record.response_time) + "\n";
+  if (trial.limited)
+    text += "With the materials as they were limited to what the device can show.\n";
+  text += verdict(trial, found) + in_words(found.recorded, "recorded");
+  if (found.other) {
+    text += in_words(*found.other, "same way") +
+            formatted("  their forces differ by %.3f N rms, at most %.3f N\n", found.rms_difference,
+                      found.max_difference);
+  }
+  return text;
+}
+
+std::string to_json_text(const std::string& name, const RecordedTrial& trial,
+                         const ReplayComparison& found) {
+  Json result = {{"version", 1},
+                 {"trial", name},
+                 {"protocol", trial.stored.protocol_name},
+                 {"simulated", trial.stored.participant.simulated},
+                 {"recorded_with", trial.stored.run.program_version},
+                 {"replayed_with", PALPATE_VERSION},
+                 {"ticks", found.ticks.size()},
+                 {"equal_ticks", found.equal_ticks},
+                 {"periods_on_record", found.periods_known},
+                 {"material_limited", trial.limited},
+                 {"recorded", to_json(found.recorded)}};
+  if (found.other) {
+    result["other"] = to_json(*found.other);
+    result["rms_difference_n"] = found.rms_difference;
+    result["max_difference_n"] = found.max_difference;
+  }
+  return result.dump(1) + "\n";
+}
+
+std::string to_csv(const ReplayComparison& found) {
+  std::string text = csv_header(found.other.has_value());
+  for (const ReplayedTick& tick : found.ticks) {
+    const data::SampleRecord& was = *tick.recorded;
+    text += std::to_string(was.tick);
+    put(text, tick.time);
+    for (const auto& v : {was.tip, was.tail, was.force, was.torque}) put_vector(text, v);
+    put(text, was.depth);
+    put(text, tick.again);
+    if (found.other) put(text, tick.other);
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace palpate::runner

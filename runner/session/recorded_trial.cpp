@@ -1,0 +1,107 @@
+#include "runner/session/recorded_trial.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "protocols/parse.h"
+#include "runner/session/device_check.h"
+
+namespace palpate::runner {
+namespace {
+
+data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
+                             const std::string& protocol) {
+  std::optional<data::StoredTrial> found;
+  bool cut_off = false;
+  std::string protocols;
+  for (data::StoredTrial& trial : store.attempts(name)) {
+    if (!protocol.empty() && trial.protocol_name != protocol) continue;
+    if (!trial.cut_off_reason.empty()) {
+      cut_off = true;
+      continue;
+    }
+    protocols += (protocols.empty() ? "" : ", ") + trial.protocol_name;
+    if (found) {
+      throw data::StoreRefused("--trial " + to_string(name) +
+                               ": there is one in each of several protocols (" + protocols +
+                               "); say which with --protocol NAME");
+    }
+    found = std::move(trial);
+  }
+  const std::string place = store.path() + ": " + to_string(name);
+  if (!found) {
+    throw data::StoreRefused(
+        place + (cut_off
+                     ? " was cut off before an answer: nothing of it was kept to replay"
+                     : " is not on record" + (protocol.empty() ? "" : " in protocol " + protocol)));
+  }
+  if (found->record.samples.empty()) {
+    throw data::StoreRefused(place +
+                             " was recorded without servo samples; a protocol with \"samples\": "
+                             "true keeps them");
+  }
+  return std::move(*found);
+}
+
+/// Where a run was shown with another text, that differs in words only.
+protocols::Protocol stored_protocol(data::Store& store, const data::StoredTrial& trial,
+                                    const std::string& mesh_folder) {
+  std::string text;
+  for (const data::ProtocolInfo& info : store.protocols()) {
+    if (info.sha256 == trial.protocol_sha256) text = info.text;
+  }
+  protocols::StoredFiles files;
+  for (data::ProtocolFile& file : store.files(trial.protocol_sha256))
+    files.emplace(file.name, std::move(file.bytes));
+  const std::filesystem::path place =
+      std::filesystem::path(mesh_folder) / (trial.protocol_name + ".json");
+  return protocols::parse_protocol_text(text, place.string(), files);
+}
+
+/// Scales the materials down to what the device of the trial's run could show. True: there were
+/// any.
+bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
+                       const data::StoredTrial& trial) {
+  for (const data::StoredNote& note : store.notes()) {
+    const data::ClockStamp &noted = note.run_clock, &shown = trial.run.clock;
+    if (note.participant.id != trial.participant.id || note.session != trial.record.session ||
+        noted.utc_ns != shown.utc_ns || noted.monotonic_ns != shown.monotonic_ns) {
+      continue;
+    }
+    try {
+      // A simulated session that was resumed has the same event again.
+      if (runner::limit_as_recorded(protocol, note.text)) return true;
+    } catch (const std::invalid_argument& error) {
+      throw data::StoreRefused(store.path() + ": " + error.what());
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string to_string(const data::TrialName& name) {
+  return name.code + "/" + std::to_string(name.session) + "/" + std::to_string(name.trial);
+}
+
+RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& name,
+                                  const std::string& protocol, const std::string& mesh_folder) {
+  RecordedTrial trial;
+  trial.stored = find_trial(store, name, protocol);
+  trial.protocol = stored_protocol(store, trial.stored, mesh_folder);
+  const std::string& shape = trial.stored.record.shape;
+  const auto& stimuli = trial.protocol.stimuli;
+  if (std::none_of(stimuli.begin(), stimuli.end(),
+                   [&](const auto& stimulus) { return stimulus.name == shape; })) {
+    throw data::StoreRefused(store.path() + ": trial " + to_string(name) + " shows '" + shape +
+                             "', which its protocol " + trial.stored.protocol_name +
+                             " does not have; expected one of its stimuli");
+  }
+  trial.limited = limit_as_recorded(trial.protocol, store, trial.stored);
+  return trial;
+}
+
+}  // namespace palpate::runner

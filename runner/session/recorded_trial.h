@@ -1,0 +1,29 @@
+#pragma once
+// A trial of a database with what is needed to render it again: its record, its protocol and the
+// materials as its device showed them.
+
+#include <string>
+
+#include "data/store/store.h"
+#include "protocols/protocol.h"
+
+namespace palpate::runner {
+
+struct RecordedTrial {
+  data::StoredTrial stored;
+  protocols::Protocol protocol;  ///< materials as they were limited to the device of its run
+  bool limited = false;          ///< some were
+};
+
+/// The completed attempt at a trial.
+/// \param protocol     the protocol's name, where the code is enrolled in several; empty: any
+/// \param mesh_folder  where mesh files are, for a database of before they were kept in it
+/// \throws StoreRefused: it is not there, is in several protocols, has no samples, or its record
+/// and protocol do not agree; InputError, MeshError: the stored protocol cannot be read
+RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& name,
+                                  const std::string& protocol, const std::string& mesh_folder);
+
+/// "P03/1/12"
+std::string to_string(const data::TrialName& name);
+
+}  // namespace palpate::runner

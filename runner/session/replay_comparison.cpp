@@ -1,0 +1,101 @@
+#include "runner/session/replay_comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "runner/session/replay.h"
+
+namespace palpate::runner {
+namespace {
+
+using protocols::RendererKind;
+
+double length(const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); }
+
+/// Takes a renderer's forces tick by tick.
+class Summarizer {
+ public:
+  explicit Summarizer(RendererKind kind) { sum_.renderer = protocols::to_string(kind); }
+
+  void add(double time, double force, double depth, int contacts) {
+    if (contacts > 0 && !sum_.first_contact) sum_.first_contact = time;
+    in_contact_ += contacts > 0;
+    square_sum_ += force * force;
+    sum_.max_force = std::max(sum_.max_force, force);
+    sum_.max_depth = std::max(sum_.max_depth, depth);
+  }
+  ForceSummary over(std::size_t ticks) {
+    sum_.time_in_contact = static_cast<double>(in_contact_) / static_cast<double>(ticks);
+    sum_.rms_force = std::sqrt(square_sum_ / static_cast<double>(ticks));
+    return sum_;
+  }
+
+ private:
+  ForceSummary sum_;
+  std::size_t in_contact_ = 0;
+  double square_sum_ = 0;  // N^2
+};
+
+RendererKind kind_of(const std::string& renderer) {
+  return renderer == protocols::to_string(RendererKind::ray) ? RendererKind::ray
+                                                             : RendererKind::point;
+}
+
+RenderedForce rendered(const Sample& sample) {
+  const rendering::Rendering& r = sample.rendering;
+  return {r.force, r.torque, r.deepest.depth};
+}
+
+ForceSummary render_again(const protocols::Protocol& protocol, const data::TrialRecord& record,
+                          RendererKind kind, ReplayComparison& out) {
+  Summarizer shown(kind);
+  double time = 0;
+  out.ticks.reserve(record.samples.size());
+  replay(protocol, record, kind, [&](const data::SampleRecord& was, const Sample& is) {
+    if (!out.ticks.empty()) time += static_cast<double>(is.period_ns) * 1e-9;
+    if (was.period_ns <= 0) out.periods_known = false;
+    if (equals_record(was, is)) {
+      ++out.equal_ticks;
+    } else if (!out.first_difference) {
+      out.first_difference = was.tick;
+    }
+    shown.add(time, length(was.force), was.depth, was.contacts);
+    out.ticks.push_back({time, &was, rendered(is), {}});
+  });
+  return shown.over(out.ticks.size());
+}
+
+ForceSummary render_other(const protocols::Protocol& protocol, const data::TrialRecord& record,
+                          RendererKind kind, ReplayComparison& out) {
+  Summarizer shown(kind);
+  double square_sum = 0;  // N^2
+  auto tick = out.ticks.begin();
+  replay(protocol, record, kind, [&](const data::SampleRecord& was, const Sample& is) {
+    const rendering::Rendering& r = is.rendering;
+    shown.add(tick->time, glm::length(r.force), r.deepest.depth, static_cast<int>(r.contacts));
+    const double apart = glm::length(r.force - Vec3(was.force[0], was.force[1], was.force[2]));
+    square_sum += apart * apart;
+    out.max_difference = std::max(out.max_difference, apart);
+    tick->other = rendered(is);
+    ++tick;
+  });
+  out.rms_difference = std::sqrt(square_sum / static_cast<double>(out.ticks.size()));
+  return shown.over(out.ticks.size());
+}
+
+}  // namespace
+
+ReplayComparison compare_with_record(const protocols::Protocol& protocol,
+                                     const data::TrialRecord& record, bool compare_other) {
+  ReplayComparison out;
+  const RendererKind kind = kind_of(record.renderer);
+  out.recorded = render_again(protocol, record, kind, out);
+  if (compare_other) {
+    const RendererKind other = kind == RendererKind::ray ? RendererKind::point : RendererKind::ray;
+    out.other = render_other(protocol, record, other, out);
+  }
+  return out;
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,52 @@
+#pragma once
+// A recorded trial held against what the renderers make of its path today.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/record.h"
+#include "protocols/protocol.h"
+#include "stimuli/vec.h"
+
+namespace palpate::runner {
+
+/// What one renderer showed along the path.
+struct ForceSummary {
+  std::string renderer;
+  double time_in_contact = 0;           ///< fraction of the ticks
+  std::optional<double> first_contact;  ///< s from time zero; none: no contact
+  double rms_force = 0, max_force = 0;  ///< N
+  double max_depth = 0;                 ///< m, penetration
+};
+
+struct RenderedForce {
+  Vec3 force, torque;  ///< N, N m, on the hand
+  double depth = 0;    ///< m
+};
+
+struct ReplayedTick {
+  double time = 0;  ///< s from time zero
+  const data::SampleRecord* recorded;
+  RenderedForce again;  ///< by the recorded renderer
+  RenderedForce other;  ///< by the other one, where it was asked for
+};
+
+struct ReplayComparison {
+  std::size_t equal_ticks = 0;                    ///< to the bit
+  std::optional<std::uint32_t> first_difference;  ///< tick
+  bool periods_known = true;  ///< the record holds the ticks' periods, on which damping depends
+  ForceSummary recorded;
+  std::optional<ForceSummary> other;
+  double rms_difference = 0, max_difference = 0;  ///< N, of the two renderers' forces
+  std::vector<ReplayedTick> ticks;                ///< all, in order
+};
+
+/// \param record         with samples; must outlive the result
+/// \param compare_other  whether the other renderer goes along the same path
+/// \throws std::invalid_argument where the protocol has no such stimulus
+ReplayComparison compare_with_record(const protocols::Protocol& protocol,
+                                     const data::TrialRecord& record, bool compare_other);
+
+}  // namespace palpate::runner
