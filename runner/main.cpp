@@ -1,8 +1,8 @@
 // palpate: show a shape to a hand, time the answer, know what may be concluded.
 // From here to a force in a live session:
-//   commands/run/run.cpp          opens the station (session/station.h): record, device, servo, displays
-//   session/live_session.cpp      experimenter's commands, pauses and faults around the trials
-//   session/session.cpp           the trial loop, the same for simulated participants
+//   commands/run/run.cpp          opens the station (session/station.h): record, device, servo,
+//   displays session/live_session.cpp      experimenter's commands, pauses and faults around the
+//   trials session/session.cpp           the trial loop, the same for simulated participants
 //   servo/servo_thread.cpp        the servo loop's thread
 //   servo/servo.cpp               one tick: read the device, render, limit, command
 //   rendering/renderer.cpp        point or ray; rendering/tick.h, rendering/facet_walk.cpp

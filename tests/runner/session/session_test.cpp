@@ -140,8 +140,13 @@ TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
     servo.verdict.max_force = 3.5;
     servo.verdict.faults = faults;
     Scripted respondent({});
-    Session session({bench.protocol, bench.library, SessionPlan(bench.protocol, 1, 1), servo,
-                     bench.clock, {0, 0}, bench.log},
+    Session session({bench.protocol,
+                     bench.library,
+                     SessionPlan(bench.protocol, 1, 1),
+                     servo,
+                     bench.clock,
+                     {0, 0},
+                     bench.log},
                     respondent);
     run(session);
     for (const data::TrialRecord& record : bench.log.finished) {
