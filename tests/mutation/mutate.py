@@ -29,7 +29,7 @@ Examples:
   tests/mutation/mutate.py rendering --seed 1 --count 60    # resumes: the first 30 are kept
   tests/mutation/mutate.py rendering --seed 1 --again       # survivors only, after a test was written
   tests/mutation/mutate.py data protocols --seed 2 --count 25 --with-commands
-  tests/mutation/mutate.py runner/safety --seed 3 --count 10   # a sub-folder of a room
+  tests/mutation/mutate.py runner/devices/falcon --seed 3 --programs falcon_test   # a folder of a room
   tests/mutation/mutate.py analysis --seed 1 --list         # what would be tried
   tests/mutation/mutate.py --report                         # scores of all that was run
 """
@@ -430,7 +430,7 @@ class Run:
             for lists in sorted((self.copy.source / "tests" / folder).rglob("CMakeLists.txt")):
                 text = lists.read_text()
                 for name, arguments in re.findall(r"palpate_test\((\w+)([^)]*)", text):
-                    if "CLOCK" not in arguments.split():
+                    if "CLOCK" not in arguments.split() and name in (self.options.programs or [name]):
                         yield name, lists.parent.relative_to(self.copy.source)
 
     def command_tests(self):
@@ -569,6 +569,8 @@ def main():
     parser.add_argument("--list", action="store_true", help="show the mutants, try none")
     parser.add_argument("--report", action="store_true", help="scores and survivors of what was run so far")
     parser.add_argument("--with-commands", action="store_true", help="also the command tests and golden traces")
+    parser.add_argument("--programs", nargs="+", metavar="NAME",
+                        help="only these test programs, e.g. falcon_test (all in the room's folder of tests)")
     parser.add_argument("--longest", type=float, default=3, metavar="SECONDS",
                         help="leave out slower tests (3); ten times as much for a command's")
     parser.add_argument("--most-objects", type=int, default=60, metavar="N",

@@ -196,6 +196,33 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
   }
 }
 
+// Where the probe stood exactly on the surface, rounding says on which side: it goes in all the
+// same.
+TEST_P(SeveralParts, WhatWasTouchedExactlyIsFeltOnceItIsPushed) {
+  constexpr double kPressed = 1e-3;  // m
+  stimuli::Random random(9);
+  for (int i = 0; i < 2000; ++i) {
+    const Pose pose{0.1 * Vec3(random.normal(), random.normal(), random.normal()),
+                    stimuli::uniform_rotation(random)};
+    const Scene scene({placed_object(box({-0.05, -0.05, -0.04}, {0, 0.05, 0}), pose, kSpring, 0),
+                       placed_object(box({0, -0.05, -0.04}, {0.05, 0.05, 0}), pose, kSpring, 0)});
+    // Near the seam (in it is a crack as wide as rounding), or over one of the parts.
+    const double x = (i % 3 == 0 ? 1e-6 : 0.08) * (random.unit() - 0.5);
+    const double y = 0.08 * (random.unit() - 0.5);
+    const auto at = [&](double z) {
+      const Vec3 tip = pose.position + pose.orientation * Vec3(x, y, z);
+      return LineProbe{tip, tip + pose.orientation * Vec3(0.01, 0.02, 0.1)};
+    };
+    RenderState state = scene.initial_state();
+    tick(scene, state, at(0.01));
+    tick(scene, state, at(0));
+    tick(scene, state, at(0));
+    const Rendering r = tick(scene, state, at(-kPressed));
+    const Vec3 out = pose.orientation * Vec3(0, 0, 1);
+    ASSERT_LE(glm::length(r.force - kSpring * kPressed * out), 1e-9) << i;
+  }
+}
+
 TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
   constexpr int kObjects = 300;
   constexpr double kPressed = 1e-3, kSoft = 2;  // m, N/m
