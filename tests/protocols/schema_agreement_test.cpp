@@ -9,7 +9,9 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "protocols/parse.h"
 
@@ -209,8 +211,9 @@ TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 5);
 }
 
-/// Whether the parser finds fault with this value at this place; of three numbers, of the first.
-bool refused(const std::string& place, const json& value) {
+/// What the parser says of this value at this place (of three numbers, of the first); none: it
+/// takes it.
+std::optional<std::string> refusal(const std::string& place, const json& value) {
   json document = kThreeShapes;
   document["no such key"] = 1;  // so that nothing is looked at but the values themselves
   document["stylus"] = {{"length_m", 10}};
@@ -222,11 +225,22 @@ bool refused(const std::string& place, const json& value) {
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults())
       if (fault.place == place || (element && fault.place == pointer.parent_pointer().to_string()))
-        return true;
-    return false;
+        return fault.expected;
+    return std::nullopt;
   }
   ADD_FAILURE() << "an unknown key was taken";
-  return false;
+  return std::nullopt;
+}
+
+/// The unit that a key's name ends with.
+std::string unit_of(const std::string& place) {
+  const std::pair<const char*, const char*> units[] = {
+      {"_n_per_m", " N/m"}, {"_ns_per_m", " N s/m"}, {"_m", " m"},   {"_m/0", " m"},
+      {"_s", " s"},         {"_seconds", " s"},      {"_hz", " Hz"}, {"_minutes", " min"},
+      {"_db", " dB"}};
+  for (const auto& [ending, unit] : units)
+    if (place.ends_with(ending)) return unit;
+  return "";
 }
 
 /// \return the number of bounds
@@ -250,9 +264,11 @@ int expect_bounds(const std::string& place, const json& key) {
       beyond = std::nextafter(value, far);
       within = std::nextafter(value, -far);
     }
-    EXPECT_TRUE(refused(place, beyond)) << place << ": " << beyond;
-    EXPECT_FALSE(refused(place, within)) << place << ": " << within;
-    EXPECT_EQ(refused(place, bound), !bound_itself) << place << ": " << bound;
+    const std::string why = refusal(place, beyond).value_or("it was taken");
+    EXPECT_EQ(why.rfind("expected", 0), 0u) << place << ": " << beyond << ": " << why;
+    EXPECT_NE((why + ",").find(unit_of(place) + ","), std::string::npos) << place << ": " << why;
+    EXPECT_FALSE(refusal(place, within)) << place << ": " << within;
+    EXPECT_EQ(!refusal(place, bound), bound_itself) << place << ": " << bound;
   };
   expect("minimum", -1, true);
   expect("maximum", 1, true);
