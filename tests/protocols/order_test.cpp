@@ -175,7 +175,8 @@ TEST(Order, RefusalSaysWhyAndWhatWouldHelp) {
   EXPECT_NE(refusal({4}, limits({}, 2)).find("at most 1"), std::string::npos);
 }
 
-// Each trial of a long block has its share of the draws, or limits would no longer be met uniformly.
+// Each trial of a long block has its share of the draws, or limits would no longer be met
+// uniformly.
 TEST(Order, TheBudgetOfDrawsGrowsWithTheBlock) {
   EXPECT_EQ(uniform_draw_budget(2'000'000), 2 * uniform_draw_budget(1'000'000));
   EXPECT_GE(uniform_draw_budget(1), 200u);  // one plain order in 200 is to be found in any block
