@@ -1,16 +1,17 @@
 #pragma once
+// Errors of data/: messages for the user that name the file and what to do.
 
 #include <stdexcept>
 
 namespace palpate::data {
 
-/// The database could not be read or written; what() names the file and says what to do.
+/// A file could not be read or written. Commands exit with 1.
 class StoreError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The file is not ours, or what was asked does not fit what it holds (a number that is taken, a
-/// trial that has its record): bad input rather than a failure. Commands exit with 2.
+/// Bad input: not a palpate database, a damaged one, or a request that conflicts with its content
+/// (a number that is taken, a trial that has a record). Commands exit with 2.
 class StoreRefused : public StoreError {
   using StoreError::StoreError;
 };

@@ -1,6 +1,6 @@
 #pragma once
-// What is kept of a session and of every trial. Plain values; SI units; times are int64
-// nanoseconds.
+// The records of a session and of every trial: plain values that sessions fill, the store keeps,
+// and exports and analysis read. SI units; times are int64 nanoseconds.
 
 #include <array>
 #include <cstdint>
@@ -11,12 +11,12 @@
 
 namespace palpate::data {
 
-/// One servo tick of a trial, as it is kept when the protocol asks for samples.
+/// One servo tick of a trial; recorded if the protocol has samples = true.
 struct SampleRecord {
   std::uint32_t tick = 0;               ///< from time zero of the trial
-  std::int64_t period_ns = 0;           ///< since the tick before; 0: not known (older records)
-  std::int64_t lateness_ns = 0;         ///< behind the time at which the tick was due
-  std::int64_t compute_ns = 0;          ///< from the device's reading to the command for it
+  std::int64_t period_ns = 0;           ///< since the previous tick; 0: unknown (older records)
+  std::int64_t lateness_ns = 0;         ///< behind the scheduled time of the tick
+  std::int64_t compute_ns = 0;          ///< from reading the device to commanding its force
   std::array<double, 3> tip{}, tail{};  ///< m, world frame
   std::array<double, 3> force{};        ///< N, on the hand, as rendered
   std::array<double, 3> torque{};       ///< N m, about the virtual tip, as rendered
@@ -29,11 +29,11 @@ struct SampleRecord {
   std::uint32_t faults = 0;  ///< fault bits of the tick
 };
 
-/// One presentation of one trial. Every number is finite; -0.0 comes back from the store as 0.
+/// One presentation of one trial. All numbers are finite; the store returns -0.0 as 0.
 struct TrialRecord {
   int session = 1, block = 1, trial = 1;
   int attempt = 1;
-  std::string renderer, shape, response;  ///< response empty: none
+  std::string renderer, shape, response;  ///< response "": none
   bool correct = false, practice = false, timed_out = false;
   std::array<double, 4> orientation_wxyz{1, 0, 0, 0};
   double response_time = 0;                  ///< s, from time zero
@@ -45,32 +45,32 @@ struct TrialRecord {
   std::array<double, 3> start_tip{}, start_tail{};  ///< m, at time zero
   std::uint64_t ticks = 0, missed_ticks = 0;
   std::int64_t longest_period_ns = 0;
-  std::uint32_t faults = 0;           ///< or of all ticks' fault bits
+  std::uint32_t faults = 0;           ///< bitwise or of all ticks' fault bits
   bool started_inside = false;        ///< the stylus was inside an object at time zero
   double max_force = 0;               ///< N
-  std::vector<SampleRecord> samples;  ///< empty unless asked for
+  std::vector<SampleRecord> samples;  ///< empty unless recorded and requested
 };
 
 /// A file that a protocol names, such as a mesh.
 struct ProtocolFile {
   std::string name;   ///< as the protocol names it
-  std::string bytes;  ///< as they were read
+  std::string bytes;  ///< content, unchanged
 };
 
-/// The protocol a participant is enrolled in.
+/// A protocol as it was read from its file.
 struct ProtocolInfo {
   std::string name;
-  std::string text;                      ///< the file as it was read, byte for byte
+  std::string text;                      ///< of the file, byte for byte
   std::string sha256;                    ///< of text, 64 lower-case hexadecimal digits
   std::vector<ProtocolFile> files = {};  ///< that it names, each once
 };
 
-/// Somebody, or a simulated somebody, enrolled in one protocol. Pseudonyms only.
+/// A person or a simulated participant, enrolled in one protocol. Pseudonyms only.
 struct Participant {
-  std::int64_t id = 0;  ///< the store's own key
+  std::int64_t id = 0;  ///< row id in the database
   std::string code;     ///< 1 to 32 letters and digits
   int number = 0;       ///< 1, 2, ...: unique within the protocol
-  /// Orders the counterbalancing: number, unless a merge had to give another one since.
+  /// Selects the counterbalanced order: equals number unless a merge has changed that since.
   int enrolled_number = 0;
   bool simulated = false;
   std::optional<std::uint64_t> seed;  ///< of a simulated participant
@@ -79,46 +79,46 @@ struct Participant {
 /// Whether a participant can have this code: 1 to 32 ASCII letters and digits.
 bool is_participant_code(std::string_view code);
 
-/// One instant on both clocks; ties a run's times to the calendar.
+/// One instant on both clocks; converts the times of a run to UTC.
 struct ClockStamp {
   std::int64_t utc_ns = 0;        ///< since 1970-01-01T00:00:00Z
   std::int64_t monotonic_ns = 0;  ///< session clock (CLOCK_MONOTONIC; virtual when simulated)
 };
 
-/// How a run, one process's part of a session, ended.
+/// How a run ended. A run is the part of a session that one process showed.
 enum class RunEnd {
-  running,      ///< it has not
+  running,      ///< it has not ended
   done,         ///< every trial of the session has a record
-  paused,       ///< to be continued another day
+  paused,       ///< to be resumed another day
   aborted,      ///< by the experimenter or by a fault
   withdrawn,    ///< by the participant
-  interrupted,  ///< the process died; only the store says so
+  interrupted,  ///< the process died; set by the next writer only
 };
 const char* to_string(RunEnd end);                           ///< "running", "done", ...
 std::optional<RunEnd> parse_run_end(std::string_view text);  ///< the inverse of to_string
 
-/// What is recorded when a process starts or resumes a session. Empty texts: not known.
+/// What is recorded when a process begins or resumes a session. Empty texts: unknown.
 struct RunInfo {
   int session = 1;
   ClockStamp clock;
   std::string program_version;             ///< "0.1.0"
   std::string build;                       ///< compiler and flags
   std::string device;                      ///< as in --device
-  std::string device_calibration;          ///< the device's own text
+  std::string device_calibration;          ///< as the device reports it
   std::string response_device;             ///< "keyboard", ...
   std::optional<double> response_latency;  ///< s, measured; none: unknown. Never subtracted
   std::string observer_sha256;             ///< of the settings of a simulated participant
   std::string consent_version;
   std::optional<std::int64_t> consent_utc_ns;
   std::string hand;  ///< "left", "right"
-  /// The participant has withdrawn and asks to take part again: else no session of theirs that was
-  /// withdrawn is begun. Not stored by itself.
+  /// Allows begin_run to resume a session that ended as `withdrawn`: the participant asks to take
+  /// part again. Not stored.
   bool after_withdrawal = false;
-  /// Of the protocol that the run was shown with, where only its texts differ from that of the
-  /// participant; "": the participant's own.
+  /// Of the protocol that the run was shown with, if its texts differ from the participant's; "":
+  /// the participant's own.
   std::string protocol_sha256;
-  /// Of the files of that protocol, as the store knows them; "": none, or recorded by a palpate
-  /// that did not keep them. The store fills it in.
+  /// Of the stored files of that protocol (files_checksum); "": none, or recorded by a version that
+  /// did not store them. Set by the store.
   std::string files_sha256;
 };
 

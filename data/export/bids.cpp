@@ -18,15 +18,15 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kBidsVersion = "1.9.0";
 
-/// The columns of trials.csv that a beh.tsv has: whose they are is in its name.
+/// The columns of trials.csv without participant_id, which is in the file name.
 std::span<const Column> beh_columns(Times times) { return trial_columns(times).subspan(1); }
 
 const Column kOnset{"onset", "First tick with forces on, from that of the first row", "s"};
 const Column kDuration{"duration", "From onset to the response, or the limit for a time-out", "s"};
 
-/// The values of the columns that name what a session was run with.
-Json found_in(const std::string& column, const std::vector<RunInfo>& runs,
-              const StudyLabel& study) {
+/// Levels of the columns whose values come from the runs: device, version, protocol, observer.
+Json recorded_levels(const std::string& column, const std::vector<RunInfo>& runs,
+                     const StudyLabel& study) {
   Json levels;
   if (column == "protocol_sha256") {
     levels[study.protocol.sha256] = "sourcedata/" + study.label + "_protocol.json";
@@ -44,7 +44,7 @@ Json found_in(const std::string& column, const std::vector<RunInfo>& runs,
   return levels;
 }
 
-Json describe(const RunInfo& run, const Participant& person, const ExportClock& clock) {
+Json describe_run(const RunInfo& run, const Participant& person, const ExportClock& clock) {
   Json json{{"StartedUTC", clock.utc(person, run.clock.utc_ns)},
             {"ProgramVersion", run.program_version},
             {"Build", run.build},
@@ -56,32 +56,45 @@ Json describe(const RunInfo& run, const Participant& person, const ExportClock& 
   return json;
 }
 
-class BidsWriter {
- public:
-  BidsWriter(Store& store, const std::string& path, const ExportSettings& settings,
-             const ExportClock& clock)
-      : store_(store),
-        settings_(settings),
-        clock_(clock),
-        labels_(label_protocols(store, settings)),
-        folder_(path) {}
+std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool simulated,
+                        bool relative) {
+  return dataset_name(labels, simulated) + "\n\n" + dataset_description(labels, simulated) +
+         "\n\n"
+         "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
+         "sorted by\nonset. Every column is described in the JSON file beside the table. The "
+         "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
+         "checksum.\n\n"
+         "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
+         "it "
+         "holds\nthose of all its trials, one row a period of the servo, and its JSON file where "
+         "each trial stands,\nwhich object was felt, how it was turned and with which renderer. A "
+         "new run begins with every\nstart of the program and after more than a minute between "
+         "two trials. Periods between trials, and\nthose whose tick was missed, are rows of n/a. "
+         "Places are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
+         (relative ? kRelativeSentence : "") + kGuardSentence +
+         "\n"
+         "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
+         "trials were\nshown again. They are in no other table.\n";
+}
 
-  /// Whether an export of ours has such a file.
+class BidsWriter : public DatasetWriter {
+ public:
+  using DatasetWriter::DatasetWriter;
+
+  /// Whether an export of palpate has such a file.
   static bool has_file(const std::string& name);
 
-  AtomicFolder& folder() { return folder_; }
-  static std::string begin_attempts() { return "sourcedata/attempts.csv"; }
-  void add(const StoredTrial& trial);
-  void end_table();
-  void describe_dataset(bool simulated);
-  std::int64_t samples() const { return samples_; }
+  std::string begin_attempts() override { return "sourcedata/attempts.csv"; }
+  void add(const StoredTrial& trial) override;
+  void end_table() override;
+  void describe_dataset(bool simulated) override;
 
  private:
   struct Row {
     std::int64_t onset_ns = 0;
-    std::string rest;  // from the second column on, with its end
+    std::string rest;  // from the second column on, with the line end
   };
-  /// The session, or with samples the run, that is being gathered.
+  /// The session, or with samples the BIDS run, whose rows are being collected.
   struct Table {
     std::string stem;  // of its files, with folders
     const StudyLabel* study = nullptr;
@@ -89,22 +102,13 @@ class BidsWriter {
     std::vector<Row> rows;
     std::vector<RunInfo> runs;
   };
-  void write(const std::string& name, const std::string& text) {
-    FileSink file(folder_.place(name));
-    file.write(text);
-    file.close(false);
-  }
   void begin_session(const StoredTrial& trial);
   void add_row(const StoredTrial& trial);
   void write_table();
+  void write_sidecar();
   void describe_participants();
 
-  Store& store_;
-  const ExportSettings& settings_;
-  const ExportClock& clock_;
-  const std::map<std::string, StudyLabel> labels_;
-  AtomicFolder folder_;
-  std::map<std::string, std::string> people_;  // code -> simulated
+  std::map<std::string, std::string> participants_;  // code -> value of the column simulated
   std::int64_t participant_ = -1;
   int session_ = 0;
   std::string session_stem_;
@@ -112,7 +116,6 @@ class BidsWriter {
   Table table_;
   std::optional<BidsRecording> recording_;
   DelimitedRow row_{DelimitedFormat::tsv};
-  std::int64_t samples_ = 0;
 };
 
 void BidsWriter::begin_session(const StoredTrial& trial) {
@@ -124,7 +127,7 @@ void BidsWriter::begin_session(const StoredTrial& trial) {
                   labels_.at(trial.protocol_sha256).label;
   run_ = store_.has_samples(trial.participant, session_) ? 1 : 0;
   const std::string simulated = trial.participant.simulated ? "1" : "0";
-  const auto [at, added] = people_.emplace(trial.participant.code, simulated);
+  const auto [at, added] = participants_.emplace(trial.participant.code, simulated);
   if (!added && at->second != simulated) at->second = "mixed";
 }
 
@@ -144,13 +147,13 @@ void BidsWriter::add(const StoredTrial& trial) {
   }
   add_row(trial);
   if (!recording_) return;
-  recording_->add(trial, folder_.place(table_.stem + "_recording-haptic_physio.tsv.gz"));
+  recording_->add(trial, folder_.prepare(table_.stem + "_recording-haptic_physio.tsv.gz"));
   samples_ += static_cast<std::int64_t>(trial.record.samples.size());
 }
 
 void BidsWriter::add_row(const StoredTrial& trial) {
   row_ << trial.record.response_time;
-  put_trial_but_who(row_, trial, clock_);
+  put_trial_without_participant(row_, trial, clock_);
   table_.rows.push_back({to_unix_ns(trial.run.clock, trial.record.onset_ns), row_.end()});
   const ClockStamp& clock = trial.run.clock;
   if (table_.runs.empty() || table_.runs.back().clock.utc_ns != clock.utc_ns ||
@@ -160,7 +163,10 @@ void BidsWriter::add_row(const StoredTrial& trial) {
 }
 
 void BidsWriter::end_table() {
-  if (!table_.rows.empty()) write_table();
+  if (!table_.rows.empty()) {
+    write_table();
+    write_sidecar();
+  }
   if (recording_) {
     if (const auto about = recording_->finish(settings_.fault_bits)) {
       write(table_.stem + "_recording-haptic_physio.json", json_text(*about));
@@ -174,11 +180,11 @@ void BidsWriter::write_table() {
   auto& rows = table_.rows;
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a.onset_ns < b.onset_ns; });
-  FileSink file(folder_.place(table_.stem + "_beh.tsv"));
+  FileSink file(folder_.prepare(table_.stem + "_beh.tsv"));
   row_ << kOnset.name << kDuration.name << beh_columns(settings_.times);
   file.write(row_.end());
   for (const Row& row : rows) {
-    // Without sign: damaged times may lie further apart than 63 bits reach.
+    // Unsigned: damaged times may differ by more than 63 bits.
     const auto since = static_cast<std::uint64_t>(row.onset_ns) -
                        static_cast<std::uint64_t>(rows.front().onset_ns);
     row_ << static_cast<double>(since) / 1e9;
@@ -188,21 +194,23 @@ void BidsWriter::write_table() {
     file.write(row.rest);
   }
   file.close(false);
+}
 
+void BidsWriter::write_sidecar() {
   const StudyLabel& study = *table_.study;
   Json json{{"TaskName", study.protocol.name},
             {"TaskDescription", study.facts.title},
             {"Simulated", table_.person.simulated}};
   if (table_.person.simulated) json["SimulatedNote"] = kSimulatedSentence;
   for (const RunInfo& run : table_.runs) {
-    json["Sittings"].push_back(describe(run, table_.person, clock_));
+    json["Sittings"].push_back(describe_run(run, table_.person, clock_));
   }
   for (const Column& column : {kOnset, kDuration}) {
-    json[column.name] = describe(column, study.facts, settings_.fault_bits);
+    json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
   }
   for (const Column& column : beh_columns(settings_.times)) {
-    Json& about = json[column.name] = describe(column, study.facts, settings_.fault_bits);
-    const Json levels = found_in(column.name, table_.runs, study);
+    Json& about = json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
+    const Json levels = recorded_levels(column.name, table_.runs, study);
     if (!levels.is_null()) about["Levels"] = levels;
   }
   write(table_.stem + "_beh.json", json_text(json));
@@ -210,7 +218,8 @@ void BidsWriter::write_table() {
 
 void BidsWriter::describe_participants() {
   std::string table = "participant_id\tsimulated\n";
-  for (const auto& [code, simulated] : people_) table += "sub-" + code + "\t" + simulated + "\n";
+  for (const auto& [code, simulated] : participants_)
+    table += "sub-" + code + "\t" + simulated + "\n";
   write("participants.tsv", table);
   const Json json{
       {"participant_id", {{"Description", "Pseudonym of the participant"}}},
@@ -238,25 +247,7 @@ void BidsWriter::describe_dataset(bool simulated) {
          {"Version", settings_.program_version},
          {"Description", "palpate export --format bids; trials recorded by palpate"}}}}};
   write("dataset_description.json", json_text(json));
-  write(
-      "README",
-      dataset_name(labels_, simulated) + "\n\n" + dataset_description(labels_, simulated) +
-          "\n\n"
-          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
-          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
-          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
-          "checksum.\n\n"
-          "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
-          "it "
-          "holds\nthose of all its trials, one row a period of the servo, and its JSON file where "
-          "each trial stands,\nwhich object was felt, how it was turned and with which renderer. A "
-          "new run begins with every\nstart of the program and after more than a minute between "
-          "two trials. Periods between trials, and\nthose whose tick was missed, are rows of n/a. "
-          "Places are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
-          (clock_.relative() ? kRelativeSentence : "") + kGuardSentence +
-          "\n"
-          "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
-          "trials were\nshown again. They are in no other table.\n");
+  write("README", readme_text(labels_, simulated, clock_.relative()));
 }
 
 bool BidsWriter::has_file(const std::string& name) {

@@ -1,4 +1,5 @@
 #pragma once
+// Export as a BIDS dataset.
 
 #include <string>
 
@@ -22,10 +23,10 @@ namespace palpate::data {
 /// of the program and after more than a minute without a trial. Each has a table,
 /// ..._run-1_beh.tsv, and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row a
 /// servo period (bids_recording.h); its sidecar has the trials' places, poses and renderers and the
-/// objects. Trials come one at a time: memory holds the samples of one.
+/// objects. Memory holds the samples of one trial at a time.
 ///
-/// Experimenter's notes are not exported. The folder is made whole or not at all.
-/// \throws StoreRefused: `path` is taken (see require_replaceable), there are no trials, a text
+/// Experimenter's notes are not exported. The folder appears complete or not at all.
+/// \throws StoreRefused: `path` exists (see require_replaceable), there are no trials, a text
 /// does not fit a TSV file; StoreError: it could not be written.
 ExportResult export_bids(Store& store, const std::string& path, const ExportSettings& settings);
 

@@ -24,7 +24,7 @@ const std::string& empty_row() {
   return row;
 }
 
-/// Files stand elsewhere in a dataset than beside the protocol.
+/// Replaces file names of the protocol by their BIDS URIs in the dataset.
 void rename_files(nlohmann::ordered_json& object, const StudyLabel& study) {
   if (const auto file = object.find("file"); file != object.end() && file->is_string()) {
     const auto found = study.files.find(file->get<std::string>());
@@ -59,7 +59,7 @@ BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study)
 
 std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
   if (unix_ns < begin_ns_) return std::nullopt;
-  constexpr double kMostSlots = 1e12;  // years: damaged times
+  constexpr double kMostSlots = 1e12;  // 30 years at 1 kHz: damaged times
   const auto since = static_cast<std::uint64_t>(unix_ns) - static_cast<std::uint64_t>(begin_ns_);
   const double slot = std::round(static_cast<double>(since) / 1e9 * study_.facts.servo_rate);
   if (slot > kMostSlots) return std::nullopt;
@@ -120,9 +120,9 @@ std::optional<nlohmann::ordered_json> BidsRecording::finish(
       {"Device", run_.device}};
   json["Columns"].push_back(kTrialOfSample.name);
   for (const Column& column : sample_columns()) json["Columns"].push_back(column.name);
-  json[kTrialOfSample.name] = describe(kTrialOfSample, {}, fault_bits);
+  json[kTrialOfSample.name] = describe_column(kTrialOfSample, {}, fault_bits);
   for (const Column& column : sample_columns()) {
-    json[column.name] = describe(column, {}, fault_bits);
+    json[column.name] = describe_column(column, {}, fault_bits);
   }
   json["TrialsDescription"] =
       "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "

@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: the servo samples of a BIDS run as one recording.
+// Internal to data/export: the servo samples of a BIDS run as one physiological recording
+// (https://bids-specification.readthedocs.io, "Physiological recordings").
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -11,21 +12,21 @@
 
 namespace palpate::data {
 
-/// Gzipped rows without a header, one a servo period from the first sample to the last: recordings
-/// of BIDS have no gaps, so periods between trials, and those whose tick was missed, are rows of
-/// n/a. Time is counted from the onset of the run's first trial.
+/// A gzipped TSV without header, one row per servo period from the first sample to the last. BIDS
+/// requires a constant sampling frequency: periods between trials and missed ticks are rows of n/a.
+/// Time is relative to the onset of the first trial of the run.
 class BidsRecording {
  public:
-  /// Begins with this trial, which need not have samples. \param study of the protocol
+  /// Starts with this trial, which need not have samples. \param study of the protocol
   BidsRecording(const StoredTrial& first, const StudyLabel& study);
 
-  /// Whether a trial can stand in the same recording: shown by the same process, after all that is
-  /// there, and at most a minute later (longer gaps would be more n/a than data).
+  /// Whether a trial belongs to the same recording: shown by the same process, later than the last
+  /// one, and by at most a minute (longer gaps would be more n/a than data).
   bool continues_with(const StoredTrial& trial) const;
-  /// \param path of the file, which is made when the first samples come
+  /// \param path of the file, which is created with the first samples
   /// \throws StoreRefused: the samples are damaged.
   void add(const StoredTrial& trial, const std::string& path);
-  /// The sidecar, once all is there; none where no trial had samples.
+  /// Closes the file. \return the JSON sidecar; none where no trial had samples.
   std::optional<nlohmann::ordered_json> finish(const std::vector<FaultMeaning>& fault_bits);
 
  private:

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::int64_t kYear1900 = -2'208'988'800'000'000'000;  // ns since 1970
 
-/// a - b; sums beyond the range stay at its end: the values may come from a damaged file.
+/// a - b, saturated: the values may come from a damaged file.
 std::int64_t difference(std::int64_t a, std::int64_t b) {
   std::int64_t out = 0;
   if (!__builtin_sub_overflow(a, b, &out)) return out;

@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: how an export tells when something happened.
+// Internal to data/export: times of an export, absolute (UTC) or relative to the participant's
+// first trial.
 
 #include <cstdint>
 #include <map>
@@ -17,13 +18,13 @@ class ExportClock {
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
-  /// Of a trial's onset, or of the begin of an attempt that was cut off.
+  /// ISO 8601 of the onset of a trial, or of the begin of an attempt that was cut off.
   std::string onset_utc(const StoredTrial& trial) const;
-  /// s, the same moment from the participant's first trial.
+  /// s from the participant's first trial to the same moment.
   double elapsed(const StoredTrial& trial) const;
-  /// Any moment of a participant's, ns since 1970.
+  /// ISO 8601 of any moment of a participant. \param unix_ns ns since 1970
   std::string utc(const Participant& person, std::int64_t unix_ns) const;
-  /// What a device says of its calibration may hold a date: left out of relative times.
+  /// Removes dates from a text (of a device's calibration) if times are relative.
   std::string without_dates(const std::string& text) const;
 
  private:

@@ -17,7 +17,7 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
     for (const auto& values :
          {column_levels(column, facts), column_bits(column, settings.fault_bits)}) {
       for (const auto& [value, meaning] : values.items()) {
-        // A name of a stimulus is guarded already; a guard of its own would be one too many.
+        // Names of stimuli are guarded already: DelimitedRow would guard them twice.
         row << table << column.name << column.unit << unguarded(value)
             << meaning.get<std::string>();
         out.write(row.end());

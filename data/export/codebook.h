@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: what the columns of trials.csv and attempts.csv mean, as a table.
+// Internal to data/export: a table that explains the columns of trials.csv and attempts.csv.
 
 #include "data/export/column_definitions.h"
 #include "data/export/dataset_description.h"
@@ -8,8 +8,8 @@
 
 namespace palpate::data {
 
-/// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, then one for
-/// each value or bit that stands for something.
+/// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, followed by one
+/// for each of its codes or fault bits.
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings);
 
 }  // namespace palpate::data

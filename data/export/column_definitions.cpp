@@ -152,7 +152,7 @@ std::vector<Column> make_samples() {
   };
 }
 
-/// The same with dates that are shifted, and the seconds between them.
+/// With shifted dates, and the seconds between them in the column elapsed.
 std::vector<Column> made_relative(std::vector<Column> columns) {
   for (Column& column : columns) {
     const std::string_view name = column.name;

@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/: what every column of an export is. One table for CSV headers, BIDS sidecars
-// and Psych-DS's variableMeasured.
+// Internal to data/export: name, unit and meaning of every exported column. One table for CSV
+// headers, the codebook, BIDS sidecars and variableMeasured of Psych-DS.
 
 #include <span>
 #include <string>
@@ -15,11 +15,11 @@ struct Column {
   const char* name;
   const char* description;
   const char* unit = "";  ///< "1": a pure number; "": a text or a code
-  /// Value -> meaning; empty where the values are no codes.
+  /// Code -> meaning; empty where the values are no codes.
   std::vector<std::pair<const char*, const char*>> levels = {};
 };
 
-/// Of trials.csv, in order; relative times have one more at the end.
+/// Of trials.csv, in order; relative times add the column elapsed.
 std::span<const Column> trial_columns(Times times);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order

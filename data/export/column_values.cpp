@@ -4,10 +4,11 @@ namespace palpate::data {
 
 void put_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
   row << trial.participant.code;
-  put_trial_but_who(row, trial, clock);
+  put_trial_without_participant(row, trial, clock);
 }
 
-void put_trial_but_who(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
+void put_trial_without_participant(DelimitedRow& row, const StoredTrial& trial,
+                                   const ExportClock& clock) {
   const TrialRecord& record = trial.record;
   row << record.session << record.block << record.trial << record.renderer << record.shape
       << record.response << record.correct << record.response_time;

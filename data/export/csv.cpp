@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <filesystem>
+#include <optional>
 #include <system_error>
 
 #include "data/export/codebook.h"
@@ -19,76 +20,99 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Large texts in large pieces; the descriptor stays the draft's.
-FileSink sink_of(const AtomicFile& draft, const fs::path& path) {
-  return {::fcntl(draft.descriptor(), F_DUPFD_CLOEXEC, 0), path.string()};
+struct CsvPaths {
+  fs::path trials;
+  std::optional<fs::path> attempts;  // if attempts were cut off
+  std::string codebook;              // "": none
+};
+
+/// A buffered sink for a temporary file, whose descriptor stays open for its commit.
+FileSink sink_of(const AtomicFile& file, const std::string& path) {
+  return {::fcntl(file.descriptor(), F_DUPFD_CLOEXEC, 0), path};
 }
 
 /// \throws StoreRefused
-void require_place(const fs::path& path, bool force, const ProtectedFiles& taken) {
+void require_writable(const fs::path& path, bool force, const ProtectedFiles& others) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     throw StoreRefused(path.string() + ": is not a file; name the CSV file to be written");
   }
-  const std::string why = write_refusal(path.string(), force, taken);
-  if (!why.empty()) throw StoreRefused(path.string() + ": " + why);
+  const std::string reason = write_refusal(path.string(), force, others);
+  if (!reason.empty()) throw StoreRefused(path.string() + ": " + reason);
+}
+
+/// \throws StoreRefused
+CsvPaths checked_paths(Store& store, const std::string& path, const ExportSettings& settings) {
+  const fs::path trials(path), attempts = trials.parent_path() / "attempts.csv";
+  if (trials.filename().empty()) throw StoreRefused("'" + path + "' names no file to write to");
+  if (trials.filename() == attempts.filename()) {
+    throw StoreRefused(
+        path + ": that name is reserved for the attempts that were cut off; choose another");
+  }
+  CsvPaths paths{.trials = trials, .attempts = {}, .codebook = settings.codebook};
+  if (store.counts().cut_off > 0) paths.attempts = attempts;
+  ProtectedFiles others;
+  others.add(store.path(), "it is the database itself, or SQLite's file beside it");
+  require_writable(trials, settings.force, others);
+  if (paths.attempts) require_writable(attempts, settings.force, others);
+  if (!paths.codebook.empty()) {
+    others.add(trials.string(), "the trials go there");
+    others.add(attempts.string(), "that name is reserved for the attempts that were cut off");
+    require_writable(paths.codebook, settings.force, others);
+  }
+  return paths;
+}
+
+/// \return rows
+std::int64_t write_trials(Store& store, TextSink& out, const ExportClock& clock,
+                          ExportedParticipants& participants, ProgressCounter& counter) {
+  std::int64_t rows = 0;
+  DelimitedRow row(DelimitedFormat::csv);
+  row << trial_columns(clock.times());
+  out.write(row.end());
+  store.for_each_trial([&](const StoredTrial& trial) {
+    put_trial(row, trial, clock);
+    out.write(row.end());
+    participants.add(trial.participant);
+    ++rows;
+    counter.next();
+  });
+  return rows;
 }
 
 }  // namespace
 
 ExportResult export_csv(Store& store, const std::string& path, const ExportSettings& settings) {
-  const fs::path trials_path(path);
-  const fs::path attempts_path = trials_path.parent_path() / "attempts.csv";
-  if (trials_path.filename().empty())
-    throw StoreRefused("'" + path + "' names no file to write to");
-  if (trials_path.filename() == attempts_path.filename()) {
-    throw StoreRefused(path +
-                       ": that name is kept for the attempts that were cut off; choose another");
-  }
-  ProtectedFiles taken;
-  taken.add(store.path(), "it is the database itself, or SQLite's file beside it");
-  const bool with_attempts = store.counts().cut_off > 0;
-  require_place(trials_path, settings.force, taken);
-  if (with_attempts) require_place(attempts_path, settings.force, taken);
-  if (!settings.codebook.empty()) {
-    taken.add(trials_path.string(), "the trials go there");
-    taken.add(attempts_path.string(), "that name is kept for the attempts that were cut off");
-    require_place(settings.codebook, settings.force, taken);
-  }
-
-  ExportResult done;
-  ExportedParticipants people;
+  const CsvPaths paths = checked_paths(store, path, settings);
+  ExportResult result;
+  ExportedParticipants participants;
   ProgressCounter counter(settings);
   const ExportClock clock(store, settings.times);
-  DelimitedRow row(DelimitedFormat::csv);
-  std::deque<AtomicFile> drafts;
-  FileSink trials = sink_of(drafts.emplace_back(trials_path.string()), trials_path);
-  row << trial_columns(settings.times);
-  trials.write(row.end());
-  store.for_each_trial([&](const StoredTrial& trial) {
-    put_trial(row, trial, clock);
-    trials.write(row.end());
-    people.add(trial.participant);
-    ++done.trials;
-    counter.next();
+  std::deque<AtomicFile> files;
+  const auto write_file = [&files](const std::string& target, const auto& write) {
+    FileSink sink = sink_of(files.emplace_back(target), target);
+    write(sink);
+    sink.close(true);
+  };
+  write_file(paths.trials.string(), [&](TextSink& sink) {
+    result.trials = write_trials(store, sink, clock, participants, counter);
   });
-  trials.close(true);
-  if (with_attempts) {
-    FileSink attempts = sink_of(drafts.emplace_back(attempts_path.string()), attempts_path);
-    done.attempts = write_attempts(store, attempts, clock, people, counter);
-    attempts.close(true);
-    done.attempts_path = attempts_path.string();
+  if (paths.attempts) {
+    result.attempts_path = paths.attempts->string();
+    write_file(result.attempts_path, [&](TextSink& sink) {
+      result.attempts = write_attempts(store, sink, clock, participants, counter);
+    });
   }
-  if (!settings.codebook.empty()) {
-    FileSink codebook = sink_of(drafts.emplace_back(settings.codebook), settings.codebook);
-    write_codebook(codebook, all_facts(label_protocols(store, settings)), settings);
-    codebook.close(true);
+  if (!paths.codebook.empty()) {
+    write_file(paths.codebook, [&](TextSink& sink) {
+      write_codebook(sink, all_facts(label_protocols(store, settings)), settings);
+    });
   }
-  done.simulated = people.any_simulated();
-  done.not_recorded = people.record(store.path(), path, "csv");
-  commit_all(drafts, settings.force);
-  return done;
+  result.simulated = participants.any_simulated();
+  result.not_recorded = participants.record(store.path(), path, "csv");
+  commit_all(files, settings.force);
+  return result;
 }
 
 }  // namespace palpate::data

@@ -1,4 +1,5 @@
 #pragma once
+// Export as CSV: one row per trial.
 
 #include <string>
 
@@ -8,17 +9,14 @@
 namespace palpate::data {
 
 /// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
-/// in the same folder. UTF-8, no BOM, RFC 4180 (lines end in CRLF, fields quoted only where
+/// in the same folder. UTF-8 without BOM, RFC 4180 (lines end in CRLF, fields quoted only where
 /// needed), numbers as the shortest text that reads back exactly; texts that a spreadsheet would
-/// run are guarded (spreadsheet_text.h), the others as they are stored. What the columns mean goes
-/// to `settings.codebook` where that is named. Each file is written to a temporary one beside it,
-/// synced and renamed: it is whole or it is not there. The database records that the export was
-/// made.
+/// evaluate are guarded (formula_guard.h). settings.codebook names a file for the meaning of the
+/// columns. Columns: column_definitions.h. Each file appears complete or not at all
+/// (atomic_file.h), and the database records the export.
 ///
-/// Columns: columns.h.
-///
-/// \throws StoreRefused: a file is there and `force` is not given, or `path` is no place for it;
-/// StoreError: it could not be written. Nothing is left behind then.
+/// \throws StoreRefused: a file exists and `force` is not given, or `path` must not be written to;
+/// StoreError: it could not be written. No file is left behind then.
 ExportResult export_csv(Store& store, const std::string& path, const ExportSettings& settings);
 inline ExportResult export_csv(Store& store, const std::string& path, bool force) {
   return export_csv(store, path, ExportSettings{.force = force});

@@ -5,7 +5,7 @@
 namespace palpate::data {
 
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
-                            ExportedParticipants& people, ProgressCounter& counter) {
+                            ExportedParticipants& participants, ProgressCounter& counter) {
   std::int64_t rows = 0;
   DelimitedRow row(DelimitedFormat::csv);
   row << attempt_columns(clock.times());
@@ -13,7 +13,7 @@ std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& cloc
   store.for_each_cut_off([&](const StoredTrial& attempt) {
     put_attempt(row, attempt, clock);
     out.write(row.end());
-    people.add(attempt.participant);
+    participants.add(attempt.participant);
     ++rows;
     counter.next();
   });

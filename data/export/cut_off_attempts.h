@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: attempts.csv, the same in every export.
+// Internal to data/export: the table of attempts that were cut off, the same in every format.
 
 #include "data/export/clock.h"
 #include "data/export/settings.h"
@@ -9,8 +9,8 @@
 
 namespace palpate::data {
 
-/// Writes all attempts that were cut off, RFC 4180 with a header. \return rows
+/// RFC 4180 with a header. \return rows
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
-                            ExportedParticipants& people, ProgressCounter& counter);
+                            ExportedParticipants& participants, ProgressCounter& counter);
 
 }  // namespace palpate::data

@@ -27,7 +27,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// Base names that every disk takes, each once; a protocol may name files anywhere.
+/// File name in the protocol (any path) -> a unique portable base name in the dataset.
 std::map<std::string, std::string> file_names(const std::vector<ProtocolFile>& files) {
   constexpr std::size_t kLongest = 100;
   std::map<std::string, std::string> names;
@@ -54,7 +54,7 @@ void write_protocol_files(Store& store, const StudyLabel& study, const std::stri
                           const AtomicFolder& draft) {
   if (study.files.empty()) return;
   for (const ProtocolFile& file : store.files(study.protocol.sha256)) {
-    FileSink out(draft.place(folder + "/" + study.label + "/" + study.files.at(file.name)));
+    FileSink out(draft.prepare(folder + "/" + study.label + "/" + study.files.at(file.name)));
     out.write(file.bytes);
     out.close(false);
   }
@@ -135,8 +135,8 @@ nlohmann::ordered_json column_bits(const Column& column,
   return bits;
 }
 
-nlohmann::ordered_json describe(const Column& column, const ProtocolFacts& facts,
-                                const std::vector<FaultMeaning>& fault_bits) {
+nlohmann::ordered_json describe_column(const Column& column, const ProtocolFacts& facts,
+                                       const std::vector<FaultMeaning>& fault_bits) {
   nlohmann::ordered_json json{{"Description", column.description}};
   if (*column.unit != '\0') json["Units"] = column.unit;
   if (const auto levels = column_levels(column, facts); !levels.is_null()) json["Levels"] = levels;

@@ -1,10 +1,14 @@
 #pragma once
-// Internal to data/: how an export that is a folder of tables comes about.
+// Internal to data/export: the part that BIDS and Psych-DS have in common: a folder of tables that
+// appears complete or not at all, and that the database records.
 
+#include <cstdint>
+#include <map>
 #include <string>
 
 #include "data/export/clock.h"
 #include "data/export/cut_off_attempts.h"
+#include "data/export/dataset_description.h"
 #include "data/export/settings.h"
 #include "data/files/atomic_folder.h"
 #include "data/files/text_sink.h"
@@ -13,41 +17,75 @@
 
 namespace palpate::data {
 
-/// All trials, then the attempts that were cut off, then what describes them. The folder appears
-/// whole, or not at all, and the database knows of it.
-/// \tparam Writer  of one format; it decides which files there are
-/// \param format   its name
+/// Writes the files of one dataset. A format derives from it and decides which files there are; it
+/// has a static has_file(name) as well: whether its exports contain such a file.
+class DatasetWriter {
+ public:
+  DatasetWriter(Store& store, const std::string& path, const ExportSettings& settings,
+                const ExportClock& clock)
+      : store_(store),
+        settings_(settings),
+        clock_(clock),
+        labels_(label_protocols(store, settings)),
+        folder_(path) {}
+  virtual ~DatasetWriter() = default;
+  DatasetWriter(const DatasetWriter&) = delete;
+  DatasetWriter& operator=(const DatasetWriter&) = delete;
+
+  AtomicFolder& folder() { return folder_; }
+  virtual void add(const StoredTrial& trial) = 0;
+  virtual void end_table() = 0;  ///< after the last trial
+  /// \return the name of the table of attempts that were cut off
+  virtual std::string begin_attempts() = 0;
+  /// Writes what describes the tables, after all of them. \param simulated participants are in it
+  virtual void describe_dataset(bool simulated) = 0;
+  std::int64_t samples() const { return samples_; }  ///< written so far
+
+ protected:
+  void write(const std::string& name, const std::string& text);
+
+  Store& store_;
+  const ExportSettings& settings_;
+  const ExportClock& clock_;
+  const std::map<std::string, StudyLabel> labels_;  // by the protocol's SHA-256
+  AtomicFolder folder_;
+  std::int64_t samples_ = 0;
+};
+
+/// Exports all completed trials, then the attempts that were cut off, then the descriptions.
+/// \tparam Writer  a DatasetWriter
+/// \param format   its name, as recorded in the database
 /// \throws StoreRefused, StoreError as require_replaceable and AtomicFolder do.
 template <class Writer>
 ExportResult export_dataset(Store& store, const std::string& path, const ExportSettings& settings,
                             const std::string& format) {
   require_replaceable(path, settings.force, Writer::has_file);
   require_exportable(store);
-  ExportResult done;
-  ExportedParticipants people;
+  ExportResult result;
+  ExportedParticipants participants;
   ProgressCounter counter(settings);
   const ExportClock clock(store, settings.times);
   Writer writer(store, path, settings, clock);
   store.for_each_trial(
       [&](const StoredTrial& trial) {
         writer.add(trial);
-        people.add(trial.participant);
-        ++done.trials;
+        participants.add(trial.participant);
+        ++result.trials;
         counter.next();
       },
       store.counts().sampled > 0);
   writer.end_table();
-  done.samples = writer.samples();
+  result.samples = writer.samples();
   if (store.counts().cut_off > 0) {
-    FileSink file(writer.folder().place(writer.begin_attempts()));
-    done.attempts = write_attempts(store, file, clock, people, counter);
+    FileSink file(writer.folder().prepare(writer.begin_attempts()));
+    result.attempts = write_attempts(store, file, clock, participants, counter);
     file.close(false);
   }
-  done.simulated = people.any_simulated();
-  writer.describe_dataset(done.simulated);
-  done.not_recorded = people.record(store.path(), path, format);
+  result.simulated = participants.any_simulated();
+  writer.describe_dataset(result.simulated);
+  result.not_recorded = participants.record(store.path(), path, format);
   writer.folder().commit(settings.force);
-  return done;
+  return result;
 }
 
 }  // namespace palpate::data

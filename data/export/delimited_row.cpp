@@ -9,7 +9,7 @@ namespace palpate::data {
 namespace {
 
 bool quotes_needed(std::string_view text) {
-  // Without a way out: compilers make that 16 characters and more at a time.
+  // Without early exit, so that compilers vectorise the loop.
   bool needed = false;
   for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
   return needed;
@@ -41,8 +41,8 @@ DelimitedRow& DelimitedRow::cell(std::string_view text) {
   if (style_ == DelimitedFormat::tsv) {
     if (!fits_tsv(text)) {
       throw StoreRefused("the text '" + std::string(text) +
-                         "' cannot stand in a TSV file (tab, line break or the mark of a missing "
-                         "value); export as csv or psych-ds");
+                         "' cannot be written to a TSV file (tab, line break or the text n/a); "
+                         "export as csv or psych-ds");
     }
     return raw(text.empty() ? "n/a" : text);
   }

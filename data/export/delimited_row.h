@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: one row of a CSV or TSV file.
+// Internal to data/export: formats one row of a CSV or TSV file.
 
 #include <array>
 #include <charconv>
@@ -15,18 +15,17 @@ namespace palpate::data {
 
 enum class DelimitedFormat {
   csv,  ///< RFC 4180: fields quoted where needed, CRLF; a missing value is an empty field
-  tsv,  ///< BIDS: tab, LF; a missing value is n/a. There is no quoting: see DelimitedRow::text
+  tsv,  ///< BIDS: tab, LF; a missing value is n/a. No quoting: some texts are refused
 };
 
-/// Builds a row value by value. Numbers are the shortest text that reads back as the same number,
-/// never with a decimal comma; booleans are 0 or 1.
+/// Appends values left to right. Numbers are written as the shortest text that reads back as the
+/// same number (std::to_chars), with a decimal point in every locale; booleans as 0 or 1.
 class DelimitedRow {
  public:
   explicit DelimitedRow(DelimitedFormat style) : style_(style) {}
 
-  /// "" is a missing value; what a spreadsheet would run is guarded (spreadsheet_text.h).
-  /// \throws StoreRefused: a text that this style cannot hold (TSV: tabs, line breaks, the text
-  /// "n/a").
+  /// "" is a missing value; texts that a spreadsheet would evaluate are guarded (formula_guard.h).
+  /// \throws StoreRefused: a text that TSV cannot represent (tabs, line breaks, the text "n/a").
   DelimitedRow& operator<<(std::string_view text);
   DelimitedRow& operator<<(const char* text) { return *this << std::string_view(text); }
   DelimitedRow& operator<<(bool value) { return raw(value ? "1" : "0"); }
@@ -36,7 +35,7 @@ class DelimitedRow {
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
     return raw({text.data(), static_cast<std::size_t>(end.ptr - text.data())});
   }
-  /// With at most so many decimals, zeros at the end left out.
+  /// With at most so many decimals, without trailing zeros.
   DelimitedRow& rounded(double value, int decimals);
   template <class T>
   DelimitedRow& operator<<(const std::optional<T>& value) {
@@ -44,7 +43,7 @@ class DelimitedRow {
   }
   DelimitedRow& operator<<(std::span<const Column> names);
 
-  /// The row with its end; valid until the next one is begun.
+  /// The row with its line end; valid until the next value is appended.
   const std::string& end();
 
  private:

@@ -18,53 +18,74 @@ using Json = nlohmann::ordered_json;
 
 const Column kTimeOfTick{"time", "Time of the tick, from the first tick with forces on", "s"};
 
-class PsychDsWriter {
- public:
-  PsychDsWriter(Store& store, const std::string& path, const ExportSettings& settings,
-                const ExportClock& clock)
-      : store_(store),
-        settings_(settings),
-        clock_(clock),
-        labels_(label_protocols(store, settings)),
-        folder_(path) {}
+/// ". Values: 0 = no; 1 = yes." \param meanings value -> meaning; null: none
+std::string listed(const char* title, const Json& meanings) {
+  if (meanings.is_null()) return "";
+  std::string text = std::string(". ") + title + ":";
+  for (const auto& [value, meaning] : meanings.items()) {
+    text += " " + value + " = " + meaning.get<std::string>() + ";";
+  }
+  text.back() = '.';
+  return text;
+}
 
-  /// Whether an export of ours has such a file.
+/// An entry of variableMeasured: https://schema.org/PropertyValue
+Json describe_variable(const Column& column, const ProtocolFacts& facts,
+                       const std::vector<FaultMeaning>& fault_bits) {
+  const std::string text = column.description + listed("Values", column_levels(column, facts)) +
+                           listed("Bits", column_bits(column, fault_bits));
+  Json variable{{"@type", "PropertyValue"}, {"name", column.name}, {"description", text}};
+  if (*column.unit != '\0') variable["unitText"] = column.unit;
+  return variable;
+}
+
+std::string dataset_readme(const std::string& name, const std::string& about, bool relative) {
+  return "# " + name + "\n\n" + about +
+         "\n\n"
+         "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
+         "one row a trial.\n"
+         "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
+         "samples of session S,\none row a tick; `time` counts from the first tick with forces on "
+         "of its trial, which is the `onset_utc` of\nthat trial. What was felt, how it was turned "
+         "and with which renderer stands in the trial's row.\nPlaces are rounded to 1 nm, forces "
+         "to "
+         "1 uN and torques to 1 uN m.\n"
+         "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
+         "were cut off; their\ntrials were shown again.\n"
+         "Every column is described in `dataset_description.json`; an empty field is a missing "
+         "value. The protocol\nthat was run is in `materials/`, byte for byte; "
+         "`protocol_sha256` is its checksum.\n\n" +
+         (relative ? kRelativeSentence : "") + kGuardSentence;
+}
+
+class PsychDsWriter : public DatasetWriter {
+ public:
+  using DatasetWriter::DatasetWriter;
+
+  /// Whether an export of palpate has such a file.
   static bool has_file(const std::string& name);
 
-  AtomicFolder& folder() { return folder_; }
-  void add(const StoredTrial& trial);
-  void end_table();
-  void use(std::span<const Column> columns) {
-    for (const Column& column : columns) used_.insert(column.name);
-  }
-  void describe_dataset(bool simulated);
-  /// One table for all: an attempt names its participant and its protocol.
-  std::string begin_attempts() {
+  void add(const StoredTrial& trial) override;
+  void end_table() override;
+  void describe_dataset(bool simulated) override;
+  /// One table for all participants and protocols: its columns name them.
+  std::string begin_attempts() override {
     use(attempt_columns(settings_.times));
     return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";
   }
-  std::int64_t samples() const { return samples_; }
 
  private:
-  void write(const std::string& name, const std::string& text) {
-    FileSink file(folder_.place(name));
-    file.write(text);
-    file.close(false);
+  void use(std::span<const Column> columns) {
+    for (const Column& column : columns) used_.insert(column.name);
   }
   void write_samples(const StoredTrial& trial, const std::string& stem, double servo_rate);
   Json variables() const;
 
-  Store& store_;
-  const ExportSettings& settings_;
-  const ExportClock& clock_;
-  const std::map<std::string, StudyLabel> labels_;
-  AtomicFolder folder_;
   std::set<std::string> used_;  // columns
   std::int64_t participant_ = -1;
   int session_ = 0;  // of haptic_
   std::optional<FileSink> table_, haptic_;
   DelimitedRow row_{DelimitedFormat::csv};
-  std::int64_t samples_ = 0;
 };
 
 void PsychDsWriter::add(const StoredTrial& trial) {
@@ -74,7 +95,7 @@ void PsychDsWriter::add(const StoredTrial& trial) {
   if (trial.participant.id != participant_) {
     end_table();
     participant_ = trial.participant.id;
-    table_.emplace(folder_.place(stem + "_data.csv"));
+    table_.emplace(folder_.prepare(stem + "_data.csv"));
     row_ << trial_columns(settings_.times);
     table_->write(row_.end());
     use(trial_columns(settings_.times));
@@ -100,8 +121,8 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
   }
   if (!haptic_) {
     session_ = record.session;
-    haptic_.emplace(folder_.place(stem + "_session-" + std::to_string(session_) +
-                                  "_description-haptic_data.csv"));
+    haptic_.emplace(folder_.prepare(stem + "_session-" + std::to_string(session_) +
+                                    "_description-haptic_data.csv"));
     row_ << "participant_id"
          << "session"
          << "trial" << kTimeOfTick.name << sample_columns();
@@ -122,28 +143,11 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
 Json PsychDsWriter::variables() const {
   const ProtocolFacts facts = all_facts(labels_);
   Json all = Json::array();
-  std::set<std::string> named;
+  std::set<std::string> described;
   const auto add = [&](std::span<const Column> columns) {
     for (const Column& column : columns) {
-      if (!used_.contains(column.name) || !named.insert(column.name).second) continue;
-      std::string text = column.description;
-      if (const Json levels = column_levels(column, facts); !levels.is_null()) {
-        text += ". Values:";
-        for (const auto& [value, meaning] : levels.items()) {
-          text += " " + value + " = " + meaning.get<std::string>() + ";";
-        }
-        text.back() = '.';
-      }
-      if (const Json bits = column_bits(column, settings_.fault_bits); !bits.is_null()) {
-        text += ". Bits:";
-        for (const auto& [bit, meaning] : bits.items()) {
-          text += " " + bit + " = " + meaning.get<std::string>() + ";";
-        }
-        text.back() = '.';
-      }
-      Json& one = all.emplace_back(
-          Json{{"@type", "PropertyValue"}, {"name", column.name}, {"description", text}});
-      if (*column.unit != '\0') one["unitText"] = column.unit;
+      if (!used_.contains(column.name) || !described.insert(column.name).second) continue;
+      all.push_back(describe_variable(column, facts, settings_.fault_bits));
     }
   };
   add(trial_columns(settings_.times));
@@ -167,24 +171,7 @@ void PsychDsWriter::describe_dataset(bool simulated) {
                    {"description", about},
                    {"measurementTechnique", "palpate " + settings_.program_version},
                    {"variableMeasured", variables()}}));
-  write(
-      "README.md",
-      "# " + name + "\n\n" + about +
-          "\n\n"
-          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
-          "one row a trial.\n"
-          "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
-          "samples of session S,\none row a tick; `time` counts from the first tick with forces on "
-          "of its trial, which is the `onset_utc` of\nthat trial. What was felt, how it was turned "
-          "and with which renderer stands in the trial's row.\nPlaces are rounded to 1 nm, forces "
-          "to "
-          "1 uN and torques to 1 uN m.\n"
-          "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
-          "were cut off; their\ntrials were shown again.\n"
-          "Every column is described in `dataset_description.json`; an empty field is a missing "
-          "value. The protocol\nthat was run is in `materials/`, byte for byte; "
-          "`protocol_sha256` is its checksum.\n\n" +
-          (clock_.relative() ? kRelativeSentence : "") + kGuardSentence);
+  write("README.md", dataset_readme(name, about, clock_.relative()));
 }
 
 bool PsychDsWriter::has_file(const std::string& name) {

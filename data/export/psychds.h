@@ -1,4 +1,5 @@
 #pragma once
+// Export as a Psych-DS dataset.
 
 #include <string>
 
@@ -18,8 +19,8 @@ namespace palpate::data {
 ///   materials/T/                                         the files that it names (meshes)
 ///
 /// T is the protocol's name without '-'. variableMeasured describes exactly the columns that are
-/// there. Experimenter's notes are not exported. The folder is made whole or not at all.
-/// \throws StoreRefused: `path` is taken (see require_replaceable), there are no trials;
+/// there. Experimenter's notes are not exported. The folder appears complete or not at all.
+/// \throws StoreRefused: `path` exists (see require_replaceable), there are no trials;
 /// StoreError: it could not be written.
 ExportResult export_psychds(Store& store, const std::string& path, const ExportSettings& settings);
 

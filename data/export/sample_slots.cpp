@@ -17,7 +17,7 @@ std::int64_t SampleSlots::next() {
   const SampleRecord& before = samples[index_ - 2];
   double step = static_cast<double>(sample.tick) - static_cast<double>(before.tick);
   if (step == 1 && sample.period_ns > 0) {
-    // A tick that came late leaves the slots empty in which it should have been over.
+    // After a late tick, the slots until the next scheduled one are empty.
     const double due_ns = static_cast<double>(sample.period_ns) -
                           static_cast<double>(sample.lateness_ns) +
                           static_cast<double>(before.lateness_ns);

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: where the servo ticks of a trial lie in time.
+// Internal to data/export: the servo period of every sample, counted from the onset of its trial.
 
 #include <cstdint>
 
@@ -7,16 +7,16 @@
 
 namespace palpate::data {
 
-/// Goes through the samples of one trial. A slot is a period of the servo; every tick was due at
-/// the begin of one, and a slot whose tick was missed or is not on record stays empty.
+/// Iterates over the samples of one trial. A slot is one servo period; every tick was scheduled at
+/// the begin of one. A slot without a sample is a missed tick.
 class SampleSlots {
  public:
   /// \param servo_rate Hz
   SampleSlots(const StoredTrial& trial, double servo_rate) : trial_(trial), rate_(servo_rate) {}
 
-  /// The slot of the next sample, counted from the trial's onset. Always later than the one before.
-  /// \throws StoreRefused: ticks that do not increase, or that leave out more than any trial could:
-  /// the samples are damaged.
+  /// The slot of the next sample, from the onset of the trial; strictly increasing.
+  /// \throws StoreRefused: ticks do not increase, or have an impossible gap: the samples are
+  /// damaged.
   std::int64_t next();
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// What all exports have in common.
+// Settings and results that all export formats share.
 
 #include <cstdint>
 #include <functional>
@@ -12,17 +12,17 @@ namespace palpate::data {
 
 struct StimulusFacts {
   std::string name;
-  std::string object;  ///< JSON: what the protocol says of it but for its name
+  std::string object;  ///< JSON of the protocol, without the name
 };
 
-/// What an export needs to know of a protocol beyond its text.
+/// What an export needs of a protocol beyond its text; the caller parses it, data/ cannot.
 struct ProtocolFacts {
   std::string title = {};    ///< "" for none
   double servo_rate = 1000;  ///< Hz
   std::vector<StimulusFacts> stimuli = {};
 };
 
-/// What a bit of the columns `faults` means.
+/// Meaning of a bit of the columns `faults`.
 struct FaultMeaning {
   std::uint32_t bit = 0;
   std::string text;
@@ -30,35 +30,35 @@ struct FaultMeaning {
 
 enum class Times {
   absolute,  ///< on the calendar
-  /// Seconds from the participant's first trial; where a date has to stand, it is shifted so that
-  /// this trial is at the beginning of 1900 (BIDS: before 1925, so that nobody takes it for real).
+  /// Seconds from the participant's first trial; dates are shifted so that this trial is at the
+  /// beginning of 1900 (BIDS: shifted dates are before 1925, to be told from real ones).
   relative,
 };
 
 struct ExportSettings {
-  bool force = false;                ///< replace what is there, if it is an export of ours
+  bool force = false;                ///< replace an existing export
   std::string program_version = {};  ///< "0.1.0"
   Times times = Times::absolute;
   std::string codebook = {};  ///< csv: a file that describes the columns; "" for none
   std::vector<FaultMeaning> fault_bits = {};  ///< lowest first
-  /// Reads a protocol's text; asked only by exports that describe themselves. May throw.
+  /// Parses the text of a protocol; called by exports with descriptions only. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};
-  /// Called after every so many trials with their number; may throw to stop the export, which then
-  /// leaves nothing.
+  /// Called every so many trials with their number; may throw to stop the export, which then leaves
+  /// no file.
   std::function<void(std::int64_t)> progress = {};
 };
 
 struct ExportResult {
   std::int64_t trials = 0;    ///< rows written
-  std::int64_t attempts = 0;  ///< that were cut off; 0: their file was not written
+  std::int64_t attempts = 0;  ///< that were cut off; 0: no file of them was written
   std::int64_t samples = 0;   ///< servo ticks
-  bool simulated = false;     ///< there are simulated participants among them
+  bool simulated = false;     ///< contains simulated participants
   std::string attempts_path;  ///< csv only
-  /// Why the export could not be recorded in the database; forget will not list it. "" when it is.
+  /// Why the export could not be recorded in the database (forget will not list it), or "".
   std::string not_recorded;
 };
 
-/// Called once a trial; asks `progress` now and then.
+/// Counts trials; calls `progress` every 256th.
 class ProgressCounter {
  public:
   explicit ProgressCounter(const ExportSettings& settings) : settings_(settings) {}

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether `name` in `folder` is the file that is open.
+/// Whether `name` in `folder` is the open file.
 bool leads_to(int folder, const std::string& name, int descriptor) {
   struct stat named {
   }, opened{};
@@ -31,11 +31,11 @@ bool leads_to(int folder, const std::string& name, int descriptor) {
 }  // namespace
 
 AtomicFile::AtomicFile(const std::string& target) : target_(target) {
-  const ResolvedPath followed = resolve_trusted_links(target);
-  if (!followed.fault.empty()) throw StoreRefused(target + ": " + followed.fault);
-  open_folder(followed.path);
-  remove_stale_temporaries(followed.path);
-  make();
+  const ResolvedPath resolved = resolve_trusted_links(target);
+  if (!resolved.fault.empty()) throw StoreRefused(target + ": " + resolved.fault);
+  open_folder(resolved.path);
+  remove_stale_temporaries(resolved.path);
+  create();
 }
 
 void AtomicFile::open_folder(const std::string& path) {
@@ -46,19 +46,20 @@ void AtomicFile::open_folder(const std::string& path) {
   if (folder_ < 0) fail("cannot be written", errno);
 }
 
-void AtomicFile::make() {
+void AtomicFile::create() {
   const std::string stem = temporary_prefix(name_);
   for (int tries = 0; tries < 100; ++tries) {
-    draft_ = stem + random_letters();
-    descriptor_ =
-        ::openat(folder_, draft_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+    temporary_ = stem + random_letters();
+    descriptor_ = ::openat(folder_, temporary_.c_str(),
+                           O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
     if (descriptor_ < 0 && errno == EEXIST) continue;
     if (descriptor_ < 0) break;
-    // Another program that clears up may have taken it for dead before it was locked.
-    if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 && leads_to(folder_, draft_, descriptor_)) {
+    // Between creation and lock, another process may have removed it as stale.
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 &&
+        leads_to(folder_, temporary_, descriptor_)) {
       return;
     }
-    ::unlinkat(folder_, draft_.c_str(), 0);
+    ::unlinkat(folder_, temporary_.c_str(), 0);
     ::close(std::exchange(descriptor_, -1));
   }
   const int error = errno;
@@ -67,8 +68,8 @@ void AtomicFile::make() {
 }
 
 AtomicFile::~AtomicFile() {
-  if (state_ == State::draft || state_ == State::exchanged) {
-    ::unlinkat(folder_, draft_.c_str(), 0);
+  if (state_ == State::temporary || state_ == State::exchanged) {
+    ::unlinkat(folder_, temporary_.c_str(), 0);
   }
   ::close(descriptor_);
   ::close(folder_);
@@ -89,38 +90,40 @@ void AtomicFile::sync() {
 
 void AtomicFile::commit(bool replace) {
   const auto rename = [&](unsigned flags) {
-    return ::renameat2(folder_, draft_.c_str(), folder_, name_.c_str(), flags) == 0;
+    return ::renameat2(folder_, temporary_.c_str(), folder_, name_.c_str(), flags) == 0;
   };
   struct stat found {};
-  const bool there = replace && ::fstatat(folder_, name_.c_str(), &found, AT_SYMLINK_NOFOLLOW) == 0;
-  if (there && !S_ISREG(found.st_mode)) fail("cannot be replaced", EEXIST);
-  if (there && rename(RENAME_EXCHANGE)) {
-    state_ = State::exchanged;  // what was there has the draft's name
+  const bool exists =
+      replace && ::fstatat(folder_, name_.c_str(), &found, AT_SYMLINK_NOFOLLOW) == 0;
+  if (exists && !S_ISREG(found.st_mode)) fail("cannot be replaced", EEXIST);
+  if (exists && rename(RENAME_EXCHANGE)) {
+    state_ = State::exchanged;  // the previous file has the temporary name
   } else if (rename(RENAME_NOREPLACE)) {
-    state_ = State::named;
-  } else if (errno != EINVAL && errno != ENOSYS && !(there && errno == EEXIST)) {
-    fail("cannot be given its name", errno);
-  } else if (replace) {  // a file system that cannot exchange
-    if (!rename(0)) fail("cannot be given its name", errno);
+    state_ = State::renamed;
+  } else if (errno != EINVAL && errno != ENOSYS && !(exists && errno == EEXIST)) {
+    fail("cannot be renamed to its final name", errno);
+  } else if (replace) {  // a file system without RENAME_EXCHANGE
+    if (!rename(0)) fail("cannot be renamed to its final name", errno);
     state_ = State::replaced;
   } else {
-    if (::linkat(folder_, draft_.c_str(), folder_, name_.c_str(), 0) != 0) {
-      fail("cannot be given its name", errno);
+    if (::linkat(folder_, temporary_.c_str(), folder_, name_.c_str(), 0) != 0) {
+      fail("cannot be renamed to its final name", errno);
     }
-    ::unlinkat(folder_, draft_.c_str(), 0);
-    state_ = State::named;
+    ::unlinkat(folder_, temporary_.c_str(), 0);
+    state_ = State::renamed;
   }
-  ::fsync(folder_);  // not every folder that may be written may be read, and so synced
+  ::fsync(folder_);  // may fail: a folder that can be written need not be readable
 }
 
 void AtomicFile::roll_back() {
-  if (state_ == State::draft || state_ == State::replaced) return;
-  if (state_ == State::named) {
+  if (state_ == State::temporary || state_ == State::replaced) return;
+  if (state_ == State::renamed) {
     if (leads_to(folder_, name_, descriptor_)) ::unlinkat(folder_, name_.c_str(), 0);
-  } else if (::renameat2(folder_, name_.c_str(), folder_, draft_.c_str(), RENAME_EXCHANGE) != 0) {
+  } else if (::renameat2(folder_, name_.c_str(), folder_, temporary_.c_str(), RENAME_EXCHANGE) !=
+             0) {
     return;
   }
-  state_ = State::draft;
+  state_ = State::temporary;
 }
 
 void AtomicFile::fail(const char* what, int error) const {
@@ -128,30 +131,30 @@ void AtomicFile::fail(const char* what, int error) const {
                    "; nothing was written. Check the folder, its permissions and the free space");
 }
 
-bool rename_if_absent(const std::string& draft, const std::string& path) {
-  int status = ::renameat2(AT_FDCWD, draft.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE);
-  if (status != 0 && (errno == EINVAL || errno == ENOSYS)) {  // not every file system can
-    status = ::link(draft.c_str(), path.c_str());
-    if (status == 0) ::unlink(draft.c_str());
+bool rename_if_absent(const std::string& temporary, const std::string& path) {
+  int status = ::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE);
+  if (status != 0 && (errno == EINVAL || errno == ENOSYS)) {  // not supported by every file system
+    status = ::link(temporary.c_str(), path.c_str());
+    if (status == 0) ::unlink(temporary.c_str());
   }
   if (status != 0 && errno == EEXIST) return false;
   if (status != 0) {
-    throw StoreError(path + ": cannot be given its name: " +
+    throw StoreError(path + ": cannot be renamed to its final name: " +
                      std::generic_category().message(errno) + "; nothing was written");
   }
   const fs::path folder = fs::path(path).parent_path();
   const int opened = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
-  if (opened < 0) return true;  // not every folder that may be written may be read
+  if (opened < 0) return true;  // a folder that can be written need not be readable
   ::fsync(opened);
   ::close(opened);
   return true;
 }
 
-void commit_all(std::deque<AtomicFile>& drafts, bool replace) {
+void commit_all(std::deque<AtomicFile>& files, bool replace) {
   try {
-    for (AtomicFile& draft : drafts) draft.commit(replace);
+    for (AtomicFile& file : files) file.commit(replace);
   } catch (...) {
-    for (AtomicFile& draft : drafts) draft.roll_back();
+    for (AtomicFile& file : files) file.roll_back();
     throw;
   }
 }

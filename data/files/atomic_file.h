@@ -1,6 +1,7 @@
 #pragma once
-// A file that appears whole, under its name, or not at all. Everything that palpate writes for its
-// users but databases and whole folders goes this way.
+// Files that appear under their name complete, or not at all: written to a temporary file in the
+// same folder, synced, and renamed (rename(2) is atomic). Everything that palpate writes for its
+// users goes this way, except databases (schema.h) and folders (atomic_folder.h).
 
 #include <deque>
 #include <string>
@@ -8,41 +9,47 @@
 
 namespace palpate::data {
 
-/// A draft is private (0600), beside its target, and locked while its program lives. The folder is
-/// looked up once: who moves it meanwhile moves nothing of this.
+/// The temporary file has mode 0600 and is locked (flock) while its process lives. Works on a
+/// descriptor of the folder, so that renaming the folder meanwhile does no harm.
 class AtomicFile {
  public:
-  /// \throws StoreRefused, StoreError: it cannot be made there.
+  /// \throws StoreRefused, StoreError: a temporary file cannot be created there.
   explicit AtomicFile(const std::string& target);
-  ~AtomicFile();  ///< removes the draft unless it has got its name; then what it replaced
+  ~AtomicFile();  ///< removes the temporary file, or after a commit what it replaced
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  int descriptor() const { return descriptor_; }  ///< open for writing; stays the draft's
+  int descriptor() const { return descriptor_; }  ///< open for writing; owned by this object
   void write(std::string_view text);
-  void sync();  ///< on the disk when it returns
+  void sync();  ///< fsync
 
-  /// \param replace a file that is there may go; without it, one that came meanwhile is left alone.
+  /// Renames the temporary file to the target. \param replace an existing file; without it an
+  /// existing file is an error.
   void commit(bool replace);
-  /// All is as before commit.
+  /// Undoes commit(): the previous file has its name again.
   void roll_back();
 
  private:
-  enum class State { draft, named, exchanged, replaced };
+  enum class State {
+    temporary,
+    renamed,    ///< there was no file
+    exchanged,  ///< the previous file has the temporary name: roll_back() can restore it
+    replaced,   ///< the previous file is lost: the file system cannot exchange names
+  };
   void open_folder(const std::string& path);
-  void make();
+  void create();
   [[noreturn]] void fail(const char* what, int error) const;
-  std::string target_;        ///< as given, for messages
-  std::string name_, draft_;  ///< in the folder
+  std::string target_;            ///< as given, for messages
+  std::string name_, temporary_;  ///< in the folder
   int folder_ = -1, descriptor_ = -1;
-  State state_ = State::draft;
+  State state_ = State::temporary;
 };
 
-/// Gives a file its name where nothing has it, on the disk when it returns. False: something has.
+/// Renames a file unless `path` exists, and syncs the folder. \return false: `path` exists.
 /// \throws StoreError
-bool rename_if_absent(const std::string& draft, const std::string& path);
+bool rename_if_absent(const std::string& temporary, const std::string& path);
 
-/// All of them or none. They have been synced.
-void commit_all(std::deque<AtomicFile>& drafts, bool replace);
+/// Commits all, or rolls back all. Call sync() of each before.
+void commit_all(std::deque<AtomicFile>& files, bool replace);
 
 }  // namespace palpate::data

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// "/a/b/" and "b" -> an absolute path that ends in a name.
-fs::path named(const std::string& target) {
+fs::path without_trailing_slash(const std::string& target) {
   fs::path path = fs::absolute(target).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   return path;
@@ -42,20 +42,21 @@ bool made_by_palpate(const fs::path& description) {
 
 }  // namespace
 
-AtomicFolder::AtomicFolder(const std::string& target) : target_(named(target).string()) {
+AtomicFolder::AtomicFolder(const std::string& target)
+    : target_(without_trailing_slash(target).string()) {
   const std::string fault = resolve_trusted_links(fs::path(target_).parent_path().string()).fault;
   if (!fault.empty()) throw StoreRefused(target_ + ": " + fault);
   remove_stale_temporaries(target_);
-  draft_ = temporary_prefix(target_) + "XXXXXX";
-  if (::mkdtemp(draft_.data()) == nullptr) {
+  temporary_ = temporary_prefix(target_) + "XXXXXX";
+  if (::mkdtemp(temporary_.data()) == nullptr) {
     const int error = errno;
-    draft_.clear();
+    temporary_.clear();
     fail("cannot be created", error);
   }
-  descriptor_ = ::open(draft_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  descriptor_ = ::open(temporary_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor_ < 0 || ::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
-    fs::remove_all(draft_);
+    fs::remove_all(temporary_);
     if (descriptor_ >= 0) ::close(descriptor_);
     fail("cannot be created", error);
   }
@@ -63,12 +64,12 @@ AtomicFolder::AtomicFolder(const std::string& target) : target_(named(target).st
 
 AtomicFolder::~AtomicFolder() {
   std::error_code error;
-  if (!draft_.empty()) fs::remove_all(draft_, error);
+  if (!temporary_.empty()) fs::remove_all(temporary_, error);
   ::close(descriptor_);
 }
 
-std::string AtomicFolder::place(const std::string& name) const {
-  const fs::path path = fs::path(draft_) / name;
+std::string AtomicFolder::prepare(const std::string& name) const {
+  const fs::path path = fs::path(temporary_) / name;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   if (error) fail("cannot be created", error.value());
@@ -79,24 +80,25 @@ void AtomicFolder::commit(bool replace) {
   if (::syncfs(descriptor_) != 0) fail("cannot be written", errno);
   const bool swap = replace && fs::exists(target_) && !fs::is_empty(target_);
   if (!swap) {
-    if (::rename(draft_.c_str(), target_.c_str()) != 0) fail("cannot be given its name", errno);
-    draft_.clear();
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0)
+      fail("cannot be renamed to its final name", errno);
+    temporary_.clear();
     return;
   }
-  if (::renameat2(AT_FDCWD, draft_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) {
-    if (errno != EINVAL && errno != ENOSYS) fail("cannot be given its name", errno);
-    // A file system that cannot exchange: the old one steps aside.
-    const std::string aside = draft_ + "-old";
+  if (::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) {
+    if (errno != EINVAL && errno != ENOSYS) fail("cannot be renamed to its final name", errno);
+    // A file system without RENAME_EXCHANGE: two renames.
+    const std::string aside = temporary_ + "-old";
     if (::rename(target_.c_str(), aside.c_str()) != 0) fail("cannot be replaced", errno);
-    if (::rename(draft_.c_str(), target_.c_str()) != 0) {
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
       const int error = errno;
       ::rename(aside.c_str(), target_.c_str());
-      fail("cannot be given its name", error);
+      fail("cannot be renamed to its final name", error);
     }
-    draft_ = aside;
+    temporary_ = aside;
   }
-  std::error_code error;  // the new one is in place; of the old one, all that can be removed is
-  fs::remove_all(std::exchange(draft_, ""), error);
+  std::error_code error;  // the export is in place: failing to remove the previous one is no error
+  fs::remove_all(std::exchange(temporary_, ""), error);
 }
 
 void AtomicFolder::fail(const char* what, int error) const {
@@ -107,28 +109,29 @@ void AtomicFolder::fail(const char* what, int error) const {
 void require_replaceable(const std::string& target, bool force,
                          const std::function<bool(const std::string&)>& ours) {
   if (target.empty()) throw StoreRefused("'' names no folder to write to");
-  const fs::path folder = named(target);
+  const fs::path folder = without_trailing_slash(target);
   const fs::file_status status = fs::symlink_status(folder);
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status)) {
-    throw StoreRefused(target + ": is there and is not a folder; name a folder to be made");
+    throw StoreRefused(target + ": exists and is not a folder; name a folder to be created");
   }
   if (fs::is_empty(folder)) return;
   if (!force) {
-    throw StoreRefused(target + ": is there already; give --force to replace it, or another name");
+    throw StoreRefused(target + ": exists already; give --force to replace it, or another name");
   }
   if (!made_by_palpate(folder / "dataset_description.json")) {
     throw StoreRefused(target +
-                       ": is not an export of palpate (its dataset_description.json does not say "
-                       "so) and is not replaced; name another folder");
+                       ": is not an export of palpate (by its dataset_description.json) and is not "
+                       "replaced; name another folder");
   }
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (fs::is_directory(entry.symlink_status())) continue;
     const std::string name = entry.path().lexically_relative(folder).string();
     if (!fs::is_regular_file(entry.symlink_status()) || !ours(name)) {
-      throw StoreRefused(target + ": holds " + name +
-                         ", which such an export does not make and which would be lost; move it "
-                         "away, or name another folder");
+      throw StoreRefused(
+          target + ": contains " + name +
+          ", which is not part of such an export and would be lost; move it away, or "
+          "name another folder");
     }
   }
 }

@@ -1,39 +1,40 @@
 #pragma once
-// Internal to data/: a folder of files that appears whole, under its name, or not at all.
+// Folders of files that appear under their name complete, or not at all: filled under a temporary
+// name beside the target and renamed. Exports that are folders, new databases and backups use them.
 
 #include <functional>
 #include <string>
 
 namespace palpate::data {
 
-/// Draft folders lie beside their target, ".NAME.palpate-XXXXXX", private. One that a killed
-/// program left behind is removed by the next draft for the same target.
+/// The temporary folder is ".NAME.palpate-XXXXXX", private (0700) and locked while its process
+/// lives. One that a killed process left is removed by the next AtomicFolder for the same target.
 class AtomicFolder {
  public:
-  /// \throws StoreError: it cannot be made.
+  /// \throws StoreError: the temporary folder cannot be created.
   explicit AtomicFolder(const std::string& target);
-  ~AtomicFolder();  ///< removes it unless it has got its name
+  ~AtomicFolder();  ///< removes the temporary folder
   AtomicFolder(const AtomicFolder&) = delete;
   AtomicFolder& operator=(const AtomicFolder&) = delete;
 
-  std::string operator/(const std::string& name) const { return draft_ + "/" + name; }
-  /// The path of a file in it, whose folders are made.
-  std::string place(const std::string& name) const;
+  std::string operator/(const std::string& name) const { return temporary_ + "/" + name; }
+  /// The path of a file in the temporary folder; creates the folders on the way.
+  std::string prepare(const std::string& name) const;
 
-  /// Everything is on the disk, then has its name; an old target is gone then. The target must not
-  /// be there, or be an empty folder, unless `replace`.
+  /// Syncs the file system, renames the folder to the target, and deletes the previous target. That
+  /// must not exist, or be an empty folder, unless `replace`.
   void commit(bool replace);
 
  private:
   [[noreturn]] void fail(const char* what, int error) const;
-  std::string target_, draft_;
-  int descriptor_ = -1;  // locked: this draft is being written
+  std::string target_, temporary_;
+  int descriptor_ = -1;  // locked while it is being written
 };
 
-/// Whether an export may go to `target`. \param ours tells of a path within the folder whether an
-/// export of that format has such a file; what it has not would be lost.
-/// \throws StoreRefused: something is there and `force` is not given; with it: what is there is not
-/// a folder that palpate exported, or holds other files as well.
+/// Whether an export may be written to `target`. \param ours whether an export of the same format
+/// has such a file, by its path within the folder; other files would be lost. \throws StoreRefused:
+/// something exists and `force` is not given; with it: what exists is not a folder that palpate
+/// exported, or contains other files.
 void require_replaceable(const std::string& target, bool force,
                          const std::function<bool(const std::string&)>& ours);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: SHA-256.
+// SHA-256 (FIPS 180-4) through nettle: identifies protocols and files, seals rows.
 
 #include <array>
 #include <cstddef>

@@ -22,7 +22,7 @@ std::string octal(mode_t mode) {
   return text.data();
 }
 
-/// A group that is one user's own, as Debian makes them: its members are nobody else.
+/// A user private group, as Debian creates for every user: it has no other members.
 bool is_private_group(uid_t user, gid_t group) {
   const passwd* const person = ::getpwuid(user);
   if (person == nullptr || person->pw_gid != group) return false;
@@ -36,31 +36,31 @@ bool others_may_write(const struct stat& found) {
   return (found.st_mode & S_IWGRP) != 0 && !is_private_group(found.st_uid, found.st_gid);
 }
 
-bool is_strange(uid_t owner) { return owner != ::geteuid() && owner != 0; }
+bool is_foreign(uid_t owner) { return owner != ::geteuid() && owner != 0; }
 
 }  // namespace
 
 void require_private_sqlite_files(const std::string& file) {
   struct stat database {};
   const bool there = ::stat(file.c_str(), &database) == 0;
-  const mode_t open_to = there ? database.st_mode & 0777 : 0600;
+  const mode_t permissions = there ? database.st_mode & 0777 : 0600;
   for (const std::string& end : sqlite_file_suffixes()) {
     const std::string beside = file + end;
     struct stat found {};
     if (::lstat(beside.c_str(), &found) != 0) continue;
     const auto refuse = [&](const std::string& why) {
-      throw StoreRefused(file + ": beside it lies " + beside + ", which " + why +
+      throw StoreRefused(file + ": the file " + beside + " beside it " + why +
                          "; nothing was read or written. Move it away if it is not yours, and keep "
                          "the database in a folder that only you can write to");
     };
-    if (!S_ISREG(found.st_mode)) refuse("is no regular file");
-    if (is_strange(found.st_uid) && !(there && found.st_uid == database.st_uid)) {
+    if (!S_ISREG(found.st_mode)) refuse("is not a regular file");
+    if (is_foreign(found.st_uid) && !(there && found.st_uid == database.st_uid)) {
       refuse("belongs to another user (number " + std::to_string(found.st_uid) + ")");
     }
-    if (found.st_nlink > 1) refuse("has a second name elsewhere (a hard link)");
-    if ((found.st_mode & 077 & ~open_to) != 0) {
-      refuse("is open to others (mode " + octal(found.st_mode) + ") to whom the database is not (" +
-             octal(open_to) + "); if it is yours: chmod 600");
+    if (found.st_nlink > 1) refuse("has another name (a hard link)");
+    if ((found.st_mode & 077 & ~permissions) != 0) {
+      refuse("has wider permissions (mode " + octal(found.st_mode) + ") than the database (" +
+             octal(permissions) + "); if it is yours: chmod 600");
     }
   }
 }
@@ -73,7 +73,7 @@ std::string access_warning(const std::string& database) {
   const char* const advice = "keep studies in a folder that only you can write to";
   struct stat found {};
   if (::stat(folder.c_str(), &found) == 0) {
-    if (is_strange(found.st_uid)) {
+    if (is_foreign(found.st_uid)) {
       return "the folder " + folder + " belongs to another user (number " +
              std::to_string(found.st_uid) + "), who can replace the database; " + advice;
     }
@@ -83,7 +83,7 @@ std::string access_warning(const std::string& database) {
     }
   }
   if (::stat(file.c_str(), &found) != 0) return "";
-  if (is_strange(found.st_uid)) {
+  if (is_foreign(found.st_uid)) {
     return "the database " + database + " belongs to another user (number " +
            std::to_string(found.st_uid) + "), who can read and change it";
   }

@@ -1,32 +1,34 @@
 #pragma once
-// Texts in CSV and TSV files that a spreadsheet would run as a formula.
+// Protection against formula injection: text cells of CSV and TSV files that a spreadsheet would
+// evaluate as a formula get a leading apostrophe
+// (https://owasp.org/www-community/attacks/CSV_Injection).
 
 #include <string_view>
 
 namespace palpate::data {
 
-namespace spreadsheet {
-constexpr bool runs(std::string_view text) {
+namespace formula {
+constexpr bool starts_formula(std::string_view text) {
   return !text.empty() && (text[0] == '=' || text[0] == '+' || text[0] == '-' || text[0] == '@' ||
                            text[0] == '\t' || text[0] == '\r' || text[0] == '\n');
 }
-constexpr bool runs_behind_quotes(std::string_view text) {
+constexpr bool starts_formula_behind_quotes(std::string_view text) {
   while (!text.empty() && text[0] == '\'') text.remove_prefix(1);
-  return runs(text);
+  return starts_formula(text);
 }
-}  // namespace spreadsheet
+}  // namespace formula
 
-/// Whether a text cell gets a ' in front: it begins with = + - @ tab CR or LF, or would be taken
-/// for a guarded one ('=1). Numbers are never guarded.
+/// Whether a text cell gets a leading ': it begins with = + - @ tab CR or LF, or would be read back
+/// as a guarded one ('=1). Numbers are never guarded.
 constexpr bool needs_guard(std::string_view text) {
-  return !text.empty() && (text[0] == '\'' ? spreadsheet::runs_behind_quotes(text.substr(1))
-                                           : spreadsheet::runs(text));
+  return !text.empty() && (text[0] == '\'' ? formula::starts_formula_behind_quotes(text.substr(1))
+                                           : formula::starts_formula(text));
 }
 
-/// The text as it was before it was guarded; any other text as it is.
+/// The original of a guarded text; any other text unchanged.
 constexpr std::string_view unguarded(std::string_view text) {
   const bool guarded =
-      !text.empty() && text[0] == '\'' && spreadsheet::runs_behind_quotes(text.substr(1));
+      !text.empty() && text[0] == '\'' && formula::starts_formula_behind_quotes(text.substr(1));
   return guarded ? text.substr(1) : text;
 }
 

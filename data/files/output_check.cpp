@@ -21,21 +21,21 @@ namespace fs = std::filesystem;
 
 constexpr const char* kLockEnd = ".palpate-lock";
 
-std::optional<struct stat> look_at(const std::string& path) {
+std::optional<struct stat> stat_of(const std::string& path) {
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0) return std::nullopt;
   return found;
 }
 
-std::string place_of(const std::string& path) {
+std::string resolved(const std::string& path) {
   std::error_code error;
   const fs::path place = fs::weakly_canonical(fs::absolute(path, error), error);
   return error ? path : place.string();
 }
 
-bool same(const std::string& a, const std::string& b) {
+bool same_file(const std::string& a, const std::string& b) {
   if (a == b) return true;
-  const auto first = look_at(a), second = look_at(b);
+  const auto first = stat_of(a), second = stat_of(b);
   return first && second && first->st_dev == second->st_dev && first->st_ino == second->st_ino;
 }
 
@@ -43,13 +43,14 @@ bool is_null_device(const struct stat& found) {
   return S_ISCHR(found.st_mode) && found.st_rdev == makedev(1, 3);
 }
 
-/// Pipes, terminals and what the shell opened take a text as it comes. \return why not, or "".
+/// Why a file that is not a regular one cannot be written to; "" for pipes, terminals and what the
+/// shell has opened.
 std::string stream_refusal(const struct stat& found, std::optional<int> descriptor) {
-  if (S_ISDIR(found.st_mode)) return "expected a file; this is a folder";
+  if (S_ISDIR(found.st_mode)) return "is a folder; must be a file";
   if (is_null_device(found)) return "";
   if (S_ISFIFO(found.st_mode)) {
     const bool ours = descriptor || found.st_uid == ::geteuid() || found.st_uid == 0;
-    return ours ? "" : "is a pipe of another user's; name a file";
+    return ours ? "" : "is a pipe of another user; name a file";
   }
   if (S_ISSOCK(found.st_mode) && descriptor) return "";
   const bool terminal =
@@ -66,8 +67,8 @@ const std::vector<std::string>& sqlite_file_suffixes() {
 }
 
 bool may_be_database(const std::string& path) {
-  const auto found = look_at(path);
-  // Not even opened: whoever waits at the other end of a pipe would take it for the reader.
+  const auto found = stat_of(path);
+  // A pipe is not even opened: the process at its other end would take this one for its reader.
   if (!found || !S_ISREG(found->st_mode)) return false;
   const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0) return true;
@@ -86,7 +87,7 @@ bool may_be_database(const std::string& path) {
 }
 
 bool belongs_to_database(const std::string& path) {
-  const std::string place = place_of(path);
+  const std::string place = resolved(path);
   for (std::string_view end : {"-wal", "-shm", "-journal", kLockEnd}) {
     if (!place.ends_with(end)) continue;
     const std::string database = place.substr(0, place.size() - end.size());
@@ -108,52 +109,53 @@ std::optional<int> descriptor_of_path(const std::string& path) {
   return std::nullopt;
 }
 
-void ProtectedFiles::add(const std::string& path, const std::string& why) {
+void ProtectedFiles::add(const std::string& path, const std::string& reason) {
   if (path.empty()) return;
-  const std::string place = place_of(path);
-  taken_.push_back({place, why});
-  if (!may_be_database(place)) return;
-  for (const std::string& end : sqlite_file_suffixes()) {
-    taken_.push_back({place + end, "SQLite's file beside a database: " + why});
+  const std::string file = resolved(path);
+  entries_.push_back({file, reason});
+  if (!may_be_database(file)) return;
+  for (const std::string& suffix : sqlite_file_suffixes()) {
+    entries_.push_back({file + suffix, "SQLite's file beside a database: " + reason});
   }
 }
 
-std::string ProtectedFiles::why(const std::string& path) const {
-  const auto found = look_at(path);
-  // A terminal or a pipe may be read and written.
+std::string ProtectedFiles::reason(const std::string& path) const {
+  const auto found = stat_of(path);
+  // A terminal or a pipe may be input and output at once.
   if (found && !S_ISREG(found->st_mode)) return "";
-  const std::string place = place_of(path);
-  for (const Taken& one : taken_) {
-    if (same(one.place, place)) return one.why;
+  const std::string file = resolved(path);
+  for (const Entry& one : entries_) {
+    if (same_file(one.file, file)) return one.reason;
   }
   return "";
 }
 
-std::string write_refusal(const std::string& path, bool force, const ProtectedFiles& taken) {
-  if (path.empty()) return "expected a path";
-  const auto found = look_at(path);
+std::string write_refusal(const std::string& path, bool force,
+                          const ProtectedFiles& protected_files) {
+  if (path.empty()) return "must not be empty";
+  const auto found = stat_of(path);
   const auto descriptor = descriptor_of_path(path);
   if (descriptor) {
     const int mode = ::fcntl(*descriptor, F_GETFL);
     if (mode < 0 || (mode & O_ACCMODE) == O_RDONLY) return "is not open for writing";
   }
   if (found && !S_ISREG(found->st_mode)) return stream_refusal(*found, descriptor);
-  std::string why = taken.why(path);
+  std::string why = protected_files.reason(path);
   if (!why.empty()) return why;
-  const std::string place = place_of(path);
-  const bool logged = found && (look_at(place + "-wal") || look_at(place + "-journal"));
+  const std::string place = resolved(path);
+  const bool logged = found && (stat_of(place + "-wal") || stat_of(place + "-journal"));
   if (logged || may_be_database(path) || belongs_to_database(path)) {
-    return "is a database or what belongs to one, and is never written over; name another file";
+    return "is a database or a file of one, and is never overwritten; name another file";
   }
   if (descriptor) return "";
   if (place.starts_with("/dev/") && !place.starts_with("/dev/shm/")) {
-    return "is in the folder of devices; name a file elsewhere";
+    return "is in the folder of devices; name a file in another folder";
   }
   why = resolve_trusted_links(path).fault;
   if (!why.empty()) return why;
   struct stat link {};
-  if (!found && ::lstat(path.c_str(), &link) == 0) return "is a link that leads nowhere";
-  if (found && !force) return "is there already; --force replaces it";
+  if (!found && ::lstat(path.c_str(), &link) == 0) return "is a link to nothing";
+  if (found && !force) return "exists already; --force replaces it";
   return "";
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// What must not be written over: databases, what a command reads, what is no file.
+// Decides whether a path may be written to. Never overwritten: databases and their -wal, -shm,
+// -journal and lock files, inputs of the same command, devices.
 
 #include <optional>
 #include <string>
@@ -8,37 +9,39 @@
 
 namespace palpate::data {
 
-/// "-wal", "-shm", "-journal": what SQLite keeps beside a database.
+/// "-wal", "-shm", "-journal": suffixes of the files that SQLite creates beside a database
+/// (https://www.sqlite.org/tempfiles.html).
 const std::vector<std::string>& sqlite_file_suffixes();
 
-/// A database of any program, or one's log, by how it begins. A file that may not be read may be
-/// one.
+/// Whether the file begins like a SQLite database, -wal or -journal, of any program. True for a
+/// file that cannot be read.
 bool may_be_database(const std::string& path);
 
-/// Whether the name is, or would be, that of a log or lock beside a database that is there.
+/// Whether the name is that of a -wal, -shm, -journal or lock file of an existing database.
 bool belongs_to_database(const std::string& path);
 
-/// The open descriptor that a path means: "/dev/stdout", "/dev/fd/63" (as shells name pipes).
+/// The open descriptor that a path names: "/dev/stdout", "/dev/fd/63" (process substitution).
 std::optional<int> descriptor_of_path(const std::string& path);
 
-/// Files that are not to be written over, each with why: what a command reads, its other outputs.
+/// Files that must not be overwritten, each with the reason: inputs and other outputs of a command.
 class ProtectedFiles {
  public:
-  /// \param why "--db reads it". A database is there with what SQLite keeps beside it.
-  void add(const std::string& path, const std::string& why);
-  /// Why the file that `path` leads to, under this name or another, is taken; "" where it is not.
-  std::string why(const std::string& path) const;
+  /// \param reason "--db reads it". Of a database, its -wal, -shm and -journal are protected, too.
+  void add(const std::string& path, const std::string& reason);
+  /// Why the file that `path` leads to (also by another name) is protected; "": it is not.
+  std::string reason(const std::string& path) const;
 
  private:
-  struct Taken {
-    std::string place;  ///< links followed
-    std::string why;
+  struct Entry {
+    std::string file;  ///< absolute, links resolved
+    std::string reason;
   };
-  std::vector<Taken> taken_;
+  std::vector<Entry> entries_;
 };
 
-/// Why no text may be written to `path`, in words that follow the path; "" where it may.
-/// \param force a file that is there may be replaced; never a database or what is taken
-std::string write_refusal(const std::string& path, bool force, const ProtectedFiles& taken = {});
+/// Why `path` must not be written to, to be appended to the path in a message; "": it may be.
+/// \param force an existing file may be replaced; never a database or a protected file
+std::string write_refusal(const std::string& path, bool force,
+                          const ProtectedFiles& protected_files = {});
 
 }  // namespace palpate::data

@@ -22,20 +22,20 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLetters = 6;
 constexpr std::string_view kMark = ".palpate-";
 
-/// Removes what has such a name, is ours, and is locked by nobody.
-template <class IsDraft>
-void remove_dead(const fs::path& folder, IsDraft is_draft) {
+/// Removes entries of the folder with such a name, of this user, that no process has locked.
+template <class IsTemporary>
+void remove_unlocked(const fs::path& folder, IsTemporary is_temporary) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder.empty() ? "." : folder, error)) {
-    if (!is_draft(entry.path().filename().string())) continue;
+    if (!is_temporary(entry.path().filename().string())) continue;
     const std::string path = (folder / entry.path().filename()).string();
     struct stat found {};
     if (::lstat(path.c_str(), &found) != 0 || found.st_uid != ::geteuid()) continue;
     if (!S_ISDIR(found.st_mode) && !(S_ISREG(found.st_mode) && found.st_nlink == 1)) continue;
-    const int draft = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (draft < 0) continue;
-    if (::flock(draft, LOCK_EX | LOCK_NB) == 0) fs::remove_all(path, error);
-    ::close(draft);
+    const int temporary = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (temporary < 0) continue;
+    if (::flock(temporary, LOCK_EX | LOCK_NB) == 0) fs::remove_all(path, error);
+    ::close(temporary);
   }
 }
 
@@ -63,13 +63,13 @@ std::string temporary_prefix(const std::string& target) {
 
 void remove_stale_temporaries(const std::string& target) {
   const std::string stem = fs::path(temporary_prefix(target)).filename().string();
-  remove_dead(fs::path(target).parent_path(), [&](const std::string& name) {
+  remove_unlocked(fs::path(target).parent_path(), [&](const std::string& name) {
     return name.starts_with(stem) && name.size() == stem.size() + kLetters;
   });
 }
 
 void remove_stale_temporaries_in(const std::string& folder) {
-  remove_dead(folder, [](const std::string& name) {
+  remove_unlocked(folder, [](const std::string& name) {
     const std::size_t letters = name.rfind(kMark);
     return name.starts_with('.') && letters != std::string::npos && letters > 1 &&
            name.size() == letters + kMark.size() + kLetters;

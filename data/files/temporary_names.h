@@ -1,17 +1,16 @@
 #pragma once
-// Internal to data/: names of the temporary files and folders that a program writes before it gives
-// them their final name by an atomic rename, and removal of those that killed programs left.
+// Names of the temporary files and folders that are renamed to their final name when they are
+// complete, and removal of those that killed processes left.
 
 #include <string>
 
 namespace palpate::data {
 
-/// ".NAME.palpate-" beside the target: how the names of all drafts for it begin; six letters
-/// follow.
+/// ".NAME.palpate-" in the folder of the target; six random characters follow.
 std::string temporary_prefix(const std::string& target);
 
-/// Removes drafts for `target`, files and folders, that are ours and that nobody holds a lock on:
-/// their program is dead.
+/// Removes the temporary files and folders for `target` that belong to this user and that no
+/// process has locked: their process has ended.
 void remove_stale_temporaries(const std::string& target);
 /// The same for all targets in a folder.
 void remove_stale_temporaries_in(const std::string& folder);

@@ -60,7 +60,7 @@ struct GzipSink::Stream {
 };
 
 GzipSink::GzipSink(TextSink& out) : out_(out), stream_(std::make_unique<Stream>()) {
-  constexpr int kLevel = 6;  // a sixth less than at 3; 9 saves a hundredth more
+  constexpr int kLevel = 6;  // files are 17 % smaller than with 3; 9 saves another 1 %
   constexpr int kGzip = 15 + 16;
   if (deflateInit2(&stream_->z, kLevel, Z_DEFLATED, kGzip, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
     throw StoreError("the samples could not be compressed: out of memory");

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: where the text of an export goes.
+// Internal to data/: output streams for the text of exports, with errors that name the file.
 
 #include <memory>
 #include <string>
@@ -13,18 +13,18 @@ class TextSink {
   virtual void write(std::string_view text) = 0;
 };
 
-/// A file of its own, created 0600, written in large pieces. \throws StoreError, naming the file.
+/// A buffered file, mode 0600. \throws StoreError, naming the file.
 class FileSink : public TextSink {
  public:
-  explicit FileSink(const std::string& path);  ///< must not be there yet
-  /// Takes over an open file. \param path for messages
+  explicit FileSink(const std::string& path);  ///< must not exist
+  /// Takes ownership of an open file. \param path for messages
   FileSink(int descriptor, std::string path);
-  ~FileSink() override;  ///< without close(): as it is
+  ~FileSink() override;  ///< without close(): discards what is buffered
   FileSink(const FileSink&) = delete;
   FileSink& operator=(const FileSink&) = delete;
 
   void write(std::string_view text) override;
-  void close(bool sync);  ///< \param sync on the disk when it returns
+  void close(bool sync);  ///< \param sync fsync first
 
  private:
   void flush();
@@ -33,8 +33,8 @@ class FileSink : public TextSink {
   int descriptor_ = -1;
 };
 
-/// Text into another sink, as a gzip stream with no name and no time in it: the same text gives the
-/// same bytes.
+/// Compresses into another sink, as a gzip stream (RFC 1952) without name and time: the same text
+/// gives the same bytes.
 class GzipSink : public TextSink {
  public:
   explicit GzipSink(TextSink& out);

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_ours_or_the_systems(uid_t owner) { return owner == ::geteuid() || owner == 0; }
+bool is_trusted_owner(uid_t owner) { return owner == ::geteuid() || owner == 0; }
 
 }  // namespace
 
@@ -19,7 +19,7 @@ ResolvedPath resolve_trusted_links(const std::string& path) {
   constexpr int kMostLinks = 40;
   std::error_code error;
   fs::path rest = fs::absolute(path, error), done = "/";
-  if (path.empty() || error) return {"", "is no path of a file"};
+  if (path.empty() || error) return {"", "is not a path of a file"};
   for (int links = 0;;) {
     const fs::path ahead = rest.relative_path();
     auto part = ahead.begin();
@@ -38,10 +38,10 @@ ResolvedPath resolve_trusted_links(const std::string& path) {
       done = here;
       continue;
     }
-    if (!is_ours_or_the_systems(found.st_uid)) {
+    if (!is_trusted_owner(found.st_uid)) {
       return {"", "leads through " + here.string() +
-                      ", a link of another user's, which is not followed; name the file itself, in "
-                      "a folder of your own"};
+                      ", a link of another user, which is not followed; name the file itself, in a "
+                      "folder of your own"};
     }
     const fs::path to = fs::read_symlink(here, error);
     if (error || ++links > kMostLinks) return {"", "is a link that leads nowhere"};

@@ -1,17 +1,18 @@
 #pragma once
-// Symbolic links on the way to a file that is to be written.
+// Resolves symbolic links of a path that is to be written. In a shared folder another user could
+// lay a link that redirects the output: only links of this user and of root are followed.
 
 #include <string>
 
 namespace palpate::data {
 
 struct ResolvedPath {
-  std::string path;   ///< absolute, without links
-  std::string fault;  ///< why it was not followed, in words that follow the path; "" where it was
+  std::string path;  ///< absolute, links resolved
+  std::string
+      fault;  ///< why it was not resolved, to be appended to the path in a message; "": resolved
 };
 
-/// Where `path` leads when links are followed: those of this user and of the system alone. What
-/// another user laid in a shared folder could carry a text anywhere. The last name need not exist.
+/// The file that `path` leads to; the last component need not exist.
 ResolvedPath resolve_trusted_links(const std::string& path);
 
 }  // namespace palpate::data

@@ -20,7 +20,7 @@ std::string format_utc(std::int64_t unix_ns) {
     at[digits] = after;
     at += digits + 1;
   };
-  put(static_cast<int>(date.year()), 4, '-');  // 1677 to 2262: what 64 bits of nanoseconds reach
+  put(static_cast<int>(date.year()), 4, '-');  // 1677 to 2262: the range of 64 bits of nanoseconds
   put(static_cast<unsigned>(date.month()), 2, '-');
   put(static_cast<unsigned>(date.day()), 2, 'T');
   put(time.hours().count(), 2, ':');

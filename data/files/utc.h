@@ -1,4 +1,5 @@
 #pragma once
+// UTC time stamps of exports and messages, and the session clock converted to UTC.
 
 #include <cstdint>
 #include <string>
@@ -11,8 +12,8 @@ namespace palpate::data {
 /// \param unix_ns since 1970-01-01T00:00:00Z; any value, also before.
 std::string format_utc(std::int64_t unix_ns);
 
-/// Where `monotonic_ns` of a session clock lies on the calendar, ns since 1970. Sums beyond the
-/// range stay at its end: the values may come from a damaged file.
+/// Converts a time of the session clock to ns since 1970. Saturates at the range of 64 bits: the
+/// values may come from a damaged file.
 std::int64_t to_unix_ns(const ClockStamp& clock, std::int64_t monotonic_ns);
 
 }  // namespace palpate::data

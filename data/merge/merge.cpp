@@ -29,19 +29,20 @@ namespace fs = std::filesystem;
 
 void require_free(const std::string& out) {
   std::error_code error;
-  if (out.empty()) throw StoreRefused("'' is no path of a database");
+  if (out.empty()) throw StoreRefused("'' is not a path of a database");
   for (const char* end : {"", "-wal", "-shm", "-journal"}) {
     if (!fs::exists(fs::symlink_status(out + end, error))) continue;
     throw StoreRefused(out + end +
-                       ": is there already; a merge makes a new database and replaces none, give "
+                       ": exists already; a merge creates a new database and replaces none, give "
                        "another name or move it away");
   }
   if (belongs_to_database(out)) {
-    throw StoreRefused(out + ": is a name of what lies beside a database; give another name");
+    throw StoreRefused(
+        out + ": is the name of a file that belongs to another database; give another name");
   }
 }
 
-/// Opens every file once, however often and under whatever name it was given.
+/// Opens every file once, even if it is given several times or by several names.
 std::deque<StationDatabase> open_stations(const std::vector<std::string>& inputs,
                                           const AtomicFolder& scratch) {
   std::deque<StationDatabase> stations;
@@ -55,9 +56,10 @@ std::deque<StationDatabase> open_stations(const std::vector<std::string>& inputs
   return stations;
 }
 
-/// A value that the tables refuse is damage of the file that it came from.
+/// Copies rows; one that violates a constraint of the new database means that its source is
+/// damaged.
 template <class Work>
-void take_from(const StationDatabase& station, Work&& work) {
+void copy_from(const StationDatabase& station, Work&& work) {
   guarded(station.path(), [&] {
     try {
       work();
@@ -68,7 +70,24 @@ void take_from(const StationDatabase& station, Work&& work) {
   });
 }
 
-/// Fills a new database in the order of the plan, so that it does not depend on that of the inputs.
+/// \return row id
+std::int64_t insert_participant(SQLite::Database& db, std::int64_t protocol_id, int number,
+                                const PlannedParticipant& person) {
+  SQLite::Statement enrol(db,
+                          "INSERT INTO participants (protocol_id, code, number, simulated, seed) "
+                          "VALUES (?, ?, ?, ?, ?)");
+  Binder(enrol) << protocol_id << person.code << number << person.simulated << person.seed;
+  copy_from(*person.station, [&] { enrol.exec(); });
+  const std::int64_t participant = db.getLastInsertRowid();
+  if (person.enrolled_number == number) return participant;
+  SQLite::Statement renumber(
+      db, "INSERT INTO renumberings (participant_id, enrolled_number) VALUES (?, ?)");
+  Binder(renumber) << participant << person.enrolled_number;
+  renumber.exec();
+  return participant;
+}
+
+/// Inserts in the order of the plan, so that the bytes do not depend on the order of the inputs.
 void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
           const std::function<void(std::int64_t, std::int64_t)>& progress) {
   std::int64_t sessions = 0;
@@ -77,27 +96,16 @@ void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
   for (const PlannedProtocol& protocol : plan.protocols) {
     const std::int64_t protocol_id = insert_protocol_if_absent(db, out, protocol.info);
     for (const auto& [number, person] : protocol.participants) {
-      SQLite::Statement enrol(db,
-                              "INSERT INTO participants (protocol_id, code, number, simulated, "
-                              "seed) VALUES (?, ?, ?, ?, ?)");
-      Binder(enrol) << protocol_id << person.code << number << person.simulated << person.seed;
-      take_from(*person.station, [&] { enrol.exec(); });
-      const std::int64_t participant = db.getLastInsertRowid();
-      if (person.enrolled_number != number) {
-        SQLite::Statement renumber(
-            db, "INSERT INTO renumberings (participant_id, enrolled_number) VALUES (?, ?)");
-        Binder(renumber) << participant << person.enrolled_number;
-        renumber.exec();
-      }
+      const std::int64_t participant = insert_participant(db, protocol_id, number, person);
       for (const auto& [session_number, session] : person.sessions) {
-        take_from(*session.station, [&, &theirs = session] {
-          copy_session(theirs.station->db(), theirs.id, db, participant);
+        copy_from(*session.station, [&, &source = session] {
+          copy_session(source.station->db(), source.id, db, participant);
         });
         if (progress) progress(++sessions, plan.sessions);
       }
     }
   }
-  // Nothing of theirs was ever in this file: there is nothing to clear.
+  // `cleared`: no row of the withdrawn participants was ever in this file.
   for (const auto& tombstone : plan.tombstones.all()) Tombstones::put(db, tombstone, true);
 }
 
@@ -119,11 +127,11 @@ MergeResult merge(const std::string& out, const std::vector<std::string>& inputs
   const AtomicFolder folder(out);
   std::deque<StationDatabase> stations = open_stations(inputs, folder);
   const MergePlan plan = plan_merge(stations, clash);
-  const std::string draft = folder / "merged.db";
-  create_database(draft);
+  const std::string temporary = folder / "merged.db";
+  create_database(temporary);
   guarded(out, [&] {
-    SQLite::Database db(draft, SQLite::OPEN_READWRITE);
-    // It is thrown away if anything fails: no journal is needed.
+    SQLite::Database db(temporary, SQLite::OPEN_READWRITE);
+    // A temporary file, deleted if anything fails: needs no journal.
     db.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA foreign_keys = ON");
     SQLite::Transaction transaction(db);
     fill(db, out, plan, progress);
@@ -131,11 +139,12 @@ MergeResult merge(const std::string& out, const std::vector<std::string>& inputs
     db.exec("PRAGMA journal_mode = WAL");
   });
   for (const StationDatabase& station : stations) station.require_unchanged();
-  MergeResult done{Store::open(draft, Store::Mode::read_only).counts(), plan.excluded,
+  MergeResult done{Store::open(temporary, Store::Mode::read_only).counts(), plan.excluded,
                    plan.renumbered};
-  sync_file(draft);
-  if (!rename_if_absent(draft, out)) {
-    throw StoreRefused(out + ": has come there meanwhile; nothing was written, give another name");
+  sync_file(temporary);
+  if (!rename_if_absent(temporary, out)) {
+    throw StoreRefused(
+        out + ": another program has created it meanwhile; nothing was written, give another name");
   }
   return done;
 }

@@ -1,4 +1,5 @@
 #pragma once
+// palpate merge: the databases of several stations (computers that run parts of a study) into one.
 
 #include <cstdint>
 #include <functional>
@@ -9,15 +10,15 @@
 
 namespace palpate::data {
 
-/// A participant of a station who has withdrawn at some station.
+/// A participant who has withdrawn at one station and is still in the database of another.
 struct ExcludedParticipant {
-  std::string code, path;  ///< of the database that still holds the participant
+  std::string code, path;  ///< path: of the database that still holds the participant
 };
 
-/// A participant whose number is another's as well.
+/// A participant who got a new number, because another one has the same.
 struct RenumberedParticipant {
   std::string code, other, path;  ///< path: of the database that holds `code`
-  int from = 0, to = 0;           ///< from: orders the trials, also those to come
+  int from = 0, to = 0;           ///< from: keeps selecting the order of trials
 };
 
 struct MergeResult {
@@ -26,21 +27,20 @@ struct MergeResult {
   std::vector<RenumberedParticipant> renumbered;
 };
 
-/// What becomes of one number for two codes: two stations counted for themselves.
+/// Two codes with one number in a protocol: two stations numbered independently.
 enum class NumberConflict {
   refuse,
-  renumber,  ///< who began later gets the next number after all; the store keeps both
+  renumber,  ///< the one who began later gets the next free number; the store keeps both
 };
 
-/// Makes one database of several stations' databases: every protocol, participant, session, run,
-/// note, attempt, sample and tombstone once. What the inputs hold in common must be alike to the
-/// last bit, so merging a merged database with its parts again changes nothing; the order of the
-/// inputs does not matter either. Who has withdrawn at one station is left out from all. Records of
-/// exports are not taken over: they belong to the stations' computers.
+/// Creates the union of several databases: every protocol, participant, session, run, note,
+/// attempt, sample and tombstone once. Rows that several inputs hold must be identical to the bit;
+/// so merging is idempotent (a merged database with its parts again gives the same bytes) and
+/// commutative. Participants who have withdrawn at one station are excluded. Records of exports are
+/// not copied: they refer to files on the stations' computers.
 ///
-/// The inputs are not written to. `out` is made whole or not at all; what is there already is never
-/// replaced. \param progress called after every session with its number and the number of all; may
-/// throw to stop.
+/// The inputs are not written to. `out` appears complete or not at all, and never replaces a file.
+/// \param progress called after every session with its number and the total; may throw to stop.
 /// \throws StoreRefused with every conflict: a participant with different content (number, a
 /// session of the same number, sessions at the same time), one number for two codes (see
 /// NumberConflict), different protocols under one name; an input that Store::open would refuse, or

@@ -54,7 +54,7 @@ struct Span {
   double begin = 0, end = 0;  // s since 1970
 };
 
-/// From the first start to the last that happened in a session.
+/// From the first start to the last recorded time of a session.
 Span span_of(const PlannedSession& session) {
   SQLite::Statement find(
       session.station->db(),
@@ -77,11 +77,11 @@ class Planner {
   void add_protocols(StationDatabase& station);
   void add_files(ProtocolInfo& known, StationDatabase& station, std::int64_t protocol_id);
   void add_participant(PlannedProtocol& protocol, FoundParticipant found);
-  void settle_numbers(PlannedProtocol& protocol, NumberConflict clash);
+  void assign_numbers(PlannedProtocol& protocol, NumberConflict clash);
   void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
-  void require_one_meaning_per_name(const std::deque<StationDatabase>& stations);
-  /// \param without_numbers so many conflicts are of another kind
-  [[noreturn]] void raise(std::size_t without_numbers) const;
+  void require_same_protocols(const std::deque<StationDatabase>& stations);
+  /// \param other_conflicts number of conflicts that are not about participant numbers
+  [[noreturn]] void raise(std::size_t other_conflicts) const;
 
   MergePlan plan_;
   std::map<std::string, PlannedProtocol> protocols_;                       // by checksum
@@ -99,10 +99,10 @@ MergePlan Planner::plan(std::deque<StationDatabase>& stations, NumberConflict cl
   }
   for (StationDatabase& station : stations)
     guarded(station.path(), [&] { add_protocols(station); });
-  require_one_meaning_per_name(stations);
-  const std::size_t without_numbers = conflicts_.size();
-  for (auto& [sha256, protocol] : protocols_) settle_numbers(protocol, clash);
-  if (!conflicts_.empty()) raise(without_numbers);
+  require_same_protocols(stations);
+  const std::size_t other_conflicts = conflicts_.size();
+  for (auto& [sha256, protocol] : protocols_) assign_numbers(protocol, clash);
+  if (!conflicts_.empty()) raise(other_conflicts);
   for (auto& [sha256, protocol] : protocols_) {
     for (const auto& [number, person] : protocol.participants) {
       plan_.sessions += static_cast<std::int64_t>(person.sessions.size());
@@ -115,16 +115,16 @@ MergePlan Planner::plan(std::deque<StationDatabase>& stations, NumberConflict cl
   return std::move(plan_);
 }
 
-void Planner::raise(std::size_t without_numbers) const {
+void Planner::raise(std::size_t other_conflicts) const {
   std::string message = "these databases cannot be merged; nothing was written:";
   for (const std::string& one : conflicts_) message += "\n  " + one;
-  if (conflicts_.size() > without_numbers) {
+  if (conflicts_.size() > other_conflicts) {
     message +=
         "\nTwo stations gave the same number: --renumber gives another one to who began later, and "
         "keeps on record whose order of trials was shown. From now on keep the stations' numbers "
         "apart with palpate run --number";
   }
-  if (without_numbers > 0) {
+  if (other_conflicts > 0) {
     message +=
         "\nLeave one of the databases out, or remove a participant who is in the wrong place from "
         "a copy of it with palpate forget";
@@ -164,7 +164,7 @@ void Planner::add_protocols(StationDatabase& station) {
   }
 }
 
-/// A station of an older palpate may not have kept them.
+/// Not every station has the files: earlier versions did not store them.
 void Planner::add_files(ProtocolInfo& known, StationDatabase& station, std::int64_t protocol_id) {
   for (ProtocolFile& file : protocol_files(station.db(), protocol_id)) {
     const auto at = std::lower_bound(known.files.begin(), known.files.end(), file.name,
@@ -173,7 +173,7 @@ void Planner::add_files(ProtocolInfo& known, StationDatabase& station, std::int6
       known.files.insert(at, std::move(file));
     } else if (at->bytes != file.bytes) {
       conflicts_.push_back(station.path() + ": " + file.name + " of protocol " + known.name +
-                           " is another file than at another station");
+                           " differs from the file of another station");
     }
   }
 }
@@ -200,7 +200,7 @@ void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found)
                          "with another seed" +
                          where);
   } else {
-    // One of the two was given another number by a merge: that stands.
+    // One of the two was renumbered by an earlier merge: keeps that number.
     if (known.number == order) {
       known.number = found.number;
     } else if (found.number != order) {
@@ -210,8 +210,9 @@ void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found)
   }
 }
 
-/// Who began first keeps a number that several have, unless it is not the one of the own trials.
-void Planner::settle_numbers(PlannedProtocol& protocol, NumberConflict clash) {
+/// Of participants with the same number the one who began first keeps it, but those who were
+/// enrolled with it before those who were renumbered to it.
+void Planner::assign_numbers(PlannedProtocol& protocol, NumberConflict clash) {
   std::vector<std::pair<std::tuple<int, bool, double, std::string>, FoundParticipant*>> ordered;
   for (auto& [code, one] : people_[protocol.info.sha256]) {
     double began = std::numeric_limits<double>::infinity();
@@ -271,9 +272,9 @@ void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& 
   }
 }
 
-/// Names of a protocol may have several checksums within a station: it was changed there. Two
-/// stations that know different ones ran different studies.
-void Planner::require_one_meaning_per_name(const std::deque<StationDatabase>& stations) {
+/// A station may have several versions (checksums) of a protocol name: it was changed there. Two
+/// stations where neither has all versions of the other ran different studies.
+void Planner::require_same_protocols(const std::deque<StationDatabase>& stations) {
   for (const auto& [name, by_station] : names_) {
     for (std::size_t i = 0; i < stations.size(); ++i) {
       for (std::size_t k = i + 1; k < stations.size(); ++k) {

@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: what of the stations goes into one study, and what speaks against it.
+// Internal to data/merge: what is copied from which station, and the conflicts that prevent a
+// merge.
 
 #include <cstdint>
 #include <deque>
@@ -15,7 +16,7 @@
 namespace palpate::data {
 
 struct PlannedSession {
-  StationDatabase* station = nullptr;  ///< that it is copied from
+  StationDatabase* station = nullptr;  ///< to copy it from
   std::int64_t id = 0;                 ///< there
 };
 

@@ -3,6 +3,7 @@
 #include <SQLiteCpp/Statement.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <utility>
@@ -11,7 +12,7 @@
 namespace palpate::data {
 namespace {
 
-/// "number, observer_sha256": the columns of a table that are no keys.
+/// "number, observer_sha256": the columns of a table without keys.
 std::string columns_but_keys(SQLite::Database& db, const std::string& table) {
   std::string columns;
   SQLite::Statement find(db, "SELECT name FROM pragma_table_info(?)");
@@ -28,7 +29,7 @@ bool same_value(const SQLite::Column& a, const SQLite::Column& b) {
   if (a.getType() != b.getType()) return false;
   if (a.isInteger()) return a.getInt64() == b.getInt64();
   if (a.isFloat()) return a.getDouble() == b.getDouble();
-  const void *bytes_a = a.getBlob(), *bytes_b = b.getBlob();  // before their lengths
+  const void *bytes_a = a.getBlob(), *bytes_b = b.getBlob();  // must precede getBytes()
   const int size = a.getBytes();
   return size == b.getBytes() &&
          (size == 0 || std::memcmp(bytes_a, bytes_b, static_cast<std::size_t>(size)) == 0);
@@ -74,8 +75,8 @@ class Inserter {
   std::int64_t operator()(const std::vector<std::int64_t>& keys, SQLite::Statement& row) {
     insert_.reset();
     for (int i = 0; i < keys_; ++i) insert_.bind(i + 1, keys[static_cast<std::size_t>(i)]);
-    for (int i = kPlaces; i < row.getColumnCount(); ++i) {
-      bind_value(insert_, keys_ + i - kPlaces + 1, row.getColumn(i));
+    for (int i = kParentColumns; i < row.getColumnCount(); ++i) {
+      bind_value(insert_, keys_ + i - kParentColumns + 1, row.getColumn(i));
     }
     insert_.exec();
     return db_.getLastInsertRowid();
@@ -90,6 +91,87 @@ class Inserter {
   SQLite::Database& db_;
   int keys_;
   SQLite::Statement insert_;
+};
+
+/// Copies one session from database to database, table by table, and maps the keys.
+class SessionCopier {
+ public:
+  SessionCopier(SQLite::Database& from, std::int64_t id, SQLite::Database& to)
+      : from_(from), id_(id), to_(to), rows_(session_rows(from)) {}
+
+  void copy(std::int64_t participant) {
+    copy_session_row(participant);
+    copy_runs();
+    copy_notes();
+    copy_attempts();
+    copy_samples();
+  }
+
+ private:
+  template <class Visit>
+  void each_row(const std::string& sql, const Visit& visit) {
+    SQLite::Statement row(from_, sql);
+    row.bind(1, id_);
+    while (row.executeStep()) visit(row);
+  }
+  Inserter inserter(const std::string& table, int keys, const std::string& key_names,
+                    const std::string& columns) {
+    const auto commas = std::count(columns.begin(), columns.end(), ',');
+    return {to_, table, keys, key_names, columns, static_cast<int>(commas) + 1};
+  }
+  /// The new id of the run that a row belongs to.
+  std::int64_t run_of(SQLite::Statement& row) const {
+    const std::int64_t position = row.getColumn(0).getInt64();
+    if (position < 1 || position > static_cast<std::int64_t>(runs_.size())) {
+      throw SQLite::Exception("an attempt is of a run of another session", SQLITE_CORRUPT);
+    }
+    return runs_[static_cast<std::size_t>(position - 1)];
+  }
+  void copy_session_row(std::int64_t participant) {
+    const std::string columns = columns_but_keys(from_, "sessions");
+    Inserter add = inserter("sessions", 1, "participant_id", columns);
+    each_row("SELECT 0, 0, " + columns + " FROM sessions WHERE id = ?1",
+             [&](auto& row) { session_ = add({participant}, row); });
+  }
+  void copy_runs() {
+    Inserter add = inserter("runs", 1, "session_id", rows_[0].columns);
+    SQLite::Statement shown_with(to_,
+                                 "UPDATE runs SET protocol_id = (SELECT id FROM protocols WHERE "
+                                 "sha256 = ?) WHERE id = ?");
+    each_row(rows_[0].select, [&](auto& row) {
+      runs_.push_back(add({session_}, row));
+      if (row.getColumn(1).isNull()) return;
+      shown_with.reset();
+      shown_with.bind(1, row.getColumn(1).getString());
+      shown_with.bind(2, runs_.back());
+      shown_with.exec();
+    });
+  }
+  void copy_notes() {
+    Inserter add = inserter("notes", 1, "run_id", rows_[1].columns);
+    each_row(rows_[1].select, [&](auto& row) { add({run_of(row)}, row); });
+  }
+  void copy_attempts() {
+    Inserter add = inserter("attempts", 2, "session_id, run_id", rows_[2].columns);
+    each_row(rows_[2].select, [&](auto& row) {
+      attempts_[{row.getColumn("trial").getInt64(), row.getColumn("attempt").getInt64()}] =
+          add({session_, run_of(row)}, row);
+    });
+  }
+  void copy_samples() {
+    Inserter add = inserter("samples", 1, "attempt_id", rows_[3].columns);
+    each_row(rows_[3].select, [&](auto& row) {
+      add({attempts_.at({row.getColumn(0).getInt64(), row.getColumn(1).getInt64()})}, row);
+    });
+  }
+
+  SQLite::Database& from_;
+  const std::int64_t id_;
+  SQLite::Database& to_;
+  const std::array<SessionRows, 4> rows_;
+  std::int64_t session_ = 0;                                                // new id
+  std::vector<std::int64_t> runs_;                                          // new ids, in order
+  std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> attempts_;  // (trial, number) -> id
 };
 
 }  // namespace
@@ -135,55 +217,7 @@ bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& d
 
 void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
                   std::int64_t participant) {
-  const auto each_row = [&](const std::string& sql, const auto& visit) {
-    SQLite::Statement row(from, sql);
-    row.bind(1, id);
-    while (row.executeStep()) visit(row);
-  };
-  const auto inserter = [&](const std::string& table, int keys, const std::string& key_names,
-                            const std::string& columns) {
-    int count = 1;
-    for (const char c : columns) count += c == ',' ? 1 : 0;
-    return Inserter(to, table, keys, key_names, columns, count);
-  };
-  const std::string columns = columns_but_keys(from, "sessions");
-  std::int64_t session = 0;
-  each_row("SELECT 0, 0, " + columns + " FROM sessions WHERE id = ?1", [&](auto& row) {
-    session = inserter("sessions", 1, "participant_id", columns)({participant}, row);
-  });
-
-  const auto rows = session_rows(from);
-  std::vector<std::int64_t> runs;
-  const auto run_of = [&](SQLite::Statement& row) {
-    const std::int64_t place = row.getColumn(0).getInt64();
-    if (place < 1 || place > static_cast<std::int64_t>(runs.size())) {
-      throw SQLite::Exception("an attempt is of a run of another session", SQLITE_CORRUPT);
-    }
-    return runs[static_cast<std::size_t>(place - 1)];
-  };
-  Inserter add_run = inserter("runs", 1, "session_id", rows[0].columns);
-  SQLite::Statement shown_with(
-      to, "UPDATE runs SET protocol_id = (SELECT id FROM protocols WHERE sha256 = ?) WHERE id = ?");
-  each_row(rows[0].select, [&](auto& row) {
-    runs.push_back(add_run({session}, row));
-    if (row.getColumn(1).isNull()) return;
-    shown_with.reset();
-    shown_with.bind(1, row.getColumn(1).getString());
-    shown_with.bind(2, runs.back());
-    shown_with.exec();
-  });
-  Inserter add_note = inserter("notes", 1, "run_id", rows[1].columns);
-  each_row(rows[1].select, [&](auto& row) { add_note({run_of(row)}, row); });
-  std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> attempts;  // (trial, number) -> id
-  Inserter add_attempt = inserter("attempts", 2, "session_id, run_id", rows[2].columns);
-  each_row(rows[2].select, [&](auto& row) {
-    attempts[{row.getColumn("trial").getInt64(), row.getColumn("attempt").getInt64()}] =
-        add_attempt({session, run_of(row)}, row);
-  });
-  Inserter add_samples = inserter("samples", 1, "attempt_id", rows[3].columns);
-  each_row(rows[3].select, [&](auto& row) {
-    add_samples({attempts.at({row.getColumn(0).getInt64(), row.getColumn(1).getInt64()})}, row);
-  });
+  SessionCopier(from, id, to).copy(participant);
 }
 
 }  // namespace palpate::data

@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/: everything that belongs to a session, without keys and in an order of its own.
-// What is compared is what is copied.
+// Internal to data/merge: compares and copies sessions between databases. Row ids differ between
+// databases: rows are compared and copied without keys, in an order of their own.
 
 #include <SQLiteCpp/Database.h>
 
@@ -14,23 +14,23 @@ namespace palpate::data {
 struct SessionRows {
   const char* table;
   std::string columns;  ///< all but keys, comma-separated
-  /// SELECT kPlaces values that say what a row belongs to, then `columns`.
+  /// SELECT of kParentColumns values that identify the parent row, then `columns`.
   std::string select;
 };
 
-/// Runs: which of the session (1, 2, ...), then the checksum of a protocol of its own, if any.
-/// Notes and attempts: which run, then 0. Samples: the attempt's trial and number.
-inline constexpr int kPlaces = 2;
+/// Runs: position in the session (1, 2, ...), checksum of a protocol of its own or NULL. Notes and
+/// attempts: position of their run, 0. Samples: trial and number of their attempt.
+inline constexpr int kParentColumns = 2;
 
-/// runs, notes, attempts, samples: in this order they can be inserted.
+/// runs, notes, attempts, samples: in the order of insertion that foreign keys need.
 std::array<SessionRows, 4> session_rows(SQLite::Database& db);
 
-/// Whether two sessions hold the same, to the last bit.
+/// Whether two sessions are identical to the bit.
 bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& db_b,
                   std::int64_t id_b);
 
 /// Inserts a copy of a session. \param participant its participant's id in `to`.
-/// \throws SQLite::Exception: rows of the session refer to what is not of the session.
+/// \throws SQLite::Exception: rows of the session refer to another session.
 void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
                   std::int64_t participant);
 

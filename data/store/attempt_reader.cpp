@@ -2,7 +2,6 @@
 
 #include <sqlite3.h>
 
-#include <cmath>
 #include <cstddef>
 #include <map>
 #include <string_view>
@@ -14,70 +13,10 @@
 #include "data/store/samples_codec.h"
 #include "data/store/seals.h"
 #include "data/store/statement_values.h"
-#include "data/store/validation.h"
+#include "data/store/stored_values.h"
 
 namespace palpate::data {
 namespace {
-
-/// What no trial of ours holds, and no export could hold. Thrown as damage. With Row, which takes
-/// neither a missing value nor a truth value beyond 0 and 1, this is all that the table's CHECKs
-/// ask of an attempt: SQLite takes twice as long for them, and leaves them out where the disk is
-/// read-only.
-class Sound {
- public:
-  explicit Sound(const StoredTrial& trial) : trial_(trial) {}
-  void text(const char* field, const std::string& value) const {
-    if (!is_clean_utf8(value)) fail(field, "is not UTF-8 text");
-  }
-  void count(const char* field, int value) const {
-    if (value < 1) fail(field, "is not 1 or more");
-  }
-  void number(const char* field, double value) const {
-    if (!std::isfinite(value)) fail(field, "is not a finite number");
-  }
-  void amount(const char* field, double value) const {
-    number(field, value);
-    if (value < 0) fail(field, "is below zero");
-  }
-  void run() const {
-    if (!is_participant_code(trial_.participant.code)) {
-      throw SQLite::Exception("a participant's code is not 1 to 32 letters and digits",
-                              SQLITE_CORRUPT);
-    }
-    count("participant number", trial_.participant.number);
-    count("session", trial_.run.session);
-    text("device", trial_.run.device);
-    text("program version", trial_.run.program_version);
-    text("observer's checksum", trial_.run.observer_sha256);
-  }
-  void record() const {
-    const TrialRecord& record = trial_.record;
-    count("block", record.block);
-    count("trial", record.trial);
-    count("attempt", record.attempt);
-    if (record.timed_out && (record.correct || !record.response.empty())) {
-      fail("time-out", "has a response or is correct");
-    }
-    text("renderer", record.renderer);
-    text("shape", record.shape);
-    text("response", record.response);
-    text("reason", trial_.cut_off_reason);
-    for (const double q : record.orientation_wxyz) number("orientation", q);
-    amount("response_time", record.response_time);
-    amount("first_contact_time", record.first_contact_time.value_or(0));
-    amount("max_force", record.max_force);
-  }
-
- private:
-  [[noreturn]] void fail(const char* field, const char* what) const {
-    const TrialRecord& record = trial_.record;
-    throw SQLite::Exception("participant " + trial_.participant.code + ", session " +
-                                std::to_string(record.session) + ", trial " +
-                                std::to_string(record.trial) + ": " + field + " " + what,
-                            SQLITE_CORRUPT);
-  }
-  const StoredTrial& trial_;
-};
 
 constexpr int kSealsSince = 3;  // schema version
 
@@ -90,17 +29,17 @@ AttemptState state_of(const std::string& text) {
 
 std::optional<Link> read_link(RowReader& row) {
   std::optional<Link> link;
-  std::optional<std::int64_t> place;
+  std::optional<std::int64_t> position;
   std::optional<Checksum> seal;
-  row >> place >> seal;
-  if (place && seal) link = {*place, *seal};
+  row >> position >> seal;
+  if (position && seal) link = {*position, *seal};
   return link;
 }
 
-class Reader {
+class AttemptReader {
  public:
-  Reader(SQLite::Database& db, const std::string& path, int version, const AttemptFilter& filter,
-         const std::function<void(const StoredTrial&)>& visit)
+  AttemptReader(SQLite::Database& db, const std::string& path, int version,
+                const AttemptFilter& filter, const std::function<void(const StoredTrial&)>& visit)
       : db_(db),
         path_(path),
         version_(version),
@@ -130,7 +69,7 @@ class Reader {
   void require_files(const RunInfo& run, std::int64_t protocol);
   void read_attempt(std::optional<ChainCheck>& chain);
   void read_samples(std::int64_t attempt, const std::optional<Checksum>& sum);
-  void require_all_seen();
+  void require_no_hidden_rows();
 
   SQLite::Database& db_;
   const std::string path_;
@@ -142,12 +81,12 @@ class Reader {
   StoredTrial trial_;
   SealedValues values_;
   std::map<std::int64_t, KnownRun> runs_;      // of the session, by id
-  std::int64_t known_run_ = 0, run_link_ = 0;  // whose details are in trial_
+  std::int64_t known_run_ = 0, run_link_ = 0;  // of the run that trial_.run holds
   std::map<std::int64_t, std::string> files_;  // checksum of a protocol's
   std::int64_t seen_ = 0;
 };
 
-std::vector<std::int64_t> Reader::sessions() {
+std::vector<std::int64_t> AttemptReader::sessions() {
   SQLite::Statement find(db_, std::string("SELECT s.id") + kFromProtocolDown +
                                   (filter_.trial != nullptr ? "WHERE pa.code = ? AND s.number = ? "
                                    : filter_.session        ? "WHERE pa.id = ? AND s.number = ? "
@@ -164,8 +103,8 @@ std::vector<std::int64_t> Reader::sessions() {
   return all;
 }
 
-/// What a run says was shown is what is stored.
-void Reader::require_files(const RunInfo& run, std::int64_t protocol) {
+/// The stored files of the protocol are those that the run recorded as shown.
+void AttemptReader::require_files(const RunInfo& run, std::int64_t protocol) {
   if (run.files_sha256.empty()) return;
   auto known = files_.find(protocol);
   if (known == files_.end()) known = files_.emplace(protocol, files_checksum(db_, protocol)).first;
@@ -176,7 +115,7 @@ void Reader::require_files(const RunInfo& run, std::int64_t protocol) {
                           SQLITE_CORRUPT);
 }
 
-void Reader::read_runs(const SessionHead& session, std::optional<ChainCheck>& chain) {
+void AttemptReader::read_runs(const SessionHead& session, std::optional<ChainCheck>& chain) {
   SQLite::Statement find(db_,
                          "SELECT r.id, r.end_reason, r.ended_ns, " +
                              std::string(sealed() ? "r.protocol_id, r.link, r.seal, r.end_link, "
@@ -196,10 +135,10 @@ void Reader::read_runs(const SessionHead& session, std::optional<ChainCheck>& ch
     const auto link = read_link(row), end_link = read_link(row);
     KnownRun& run = runs_[id];
     row >> run.info;
-    run.link = link ? link->place : 0;
+    run.link = link ? link->position : 0;
     run.running = run_end_of(end_reason) == RunEnd::running;
     trial_.run = run.info;
-    Sound(trial_).run();
+    require_valid_run(trial_);
     if (!chain) continue;
     require_files(run.info, protocol.value_or(session.protocol_id));
     put_run(values_, run.info);
@@ -210,7 +149,7 @@ void Reader::read_runs(const SessionHead& session, std::optional<ChainCheck>& ch
   }
 }
 
-void Reader::read_notes(std::int64_t session, ChainCheck& chain) {
+void AttemptReader::read_notes(std::int64_t session, ChainCheck& chain) {
   SQLite::Statement find(db_,
                          "SELECT r.link, n.at_ns, n.text, n.link, n.seal FROM notes n JOIN runs r "
                          "ON r.id = n.run_id WHERE r.session_id = ? ORDER BY n.run_id, n.id");
@@ -225,22 +164,22 @@ void Reader::read_notes(std::int64_t session, ChainCheck& chain) {
   }
 }
 
-void Reader::read_samples(std::int64_t attempt, const std::optional<Checksum>& sum) {
+void AttemptReader::read_samples(std::int64_t attempt, const std::optional<Checksum>& sum) {
   find_samples_.reset();
   find_samples_.bind(1, attempt);
   if (!find_samples_.executeStep()) {
-    if (sum) throw SQLite::Exception("its samples are gone", SQLITE_CORRUPT);
+    if (sum) throw SQLite::Exception("its samples are missing", SQLITE_CORRUPT);
     return;
   }
   const int packing = find_samples_.getColumn(0).getInt();
   const std::int64_t count = find_samples_.getColumn(1).getInt64();
   const SQLite::Column data = find_samples_.getColumn(2);
-  const void* const bytes = data.getBlob();  // before their number
+  const void* const bytes = data.getBlob();  // must precede getBytes()
   const auto size = static_cast<std::size_t>(data.getBytes());
   if (sealed() && sum != checksum_of_samples(packing, count, bytes, size)) {
     throw SQLite::Exception("its samples were changed since they were recorded", SQLITE_CORRUPT);
   }
-  if (filter_.samples != SampleReading::unpacked) return;
+  if (filter_.samples != SampleReading::unpack) return;
   if (packing < 1 || packing > kSamplesPacking) {
     throw StoreRefused(
         path_ + ": holds samples in a packing that this palpate does not know; use a newer one");
@@ -252,7 +191,7 @@ void Reader::read_samples(std::int64_t attempt, const std::optional<Checksum>& s
   }
 }
 
-void Reader::read_attempt(std::optional<ChainCheck>& chain) {
+void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
   TrialRecord& record = trial_.record;
   record = {};
   record.session = trial_.run.session;
@@ -275,7 +214,7 @@ void Reader::read_attempt(std::optional<ChainCheck>& chain) {
   if (completed) read_outcome(row, record);
   if (about.cut_off_reason.has_value() == completed) {
     throw SQLite::Exception(
-        "a reason to cut it off stands at a completed attempt, or none at one that was cut off",
+        "a completed attempt has a reason for being cut off, or one that was cut off has none",
         SQLITE_CORRUPT);
   }
   if (run != known_run_) {
@@ -286,20 +225,19 @@ void Reader::read_attempt(std::optional<ChainCheck>& chain) {
     known_run_ = run;
   }
   trial_.cut_off_reason = about.cut_off_reason.value_or("");
-  const Sound sound(trial_);
-  sound.record();
+  require_valid_record(trial_);
   if (chain) {
     about.run_link = run_link_;
     put_attempt(values_, about, record);
     chain->add(link, values_, {.kind = "trial", .number = record.trial, .attempt = record.attempt});
   }
   if (!wanted) return;
-  if (filter_.samples != SampleReading::no) read_samples(id, about.samples);
+  if (filter_.samples != SampleReading::skip) read_samples(id, about.samples);
   record.onset_utc = format_utc(to_unix_ns(trial_.run.clock, record.onset_ns));
   visit_(trial_);
 }
 
-void Reader::read_session(std::int64_t id) {
+void AttemptReader::read_session(std::int64_t id) {
   const SessionHead session = read_session_head(db_, id, version_);
   trial_.participant = session.participant;
   trial_.protocol_name = session.protocol_name;
@@ -330,20 +268,20 @@ void Reader::read_session(std::int64_t id) {
   if (chain) chain->finish();
 }
 
-/// A damaged index hides rows: they are counted without it.
-void Reader::require_all_seen() {
+/// A damaged index hides rows from queries: counts them without indexes.
+void AttemptReader::require_no_hidden_rows() {
   SQLite::Statement count(db_, "SELECT count(*) FROM attempts NOT INDEXED");
   count.executeStep();
   const std::int64_t stored = count.getColumn(0).getInt64();
   if (stored == seen_) return;
-  throw SQLite::Exception("of " + std::to_string(stored) + " attempts " + std::to_string(seen_) +
-                              " are to be found: an index is damaged",
+  throw SQLite::Exception("of " + std::to_string(stored) + " attempts only " +
+                              std::to_string(seen_) + " can be found: an index is damaged",
                           SQLITE_CORRUPT);
 }
 
-void Reader::read() {
+void AttemptReader::read() {
   for (const std::int64_t id : sessions()) read_session(id);
-  if (filter_.trial == nullptr && !filter_.session) require_all_seen();
+  if (filter_.trial == nullptr && !filter_.session) require_no_hidden_rows();
 }
 
 }  // namespace
@@ -351,7 +289,7 @@ void Reader::read() {
 void read_attempts(SQLite::Database& db, const std::string& path, int version,
                    const AttemptFilter& filter,
                    const std::function<void(const StoredTrial&)>& visit) {
-  Reader(db, path, version, filter, visit).read();
+  AttemptReader(db, path, version, filter, visit).read();
 }
 
 }  // namespace palpate::data

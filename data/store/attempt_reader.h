@@ -1,6 +1,7 @@
 #pragma once
-// Internal to data/: attempts one at a time, in order, and whether they and their sessions are what
-// was recorded.
+// Internal to data/: reads attempts one at a time, in order, and verifies them: every session that
+// is touched is checked against its hash chain (seals.h), every value against the range that
+// palpate writes. Store, and StationDatabase for merge, read trials through this only.
 
 #include <SQLiteCpp/Database.h>
 
@@ -16,21 +17,24 @@ namespace palpate::data {
 
 enum class AttemptState { running, completed, cut_off };
 
-enum class SampleReading { no, verify, unpacked };
-
-/// Which attempts are visited. The sessions that they are in are checked as a whole.
-struct AttemptFilter {
-  std::optional<AttemptState> state = {};                    ///< none: both that are over
-  const TrialName* trial = nullptr;                          ///< this one, in whatever protocols
-  std::optional<std::pair<std::int64_t, int>> session = {};  ///< participant's id, number
-  SampleReading samples = SampleReading::no;
-  bool seals_verified = false;  ///< the seals, in the same state of the database
+enum class SampleReading {
+  skip,
+  verify,  ///< against their checksum
+  unpack,  ///< verify, then decode into TrialRecord::samples
 };
 
-/// By protocol, participant number, session, trial and attempt. Every session in question is held
-/// against its seals, also the rows that are not visited, and every value against what palpate
-/// writes. \param version of the schema: there are seals since 3. \throws SQLite::Exception
-/// (damage), StoreRefused.
+/// Which attempts are visited. Their sessions are verified as a whole.
+struct AttemptFilter {
+  std::optional<AttemptState> state = {};                    ///< none: completed and cut off
+  const TrialName* trial = nullptr;                          ///< this one, in every protocol
+  std::optional<std::pair<std::int64_t, int>> session = {};  ///< participant's id, number
+  SampleReading samples = SampleReading::skip;
+  bool seals_verified = false;  ///< already, in the same snapshot of the database
+};
+
+/// Visits attempts by protocol, participant number, session, trial and attempt. Rows of a session
+/// that are not visited are verified, too. \param version of the schema; seals exist since 3.
+/// \throws SQLite::Exception (damage), StoreRefused (a row does not match its seal).
 void read_attempts(SQLite::Database& db, const std::string& path, int version,
                    const AttemptFilter& filter,
                    const std::function<void(const StoredTrial&)>& visit);

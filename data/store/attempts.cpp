@@ -1,4 +1,6 @@
-// Writing trials: one by one as they are shown, or many simulated ones at once.
+// Writes attempts: one by one as they are shown, or many simulated ones in one transaction.
+// begin_attempt commits before anything is shown, so that a crash leaves a trace of the attempt;
+// finish_attempt commits its record.
 
 #include "data/store/attempts.h"
 
@@ -14,12 +16,12 @@ std::string trial_name(const TrialRecord& record) {
   return "session " + std::to_string(record.session) + ", trial " + std::to_string(record.trial);
 }
 
-/// The attempt of a run that is open, if any.
 struct OpenAttempt {
   std::int64_t id = 0;
   TrialRecord plan;
 };
 
+/// The attempt of a run that has begun and not ended; there is one at most.
 std::optional<OpenAttempt> open_attempt(SQLite::Database& db, const Run& run) {
   SQLite::Statement find(
       db,
@@ -36,7 +38,7 @@ std::optional<OpenAttempt> open_attempt(SQLite::Database& db, const Run& run) {
   return open;
 }
 
-/// The number of the new attempt.
+/// \return its number within the trial: 1, 2, ...
 int insert_attempt(SQLite::Database& db, SQLite::Statement& insert, const Run& run,
                    const TrialRecord& plan, std::int64_t began_ns) {
   SQLite::Statement count(db,
@@ -116,17 +118,17 @@ void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& ru
 }
 
 int Store::begin_attempt(const Run& run, const TrialRecord& planned, std::int64_t began_ns) {
-  Validator checks;
-  validate_plan(checks, planned, run.session);
-  checks.raise(impl_->path + ": " + trial_name(planned));
+  Validator validator;
+  validate_plan(validator, planned, run.session);
+  validator.throw_if_invalid(impl_->path + ": " + trial_name(planned));
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
     impl_->require_running(run);
     if (has_record(db, run, planned.trial))
-      impl_->refuse(trial_name(planned) + " has its record already");
+      impl_->refuse(trial_name(planned) + " already has a record");
     if (const auto open = open_attempt(db, run)) {
       impl_->refuse(trial_name(planned) + " cannot begin while trial " +
-                    std::to_string(open->plan.trial) + " is open");
+                    std::to_string(open->plan.trial) + " has not ended");
     }
     SQLite::Statement insert(db, kInsertAttempt);
     return insert_attempt(db, insert, run, planned, began_ns);
@@ -134,21 +136,22 @@ int Store::begin_attempt(const Run& run, const TrialRecord& planned, std::int64_
 }
 
 void Store::finish_attempt(const Run& run, const TrialRecord& record) {
-  Validator checks;
-  validate_plan(checks, record, run.session);
-  validate_outcome(checks, record);
-  checks.raise(impl_->path + ": " + trial_name(record));
+  Validator validator;
+  validate_plan(validator, record, run.session);
+  validate_outcome(validator, record);
+  validator.throw_if_invalid(impl_->path + ": " + trial_name(record));
   impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
     const auto open = open_attempt(db, run);
-    if (!open) impl_->refuse(trial_name(record) + " was not begun");
+    if (!open) impl_->refuse(trial_name(record) + " has not been begun");
     const TrialRecord& plan = open->plan;
     if (plan.trial != record.trial || plan.attempt != record.attempt ||
         plan.block != record.block || plan.renderer != record.renderer ||
         plan.shape != record.shape || plan.practice != record.practice ||
         plan.orientation_wxyz != record.orientation_wxyz) {
       impl_->refuse("the record of " + trial_name(record) + ", attempt " +
-                    std::to_string(record.attempt) + " is not of the trial that was begun (trial " +
+                    std::to_string(record.attempt) +
+                    " does not belong to the attempt that was begun (trial " +
                     std::to_string(plan.trial) + ", attempt " + std::to_string(plan.attempt) + ")");
     }
     SQLite::Statement update(db, kComplete);
@@ -159,11 +162,11 @@ void Store::finish_attempt(const Run& run, const TrialRecord& record) {
 }
 
 void Store::cut_off_attempt(const Run& run, const std::string& reason) {
-  Validator checks;
-  checks.present("reason", reason);
-  checks.raise(impl_->path + ": attempt");
+  Validator validator;
+  validator.present("reason", reason);
+  validator.throw_if_invalid(impl_->path + ": attempt");
   impl_->commit([&] {
-    if (!open_attempt(*impl_->db, run)) impl_->refuse("no attempt is open that could be cut off");
+    if (!open_attempt(*impl_->db, run)) impl_->refuse("no attempt is open");
     cut_off_open_attempt(*impl_->db, *impl_->seals, run, reason);
     return true;
   });
@@ -171,11 +174,11 @@ void Store::cut_off_attempt(const Run& run, const std::string& reason) {
 
 void Store::record_simulated(const Run& run, const std::vector<TrialRecord>& records) {
   for (const auto& record : records) {
-    Validator one;
-    validate_plan(one, record, run.session);
-    validate_outcome(one, record);
-    one.expect(record.attempt == 1, "a simulated trial has one attempt");
-    one.raise(impl_->path + ": " + trial_name(record));
+    Validator validator;
+    validate_plan(validator, record, run.session);
+    validate_outcome(validator, record);
+    validator.expect(record.attempt == 1, "a simulated trial has one attempt");
+    validator.throw_if_invalid(impl_->path + ": " + trial_name(record));
   }
   impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
@@ -190,7 +193,7 @@ void Store::record_simulated(const Run& run, const std::vector<TrialRecord>& rec
     SQLite::Statement insert(db, kInsertAttempt), update(db, kComplete);
     for (const auto& record : records) {
       if (has_record(db, run, record.trial))
-        impl_->refuse(trial_name(record) + " has its record already");
+        impl_->refuse(trial_name(record) + " already has a record");
       insert_attempt(db, insert, run, record, record.onset_ns);
       const std::int64_t id = db.getLastInsertRowid();
       complete(db, update, id, record);

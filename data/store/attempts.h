@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/store: attempts that a run leaves open.
+// Internal to data/store: ends the attempt that a run has left open. Called when a run ends, and by
+// the next writer for runs whose process died.
 
 #include <SQLiteCpp/Database.h>
 
@@ -10,7 +11,7 @@
 
 namespace palpate::data {
 
-/// Within a transaction; no effect where none is open.
+/// Within a transaction of the caller; no effect where no attempt is open.
 void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
                           const std::string& reason);
 

@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: what the store_*.cpp share.
+// Internal to data/store: the open database of a Store, and the transaction that every writing call
+// runs in.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Transaction.h>
@@ -7,24 +8,26 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "data/files/file_identity.h"
 #include "data/store/lock.h"
 #include "data/store/seal_writer.h"
 #include "data/store/sqlite_errors.h"
 #include "data/store/store.h"
+#include "data/store/tombstones.h"
 
 namespace palpate::data {
 
 struct Store::Impl {
   std::string path;  ///< as given; for messages
-  std::string file;  ///< links followed
+  std::string file;  ///< absolute, links resolved
   Mode mode = Mode::read_only;
-  int version = 0;                 ///< of the schema; an older one than ours where it is only read
-  std::optional<WriterLock> lock;  // before db: given up after the database is closed
+  int version = 0;                 ///< of the schema; a reader may have opened an older one
+  std::optional<WriterLock> lock;  // before db: released after the database is closed
   std::optional<SQLite::Database> db;
   std::optional<SealWriter> seals;  ///< of a writer
-  bool checked = false;             ///< a reader has held every session against its seals
+  bool seals_verified = false;      ///< a reader has verified every session of its snapshot
   FileIdentity identity, wal_identity, index_identity;
   std::int64_t index_size = 0;  ///< bytes of the -shm
 
@@ -33,8 +36,17 @@ struct Store::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  /// Runs `work` in a transaction that is on disk when this returns. A file that has been moved
-  /// away or deleted meanwhile takes writes without a complaint: that is seen here.
+  bool writes() const { return mode == Mode::write_or_create; }
+
+  // Steps of Store::open, in order. \throws as Store::open; SQLite::Exception.
+  void require_usable_path();
+  void create_if_absent();
+  void connect();
+  void prepare_for_writing();
+
+  /// Runs `work` in a transaction (BEGIN IMMEDIATE) that is on disk when this returns. SQLite does
+  /// not notice when the database file is moved or deleted while it is open and reports success:
+  /// require_files_in_place() detects it.
   template <class Work>
   auto commit(Work&& work) {
     require_writer();
@@ -42,7 +54,7 @@ struct Store::Impl {
     return guarded(path, [&] {
       try {
         SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
-        auto result = work();
+        auto result = std::forward<Work>(work)();
         transaction.commit();
         require_files_in_place();
         return result;
@@ -53,15 +65,26 @@ struct Store::Impl {
     });
   }
 
-  /// Empties the log and rebuilds the file, so that nothing of removed rows is in either.
+  /// The transaction of forget: deletes the rows of a participant and keeps the tombstone.
+  /// \param earlier_hash of a tombstone that this one replaces; "": none
+  void replace_by_tombstone(const std::string& code, const Tombstones::Tombstone& tombstone,
+                            const std::string& earlier_hash);
+  /// Checkpoints and truncates the -wal and rebuilds the file (VACUUM), so that neither holds any
+  /// byte of deleted rows.
   void purge_deleted_rows();
+
+  // Parts of begin_run, within its transaction.
+  std::int64_t resume_or_create_session(const Participant& participant, const RunInfo& info);
+  /// The protocol that the run is shown with, if it is not the participant's `own`; stores it.
+  std::optional<std::int64_t> other_protocol(const Participant& participant, std::int64_t own,
+                                             const ProtocolInfo* shown_with);
 
   void require_writer() const;
   void require_running(const Run& run);
   void require_files_in_place();
-  /// The index of the log (-shm) is mapped into memory: where something has cut it short, a look
-  /// into it would end the program by SIGBUS. It gets its size back, empty; SQLite then makes it
-  /// again from the log, as after a crash.
+  /// The WAL index (-shm) is mapped into memory: if another program has truncated it, the next
+  /// access would end this process with SIGBUS. Restores its size, zero-filled; SQLite then
+  /// rebuilds it from the -wal, as after a crash.
   void repair_wal_index();
   [[noreturn]] void refuse(const std::string& why) const;
 };

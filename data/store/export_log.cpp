@@ -22,7 +22,7 @@ namespace {
 constexpr int kBusyMs = 5000;
 constexpr const char* kElsewhere = " (elsewhere, ";
 
-std::string tag_of(const std::string& place) {  // FNV-1a
+std::string short_hash(const std::string& place) {  // FNV-1a
   std::uint32_t hash = 2166136261U;
   for (const char c : place) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
   std::ostringstream text;
@@ -30,7 +30,7 @@ std::string tag_of(const std::string& place) {  // FNV-1a
   return text.str();
 }
 
-/// Earlier versions kept whole paths.
+/// Earlier versions of palpate recorded absolute paths.
 void shorten_paths(SQLite::Database& db, const std::string& file) {
   SQLite::Statement find(db, "SELECT id, path FROM exports WHERE substr(path, 1, 1) = '/'");
   std::vector<std::pair<std::int64_t, std::string>> whole;
@@ -45,6 +45,45 @@ void shorten_paths(SQLite::Database& db, const std::string& file) {
   }
 }
 
+/// Opens the database for writing, with the current schema.
+void open_current(std::optional<SQLite::Database>& db, const std::string& file,
+                  const std::string& database) {
+  require_private_sqlite_files(file);
+  db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
+  if (checked_version(*db, database) < kSchemaVersion) {
+    db.reset();
+    Store::open(database, Store::Mode::write_or_create);  // migrates
+    db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
+  }
+  require_private_sqlite_files(file);
+  db->exec("PRAGMA trusted_schema = OFF; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON");
+}
+
+void delete_export(SQLite::Database& db, const std::string& path) {
+  for (const char* sql :
+       {"DELETE FROM export_participants WHERE export_id = (SELECT id FROM exports WHERE path = ?)",
+        "DELETE FROM tombstone_exports WHERE export_id = (SELECT id FROM exports WHERE path = ?)",
+        "DELETE FROM exports WHERE path = ?"}) {
+    SQLite::Statement remove(db, sql);
+    Binder(remove) << path;
+    remove.exec();
+  }
+}
+
+void insert_participants(SQLite::Database& db, const std::string& database, std::int64_t export_id,
+                         const std::vector<std::int64_t>& participants) {
+  SQLite::Statement add(
+      db, "INSERT INTO export_participants SELECT ?, id FROM participants WHERE id = ?");
+  for (const std::int64_t participant : participants) {
+    add.reset();
+    Binder(add) << export_id << participant;
+    if (add.exec() == 1) continue;
+    throw StoreRefused(database +
+                       ": a participant was withdrawn while the export was made; nothing was "
+                       "exported, start it again");
+  }
+}
+
 }  // namespace
 
 std::string recorded_path(const std::string& database, const std::string& path) {
@@ -54,7 +93,7 @@ std::string recorded_path(const std::string& database, const std::string& path) 
   const fs::path folder = fs::weakly_canonical(fs::absolute(database)).parent_path();
   const fs::path within = place.lexically_relative(folder);
   if (!within.empty() && *within.begin() != "..") return within.string();
-  return place.filename().string() + kElsewhere + tag_of(place.string()) + ")";
+  return place.filename().string() + kElsewhere + short_hash(place.string()) + ")";
 }
 
 std::string export_location(const std::string& database, const std::string& recorded) {
@@ -69,42 +108,14 @@ void log_export(const std::string& database, const ExportRecord& made,
   const std::string path = recorded_path(file, made.path);
   guarded(database, [&] {
     std::optional<SQLite::Database> db;
-    require_private_sqlite_files(file);
-    db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
-    if (checked_version(*db, database) < kSchemaVersion) {
-      db.reset();
-      Store::open(database, Store::Mode::write_or_create);
-      db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
-    }
-    require_private_sqlite_files(file);
-    db->exec("PRAGMA trusted_schema = OFF; PRAGMA synchronous = FULL; PRAGMA secure_delete = ON");
+    open_current(db, file, database);
     SQLite::Transaction transaction(*db, SQLite::TransactionBehavior::IMMEDIATE);
     shorten_paths(*db, file);
-    for (const char* sql :
-         {"DELETE FROM export_participants WHERE export_id = (SELECT id FROM exports WHERE path = "
-          "?)",
-          "DELETE FROM tombstone_exports WHERE export_id = (SELECT id FROM exports WHERE path = ?)",
-          "DELETE FROM exports WHERE path = ?"}) {
-      SQLite::Statement remove(*db, sql);
-      Binder(remove) << path;
-      remove.exec();
-    }
+    delete_export(*db, path);
     SQLite::Statement add(*db, "INSERT INTO exports (path, format, made_utc_ns) VALUES (?, ?, ?)");
     Binder(add) << path << made.format << made.made_utc_ns;
     add.exec();
-    const std::int64_t id = db->getLastInsertRowid();
-    SQLite::Statement holds(*db,
-                            "INSERT INTO export_participants SELECT ?, id FROM participants WHERE "
-                            "id = ?");
-    for (const std::int64_t participant : participants) {
-      holds.reset();
-      Binder(holds) << id << participant;
-      if (holds.exec() != 1) {
-        throw StoreRefused(database +
-                           ": a participant was withdrawn while the export was made; nothing was "
-                           "exported, start it again");
-      }
-    }
+    insert_participants(*db, database, db->getLastInsertRowid(), participants);
     transaction.commit();
   });
 }

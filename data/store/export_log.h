@@ -1,5 +1,6 @@
 #pragma once
-// Which exports were made of a database: forget lists those that hold who has withdrawn.
+// The record of exports that were made of a database: forget lists those that hold a participant
+// who has withdrawn.
 
 #include <cstdint>
 #include <string>
@@ -15,35 +16,36 @@ struct ExportRecord {
   std::int64_t made_utc_ns = 0;
 };
 
-/// What is put on record of an export at `path`: relative to the database's folder, or, for a place
-/// outside of it, its name with a tag of the place, "trials.csv (elsewhere, 1f3c9a02)". A database
-/// that is handed on tells nothing of the folders of a computer.
+/// How `path` is recorded: relative to the folder of the database or, outside of it, as the file
+/// name with a hash of the path, "trials.csv (elsewhere, 1f3c9a02)". So a database that is shared
+/// does not reveal the folders of a computer.
 std::string recorded_path(const std::string& database, const std::string& path);
 
-/// Where that is; "" for a place outside of the database's folder.
+/// The absolute path of a recorded one; "" outside of the folder of the database.
 std::string export_location(const std::string& database, const std::string& recorded);
 
-/// Adds an export (`made.path`: where it is) that holds these participants (the store's keys), in
-/// place of an earlier one at the same path. Works beside a writer; brings a database of an older
-/// schema up to date first. \throws StoreRefused: a participant has been withdrawn since the data
-/// were read; StoreError: the database may not be written to.
+/// Records an export (`made.path` absolute or relative) of these participants (row ids), replacing
+/// an earlier one at the same path. Works beside a writer; migrates a database of an older schema
+/// first. \throws StoreRefused: a participant was withdrawn after the data were read; StoreError:
+/// the database cannot be written to.
 void log_export(const std::string& database, const ExportRecord& made,
                 const std::vector<std::int64_t>& participants);
 
-/// Gathers who is in an export while it is written, and records it before it gets its name.
+/// Collects the participants of an export while it is written, and records it before it is renamed
+/// to its final name.
 class ExportedParticipants {
  public:
   void add(const Participant& participant);
   bool any_simulated() const { return any_simulated_; }
   bool all_simulated() const { return any_simulated_ && !any_real_; }
 
-  /// \return why it cannot be recorded (a read-only disk), "" when it is. \throws StoreRefused: one
-  /// of them was withdrawn meanwhile.
+  /// \return why it could not be recorded (read-only disk), or "". \throws StoreRefused: one of
+  /// them was withdrawn meanwhile.
   std::string record(const std::string& database, const std::string& path,
                      const std::string& format) const;
 
  private:
-  std::vector<std::int64_t> ids_;  // each once: the rows of a participant follow each other
+  std::vector<std::int64_t> ids_;  // each once
   bool any_simulated_ = false, any_real_ = false;
 };
 

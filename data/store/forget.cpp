@@ -1,4 +1,8 @@
-// Withdrawal: nothing of a participant stays in the database, its log or its backups.
+// Withdrawal: removes every byte of a participant from the database, its -wal and its backups, and
+// leaves a tombstone (tombstones.h). Order: one transaction deletes the rows (PRAGMA secure_delete
+// overwrites them with zeros) and inserts the tombstone; then a checkpoint truncates the -wal, and
+// VACUUM rebuilds the file; then backups are deleted; last, the tombstone is marked `cleared`.
+// After a crash at any point the same call finishes the rest.
 
 #include <sqlite3.h>
 #include <unistd.h>
@@ -19,36 +23,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kTheirs = "(SELECT id FROM participants WHERE code = ?)";
+constexpr const char* kParticipantIds = "(SELECT id FROM participants WHERE code = ?)";
 
-std::int64_t count(SQLite::Database& db, const std::string& sql, const std::string& code) {
+std::int64_t count_rows(SQLite::Database& db, const std::string& sql, const std::string& code) {
   SQLite::Statement find(db, "SELECT count(*) FROM " + sql);
   Binder(find) << code;
   find.executeStep();
   return find.getColumn(0).getInt64();
 }
 
-std::string attempts_of_theirs() {
+std::string attempt_ids() {
   return std::string(
              "(SELECT a.id FROM attempts a JOIN sessions s ON s.id = a.session_id WHERE "
              "s.participant_id IN ") +
-         kTheirs + ")";
+         kParticipantIds + ")";
 }
 
-std::string sessions_of_theirs() {
-  return std::string("(SELECT id FROM sessions WHERE participant_id IN ") + kTheirs + ")";
+std::string session_ids() {
+  return std::string("(SELECT id FROM sessions WHERE participant_id IN ") + kParticipantIds + ")";
 }
 
 void delete_rows(SQLite::Database& db, const std::string& code) {
-  const std::string sessions = sessions_of_theirs();
+  const std::string sessions = session_ids();
   for (const std::string& what :
-       {"samples WHERE attempt_id IN " + attempts_of_theirs(),
-        "attempts WHERE session_id IN " + sessions,
+       {"samples WHERE attempt_id IN " + attempt_ids(), "attempts WHERE session_id IN " + sessions,
         "notes WHERE run_id IN (SELECT id FROM runs WHERE session_id IN " + sessions + ")",
         "runs WHERE session_id IN " + sessions,
-        std::string("sessions WHERE participant_id IN ") + kTheirs,
-        std::string("export_participants WHERE participant_id IN ") + kTheirs,
-        std::string("renumberings WHERE participant_id IN ") + kTheirs,
+        std::string("sessions WHERE participant_id IN ") + kParticipantIds,
+        std::string("export_participants WHERE participant_id IN ") + kParticipantIds,
+        std::string("renumberings WHERE participant_id IN ") + kParticipantIds,
         std::string("participants WHERE code = ?")}) {
     SQLite::Statement remove(db, "DELETE FROM " + what);
     Binder(remove) << code;
@@ -56,23 +59,23 @@ void delete_rows(SQLite::Database& db, const std::string& code) {
   }
 }
 
-/// The name of an export may say the code as well: it is crossed out, where that leaves other words
-/// alone ("1" is in many a path).
-void cross_out_in_paths(SQLite::Database& db, const std::string& code) {
+/// Paths of exports may contain the code, too: replaces it by "...", unless the code is short and
+/// part of another word ("1" occurs in many paths).
+void redact_export_paths(SQLite::Database& db, const std::string& code) {
   constexpr std::size_t kUnmistakable = 6;  // characters
   SQLite::Statement find(db, "SELECT id, path FROM exports WHERE instr(path, ?)");
   Binder(find) << code;
-  std::vector<std::pair<std::int64_t, std::string>> named;
+  std::vector<std::pair<std::int64_t, std::string>> redacted;
   while (find.executeStep()) {
     std::string path = find.getColumn(1).getString();
     if (code.size() < kUnmistakable && !mentions(path, code)) continue;
     for (std::size_t at = 0; (at = path.find(code)) != std::string::npos;) {
       path.replace(at, code.size(), "...");
     }
-    named.emplace_back(find.getColumn(0).getInt64(), path);
+    redacted.emplace_back(find.getColumn(0).getInt64(), path);
   }
   SQLite::Statement rename(db, "UPDATE exports SET path = ? WHERE id = ?");
-  for (const auto& [id, path] : named) {
+  for (const auto& [id, path] : redacted) {
     rename.reset();
     Binder(rename) << path + " (export " + std::to_string(id) + ")" << id;
     rename.exec();
@@ -102,18 +105,65 @@ std::vector<std::string> backups_of(const std::string& file) {
   return all;
 }
 
-enum class Backup { without, holds, unreadable };
+enum class BackupContent { other_participants, participant, unreadable };
 
-Backup look_into(const std::string& backup, const std::string& code) {
+BackupContent inspect_backup(const std::string& backup, const std::string& code) {
   try {
     require_private_sqlite_files(backup);
     SQLite::Database db(backup, SQLite::OPEN_READONLY);
-    return count(db, "participants WHERE code = ?", code) > 0 ? Backup::holds : Backup::without;
+    return count_rows(db, "participants WHERE code = ?", code) > 0
+               ? BackupContent::participant
+               : BackupContent::other_participants;
   } catch (const SQLite::Exception&) {
-    return Backup::unreadable;
+    return BackupContent::unreadable;
   } catch (const StoreRefused&) {
-    return Backup::unreadable;
+    return BackupContent::unreadable;
   }
+}
+
+/// Deletes the backups that hold the participant.
+Withdrawal remove_backups(const std::string& file, const std::string& code) {
+  Withdrawal done;
+  for (const std::string& backup : backups_of(file)) {
+    const BackupContent content = inspect_backup(backup, code);
+    if (content == BackupContent::other_participants) continue;
+    if (content == BackupContent::participant) {
+      for (const char* suffix : {"", "-journal", "-wal", "-shm"}) {
+        ::unlink((backup + suffix).c_str());
+      }
+    }
+    const bool removed = content == BackupContent::participant && !fs::exists(backup);
+    (removed ? done.backups_removed : done.backups_left).push_back(backup);
+  }
+  return done;
+}
+
+/// Exports that hold the code, also those of before a withdrawal. \param hash of its tombstone, or
+/// ""
+std::vector<ExportRecord> exports_of(SQLite::Database& db, const std::string& code,
+                                     const std::string& hash) {
+  SQLite::Statement exports(
+      db,
+      "SELECT path, format, made_utc_ns FROM exports WHERE id IN (SELECT export_id FROM "
+      "export_participants e JOIN participants p ON p.id = e.participant_id WHERE p.code = ? "
+      "UNION "
+      "SELECT export_id FROM tombstone_exports e JOIN tombstones t ON t.id = e.tombstone_id "
+      "WHERE t.code_hash = ?) ORDER BY made_utc_ns, path");
+  Binder(exports) << code << hash;
+  return read_exports(exports);
+}
+
+/// The number of notes on other participants that mention the code.
+std::int64_t notes_that_mention(SQLite::Database& db, const std::string& code) {
+  SQLite::Statement notes(
+      db,
+      "SELECT n.text FROM notes n JOIN runs r ON r.id = n.run_id JOIN sessions s ON s.id = "
+      "r.session_id JOIN participants p ON p.id = s.participant_id WHERE p.code <> ?1 AND "
+      "instr(n.text, ?1)");
+  Binder(notes) << code;
+  std::int64_t found = 0;
+  while (notes.executeStep()) found += mentions(notes.getColumn(0).getString(), code) ? 1 : 0;
+  return found;
 }
 
 }  // namespace
@@ -124,42 +174,48 @@ ParticipantSummary Store::participant_summary(const std::string& code) {
     ParticipantSummary found;
     const std::string hash = Tombstones::read(db, impl_->path).find(code).hash;
     found.withdrawn_before = !hash.empty();
-    found.protocols = count(db, "participants WHERE code = ?", code);
-    found.sessions = count(db, std::string("sessions WHERE participant_id IN ") + kTheirs, code);
-    found.trials = count(
-        db, "attempts WHERE state = 'completed' AND session_id IN " + sessions_of_theirs(), code);
-    found.cut_off = count(
-        db, "attempts WHERE state <> 'completed' AND session_id IN " + sessions_of_theirs(), code);
-    SQLite::Statement exports(
-        db,
-        "SELECT path, format, made_utc_ns FROM exports WHERE id IN (SELECT export_id FROM "
-        "export_participants e JOIN participants p ON p.id = e.participant_id WHERE p.code = ? "
-        "UNION "
-        "SELECT export_id FROM tombstone_exports e JOIN tombstones t ON t.id = e.tombstone_id "
-        "WHERE t.code_hash = ?) ORDER BY made_utc_ns, path");
-    Binder(exports) << code << hash;
-    found.exports = read_exports(exports);
-    SQLite::Statement notes(
-        db,
-        "SELECT n.text FROM notes n JOIN runs r ON r.id = n.run_id JOIN sessions s ON s.id = "
-        "r.session_id JOIN participants p ON p.id = s.participant_id WHERE p.code <> ?1 AND "
-        "instr(n.text, ?1)");
-    Binder(notes) << code;
-    while (notes.executeStep()) {
-      found.mentions += mentions(notes.getColumn(0).getString(), code) ? 1 : 0;
-    }
+    found.protocols = count_rows(db, "participants WHERE code = ?", code);
+    found.sessions =
+        count_rows(db, std::string("sessions WHERE participant_id IN ") + kParticipantIds, code);
+    found.trials = count_rows(
+        db, "attempts WHERE state = 'completed' AND session_id IN " + session_ids(), code);
+    found.cut_off = count_rows(
+        db, "attempts WHERE state <> 'completed' AND session_id IN " + session_ids(), code);
+    found.exports = exports_of(db, code, hash);
+    found.mentions = notes_that_mention(db, code);
     std::vector<std::string> known = backups_of(impl_->file);
     for (const ExportRecord& one : found.exports) {
-      const std::string place = export_location(impl_->file, one.path);
-      if (!place.empty()) known.push_back(place);
+      const std::string location = export_location(impl_->file, one.path);
+      if (!location.empty()) known.push_back(location);
     }
-    found.elsewhere = find_remaining_copies(impl_->file, code, known);
+    found.remaining_copies = find_remaining_copies(impl_->file, code, known);
     return found;
   });
 }
 
+void Store::Impl::replace_by_tombstone(const std::string& code,
+                                       const Tombstones::Tombstone& tombstone,
+                                       const std::string& earlier_hash) {
+  if (!earlier_hash.empty() && earlier_hash != tombstone.hash) {
+    SQLite::Statement rehash(*db, "UPDATE tombstones SET code_hash = ? WHERE code_hash = ?");
+    Binder(rehash) << tombstone.hash << earlier_hash;
+    rehash.exec();
+  }
+  Tombstones::put(*db, tombstone, false);
+  SQLite::Statement exports(
+      *db,
+      "INSERT OR IGNORE INTO tombstone_exports SELECT t.id, e.export_id FROM tombstones t, "
+      "export_participants e JOIN participants p ON p.id = e.participant_id WHERE t.code_hash = "
+      "? AND p.code = ?");
+  Binder(exports) << tombstone.hash << code;
+  exports.exec();
+  delete_rows(*db, code);
+  seals->reset_chains();
+  redact_export_paths(*db, code);
+}
+
 Withdrawal Store::forget(const std::string& code) {
-  if (!is_participant_code(code)) impl_->refuse("'" + code + "' is no participant's code");
+  if (!is_participant_code(code)) impl_->refuse("'" + code + "' is not a participant code");
   impl_->require_writer();
   SQLite::Database& db = *impl_->db;
   const Tombstones tombstones = guarded(impl_->path, [&] {
@@ -167,48 +223,24 @@ Withdrawal Store::forget(const std::string& code) {
     return Tombstones::read(db, impl_->path);
   });
   Tombstones::Tombstone tombstone = tombstones.find(code);
-  const std::string before = tombstone.hash;
-  if (before.empty() && participant_summary(code).protocols == 0) {
+  const std::string earlier_hash = tombstone.hash;
+  if (earlier_hash.empty() && participant_summary(code).protocols == 0) {
     impl_->refuse("there is no participant " + code + " here");
   }
-  // One of before there were secrets gets one: the code is known once more.
+  // A tombstone of schema version 2 has no secret: made again, now that the code is known.
   if (tombstone.secret.empty()) tombstone = tombstones.made_for(code);
-  const std::string& hash = tombstone.hash;
   impl_->commit([&] {
-    if (!before.empty() && before != hash) {
-      SQLite::Statement again(db, "UPDATE tombstones SET code_hash = ? WHERE code_hash = ?");
-      Binder(again) << hash << before;
-      again.exec();
-    }
-    Tombstones::put(db, tombstone, false);
-    SQLite::Statement exports(
-        db,
-        "INSERT OR IGNORE INTO tombstone_exports SELECT t.id, e.export_id FROM tombstones t, "
-        "export_participants e JOIN participants p ON p.id = e.participant_id WHERE t.code_hash = "
-        "? AND p.code = ?");
-    Binder(exports) << hash << code;
-    exports.exec();
-    delete_rows(db, code);
-    impl_->seals->reset_chains();
-    cross_out_in_paths(db, code);
+    impl_->replace_by_tombstone(code, tombstone, earlier_hash);
     return true;
   });
-  Withdrawal done;
   impl_->purge_deleted_rows();
-  for (const std::string& backup : backups_of(impl_->file)) {
-    const Backup found = look_into(backup, code);
-    if (found == Backup::without) continue;
-    if (found == Backup::holds) {
-      for (const char* end : {"", "-journal", "-wal", "-shm"}) ::unlink((backup + end).c_str());
-    }
-    (found == Backup::holds && !fs::exists(backup) ? done.backups_removed : done.backups_left)
-        .push_back(backup);
-  }
-  remove_stale_temporaries_in(fs::path(impl_->file).parent_path());  // of exports that were killed
+  const Withdrawal done = remove_backups(impl_->file, code);
+  // Temporary files of exports that were killed may hold the participant.
+  remove_stale_temporaries_in(fs::path(impl_->file).parent_path());
   if (done.backups_left.empty()) {
     impl_->commit([&] {
       SQLite::Statement cleared(db, "UPDATE tombstones SET cleared = 1 WHERE code_hash = ?");
-      Binder(cleared) << hash;
+      Binder(cleared) << tombstone.hash;
       cleared.exec();
       return true;
     });
@@ -217,27 +249,27 @@ Withdrawal Store::forget(const std::string& code) {
 }
 
 void Store::Impl::purge_deleted_rows() {
-  const auto empty_the_log = [&] {
+  const auto truncate_wal = [&] {
     SQLite::Statement checkpoint(*db, "PRAGMA wal_checkpoint(TRUNCATE)");
     checkpoint.executeStep();
     if (checkpoint.getColumn(0).getInt() != 0) {
       throw StoreError(path +
-                       ": the rows are removed, but another program that reads the database keeps "
-                       "them in its log; close it, then give the same command again");
+                       ": the rows are removed, but the log still holds them while another program "
+                       "reads the database; close it, then give the same command again");
     }
   };
   guarded(path, [&] {
-    empty_the_log();
-    // SQLite would put its working copy into the system's temporary folder.
+    truncate_wal();
+    // VACUUM writes a copy: beside the database, not into the system's temporary folder.
     const std::string folder = fs::path(file).parent_path().string();
-    SQLite::Statement place(*db, "SELECT 'PRAGMA temp_store_directory = ' || quote(?)");
-    Binder(place) << folder;
-    place.executeStep();
-    db->exec(place.getColumn(0).getString());
-    place.reset();
+    SQLite::Statement set_folder(*db, "SELECT 'PRAGMA temp_store_directory = ' || quote(?)");
+    Binder(set_folder) << folder;
+    set_folder.executeStep();
+    db->exec(set_folder.getColumn(0).getString());
+    set_folder.reset();
     db->exec("VACUUM");
     db->exec("PRAGMA temp_store_directory = ''");
-    empty_the_log();
+    truncate_wal();
   });
 }
 

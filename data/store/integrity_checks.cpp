@@ -14,10 +14,10 @@ void quick_check(SQLite::Database& db, const std::string& path, bool attempts_la
   for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
                             "exports", "export_participants", "tombstones", "tombstone_exports",
                             "files", "protocol_files", "renumberings", "tombstone_secrets"}) {
-    if (!db.tableExists(table)) continue;  // of a later version
-    const bool later = attempts_later && std::string_view(table) == "attempts";
-    db.exec(later ? "PRAGMA ignore_check_constraints = ON"
-                  : "PRAGMA ignore_check_constraints = OFF");
+    if (!db.tableExists(table)) continue;  // of a later schema version
+    const bool skip_constraints = attempts_later && std::string_view(table) == "attempts";
+    db.exec(skip_constraints ? "PRAGMA ignore_check_constraints = ON"
+                             : "PRAGMA ignore_check_constraints = OFF");
     SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
     if (!check.executeStep()) continue;
     const std::string found = check.getColumn(0).getString();
@@ -25,7 +25,8 @@ void quick_check(SQLite::Database& db, const std::string& path, bool attempts_la
   }
   db.exec("PRAGMA ignore_check_constraints = OFF");
   if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
-    throw StoreRefused(path + ": is damaged: rows refer to others that are gone; restore a backup");
+    throw StoreRefused(path +
+                       ": is damaged: rows refer to rows that are missing; restore a backup");
   }
   if (!db.tableExists("attempts") || !db.tableExists("runs")) return;
   SQLite::Statement strays(db,
@@ -59,7 +60,8 @@ void require_palpate_database(const std::string& file, const std::string& path) 
   try {
     require_application_id(probe, path);
   } catch (const SQLite::Exception& error) {
-    // Beside a writer the size in the header may run ahead of the file: a proper look will tell.
+    // Beside a writer, the size in the header may exceed the file: left to the checks after
+    // opening.
     if (error.getErrorCode() != SQLITE_CORRUPT) throw;
   }
 }
@@ -70,8 +72,9 @@ void require_complete_pages(const std::string& file) {
   if (!error && log > 0) return;
   const auto size = std::filesystem::file_size(file, error);
   if (!error && size % kPageSize != 0) {
-    throw SQLite::Exception("it has " + std::to_string(size) + " bytes, no whole number of pages",
-                            SQLITE_CORRUPT);
+    throw SQLite::Exception(
+        "it has " + std::to_string(size) + " bytes, which is not a whole number of pages",
+        SQLITE_CORRUPT);
   }
 }
 

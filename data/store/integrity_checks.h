@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: is a file one of ours, and whole?
+// Internal to data/store: whether a file is a palpate database, and undamaged. Store::open and
+// StationDatabase call these before they read anything else.
 
 #include <SQLiteCpp/Database.h>
 
@@ -7,22 +8,24 @@
 
 namespace palpate::data {
 
-/// SQLite's name for a file that nobody writes to: no locks, no log.
+/// The URI that opens a file with immutable=1 (https://www.sqlite.org/uri.html): no locks, no -wal.
+/// Only for files that nobody writes to.
 std::string immutable_uri(const std::string& file);
 
-/// Another program's file is left alone: this look takes no locks and writes nothing, where an
-/// ordinary one could roll back or checkpoint it. \throws StoreRefused: it is not ours;
-/// SQLite::Exception: it is no database.
+/// Takes no locks and writes nothing, so that another program's database is not rolled back or
+/// checkpointed by an attempt to open it. \throws StoreRefused: another program's;
+/// SQLite::Exception: not a database.
 void require_palpate_database(const std::string& file, const std::string& path);
 
-/// SQLite fills a last page that is cut short with zeros. Beside a log that is right: the log has
-/// the page. \throws SQLite::Exception.
+/// Refuses a file whose size is not a multiple of the page size: it is truncated, which SQLite does
+/// not report. Not beside a non-empty -wal, which holds the missing page. \throws
+/// SQLite::Exception.
 void require_complete_pages(const std::string& file);
 
-/// Cheap damage is found before a participant sits down. Not the samples: they may be gigabytes,
-/// and carry their own checksums. \param attempts_later the CHECKs of attempts, which take a second
-/// for every million, are left to the reader of each (for_each_attempt).
-/// \throws SQLite::Exception, StoreRefused.
+/// PRAGMA quick_check of every table but samples, and foreign_key_check, so that damage is found
+/// before a session begins. Samples may be gigabytes and have checksums of their own.
+/// \param attempts_later skips the CHECK constraints of attempts, which take a second per million;
+/// read_attempts() verifies the values. \throws SQLite::Exception, StoreRefused.
 void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later = false);
 
 }  // namespace palpate::data

@@ -17,10 +17,10 @@ namespace {
 
 constexpr std::string_view kMark = "palpate ";  // and the process's number
 
-[[noreturn]] void refuse_strange_lock(const std::string& file, const std::string& path,
+[[noreturn]] void refuse_foreign_lock(const std::string& file, const std::string& path,
                                       const std::string& why) {
-  throw StoreRefused(path + ": its lock " + file + " is there and is not one of yours (" + why +
-                     "); it is left alone. Move it away if no palpate writes to the database");
+  throw StoreRefused(path + ": its lock file " + file + " is not one of yours (" + why +
+                     ") and is not used. Move it away if no palpate writes to the database");
 }
 
 std::string text_of(int descriptor) {
@@ -29,16 +29,16 @@ std::string text_of(int descriptor) {
   return {text.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
 }
 
-/// What another program or user put there is neither locked nor changed.
+/// A file of another program or user is neither locked nor changed.
 void require_our_lock(const struct stat& found, const std::string& file, const std::string& path) {
   struct stat database {};
   const bool theirs = ::stat(path.c_str(), &database) == 0 && found.st_uid == database.st_uid;
-  if (!S_ISREG(found.st_mode)) refuse_strange_lock(file, path, "no regular file");
+  if (!S_ISREG(found.st_mode)) refuse_foreign_lock(file, path, "not a regular file");
   if (found.st_uid != ::geteuid() && found.st_uid != 0 && !theirs) {
-    refuse_strange_lock(file, path, "it belongs to user " + std::to_string(found.st_uid));
+    refuse_foreign_lock(file, path, "it belongs to user " + std::to_string(found.st_uid));
   }
-  if ((found.st_mode & 077) != 0) refuse_strange_lock(file, path, "it is open to others");
-  if (found.st_nlink > 1) refuse_strange_lock(file, path, "it has a second name elsewhere");
+  if ((found.st_mode & 077) != 0) refuse_foreign_lock(file, path, "others may access it");
+  if (found.st_nlink > 1) refuse_foreign_lock(file, path, "it has a hard link");
 }
 
 /// \return -1: it has just been removed.
@@ -49,15 +49,15 @@ int open_old_lock(const std::string& file, const std::string& path) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0 && errno == ENOENT) return -1;
   if (descriptor < 0) {
-    throw StoreRefused(path + ": its lock " + file +
+    throw StoreRefused(path + ": its lock file " + file +
                        " cannot be opened: " + std::generic_category().message(errno) +
-                       "; another user writes to the database, or did when it broke off");
+                       "; another user writes to the database, or did when the program was killed");
   }
   const std::string text = text_of(descriptor);
   if (::fstat(descriptor, &found) == 0) require_our_lock(found, file, path);
   if (!text.empty() && !text.starts_with(kMark)) {
     ::close(descriptor);
-    refuse_strange_lock(file, path, "it does not say palpate");
+    refuse_foreign_lock(file, path, "palpate did not write it");
   }
   return descriptor;
 }
@@ -68,10 +68,10 @@ int open_lock_file(const std::string& file, const std::string& path) {
     if (made >= 0) return made;
     if (errno != EEXIST) {
       throw StoreError(path + ": cannot be opened for writing, its lock file " + file +
-                       " cannot be made: " + std::generic_category().message(errno) +
+                       " cannot be created: " + std::generic_category().message(errno) +
                        "; check that the folder exists and that you may write there");
     }
-    // Left by a program that was killed, or held by one that runs.
+    // Left by a killed process, or held by a running one.
     const int old = open_old_lock(file, path);
     if (old >= 0) return old;
   }
@@ -91,8 +91,8 @@ std::string holder(int descriptor) {
                      "; wait until that has ended, or use another database and merge later");
 }
 
-// Whether the path still leads to the open file: an ending writer removes it.
-bool is_current(int descriptor, const std::string& file) {
+// Whether the path still names the open file: a writer that ends removes it.
+bool is_same_file(int descriptor, const std::string& file) {
   struct stat opened {
   }, found{};
   return ::fstat(descriptor, &opened) == 0 && ::lstat(file.c_str(), &found) == 0 &&
@@ -115,18 +115,18 @@ WriterLock::WriterLock(const std::string& path) : file_(path + ".palpate-lock") 
       }
       refuse_second_writer(path, who);
     }
-    if (is_current(descriptor_, file_)) break;
+    if (is_same_file(descriptor_, file_)) break;
     ::close(descriptor_);
   }
   const std::string text = std::string(kMark) + std::to_string(::getpid()) + "\n";
-  // Who holds it is for the message only: the lock stands even where a full disk keeps it empty.
+  // The process id is for messages only: the lock holds even if a full disk leaves the file empty.
   if (::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, text.data(), text.size(), 0) < 0) {
     errno = 0;
   }
 }
 
 WriterLock::~WriterLock() {
-  if (is_current(descriptor_, file_)) ::unlink(file_.c_str());
+  if (is_same_file(descriptor_, file_)) ::unlink(file_.c_str());
   ::close(descriptor_);
 }
 

@@ -1,18 +1,18 @@
 #pragma once
-// Internal to data/: one writer a database.
+// Internal to data/store: one writer per database, across processes.
 
 #include <string>
 
 namespace palpate::data {
 
-/// Advisory lock on `path`.palpate-lock, held until destruction or the death of the process. The
-/// file names the holder's process and is removed with the lock; one that a killed program left is
-/// taken over. Beside the database, not on it: closing any descriptor of the database itself would
-/// drop SQLite's own locks.
+/// Advisory lock (flock) on the file `path`.palpate-lock, held until destruction or until the
+/// process ends. The file contains the process id of the holder and is removed with the lock; one
+/// that a killed process left is reused. Not on the database itself: closing any descriptor of it
+/// would release SQLite's POSIX locks (https://www.sqlite.org/howtocorrupt.html, 2.2).
 class WriterLock {
  public:
-  /// \throws StoreRefused, naming the process, when another writer holds it, and when a file that
-  /// is not a lock of ours has its name; StoreError when the lock file cannot be made.
+  /// \throws StoreRefused: another writer holds it (names the process), or the file is not a lock
+  /// of palpate; StoreError: the lock file cannot be created.
   explicit WriterLock(const std::string& path);
   ~WriterLock();
   WriterLock(const WriterLock&) = delete;

@@ -1,4 +1,9 @@
-// Opening a store: which files are taken, by whom, and what a dead process left behind.
+// Store::open: checks the path, takes the writer's lock, creates or migrates the file, verifies its
+// integrity, and marks the runs that a crashed process left open.
+//
+// SQLite settings of a writer: WAL journal mode, synchronous=FULL (a commit is synced to disk
+// before it returns), foreign keys on. https://www.sqlite.org/wal.html,
+// https://www.sqlite.org/pragma.html
 
 #include <SQLiteCpp/Transaction.h>
 #include <sqlite3.h>
@@ -26,20 +31,21 @@ namespace {
 constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";
 
 constexpr int kBusyTimeoutMs = 5000;
-// A store belongs to one thread at a time: SQLite need not lock every look at a column.
+// A store belongs to one thread at a time: without SQLite's mutex every column is read faster.
 constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
 constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
-/// The one writer is us: whatever else is still running in the file is dead.
+/// This process is the only writer (WriterLock): a run in state `running` belongs to a process that
+/// has died.
 void mark_interrupted_runs(SQLite::Database& db, SealWriter& seals) {
   SQLite::Statement find(db, "SELECT 1 FROM runs WHERE end_reason = 'running' LIMIT 1");
   if (!find.executeStep()) return;
   find.reset();
   SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
-  std::vector<std::int64_t> dead;
+  std::vector<std::int64_t> interrupted;
   SQLite::Statement all(db, "SELECT id FROM runs WHERE end_reason = 'running' ORDER BY id");
-  while (all.executeStep()) dead.push_back(all.getColumn(0).getInt64());
-  for (const std::int64_t id : dead) {
+  while (all.executeStep()) interrupted.push_back(all.getColumn(0).getInt64());
+  for (const std::int64_t id : interrupted) {
     cut_off_open_attempt(db, seals, {.id = id}, kInterrupted);
     SQLite::Statement end(db, "UPDATE runs SET end_reason = 'interrupted' WHERE id = ?");
     Binder(end) << id;
@@ -54,8 +60,9 @@ bool may_write(const std::string& file) {
          ::access(std::filesystem::path(file).parent_path().c_str(), W_OK) == 0;
 }
 
-/// A reader that may write opens the file so as to leave nothing behind: the last one to close a
-/// write-ahead log removes it. On a read-only disk a file without a log is taken as it is.
+/// With write permission, a reader opens read-write and sets query_only: the last connection to
+/// close a WAL database removes its -wal and -shm, which a read-only connection cannot. On a
+/// read-only disk a file without a -wal is opened as immutable.
 void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file) {
   if (may_write(file)) {
     db.emplace(file, kOpenWrite, kBusyTimeoutMs);
@@ -76,81 +83,94 @@ Store::~Store() = default;
 
 const std::string& Store::path() const { return impl_->path; }
 
-Store Store::open(const std::string& path, Mode mode) {
+void Store::Impl::require_usable_path() {
   namespace fs = std::filesystem;
+  std::error_code error;
+  file = fs::weakly_canonical(fs::absolute(path, error), error).string();
+  if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a database");
+  // Reading follows links of other users; writing does not, they could redirect it.
+  const std::string fault = writes() ? resolve_trusted_links(path).fault : "";
+  if (!fault.empty()) refuse(fault);
+  const fs::file_status status = fs::status(file, error);
+  if (fs::exists(status) && !fs::is_regular_file(status)) refuse("is not a file; name a file");
+  if (!writes() && !fs::exists(status)) {
+    refuse("there is no such file (or its folder may not be read)");
+  }
+}
+
+void Store::Impl::create_if_absent() {
+  namespace fs = std::filesystem;
+  if (fs::exists(file)) return;
+  if (belongs_to_database(file)) {
+    refuse("is the name of a file that belongs to another database; name another file");
+  }
+  // SQLite would roll the old -wal or -journal into the new file.
+  for (const char* suffix : {"-wal", "-journal"}) {
+    if (!fs::exists(file + suffix)) continue;
+    refuse("is missing, but its log " + file + suffix +
+           " exists and may hold trials; put the database back beside it, or move the log away to "
+           "create a new one");
+  }
+  create_database(file);
+}
+
+void Store::Impl::connect() {
+  require_palpate_database(file, path);
+  require_complete_pages(file);
+  if (writes()) {
+    db.emplace(file, kOpenWrite, kBusyTimeoutMs);
+  } else {
+    open_for_reading(db, file);
+  }
+  db->exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
+  if (!writes()) db->exec("BEGIN");  // one snapshot for as long as the store is open
+  version = checked_version(*db, path);
+  verify_schema(*db, path, version);
+}
+
+void Store::Impl::prepare_for_writing() {
+  if (sqlite3_db_readonly(db->getHandle(), "main") == 1) {
+    throw StoreError(path + ": cannot be written; check its permissions");
+  }
+  if (version < kSchemaVersion) {
+    migrate(*db, file, version, kSchemaVersion, migrations());
+    version = kSchemaVersion;
+  }
+  if (db->execAndGet("PRAGMA journal_mode = WAL").getString() != "wal") {
+    throw StoreError(path +
+                     ": this disk does not support a write-ahead log; keep the database on "
+                     "a local disk");
+  }
+  db->exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
+}
+
+Store Store::open(const std::string& path, Mode mode) {
   auto impl = std::make_unique<Impl>();
   impl->path = path;
   impl->mode = mode;
-  std::error_code error;
-  impl->file = fs::weakly_canonical(fs::absolute(path, error), error).string();
-  if (path.empty() || error) throw StoreRefused("'" + path + "' is no path of a database");
-  const bool writes = mode == Mode::write_or_create;
-  // A colleague's links may be read through; what is written goes nowhere that others choose.
-  const std::string fault = writes ? resolve_trusted_links(path).fault : "";
-  if (!fault.empty()) impl->refuse(fault);
-  const fs::file_status status = fs::status(impl->file, error);
-  if (fs::exists(status) && !fs::is_regular_file(status)) {
-    impl->refuse("is not a file; name a file");
-  }
-  if (!writes && !fs::exists(status)) {
-    impl->refuse("there is no such file (or its folder may not be read)");
-  }
+  impl->require_usable_path();
+  const std::string& file = impl->file;
+  const bool writes = impl->writes();
   if (writes) {
-    impl->lock.emplace(impl->file);
-    if (!fs::exists(impl->file)) {
-      if (belongs_to_database(impl->file)) {
-        impl->refuse("is a name of what lies beside a database; name another file");
-      }
-      // SQLite would play the left-over log into the new file.
-      for (const char* end : {"-wal", "-journal"}) {
-        if (!fs::exists(impl->file + end)) continue;
-        impl->refuse("is gone but its log " + impl->file + end +
-                     " is there and may hold trials; put the database back beside it, or move "
-                     "the log away to begin a new one");
-      }
-      create_database(impl->file);
-    }
+    impl->lock.emplace(file);
+    impl->create_if_absent();
   }
-  if (fs::file_size(impl->file, error) == 0 && !error) {
+  std::error_code error;
+  if (std::filesystem::file_size(file, error) == 0 && !error) {
     impl->refuse(
-        "is empty, which a palpate database never is; restore a backup, or remove it to begin a "
+        "is empty, which a palpate database never is; restore a backup, or remove it to create a "
         "new one");
   }
-  require_private_sqlite_files(impl->file);
+  require_private_sqlite_files(file);
   guarded(path, [&] {
-    require_palpate_database(impl->file, path);
-    require_complete_pages(impl->file);
-    if (writes) {
-      impl->db.emplace(impl->file, kOpenWrite, kBusyTimeoutMs);
-    } else {
-      open_for_reading(impl->db, impl->file);
-    }
-    SQLite::Database& db = *impl->db;
-    db.exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
-    if (!writes) db.exec("BEGIN");
-    impl->version = checked_version(db, path);
-    verify_schema(db, path, impl->version);
-    if (writes) {
-      if (sqlite3_db_readonly(db.getHandle(), "main") == 1) {
-        throw StoreError(path + ": may not be written; check its permissions");
-      }
-      if (impl->version < kSchemaVersion) {
-        migrate(db, impl->file, impl->version, kSchemaVersion, migrations());
-        impl->version = kSchemaVersion;
-      }
-      if (db.execAndGet("PRAGMA journal_mode = WAL").getString() != "wal") {
-        throw StoreError(
-            path +
-            ": this disk does not allow a write-ahead log; keep the database on a local disk");
-      }
-      db.exec("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON");
-    }
-    quick_check(db, path, !writes);
-    verify_protocol_checksums(db, path, impl->version);
-    require_private_sqlite_files(impl->file);  // SQLite has made them, or found others' by now
-    if (writes) mark_interrupted_runs(db, impl->seals.emplace(db));
+    impl->connect();
+    if (writes) impl->prepare_for_writing();
+    quick_check(*impl->db, path, !writes);
+    verify_protocol_checksums(*impl->db, path, impl->version);
+    require_private_sqlite_files(file);  // again: by now SQLite has created or opened them
+    if (writes) mark_interrupted_runs(*impl->db, impl->seals.emplace(*impl->db));
   });
-  impl->identity = identity_of(impl->file);
+  impl->identity = identity_of(file);
   impl->repair_wal_index();
   return Store(std::move(impl));
 }

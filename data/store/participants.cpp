@@ -9,31 +9,30 @@
 namespace palpate::data {
 namespace {
 
-/// A database that is open, and what it is called in messages.
-struct Place {
-  SQLite::Database& db;
-  const std::string& path;
-  [[noreturn]] void refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
-};
+[[noreturn]] void refuse_enrolment(const std::string& path, const std::string& why) {
+  throw StoreRefused(path + ": " + why);
+}
 
 void require_enrollable(const std::string& path, const ProtocolInfo& protocol,
                         const std::string& code, std::optional<int> wanted_number, bool simulated,
                         std::optional<std::uint64_t> seed) {
-  Validator checks;
-  checks.expect(
+  Validator validator;
+  validator.expect(
       is_participant_code(code),
       "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
-  if (wanted_number) checks.positive("the participant's number", *wanted_number);
-  checks.expect(simulated || !seed, "only a simulated participant has a seed");
-  check(checks, protocol);
-  checks.raise(path + ": participant");
+  if (wanted_number) validator.positive("the participant's number", *wanted_number);
+  validator.expect(simulated || !seed, "only a simulated participant has a seed");
+  validate(validator, protocol);
+  validator.throw_if_invalid(path + ": participant");
 }
 
-/// Who is in the protocol under this code. \throws StoreRefused: as somebody else.
-std::optional<Participant> enrolled(const Place& in, std::int64_t protocol,
-                                    const Participant& wanted, std::optional<int> number) {
+/// The participant with this code in the protocol. \throws StoreRefused: with another number, seed,
+/// or simulated instead of real.
+std::optional<Participant> find_enrolled(SQLite::Database& db, const std::string& path,
+                                         std::int64_t protocol, const Participant& wanted,
+                                         std::optional<int> number) {
   SQLite::Statement find(
-      in.db,
+      db,
       "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
       "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
       "AND code = ?");
@@ -45,34 +44,37 @@ std::optional<Participant> enrolled(const Place& in, std::int64_t protocol,
   RowReader(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
       was_seed;
   if (number && *number != person.number && *number != person.enrolled_number) {
-    in.refuse("participant " + person.code + " has number " + std::to_string(person.number) +
-              ", not " + std::to_string(*number) + "; leave the number out to go on");
+    refuse_enrolment(path, "participant " + person.code + " has number " +
+                               std::to_string(person.number) + ", not " + std::to_string(*number) +
+                               "; leave the number out to continue");
   }
   if (was_simulated != person.simulated) {
-    in.refuse("participant " + person.code + " is " + (was_simulated ? "simulated" : "real") +
-              " in this database; use another code or another database");
+    refuse_enrolment(path, "participant " + person.code + " is " +
+                               (was_simulated ? "simulated" : "real") +
+                               " in this database; use another code or another database");
   }
   const auto text = person.seed ? std::optional(std::to_string(*person.seed)) : std::nullopt;
   if (was_seed != text) {
-    in.refuse("participant " + person.code + " was simulated with seed " +
-              was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
-              "; use that seed or another database");
+    refuse_enrolment(path, "participant " + person.code + " was simulated with seed " +
+                               was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
+                               "; use that seed or another database");
   }
   return person;
 }
 
-/// The wanted number, or the smallest unused: the counterbalancing has no gaps.
-int free_number(const Place& in, std::optional<std::int64_t> protocol, std::optional<int> wanted) {
+/// The wanted number, or the smallest unused one: gaps would unbalance the counterbalancing.
+int free_number(SQLite::Database& db, const std::string& path, std::optional<std::int64_t> protocol,
+                std::optional<int> wanted) {
   SQLite::Statement numbers(
-      in.db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
+      db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
   Binder(numbers) << protocol;
   int next = 1;
   while (numbers.executeStep()) {
     const int number = numbers.getColumn(0).getInt();
     if (wanted == number) {
-      in.refuse("number " + std::to_string(number) + " is taken by participant " +
-                numbers.getColumn(1).getString() +
-                "; leave the number out for the next unused one");
+      refuse_enrolment(path, "number " + std::to_string(number) + " is taken by participant " +
+                                 numbers.getColumn(1).getString() +
+                                 "; leave the number out for the next unused one");
     }
     if (number == next) ++next;
   }
@@ -86,17 +88,20 @@ Participant Store::look_up(const ProtocolInfo& protocol, const std::string& code
                            std::optional<std::uint64_t> seed) {
   require_enrollable(impl_->path, protocol, code, wanted_number, simulated, seed);
   return guarded(impl_->path, [&] {
-    const Place in{*impl_->db, impl_->path};
+    SQLite::Database& db = *impl_->db;
     Participant person{.code = code, .simulated = simulated, .seed = seed};
-    const auto protocol_id = find_protocol(in.db, in.path, protocol);
+    const auto protocol_id = find_protocol(db, impl_->path, protocol);
     if (protocol_id) {
-      if (const auto known = enrolled(in, *protocol_id, person, wanted_number)) return *known;
+      if (const auto known = find_enrolled(db, impl_->path, *protocol_id, person, wanted_number)) {
+        return *known;
+      }
     }
-    if (Tombstones::read(in.db, in.path).holds(code)) {
-      in.refuse("the participant with code " + code +
-                " has withdrawn; the code is not given again, choose another");
+    if (Tombstones::read(db, impl_->path).holds(code)) {
+      impl_->refuse("the participant with code " + code +
+                    " has withdrawn; the code cannot be used again, choose another");
     }
-    person.number = person.enrolled_number = free_number(in, protocol_id, wanted_number);
+    person.number = person.enrolled_number =
+        free_number(db, impl_->path, protocol_id, wanted_number);
     return person;
   });
 }

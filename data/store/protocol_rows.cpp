@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kFilesSince = 3;  // schema version
 
-std::string shown(const std::string& sha256) { return sha256.substr(0, 12) + "..."; }
+std::string abbreviated(const std::string& sha256) { return sha256.substr(0, 12) + "..."; }
 
 std::int64_t insert_file_if_absent(SQLite::Database& db, const std::string& bytes) {
   const std::string sha256 = checksum_hex(bytes);
@@ -49,11 +49,11 @@ void require_same_files(SQLite::Database& db, const std::string& path, std::int6
     const std::string sha256 = checksum_hex(file.bytes);
     if (known == stored.end() || known->second == sha256) continue;
     throw StoreRefused(path + ": " + file.name + " is not the file that protocol " + protocol.name +
-                       " was begun with here (SHA-256 " + shown(sha256) + ", stored " +
-                       shown(known->second) +
-                       "): participants would not touch the same shape; put back the file as it "
-                       "was (an export holds it), or give the changed one another name and name "
-                       "it in the protocol, which makes it another protocol");
+                       " was begun with in this database (SHA-256 " + abbreviated(sha256) +
+                       ", stored " + abbreviated(known->second) +
+                       "): participants would not touch the same shape; restore the file (an "
+                       "export holds it), or name the changed one differently in the protocol, "
+                       "which makes it another protocol");
   }
 }
 

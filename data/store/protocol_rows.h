@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: protocols with the files that they name.
+// Protocols in the database, with the files that they name (meshes). Texts and files are stored
+// byte for byte and identified by SHA-256.
 
 #include <SQLiteCpp/Database.h>
 
@@ -12,24 +13,24 @@
 
 namespace palpate::data {
 
-/// The id of a protocol; none where it is not there. \throws StoreRefused: its text or a file
-/// differs from what is stored.
+/// The row id of a protocol, if it is stored. \throws StoreRefused: its text or a file differs from
+/// what is stored.
 std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::string& path,
                                           const ProtocolInfo& protocol);
 
-/// The same; it is added where it is not there yet. One that came from a version without files gets
-/// them.
+/// The same; inserts it where it is absent. Adds the files to one that an earlier version stored
+/// without them.
 std::int64_t insert_protocol_if_absent(SQLite::Database& db, const std::string& path,
                                        const ProtocolInfo& protocol);
 
 /// By name.
 std::vector<ProtocolFile> protocol_files(SQLite::Database& db, std::int64_t protocol_id);
 
-/// One checksum for all files of a protocol: SHA-256 of, for each by name, its name, a zero byte,
-/// its SHA-256 as 64 digits and a line feed. "" where there are none.
+/// One checksum for all files of a protocol: SHA-256 of, for each file by name, its name, a zero
+/// byte, its SHA-256 as 64 digits and a line feed. "" without files.
 std::string files_checksum(SQLite::Database& db, std::int64_t protocol_id);
 
-/// Every protocol's text and every file has the checksum that it had when it was stored.
+/// Verifies that the text of every protocol and every file still has its stored checksum.
 /// \param version  of the schema. \throws StoreRefused.
 void verify_protocol_checksums(SQLite::Database& db, const std::string& path, int version);
 

@@ -1,4 +1,4 @@
-// Reading what a database and a session hold: all but the attempts one by one (store_attempts.cpp).
+// The reading calls of Store. Trials are read and verified by attempt_reader.h.
 
 #include <algorithm>
 
@@ -146,7 +146,7 @@ StoreCounts Store::counts() {
   return guarded(impl_->path, [&] {
     SQLite::Statement count(
         *impl_->db,
-        // Indexes answer; the table would have to be read for those that were cut off.
+        // Counted from indexes; counting state = 'cut_off' would scan the table.
         "WITH a(completed, running) AS (SELECT (SELECT count(*) FROM attempts WHERE state = "
         "'completed'), (SELECT count(*) FROM attempts WHERE state = 'running')) "
         "SELECT (SELECT count(*) FROM protocols), (SELECT count(*) FROM participants), (SELECT "
@@ -165,15 +165,16 @@ void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
                            bool with_samples) {
   guarded(impl_->path, [&] {
     AttemptFilter filter{.state = AttemptState::completed};
-    if (with_samples) filter.samples = SampleReading::unpacked;
+    if (with_samples) filter.samples = SampleReading::unpack;
     read_attempts(*impl_->db, impl_->path, impl_->version, filter, visit);
   });
-  impl_->checked = impl_->mode == Mode::read_only;  // nothing changes in its snapshot
+  impl_->seals_verified = !impl_->writes();  // a reader's snapshot does not change
 }
 
 void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visit) {
   guarded(impl_->path, [&] {
-    const AttemptFilter filter{.state = AttemptState::cut_off, .seals_verified = impl_->checked};
+    const AttemptFilter filter{.state = AttemptState::cut_off,
+                               .seals_verified = impl_->seals_verified};
     read_attempts(*impl_->db, impl_->path, impl_->version, filter, visit);
   });
 }
@@ -181,7 +182,7 @@ void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visi
 std::vector<StoredTrial> Store::attempts(const TrialName& name) {
   return guarded(impl_->path, [&] {
     std::vector<StoredTrial> all;
-    AttemptFilter filter{.trial = &name, .samples = SampleReading::unpacked};
+    AttemptFilter filter{.trial = &name, .samples = SampleReading::unpack};
     read_attempts(*impl_->db, impl_->path, impl_->version, filter,
                   [&all](const StoredTrial& trial) { all.push_back(trial); });
     std::stable_partition(all.begin(), all.end(),
@@ -225,7 +226,7 @@ std::map<std::string, std::int64_t, std::less<>> Store::first_onsets() {
         const auto [at, added] = found.emplace(code, unix_ns);
         if (!added) at->second = std::min(at->second, unix_ns);
       }
-      firsts.merge(found);  // a code that is there already stays as it is
+      firsts.merge(found);  // keeps the codes of the first pass
     }
     return firsts;
   });

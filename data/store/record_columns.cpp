@@ -42,7 +42,7 @@ RowReader& operator>>(RowReader& row, Participant& person) {
   const char* const end = seed->data() + seed->size();
   const auto [at, error] = std::from_chars(seed->data(), end, person.seed.emplace());
   if (error != std::errc{} || at != end) {
-    throw SQLite::Exception("the seed of participant " + person.code + " is no number",
+    throw SQLite::Exception("the seed of participant " + person.code + " is not a number",
                             SQLITE_CORRUPT);
   }
   return row;
@@ -61,7 +61,8 @@ SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version
                                  ", s.number, s.observer_sha256" + kFromProtocolDown +
                                  "WHERE s.id = ?");
   Binder(find) << id;
-  if (!find.executeStep()) throw SQLite::Exception("a session of nobody", SQLITE_CORRUPT);
+  if (!find.executeStep())
+    throw SQLite::Exception("a session without a participant", SQLITE_CORRUPT);
   SessionHead head;
   RowReader row(find);
   row >> head.id >> head.protocol_id >> head.protocol_name >> head.protocol_sha256;

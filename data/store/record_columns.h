@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/: which columns stand for a person, a run and a trial, each list beside the
-// function that takes its values from a row, in the same order.
+// Internal to data/: the SQL columns that make up a participant, a run and a trial, each list
+// beside the function that reads it from a row, in the same order.
 
 #include <SQLiteCpp/Database.h>
 
@@ -22,7 +22,7 @@ RowReader& operator>>(RowReader& row, RunInfo& info);
 /// \throws SQLite::Exception (damage)
 RunEnd run_end_of(const std::string& text);
 
-/// Whose a session is.
+/// What session rows are sealed with: participant, protocol and number.
 struct SessionHead {
   std::int64_t id = 0, protocol_id = 0;
   std::string protocol_name, protocol_sha256;
@@ -36,8 +36,8 @@ SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version
 inline constexpr const char* kPlanColumns =
     "a.id, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
     "a.orientation_w, a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
-/// kPlanColumns, all of a plan but the session; the onset is when the attempt was begun, until
-/// read_outcome knows better. \returns the attempt's key
+/// Reads kPlanColumns into every field of a plan but the session. onset_ns is when the attempt was
+/// begun until read_outcome sets it. \returns the row id of the attempt
 std::int64_t read_plan(RowReader& row, TrialRecord& record);
 
 inline constexpr const char* kOutcomeColumns =
@@ -47,8 +47,8 @@ inline constexpr const char* kOutcomeColumns =
     "a.max_force";
 void read_outcome(RowReader& row, TrialRecord& record);
 
-// CROSS JOIN keeps SQLite to this nesting; with the indexes each level comes in order, so nothing
-// is sorted in memory or in a temporary file, however many trials there are.
+// CROSS JOIN fixes SQLite's join order (https://www.sqlite.org/optoverview.html, 7.3): each level
+// is read in the order of its index, so that nothing is sorted in memory or in a temporary file.
 inline constexpr const char* kFromProtocolDown =
     " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
     "ON s.participant_id = pa.id ";

@@ -27,11 +27,11 @@ bool database_holds(const std::string& file, const std::string& code) {
     find.bind(1, code);
     return find.executeStep();
   } catch (const SQLite::Exception&) {
-    return false;  // not ours, or damaged: nothing to be said
+    return false;  // of another program, or damaged: its content is unknown
   }
 }
 
-bool file_holds(const fs::path& file, const std::string& code) {
+bool file_mentions(const fs::path& file, const std::string& code) {
   std::error_code error;
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) return false;
@@ -45,8 +45,8 @@ bool file_holds(const fs::path& file, const std::string& code) {
   return mentions({std::istreambuf_iterator<char>(in), {}}, code);
 }
 
-/// By the names of what is in it: the files of datasets carry codes.
-bool folder_names(const fs::path& folder, const std::string& code) {
+/// Searches the names of files in it only: file names of datasets contain codes.
+bool folder_mentions(const fs::path& folder, const std::string& code) {
   std::error_code error;
   int left = kMostEntries;
   for (fs::recursive_directory_iterator at(folder, error), end; at != end && left-- > 0;
@@ -85,8 +85,8 @@ std::vector<std::string> find_remaining_copies(const std::string& database, cons
       const fs::path& path = at->path();
       if (leave_out.contains(path)) continue;
       const fs::file_status status = at->symlink_status(error);
-      const bool holds = fs::is_regular_file(status) ? file_holds(path, code)
-                         : fs::is_directory(status)  ? folder_names(path, code)
+      const bool holds = fs::is_regular_file(status) ? file_mentions(path, code)
+                         : fs::is_directory(status)  ? folder_mentions(path, code)
                                                      : false;
       if (holds || mentions(path.filename().string(), code)) found.push_back(path.string());
     }

@@ -1,4 +1,5 @@
-// Who takes part and which process runs which session.
+// Sessions and runs: a session belongs to a participant; a run is the part of it that one process
+// showed, so that an interrupted session has several.
 
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
@@ -8,92 +9,134 @@
 #include "data/store/validation.h"
 
 namespace palpate::data {
-void Store::require_sound(const Participant& participant, const RunInfo& info) const {
-  Validator checks;
-  check(checks, info, participant.simulated);
-  checks.raise(impl_->path + ": session of participant " + participant.code);
+namespace {
+
+std::string session_name(const Participant& participant, const RunInfo& info) {
+  return "session " + std::to_string(info.session) + " of participant " + participant.code;
+}
+
+struct SessionRow {
+  std::int64_t id = 0;
+  std::string observer_sha256;
+};
+
+std::optional<SessionRow> find_session(SQLite::Database& db, std::int64_t participant, int number) {
+  SQLite::Statement find(
+      db, "SELECT id, observer_sha256 FROM sessions WHERE participant_id = ? AND number = ?");
+  Binder(find) << participant << number;
+  if (!find.executeStep()) return std::nullopt;
+  SessionRow session;
+  RowReader(find) >> session.id >> session.observer_sha256;
+  return session;
+}
+
+std::int64_t insert_session(SQLite::Database& db, std::int64_t participant, const RunInfo& info) {
+  SQLite::Statement add(
+      db, "INSERT INTO sessions (participant_id, number, observer_sha256) VALUES (?, ?, ?)");
+  Binder(add) << participant << info.session << info.observer_sha256;
+  add.exec();
+  return db.getLastInsertRowid();
+}
+
+/// How the latest run of a session ended; `paused` where there is none.
+RunEnd latest_run_end(SQLite::Database& db, std::int64_t session) {
+  SQLite::Statement last(
+      db, "SELECT end_reason FROM runs WHERE session_id = ? ORDER BY id DESC LIMIT 1");
+  Binder(last) << session;
+  return last.executeStep() ? run_end_of(last.getColumn(0).getString()) : RunEnd::paused;
+}
+
+std::int64_t protocol_of(SQLite::Database& db, std::int64_t participant) {
+  SQLite::Statement find(db, "SELECT protocol_id FROM participants WHERE id = ?");
+  Binder(find) << participant;
+  find.executeStep();
+  return find.getColumn(0).getInt64();
+}
+
+std::int64_t insert_run(SQLite::Database& db, std::int64_t session, const RunInfo& info,
+                        std::optional<std::int64_t> other_protocol,
+                        const std::string& files_sha256) {
+  SQLite::Statement add(
+      db,
+      "INSERT INTO runs (session_id, started_utc_ns, started_ns, program_version, build, device, "
+      "device_calibration, response_device, response_latency, consent_version, consent_utc_ns, "
+      "hand, protocol_id, files_sha256, end_reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+      "?, ?, 'running')");
+  Binder(add) << session << info.clock.utc_ns << info.clock.monotonic_ns << info.program_version
+              << info.build << info.device << info.device_calibration << info.response_device
+              << info.response_latency << info.consent_version << info.consent_utc_ns << info.hand
+              << other_protocol << files_sha256;
+  add.exec();
+  return db.getLastInsertRowid();
+}
+
+}  // namespace
+
+void Store::validate_run(const Participant& participant, const RunInfo& info) const {
+  Validator validator;
+  validate(validator, info, participant.simulated);
+  validator.throw_if_invalid(impl_->path + ": session of participant " + participant.code);
+}
+
+std::int64_t Store::Impl::resume_or_create_session(const Participant& participant,
+                                                   const RunInfo& info) {
+  const auto known = find_session(*db, participant.id, info.session);
+  if (!known) return insert_session(*db, participant.id, info);
+  const std::string name = session_name(participant, info);
+  if (known->observer_sha256 != info.observer_sha256) {
+    refuse(name +
+           " was begun with other settings of the simulated participant; use those or another "
+           "database");
+  }
+  const RunEnd end = latest_run_end(*db, known->id);
+  const bool withdrawn = end == RunEnd::withdrawn && !info.after_withdrawal;
+  if (end == RunEnd::done || withdrawn || end == RunEnd::running) {
+    refuse(name + " is " + to_string(end) + " and cannot be begun again");
+  }
+  return known->id;
+}
+
+std::optional<std::int64_t> Store::Impl::other_protocol(const Participant& participant,
+                                                        std::int64_t own,
+                                                        const ProtocolInfo* shown_with) {
+  if (shown_with == nullptr) return std::nullopt;
+  const std::int64_t shown = insert_protocol_if_absent(*db, path, *shown_with);
+  const std::string files = files_checksum(*db, own);
+  if (!files.empty() && files_checksum(*db, shown) != files) {
+    refuse("the files that the protocol names now are not those that participant " +
+           participant.code + " began with; put them back as they were");
+  }
+  return shown != own ? std::optional(shown) : std::nullopt;
 }
 
 Run Store::begin_run(const Participant& participant, const RunInfo& info,
                      const ProtocolInfo* shown_with) {
-  require_sound(participant, info);
+  validate_run(participant, info);
   if (shown_with != nullptr) {
-    Validator checks;
-    check(checks, *shown_with);
-    checks.raise(impl_->path + ": protocol");
+    Validator validator;
+    validate(validator, *shown_with);
+    validator.throw_if_invalid(impl_->path + ": protocol");
   }
   return impl_->commit([&] {
     SQLite::Database& db = *impl_->db;
-    const std::string name =
-        "session " + std::to_string(info.session) + " of participant " + participant.code;
     Run run{.session = info.session};
-    SQLite::Statement find(
-        db, "SELECT id, observer_sha256 FROM sessions WHERE participant_id = ? AND number = ?");
-    Binder(find) << participant.id << info.session;
-    if (find.executeStep()) {
-      std::string observer;
-      RowReader(find) >> run.session_id >> observer;
-      if (observer != info.observer_sha256) {
-        impl_->refuse(name +
-                      " was begun with other settings of the simulated participant; use those or "
-                      "another database");
-      }
-      SQLite::Statement last(
-          db, "SELECT end_reason FROM runs WHERE session_id = ? ORDER BY id DESC LIMIT 1");
-      Binder(last) << run.session_id;
-      const RunEnd end =
-          last.executeStep() ? run_end_of(last.getColumn(0).getString()) : RunEnd::paused;
-      const bool left = end == RunEnd::withdrawn && !info.after_withdrawal;
-      if (end == RunEnd::done || left || end == RunEnd::running) {
-        impl_->refuse(name + " is " + to_string(end) + " and cannot be begun again");
-      }
-    } else {
-      SQLite::Statement add(
-          db, "INSERT INTO sessions (participant_id, number, observer_sha256) VALUES (?, ?, ?)");
-      Binder(add) << participant.id << info.session << info.observer_sha256;
-      add.exec();
-      run.session_id = db.getLastInsertRowid();
-    }
-    SQLite::Statement own(db, "SELECT protocol_id FROM participants WHERE id = ?");
-    Binder(own) << participant.id;
-    own.executeStep();
-    const std::int64_t own_protocol = own.getColumn(0).getInt64();
-    std::optional<std::int64_t> other_protocol;
-    if (shown_with != nullptr) {
-      const std::int64_t shown = insert_protocol_if_absent(db, impl_->path, *shown_with);
-      if (shown != own_protocol) other_protocol = shown;
-      const std::string files = files_checksum(db, own_protocol);
-      if (!files.empty() && files_checksum(db, shown) != files) {
-        impl_->refuse("the files that the protocol names now are not those that participant " +
-                      participant.code + " began with; put them back as they were");
-      }
-    }
-    SQLite::Statement add(
-        db,
-        "INSERT INTO runs (session_id, started_utc_ns, started_ns, program_version, build, device, "
-        "device_calibration, response_device, response_latency, consent_version, consent_utc_ns, "
-        "hand, protocol_id, files_sha256, end_reason) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
-        "?, ?, 'running')");
-    Binder(add) << run.session_id << info.clock.utc_ns << info.clock.monotonic_ns
-                << info.program_version << info.build << info.device << info.device_calibration
-                << info.response_device << info.response_latency << info.consent_version
-                << info.consent_utc_ns << info.hand << other_protocol
-                << files_checksum(db, other_protocol.value_or(own_protocol));
-    add.exec();
-    run.id = db.getLastInsertRowid();
+    run.session_id = impl_->resume_or_create_session(participant, info);
+    const std::int64_t own = protocol_of(db, participant.id);
+    const auto other = impl_->other_protocol(participant, own, shown_with);
+    run.id = insert_run(db, run.session_id, info, other, files_checksum(db, other.value_or(own)));
     impl_->seals->run(run.id);
     return run;
   });
 }
 
-void Store::require_sound(const std::string& note) const {
-  Validator checks;
-  checks.present("note", note);
-  checks.raise(impl_->path + ": note");
+void Store::validate_note(const std::string& note) const {
+  Validator validator;
+  validator.present("note", note);
+  validator.throw_if_invalid(impl_->path + ": note");
 }
 
 void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text) {
-  require_sound(text);
+  validate_note(text);
   impl_->commit([&] {
     SQLite::Statement add(*impl_->db, "INSERT INTO notes (run_id, at_ns, text) VALUES (?, ?, ?)");
     Binder(add) << run.id << at_ns << text;
@@ -105,7 +148,7 @@ void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text
 
 void Store::end_run(const Run& run, RunEnd reason, std::int64_t ended_ns) {
   if (reason == RunEnd::running || reason == RunEnd::interrupted) {
-    impl_->refuse(std::string("a run is not ended as ") + to_string(reason));
+    impl_->refuse(std::string("a run cannot be ended as ") + to_string(reason));
   }
   impl_->commit([&] {
     impl_->require_running(run);

@@ -15,20 +15,21 @@ namespace {
 constexpr std::size_t bytes_a_sample(int packing) {
   return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0);
 }
-// What a count may claim, so that memory stays in proportion to the bytes that are there: a trial
-// of an hour at the fastest rate at most; beyond some minutes no fewer bytes a sample than a
-// clock's jitter alone takes (zlib makes 1000 equal bytes into one).
+// Limits of the count that is read, so that a damaged one cannot make the decoder allocate memory
+// out of proportion to the compressed bytes: at most a trial of an hour at the highest rate, and
+// beyond some minutes at least the bytes per sample that the jitter of a clock takes (zlib
+// compresses 1000 equal bytes to one).
 constexpr std::int64_t kMostSamples = 40'000'000;
 constexpr std::size_t kSamplesWithFewBytes = 400'000;
 constexpr std::size_t kLeastBytesASample = 2;
-constexpr std::size_t kMostShrunk = 1032;             // zlib makes nothing smaller than this part
-constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes that are unpacked at a time
-// A trial of 10 s packs in some 50 ms at this level, and higher ones save little: the low bytes of
-// a measured signal are noise.
+constexpr std::size_t kMostShrunk = 1032;             // the highest compression ratio of zlib
+constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes that are decompressed at a time
+// zlib's level: a trial of 10 s takes some 50 ms, and higher levels save little, because the low
+// bytes of a measured signal are noise.
 constexpr int kLevel = 3;
 
-// One visit for both directions: `column(get, form)` where get(sample) is a reference to the field,
-// and `form` has the type that it is stored as.
+// Visits the columns in their order, for encoder and decoder: calls column(get, form), where
+// get(sample) is a reference to the field and `form` a value of its stored type.
 template <class Visitor>
 void visit_columns(int packing, Visitor&& column) {
   constexpr std::uint8_t kByte{};
@@ -93,7 +94,7 @@ bool bytes_suffice(std::size_t count, std::size_t size) {
 
 [[noreturn]] void refuse() { throw StoreError("the samples are damaged"); }
 
-/// The bytes of a zlib stream, unpacked a piece at a time.
+/// Decompresses a zlib stream piece by piece.
 class Planes {
  public:
   Planes(const void* data, std::size_t size) : left_(size) {
@@ -104,7 +105,7 @@ class Planes {
   Planes& operator=(const Planes&) = delete;
   ~Planes() { inflateEnd(&stream_); }
 
-  /// Some of the next bytes, one at least and `most` at most. \throws StoreError at the end.
+  /// The next bytes, at least one and at most `most`. \throws StoreError at the end.
   std::span<const unsigned char> take(std::size_t most) {
     if (at_ == end_ && !fill()) refuse();
     const std::span<const unsigned char> some(piece_.data() + at_, std::min(most, end_ - at_));
@@ -112,12 +113,12 @@ class Planes {
     return some;
   }
 
-  /// \throws StoreError where more bytes follow, packed or unpacked.
+  /// \throws StoreError: more bytes follow, compressed or decompressed.
   void expect_end() {
     if (at_ != end_ || fill() || left_ + stream_.avail_in > 0) refuse();
   }
 
-  /// Of all that was unpacked.
+  /// CRC-32 of all decompressed bytes.
   std::uint32_t crc() const { return static_cast<std::uint32_t>(crc_); }
 
  private:
@@ -125,7 +126,7 @@ class Planes {
   bool fill() {
     at_ = end_ = 0;
     while (end_ == 0 && !ended_) {
-      if (stream_.avail_in == 0) {  // it counts in 32 bits
+      if (stream_.avail_in == 0) {  // avail_in has 32 bits
         stream_.avail_in = static_cast<uInt>(std::min<std::size_t>(left_, 1U << 30U));
         left_ -= stream_.avail_in;
       }
@@ -141,7 +142,7 @@ class Planes {
   }
 
   z_stream stream_{};
-  std::size_t left_;  // bytes that the stream has not been given
+  std::size_t left_;  // input bytes not yet given to the stream
   std::vector<unsigned char> piece_ = std::vector<unsigned char>(kPiece);
   std::size_t at_ = 0, end_ = 0;
   bool ended_ = false;
@@ -183,7 +184,7 @@ std::string pack_samples(const std::vector<SampleRecord>& samples) {
     offset += sizeof(Field) * count;
   });
   std::string packed = compressed(planes, kLevel);
-  // Samples that hardly differ: stored as they are, or they could not be told from a false count.
+  // Samples that hardly differ would look like a false count: stored uncompressed.
   if (!bytes_suffice(count, packed.size())) packed = compressed(planes, Z_NO_COMPRESSION);
   const std::uint32_t crc = crc_of(planes.data(), planes.size());
   for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);

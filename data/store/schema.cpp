@@ -4,6 +4,7 @@
 #include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include <array>
@@ -23,7 +24,7 @@ void set_version(SQLite::Database& db, int version) {
   db.exec("PRAGMA user_version = " + std::to_string(version));
 }
 
-/// In a folder of our own, where nobody else can put anything beside it.
+/// In a private folder, where no other user can put files beside it.
 void make_private_file(const std::string& file) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) {
@@ -31,6 +32,26 @@ void make_private_file(const std::string& file) {
                      "; check that the folder exists and that you may write there");
   }
   ::close(descriptor);
+}
+
+/// \return the path of the backup
+std::string back_up(SQLite::Database& db, const std::string& path, int version) {
+  const std::string stem = path + ".v" + std::to_string(version);
+  const AtomicFolder folder(stem);
+  const std::string temporary = folder / "backup.db";
+  make_private_file(temporary);
+  std::string copy = stem + ".backup";
+  guarded(copy, [&] {
+    SQLite::Database target(temporary, SQLite::OPEN_READWRITE);
+    if (SQLite::Backup(target, db).executeStep() != SQLITE_DONE) {
+      throw StoreError(path + ": cannot be copied to " + copy +
+                       " before it is migrated: another program has locked it");
+    }
+  });
+  for (int i = 2; !rename_if_absent(temporary, copy); ++i) {
+    copy = stem + "-" + std::to_string(i) + ".backup";
+  }
+  return copy;
 }
 
 }  // namespace
@@ -44,10 +65,10 @@ std::span<const Migration> migrations() {
 
 void create_database(const std::string& path) {
   const AtomicFolder folder(path);
-  const std::string draft = folder / "new.db";
-  make_private_file(draft);
+  const std::string temporary = folder / "new.db";
+  make_private_file(temporary);
   guarded(path, [&] {
-    SQLite::Database db(draft, SQLite::OPEN_READWRITE);
+    SQLite::Database db(temporary, SQLite::OPEN_READWRITE);
     db.exec("PRAGMA page_size = " + std::to_string(kPageSize));
     db.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
     SQLite::Transaction transaction(db);
@@ -57,8 +78,8 @@ void create_database(const std::string& path) {
     set_version(db, kSchemaVersion);
     transaction.commit();
   });
-  if (!rename_if_absent(draft, path)) {
-    throw StoreRefused(path + ": has come there while it was to be created; start again");
+  if (!rename_if_absent(temporary, path)) {
+    throw StoreRefused(path + ": another program created it at the same moment; start again");
   }
 }
 
@@ -82,23 +103,9 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest) {
 
 std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
                     std::span<const Migration> steps) {
-  const std::string stem = path + ".v" + std::to_string(from);
-  const AtomicFolder folder(stem);
-  const std::string draft = folder / "backup.db";
-  make_private_file(draft);
-  std::string copy = stem + ".backup";
-  guarded(copy, [&] {
-    SQLite::Database target(draft, SQLite::OPEN_READWRITE);
-    if (SQLite::Backup(target, db).executeStep() != 101 /* SQLITE_DONE */) {
-      throw StoreError(path + ": cannot be copied to " + copy +
-                       " before it is migrated: another program keeps it locked");
-    }
-  });
-  for (int i = 2; !rename_if_absent(draft, copy); ++i) {
-    copy = stem + "-" + std::to_string(i) + ".backup";
-  }
+  const std::string copy = back_up(db, path, from);
   guarded(path, [&] {
-    // A step may rebuild tables that others refer to: references are checked once, at the end.
+    // A step may rebuild tables that others refer to: foreign keys are checked once, at the end.
     db.exec("PRAGMA foreign_keys = OFF");
     SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
     int version = from;
@@ -109,13 +116,13 @@ std::string migrate(SQLite::Database& db, const std::string& path, int from, int
       ++version;
     }
     if (version != to) {
-      throw StoreError(path + ": no way from schema version " + std::to_string(version) + " to " +
-                       std::to_string(to));
+      throw StoreError(path + ": no migration from schema version " + std::to_string(version) +
+                       " to " + std::to_string(to));
     }
     if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
       throw StoreError(path +
-                       ": rows would be left without what they refer to; it stays at version " +
-                       std::to_string(from) + ", see the copy " + copy);
+                       ": the migration would break references between rows; it stays at version " +
+                       std::to_string(from) + "; its backup is " + copy);
     }
     set_version(db, version);
     transaction.commit();

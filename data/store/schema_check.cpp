@@ -1,4 +1,5 @@
-// A database that somebody else made may carry our name and other tables, or tables that do things.
+// Verifies the schema of a file: one that carries palpate's application_id may still have other
+// table definitions, or triggers that would run when it is written to.
 
 #include <SQLiteCpp/Statement.h>
 
@@ -12,8 +13,8 @@
 namespace palpate::data {
 namespace {
 
-/// Without comments, every run of white space as one space; text in quotes as it is.
-std::string plain_sql(const std::string& sql) {
+/// SQL without comments, every run of white space as one space; text in quotes unchanged.
+std::string normalized_sql(const std::string& sql) {
   std::string plain;
   bool quoted = false;
   for (std::size_t i = 0; i < sql.size(); ++i) {
@@ -30,7 +31,7 @@ std::string plain_sql(const std::string& sql) {
   return plain;
 }
 
-/// Name -> plain SQL of every table and index that was made by a statement.
+/// Name -> normalized SQL of every table and index that a statement created.
 std::map<std::string, std::string> objects_of(SQLite::Database& db, const std::string& path) {
   std::map<std::string, std::string> objects;
   SQLite::Statement find(db, "SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL");
@@ -41,12 +42,12 @@ std::map<std::string, std::string> objects_of(SQLite::Database& db, const std::s
                          "', which no palpate database has; remove it with: sqlite3 FILE 'DROP "
                          "TRIGGER ...', or restore a backup");
     }
-    objects[name] = plain_sql(find.getColumn(2).getString());
+    objects[name] = normalized_sql(find.getColumn(2).getString());
   }
   return objects;
 }
 
-std::map<std::string, std::string> our_objects(int version) {
+std::map<std::string, std::string> expected_objects(int version) {
   SQLite::Database db(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   db.exec(schema_sql());
   int made = 1;
@@ -60,13 +61,14 @@ std::map<std::string, std::string> our_objects(int version) {
 
 void verify_schema(SQLite::Database& db, const std::string& path, int version) {
   const auto found = objects_of(db, path);
-  for (const auto& [name, sql] : our_objects(version)) {
+  for (const auto& [name, sql] : expected_objects(version)) {
     const auto object = found.find(name);
     if (object != found.end() && object->second == sql) continue;
-    throw StoreRefused(path + ": '" + name + "' " +
-                       (object == found.end() ? "is missing" : "is not as palpate makes it") +
-                       " in schema version " + std::to_string(version) +
-                       "; the file is damaged or was changed, restore a backup");
+    throw StoreRefused(
+        path + ": '" + name + "' " +
+        (object == found.end() ? "is missing" : "is not defined as palpate defines it") +
+        " in schema version " + std::to_string(version) +
+        "; the file is damaged or was changed, restore a backup");
   }
 }
 

@@ -10,7 +10,7 @@
 namespace palpate::data {
 namespace {
 
-constexpr int kVersion = 3;  // of the schema: rows are sealed as it has them
+constexpr int kVersion = 3;  // of the schema whose columns are sealed
 
 std::vector<std::int64_t> ids(SQLite::Database& db, const char* sql, std::int64_t of = 0) {
   SQLite::Statement find(db, sql);
@@ -21,12 +21,12 @@ std::vector<std::int64_t> ids(SQLite::Database& db, const char* sql, std::int64_
 }
 
 void require_row(SQLite::Statement& find) {
-  if (!find.executeStep()) throw SQLite::Exception("a row to be sealed is gone", SQLITE_CORRUPT);
+  if (!find.executeStep()) throw SQLite::Exception("a row to be sealed is missing", SQLITE_CORRUPT);
 }
 
 }  // namespace
 
-/// The latest link of a session in the database; before the first, what stands for the session.
+/// The last link of a session in the database; link 0 (the session itself) where there is none.
 const Link& SealWriter::last_of(std::int64_t session) {
   const auto known = last_.find(session);
   if (known != last_.end()) return known->second;
@@ -39,7 +39,7 @@ const Link& SealWriter::last_of(std::int64_t session) {
                          "r.session_id = ?1) WHERE link IS NOT NULL ORDER BY link DESC LIMIT 1");
   Binder(find) << session;
   if (find.executeStep()) {
-    RowReader(find) >> link.place >> link.seal;
+    RowReader(find) >> link.position >> link.seal;
   } else {
     SealedValues whose;
     put_session(whose, read_session_head(db_, session, kVersion));
@@ -49,10 +49,10 @@ const Link& SealWriter::last_of(std::int64_t session) {
 }
 
 void SealWriter::seal(const char* update, std::int64_t session, std::int64_t id) {
-  const Link& before = last_of(session);
-  const Link link{before.place + 1, values_.seal(before.seal)};
+  const Link& previous = last_of(session);
+  const Link link{previous.position + 1, values_.seal(previous.seal)};
   SQLite::Statement write(db_, update);
-  Binder(write) << link.place << link.seal << id;
+  Binder(write) << link.position << link.seal << id;
   write.exec();
   last_[session] = link;
 }
@@ -120,10 +120,10 @@ void SealWriter::attempt(std::int64_t id) {
   if (!about.cut_off_reason) read_outcome(row, record);
   find.reset();
   put_attempt(values_, about, record);
-  const Link& before = last_of(session);
-  const Link link{before.place + 1, values_.seal(before.seal)};
+  const Link& previous = last_of(session);
+  const Link link{previous.position + 1, values_.seal(previous.seal)};
   seal_attempt_->reset();
-  Binder(*seal_attempt_) << link.place << link.seal << id;
+  Binder(*seal_attempt_) << link.position << link.seal << id;
   seal_attempt_->exec();
   seal_attempt_->reset();
   last_[session] = link;

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: seals rows as they are written.
+// Internal to data/store: seals rows (seals.h) in the transaction that writes them.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
@@ -12,20 +12,20 @@
 
 namespace palpate::data {
 
-/// Each call reads a row back as it is stored, and seals it as the next of its session. To be
-/// called within the transaction that wrote the row; when that fails, or sessions are removed, call
-/// reset_chains: what it knows of the sessions may be wrong.
+/// Each call reads back the row as it was stored and seals it as the next of its session. Caches
+/// the last link of every session: call reset_chains() after a rollback and after deleting
+/// sessions.
 class SealWriter {
  public:
   explicit SealWriter(SQLite::Database& db) : db_(db) {}
 
-  void run(std::int64_t id);  ///< that begins
+  void run(std::int64_t id);  ///< when it begins
   void note(std::int64_t id);
-  void attempt(std::int64_t id);  ///< that is over
+  void attempt(std::int64_t id);  ///< when it has ended
   void end(std::int64_t run_id);  ///< of a run
   void reset_chains() { last_.clear(); }
 
-  /// What a palpate without seals has recorded, as it is found.
+  /// Seals all rows of a database that an earlier schema version wrote without seals.
   void seal_existing_rows();
 
  private:

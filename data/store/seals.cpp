@@ -18,10 +18,10 @@ Checksum finish_sum(sha256_ctx& context) {
 
 }  // namespace
 
-Checksum SealedValues::seal(const Checksum& before) const {
+Checksum SealedValues::seal(const Checksum& previous) const {
   sha256_ctx context;
   sha256_init(&context);
-  sha256_update(&context, before.size(), before.data());
+  sha256_update(&context, previous.size(), previous.data());
   sha256_update(&context, size_, bytes_.data());
   return finish_sum(context);
 }
@@ -91,8 +91,8 @@ void ChainCheck::fail(const RowName& name, const char* what) const {
   if (name.number > 0) text += " " + std::to_string(name.number);
   if (name.attempt > 0) text += ", attempt " + std::to_string(name.attempt);
   throw StoreRefused(text + what +
-                     "; restore a backup (corrections belong into the analysis or into a copy of "
-                     "an export, not into the record)");
+                     "; restore a backup (correct data in the analysis or in a copy of an export, "
+                     "not in the database)");
 }
 
 void ChainCheck::take(const Checksum& seal, const SealedValues& values, const RowName& name) {
@@ -108,10 +108,11 @@ void ChainCheck::take(const Checksum& seal, const SealedValues& values, const Ro
 void ChainCheck::add(const std::optional<Link>& link, const SealedValues& values,
                      const RowName& name) {
   if (!link) fail(name, ": has no seal: palpate did not record it");
-  if (link->place != links_ + 1) {
-    const bool added = link->place > links_ &&
-                       waiting_.try_emplace(link->place, Waiting{link->seal, values, name}).second;
-    if (!added) fail(name, ": stands where another row was sealed");
+  if (link->position != links_ + 1) {
+    const bool added =
+        link->position > links_ &&
+        waiting_.try_emplace(link->position, Waiting{link->seal, values, name}).second;
+    if (!added) fail(name, ": is at the position of another sealed row");
     return;
   }
   take(link->seal, values, name);
@@ -123,7 +124,7 @@ void ChainCheck::add(const std::optional<Link>& link, const SealedValues& values
 
 void ChainCheck::finish() const {
   if (waiting_.empty()) return;
-  fail(waiting_.begin()->second.name, ": follows on rows that are gone");
+  fail(waiting_.begin()->second.name, ": rows before it are missing");
 }
 
 }  // namespace palpate::data

@@ -1,15 +1,15 @@
 #pragma once
-// Internal to data/: the chain of seals over the rows of a session.
+// Internal to data/store: the hash chain over the rows of a session. Its links are called seals.
 //
-// A seal is SHA-256(seal before, values of the row). It shows accidents and quiet edits: who
-// changes a value in the file changes what the seal was made of, and a row that is taken out is
-// missing in the chain. It is no proof against somebody who means to deceive: the program that made
-// the seals can make them again. Whoever wants that writes the last seal down elsewhere.
+// A seal is SHA-256(previous seal, values of the row). It detects accidents and silent edits:
+// changing a value changes what its seal was computed from, and removing a row breaks the chain. It
+// does not prove authenticity: whoever has this program can compute seals anew. Where that matters,
+// keep the last seal elsewhere.
 //
-// Values, one after the other: a letter for the type (n null, i integer, r real, t text, b blob),
-// then 8 bytes, least significant first: the integer (booleans 0 or 1), the bits of the real, or
-// the length of the text or blob, whose bytes follow. The first value is a text, the kind of the
-// row:
+// Encoding of the values, one after the other: a letter for the type (n null, i integer, r real, t
+// text, b blob), then 8 bytes, least significant first: the integer (booleans 0 or 1), the bits of
+// the real, or the length of the text or blob, whose bytes follow. The first value is a text, the
+// kind of the row:
 //
 //   session  protocol's sha256 and name, participant's code, enrolled number, simulated and seed,
 //            session's number, observer_sha256: link 0, which is not stored
@@ -34,10 +34,10 @@
 
 namespace palpate::data {
 
-/// The values of a row, as they are sealed.
+/// The values of a row in the encoding that is hashed.
 class SealedValues {
  public:
-  /// A row of this kind begins; what was there is gone.
+  /// Starts a row of this kind; drops the values of the previous row.
   SealedValues& begin(std::string_view kind) {
     size_ = 0;
     return text('t', kind);
@@ -61,7 +61,7 @@ class SealedValues {
     return *this;
   }
 
-  Checksum seal(const Checksum& before) const;  ///< of this row
+  Checksum seal(const Checksum& previous) const;  ///< of this row
 
  private:
   SealedValues& put(char type, std::uint64_t value) {
@@ -86,7 +86,7 @@ class SealedValues {
 
 struct SessionHead;
 
-/// What is sealed of an attempt beside its record.
+/// The sealed values of an attempt that are not in its TrialRecord.
 struct AttemptSealed {
   std::int64_t run_link = 0, began_ns = 0;
   std::optional<std::string> cut_off_reason;  ///< none: it was completed
@@ -103,20 +103,20 @@ void put_end(SealedValues& out, std::int64_t run_link, const std::string& reason
 /// Little-endian packing (4 bytes) and count (8), then the data.
 Checksum checksum_of_samples(int packing, std::int64_t count, const void* data, std::size_t size);
 
-/// A place in a session's chain.
+/// A position in the chain of a session.
 struct Link {
-  std::int64_t place = 0;  ///< 1, 2, ...; 0: what stands for the session itself
+  std::int64_t position = 0;  ///< 1, 2, ...; 0: the session itself
   Checksum seal{};
 };
 
-/// Which row, for messages.
+/// Identifies a row in messages.
 struct RowName {
   const char* kind;  ///< "trial", "note of run", ...
   std::int64_t number = 0;
   int attempt = 0;  ///< 0: it has none
 };
 
-/// Holds the rows of one session against their seals, in whatever order they come.
+/// Verifies the rows of one session against their seals. Rows may be added in any order.
 class ChainCheck {
  public:
   /// \param session "study.db: participant P01, session 1", for messages
@@ -124,10 +124,10 @@ class ChainCheck {
     last_ = first;
   }
 
-  /// \param link  none: the row has no seal. \throws StoreRefused: it has none, or was changed
-  /// since it was sealed.
+  /// \param link  none: the row has no seal. \throws StoreRefused: it has none, or does not match
+  /// it.
   void add(const std::optional<Link>& link, const SealedValues& values, const RowName& name);
-  /// All rows have come. \throws StoreRefused: some are gone.
+  /// After the last row. \throws StoreRefused: rows are missing.
   void finish() const;
 
  private:

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: SQLite's error codes as sentences that say what to do.
+// SQLite's result codes (https://www.sqlite.org/rescode.html) as messages that say what to do.
 
 #include <SQLiteCpp/Exception.h>
 
@@ -8,10 +8,10 @@
 
 namespace palpate::data {
 
-/// Throws the StoreRefused or StoreError that `error` amounts to.
+/// \throws StoreRefused: the file is damaged or no database; StoreError: any other `error`.
 [[noreturn]] void raise_store_error(const std::string& path, const SQLite::Exception& error);
 
-/// Calls `work`; SQLite's exceptions come out as ours.
+/// Calls `work` and converts SQLite's exceptions to StoreError and StoreRefused.
 template <class Work>
 decltype(auto) guarded(const std::string& path, Work&& work) {
   try {

@@ -15,7 +15,7 @@ void RowReader::missing() const {
 }
 
 void RowReader::out_of_range(std::int64_t stored) const {
-  throw SQLite::Exception(column_name() + " is out of its range: " + std::to_string(stored),
+  throw SQLite::Exception(column_name() + " is out of range: " + std::to_string(stored),
                           SQLITE_CORRUPT);
 }
 

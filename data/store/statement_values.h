@@ -1,6 +1,7 @@
 #pragma once
-// C++ values into the parameters of a SQL statement, and out of the columns of a result row, in
-// order. Every value that is read is held against the range of its type: the file may be damaged.
+// C++ values into the bound parameters of a SQL statement, and out of the columns of a result row,
+// in order. Every value that is read is checked against the range of its type: the file may be
+// damaged.
 
 #include <SQLiteCpp/Column.h>
 #include <SQLiteCpp/Statement.h>
@@ -16,7 +17,7 @@
 
 namespace palpate::data {
 
-/// Binds values one after the other, whatever their types.
+/// Binds values to the parameters of a statement, left to right.
 class Binder {
  public:
   explicit Binder(SQLite::Statement& statement) : statement_(statement) {}
@@ -49,11 +50,11 @@ class Binder {
   int index_ = 0;
 };
 
-/// The columns of a statement, made once for all its rows. Valid after the first step.
+/// The result columns of a statement, created once for all its rows. Valid after the first step.
 std::vector<SQLite::Column> columns_of(SQLite::Statement& statement);
 
-/// Reads the columns of a row one after the other, whatever their types. Only an optional may be
-/// missing. \throws SQLite::Exception (damage).
+/// Reads the columns of a result row, left to right. NULL is read into a std::optional only.
+/// \throws SQLite::Exception (SQLITE_CORRUPT): NULL, or a value out of the range of its type.
 class RowReader {
  public:
   explicit RowReader(SQLite::Statement& statement) : statement_(&statement) {}
@@ -61,14 +62,14 @@ class RowReader {
 
   RowReader& operator>>(std::string& value) {
     return next([&](const SQLite::Column& column) {
-      const void* const text = column.getBlob();  // before its length
+      const void* const text = column.getBlob();  // must precede getBytes()
       value.assign(static_cast<const char*>(text), static_cast<std::size_t>(column.getBytes()));
       return !value.empty() || !column.isNull();
     });
   }
   RowReader& operator>>(Checksum& value) {
     return next([&](const SQLite::Column& column) {
-      const void* const bytes = column.getBlob();  // before their length
+      const void* const bytes = column.getBlob();  // must precede getBytes()
       if (column.isNull()) return false;
       if (column.getBytes() != static_cast<int>(value.size())) out_of_range(column.getBytes());
       std::memcpy(value.data(), bytes, value.size());
@@ -109,12 +110,12 @@ class RowReader {
   }
 
  private:
-  /// \param read returns whether there was a value; asked of SQLite only where it read 0 or "".
+  /// \param read returns whether the column was not NULL, which it asks only where it read 0 or "".
   template <class Read>
   RowReader& next(const Read& read) {
-    const bool there = columns_ != nullptr ? read((*columns_)[static_cast<std::size_t>(index_)])
-                                           : read(statement_->getColumn(index_));
-    if (!there) missing();
+    const bool present = columns_ != nullptr ? read((*columns_)[static_cast<std::size_t>(index_)])
+                                             : read(statement_->getColumn(index_));
+    if (!present) missing();
     ++index_;
     return *this;
   }

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A message about the copy, as one about the file that the user named.
+/// A message about the copy, rewritten to name the file that the user gave.
 std::string renamed(std::string message, const std::string& copy, const std::string& path) {
   for (std::size_t at = 0; (at = message.find(copy, at)) != std::string::npos; at += path.size()) {
     message.replace(at, copy.size(), path);
@@ -28,7 +28,7 @@ std::string renamed(std::string message, const std::string& copy, const std::str
 
 }  // namespace
 
-StationDatabase::Looks StationDatabase::looks_of(const std::string& file) {
+StationDatabase::FileState StationDatabase::state_of_file(const std::string& file) {
   struct stat found {};
   if (::stat(file.c_str(), &found) != 0) return {};
   return {{found.st_dev, found.st_ino},
@@ -49,11 +49,11 @@ StationDatabase::StationDatabase(const std::string& path, const std::string& scr
   try {
     lock_.emplace(file_);
   } catch (const StoreRefused&) {
-    throw;  // somebody writes to it
+    throw;  // another process writes to it
   } catch (const StoreError&) {
-    lock_.reset();  // a folder that may not be written: so nobody writes to the database either
+    lock_.reset();  // no write permission for its folder, so no writer of this user either
   }
-  looks_ = looks_of(file_);
+  opened_ = state_of_file(file_);
   guarded(path, [&] {
     require_private_sqlite_files(file_);
     require_palpate_database(file_, path);
@@ -65,9 +65,9 @@ StationDatabase::StationDatabase(const std::string& path, const std::string& scr
     verify_schema(*db_, path, checked_version(*db_, path));
     if (read == file_) quick_check(*db_, path);
     verify_protocol_checksums(*db_, path, kSchemaVersion);
-    // A copy may have been sealed just now, as it was found.
+    // Rows of a copy were sealed during its migration: their samples are decoded as well.
     AttemptFilter all;
-    all.samples = read == file_ ? SampleReading::verify : SampleReading::unpacked;
+    all.samples = read == file_ ? SampleReading::verify : SampleReading::unpack;
     read_attempts(*db_, path_, kSchemaVersion, all, [](const StoredTrial&) {});
   });
 }
@@ -109,8 +109,9 @@ void StationDatabase::take_copy(const std::string& scratch) {
 }
 
 void StationDatabase::require_unchanged() const {
-  if (looks_of(file_) == looks_) return;
-  throw StoreError(path_ + ": was written to while it was read; start again when that has ended");
+  if (state_of_file(file_) == opened_) return;
+  throw StoreError(
+      path_ + ": was written to while it was read; start again when the other program has ended");
 }
 
 }  // namespace palpate::data

@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: a database that is read and not touched.
+// The database of one station (a computer that runs part of a study), opened for merge: read,
+// verified, and never written to.
 
 #include <SQLiteCpp/Database.h>
 
@@ -12,12 +13,13 @@
 
 namespace palpate::data {
 
-/// A station's database as it would be if a writer opened it now: of this schema, its log played
-/// in, what a dead process left running marked. Where that is not so, a private copy is; the file
-/// itself is never written to, and no writer gets at it meanwhile.
+/// The content that Store::open for writing would leave: current schema, -wal checkpointed, runs of
+/// crashed processes marked as interrupted. Where the file differs from that, a private copy is
+/// brought there and read instead. Holds the writer's lock, so that no other process writes
+/// meanwhile.
 class StationDatabase {
  public:
-  /// \param scratch the copy's place, a file that is not there. \throws as Store::open.
+  /// \param scratch path for the private copy; must not exist. \throws as Store::open.
   StationDatabase(const std::string& path, const std::string& scratch);
 
   const std::string& path() const { return path_; }  ///< as given
@@ -27,19 +29,19 @@ class StationDatabase {
   void require_unchanged() const;
 
  private:
-  /// What shows that a file was written to.
-  struct Looks {
+  /// Differs after the file was written to.
+  struct FileState {
     FileIdentity identity;
     std::int64_t size = 0, modified_ns = 0;
-    bool operator==(const Looks&) const = default;
+    bool operator==(const FileState&) const = default;
   };
-  static Looks looks_of(const std::string& file);
+  static FileState state_of_file(const std::string& file);
   bool is_current();
   void take_copy(const std::string& scratch);
 
   std::string path_, file_;
   std::optional<WriterLock> lock_;
-  Looks looks_;
+  FileState opened_;
   std::optional<SQLite::Database> db_;
 };
 

@@ -17,15 +17,15 @@
 namespace palpate::data {
 namespace {
 
-// yescrypt with this cost takes some 5 ms. A hash that asks for another cost is not ours: a made-up
-// one could keep us busy for days.
+// yescrypt with this cost takes some 5 ms. A hash with another cost is refused: a forged one could
+// take days to compute.
 constexpr const char* kPrefix = "$y$";
 constexpr unsigned long kCost = 3;
 
 std::string new_salt() {
   std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> text{};
   if (::crypt_gensalt_rn(kPrefix, kCost, nullptr, 0, text.data(), text.size()) == nullptr) {
-    throw StoreError("no salt can be made: the system gives no random numbers");
+    throw StoreError("cannot make a salt: the system gives no random numbers");
   }
   return text.data();
 }
@@ -42,19 +42,19 @@ std::string cost_of(const std::string& salt) { return salt.substr(0, salt.rfind(
 std::string hash_with(const std::string& code, const std::string& salt) {
   const auto work = std::make_unique<crypt_data>();
   const char* hash = ::crypt_r(code.c_str(), salt.c_str(), work.get());
-  if (hash == nullptr || hash[0] == '*') throw StoreError("a code cannot be hashed");
+  if (hash == nullptr || hash[0] == '*') throw StoreError("cannot hash a participant code");
   return hash;
 }
 
 std::string new_secret() {
   std::string secret(32, '\0');
   if (::getrandom(secret.data(), secret.size(), 0) != static_cast<ssize_t>(secret.size())) {
-    throw StoreError("no secret can be made: the system gives no random numbers");
+    throw StoreError("cannot make a secret: the system gives no random numbers");
   }
   return secret;
 }
 
-/// What is hashed of a code.
+/// The input of crypt(): HMAC-SHA256 as 64 digits.
 std::string keyed(const std::string& code, const std::string& secret) {
   if (secret.empty()) return code;
   hmac_sha256_ctx context;
@@ -84,7 +84,7 @@ Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
              c == '$' || c == '.' || c == '/';
     });
     if (!clean || cost_of(salt) != cost || salt.size() == hash.size() || hash.size() > 200) {
-      throw StoreRefused(path + ": a tombstone is none of palpate's; restore a backup");
+      throw StoreRefused(path + ": holds a tombstone that palpate did not make; restore a backup");
     }
     all.by_key_[{secret.value_or(""), salt}].push_back(hash);
   }

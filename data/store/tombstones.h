@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: what is left of a code that was withdrawn.
+// Tombstones: salted hashes of withdrawn participant codes. enrol and merge refuse or exclude a
+// code that has one.
 
 #include <SQLiteCpp/Database.h>
 
@@ -10,29 +11,28 @@
 
 namespace palpate::data {
 
-/// The tombstones of one or more databases. A tombstone is a salted hash that is slow to make
-/// (yescrypt), of the code keyed with a secret (HMAC-SHA256): nobody finds a short code by trying
-/// all of them who has the tombstone alone. The secret is in the database, or merge could not
-/// honour its tombstones: who has the whole database can still try codes, a few hundred a second.
+/// The tombstones of one or more databases. A tombstone is crypt(HMAC-SHA256(secret, code)) with
+/// yescrypt, which is salted and slow (crypt(5)): without the secret, a short code cannot be found
+/// by trying all codes. The secret is in the database, because merge needs it to recognise codes:
+/// with the whole database, some hundred codes a second can still be tried.
 class Tombstones {
  public:
   struct Tombstone {
     std::string hash;
-    std::string secret;  ///< 32 bytes; "": of a palpate that had none, the code was hashed as it is
+    std::string secret;  ///< 32 bytes; "": made by schema version 2, without HMAC
     bool operator==(const Tombstone&) const = default;
   };
 
-  /// Of an open database; \throws StoreRefused: one
-  /// of them is no hash that we make.
+  /// All of an open database. \throws StoreRefused: one is not a hash that palpate makes.
   static Tombstones read(SQLite::Database& db, const std::string& path);
 
   bool holds(const std::string& code) const { return !find(code).hash.empty(); }
-  Tombstone find(const std::string& code) const;  ///< of a code; without a hash: there is none
+  Tombstone find(const std::string& code) const;  ///< with an empty hash: none
 
-  /// What to keep of a code. Uses a secret and salt that are there, so that a code is hashed once
-  /// to be compared with all of them. \throws StoreError: no randomness to be had.
+  /// A tombstone for a code. Reuses an existing secret and salt, so that comparing a code with all
+  /// tombstones takes one hash. \throws StoreError: the system has no random numbers.
   Tombstone made_for(const std::string& code) const;
-  /// Within a transaction. \param cleared  as the column of that name.
+  /// Inserts or updates, within a transaction of the caller. \param cleared value of that column
   static void put(SQLite::Database& db, const Tombstone& tombstone, bool cleared);
 
   bool empty() const { return by_key_.empty(); }

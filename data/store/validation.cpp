@@ -8,7 +8,8 @@
 #include "data/files/checksum.h"
 
 namespace palpate::data {
-// Table 3-7 of the Unicode standard.
+
+// Well-formed byte sequences: The Unicode Standard, table 3-7.
 bool is_clean_utf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const auto lead = static_cast<unsigned char>(text[i++]);
@@ -59,58 +60,59 @@ void Validator::positive(const char* field, int value) {
   expect(value >= 1, std::string(field) + " must be 1 or more, not " + std::to_string(value));
 }
 
-void Validator::raise(const std::string& what) const {
+void Validator::throw_if_invalid(const std::string& what) const {
   if (faults_.empty()) return;
   std::string message = what + ": not stored:";
   for (std::size_t i = 0; i < faults_.size(); ++i) message += (i > 0 ? "; " : " ") + faults_[i];
   throw StoreRefused(message);
 }
 
-void check(Validator& checks, const ProtocolInfo& protocol) {
-  checks.present("protocol's name", protocol.name);
-  checks.present("protocol's text", protocol.text);
-  checks.expect(protocol.sha256 == checksum_hex(protocol.text),
-                "protocol's SHA-256 must be that of its text");
-  for (const ProtocolFile& file : protocol.files) checks.present("name of a file", file.name);
+void validate(Validator& validator, const ProtocolInfo& protocol) {
+  validator.present("protocol's name", protocol.name);
+  validator.present("protocol's text", protocol.text);
+  validator.expect(protocol.sha256 == checksum_hex(protocol.text),
+                   "protocol's SHA-256 must be that of its text");
+  for (const ProtocolFile& file : protocol.files) validator.present("name of a file", file.name);
 }
 
-void check(Validator& checks, const RunInfo& info, bool simulated) {
-  checks.positive("session", info.session);
-  checks.present("program version", info.program_version);
-  checks.present("device", info.device);
-  checks.text("build", info.build);
-  checks.text("device calibration", info.device_calibration);
-  checks.text("response device", info.response_device);
-  checks.text("consent version", info.consent_version);
-  checks.text("hand", info.hand);
-  checks.text("observer's checksum", info.observer_sha256);
-  checks.expect(simulated || info.observer_sha256.empty(),
-                "only a simulated participant has observer settings");
-  if (info.response_latency) checks.finite("response latency", *info.response_latency);
+void validate(Validator& validator, const RunInfo& info, bool simulated) {
+  validator.positive("session", info.session);
+  validator.present("program version", info.program_version);
+  validator.present("device", info.device);
+  validator.text("build", info.build);
+  validator.text("device calibration", info.device_calibration);
+  validator.text("response device", info.response_device);
+  validator.text("consent version", info.consent_version);
+  validator.text("hand", info.hand);
+  validator.text("observer's checksum", info.observer_sha256);
+  validator.expect(simulated || info.observer_sha256.empty(),
+                   "only a simulated participant has observer settings");
+  if (info.response_latency) validator.finite("response latency", *info.response_latency);
 }
 
-void validate_plan(Validator& checks, const TrialRecord& record, int session) {
-  checks.expect(record.session == session, "session must be the run's, " + std::to_string(session));
-  checks.positive("block", record.block);
-  checks.positive("trial", record.trial);
-  checks.present("renderer", record.renderer);
-  checks.present("shape", record.shape);
-  for (const double q : record.orientation_wxyz) checks.finite("orientation", q);
+void validate_plan(Validator& validator, const TrialRecord& record, int session) {
+  validator.expect(record.session == session,
+                   "session must be the run's, " + std::to_string(session));
+  validator.positive("block", record.block);
+  validator.positive("trial", record.trial);
+  validator.present("renderer", record.renderer);
+  validator.present("shape", record.shape);
+  for (const double q : record.orientation_wxyz) validator.finite("orientation", q);
 }
 
-void validate_outcome(Validator& checks, const TrialRecord& record) {
+void validate_outcome(Validator& validator, const TrialRecord& record) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
-  checks.text("response", record.response);
-  checks.amount("response_time", record.response_time);
-  if (record.first_contact_time) checks.amount("first_contact_time", *record.first_contact_time);
+  validator.text("response", record.response);
+  validator.amount("response_time", record.response_time);
+  if (record.first_contact_time) validator.amount("first_contact_time", *record.first_contact_time);
   for (int i = 0; i < 3; ++i) {
-    checks.finite("start_tip", record.start_tip[i]);
-    checks.finite("start_tail", record.start_tail[i]);
+    validator.finite("start_tip", record.start_tip[i]);
+    validator.finite("start_tail", record.start_tail[i]);
   }
-  checks.amount("max_force", record.max_force);
-  checks.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
-  checks.expect(!record.timed_out || (record.response.empty() && !record.correct),
-                "a time-out has no response and is not correct");
+  validator.amount("max_force", record.max_force);
+  validator.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
+  validator.expect(!record.timed_out || (record.response.empty() && !record.correct),
+                   "a time-out has no response and is not correct");
 }
 
 }  // namespace palpate::data

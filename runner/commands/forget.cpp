@@ -82,10 +82,10 @@ int forget_command(const std::vector<std::string>& args) {
     std::cout << stimuli::printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
   list_exports(holdings, database, std::cout);
-  if (!holdings.elsewhere.empty()) {
+  if (!holdings.remaining_copies.empty()) {
     std::cout << "These lie beside the database or its exports and name " << code
               << "; they are not changed: delete them, or give the command for each database:\n";
-    for (const std::string& path : holdings.elsewhere) {
+    for (const std::string& path : holdings.remaining_copies) {
       std::cout << "  " << stimuli::printable(path) << "\n";
     }
   }

@@ -12,7 +12,7 @@ RunRecord::RunRecord(data::Store& store, const data::ProtocolInfo& protocol,
       participant_(participant),
       info_(info),
       shown_with_(shown_with) {
-  store_.require_sound(participant_, info_);
+  store_.validate_run(participant_, info_);
 }
 
 void RunRecord::begin() {
@@ -29,7 +29,7 @@ void RunRecord::note(std::int64_t at_ns, const std::string& text) {
     store_.add_note(*run_, at_ns, text);
     return;
   }
-  store_.require_sound(text);
+  store_.validate_note(text);
   waiting_.push_back({at_ns, text});
 }
 

@@ -124,7 +124,7 @@ void Outputs::check() const {
   for (const Output& output : outputs_) {
     const std::string named = "--" + output.option + " " + output.path;
     std::string why = data::write_refusal(output.path, force_, inputs_);
-    if (why.empty()) why = others.why(output.path);
+    if (why.empty()) why = others.reason(output.path);
     if (!why.empty()) faults += (faults.empty() ? "" : "\n") + named + ": " + why;
     others.add(output.path, "--" + output.option + " writes the same file");
   }

@@ -5,82 +5,17 @@
 
 #include <algorithm>
 #include <charconv>
-#include <map>
 
 #include "data/files/formula_guard.h"
-#include "tests/data/store/store_fixture.h"
+#include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {
 namespace {
 
 using namespace palpate::data::testing;
 namespace fs = std::filesystem;
-using Rows = std::vector<std::vector<std::string>>;
 
-/// RFC 4180 to the letter: anything else fails the test.
-Rows parse_rfc4180(const std::string& text) {
-  Rows rows(1);
-  rows.back().emplace_back();
-  std::size_t i = 0;
-  while (i < text.size()) {
-    std::string& field = rows.back().back();
-    if (text[i] == '"' && field.empty()) {
-      for (++i;; ++i) {
-        if (i >= text.size()) {
-          ADD_FAILURE() << "unclosed quote";
-          return rows;
-        }
-        if (text[i] == '"') {
-          if (i + 1 >= text.size() || text[i + 1] != '"') break;
-          ++i;
-        }
-        field += text[i];
-      }
-      ++i;
-    }
-    while (i < text.size() && text[i] != ',' && text[i] != '\r') {
-      EXPECT_TRUE(text[i] != '"' && text[i] != '\n') << "at " << i;
-      field += text[i++];
-    }
-    if (i >= text.size()) break;
-    if (text[i++] == ',') {
-      rows.back().emplace_back();
-    } else {
-      EXPECT_EQ(text.at(i++), '\n');
-      rows.emplace_back().emplace_back();
-    }
-  }
-  EXPECT_EQ(rows.back(), std::vector<std::string>{""}) << "the last line has its end";
-  rows.pop_back();
-  return rows;
-}
-
-/// Column name -> value of one row.
-std::map<std::string, std::string> by_name(const Rows& rows, std::size_t row) {
-  std::map<std::string, std::string> values;
-  EXPECT_EQ(rows.at(row).size(), rows.at(0).size());
-  for (std::size_t i = 0; i < rows[0].size(); ++i) values[rows[0][i]] = rows[row].at(i);
-  return values;
-}
-
-class ExportCsv : public ::testing::Test {
- protected:
-  void show(const TrialRecord& record) {
-    store_.begin_attempt(run_, record, record.onset_ns);
-    store_.finish_attempt(run_, record);
-  }
-  Rows rows() { return parse_rfc4180(contents_of(out_)); }
-  std::ptrdiff_t files() const {
-    return std::distance(fs::directory_iterator(out_folder_.path()), fs::directory_iterator());
-  }
-  const TemporaryFolder folder_, out_folder_;
-  Store store_ = Store::open(folder_ / "study.db", Store::Mode::write_or_create);
-  const Participant person_ = store_.enrol(a_protocol(), "P1", 4);
-  const palpate::data::Run run_ = store_.begin_run(person_, a_run());
-  const std::string out_ = out_folder_ / "trials.csv";
-};
-
-TEST_F(ExportCsv, HasTheColumnsOfTheContractAlways) {
+TEST_F(ExportCsv, AlwaysHasTheSameColumns) {
   export_csv(store_, out_, false);
   EXPECT_EQ(
       contents_of(out_),
@@ -244,51 +179,6 @@ TEST_F(ExportCsv, RelativeTimesTellNoDateButTheIntervals) {
   EXPECT_EQ(cut_off.at("elapsed"), "-21");
 }
 
-TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
-  TrialRecord record = a_record(1);
-  record.shape = record.response = "-cube";
-  show(record);
-  ExportSettings settings;
-  settings.codebook = out_folder_ / "codebook.csv";
-  settings.fault_bits = {{16, "force-limited: ..."}, {2048, "old-reading: ..."}};
-  settings.facts = [](const ProtocolInfo&) {
-    return ProtocolFacts{.stimuli = {{"-cube", "{}"}, {"cone", "{}"}}};
-  };
-  export_csv(store_, out_, settings);
-  const Rows book = parse_rfc4180(contents_of(settings.codebook));
-  EXPECT_EQ(book[0], (std::vector<std::string>{"table", "column", "unit", "value", "meaning"}));
-  std::vector<std::string> described;
-  std::map<std::string, std::string> bits, shapes;
-  for (std::size_t i = 1; i < book.size(); ++i) {
-    const auto row = by_name(book, i);
-    EXPECT_NE(row.at("meaning"), "");
-    if (row.at("table") != "trials") continue;
-    if (row.at("value").empty()) described.push_back(row.at("column"));
-    if (row.at("column") == "faults") bits[row.at("value")] = row.at("meaning");
-    if (row.at("column") == "shape") shapes[row.at("value")] = row.at("meaning");
-  }
-  EXPECT_EQ(described, rows()[0]);
-  EXPECT_EQ(bits.at("16"), "force-limited: ...");
-  EXPECT_EQ(bits.at("2048"), "old-reading: ...");
-  EXPECT_TRUE(shapes.contains("'-cube")) << "as it stands in the table";
-  EXPECT_EQ(by_name(rows(), 1).at("shape"), "'-cube");
-}
-
-TEST_F(ExportCsv, TheCodebookTakesNoOtherFilesPlace) {
-  show(a_record(1));
-  ExportSettings settings;
-  for (const std::string& taken :
-       {out_, out_folder_ / "attempts.csv", folder_ / "study.db", out_folder_.path()}) {
-    settings.codebook = taken;
-    EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused) << taken;
-  }
-  settings.codebook = out_folder_ / "mine.csv";
-  write_file(settings.codebook, "mine");
-  EXPECT_THROW(export_csv(store_, out_, settings), StoreRefused);
-  EXPECT_EQ(contents_of(settings.codebook), "mine");
-  EXPECT_EQ(files(), 1) << "nothing else was written";
-}
-
 TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {
   store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
   store_.cut_off_attempt(run_, "device fault, reconnected");
@@ -345,7 +235,7 @@ TEST_F(ExportCsv, NothingIsOverwrittenWithoutForce) {
   EXPECT_EQ(files(), 2);
 }
 
-TEST_F(ExportCsv, PlacesThatAreNoneAreRefused) {
+TEST_F(ExportCsv, InvalidPathsAreRefused) {
   EXPECT_THROW(export_csv(store_, out_folder_.path(), true), StoreRefused);
   EXPECT_THROW(export_csv(store_, out_folder_ / "", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, "", true), StoreRefused);
@@ -357,7 +247,7 @@ TEST_F(ExportCsv, PlacesThatAreNoneAreRefused) {
   EXPECT_EQ(files(), 0);
 }
 
-TEST_F(ExportCsv, IsForItsOwnerOnly) {
+TEST_F(ExportCsv, OnlyTheOwnerMayReadIt) {
   export_csv(store_, out_, false);
   struct stat found {};
   ASSERT_EQ(::stat(out_.c_str(), &found), 0);

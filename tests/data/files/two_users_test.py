@@ -151,7 +151,7 @@ class TwoUsers(unittest.TestCase):
         page = (self.shared / "mine.html").stat()
         self.assertEqual((page.st_uid, stat.S_IMODE(page.st_mode)), (LAB, 0o600))
 
-    def test_drafts_that_another_user_laid_out_are_neither_used_nor_removed(self):
+    def test_temporary_files_of_another_user_are_neither_used_nor_removed(self):
         self.other("umask 0; : > .s.db.palpate-abcdef; : > .r.json.palpate-abcdef; mkdir .s.db.palpate-folder;"
                    ": > s.db.palpate-new-wal")
         self.simulate()

@@ -44,9 +44,9 @@ void make_study(const std::string& path) {
   }
 }
 
-class Hostile : public ::testing::Test {
+class DamagedDatabase : public ::testing::Test {
  protected:
-  Hostile() {
+  DamagedDatabase() {
     make_study(path_);
     fs::create_directory(folder_ / "out");
     original_ = contents_of(path_);
@@ -105,12 +105,12 @@ class Hostile : public ::testing::Test {
   std::string original_, refusals_;
 };
 
-TEST_F(Hostile, TheWholeOneGoesThrough) {
+TEST_F(DamagedDatabase, AnUndamagedDatabaseIsExported) {
   EXPECT_EQ(use(path_), 9) << refusals_;
   expect_nothing_outside();
 }
 
-TEST_F(Hostile, DamagedBytesAnywhere) {
+TEST_F(DamagedDatabase, DamagedBytesAnywhere) {
   std::mt19937 random(11);
   for (int round = 0; round < 250; ++round) {
     std::string damaged = original_;
@@ -127,7 +127,7 @@ TEST_F(Hostile, DamagedBytesAnywhere) {
   }
 }
 
-TEST_F(Hostile, CutShortAnywhere) {
+TEST_F(DamagedDatabase, TruncatedAnywhere) {
   std::mt19937 random(12);
   for (int round = 0; round < 60; ++round) {
     const std::size_t size = round % 2 == 0 ? 4096 * (random() % (original_.size() / 4096))
@@ -146,7 +146,7 @@ struct Crafted {
   const char* expectation;  ///< part of the refusal; "" when all ways go through
 };
 
-TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
+TEST_F(DamagedDatabase, ValuesThatPalpateNeverWrites) {
   const Crafted all[] = {
       {"a code that leads out of the folder",
        "UPDATE participants SET code = '../../x' WHERE id = 1", "damaged"},
@@ -157,11 +157,11 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
       {"a state that is none", "UPDATE attempts SET state = 'x' WHERE id = 1",
        "neither running nor completed nor cut off"},
       {"practice that is neither", "UPDATE attempts SET practice = 2 WHERE id = 1",
-       "practice is out of its range: 2"},
+       "practice is out of range: 2"},
       {"an answer that is neither", "UPDATE attempts SET correct = -1 WHERE id = 1",
-       "correct is out of its range: -1"},
+       "correct is out of range: -1"},
       {"a start that is neither", "UPDATE attempts SET started_inside = 7 WHERE id = 1",
-       "started_inside is out of its range: 7"},
+       "started_inside is out of range: 7"},
       {"a trial without an answer's time", "UPDATE attempts SET response_time = NULL WHERE id = 1",
        "row 1 of attempts: response_time is missing"},
       {"a trial without a response", "UPDATE attempts SET response = NULL WHERE id = 1",
@@ -173,7 +173,7 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
       {"no number of faults", "UPDATE attempts SET faults = NULL WHERE id = 1",
        "row 1 of attempts: faults is missing"},
       {"ticks below nothing", "UPDATE attempts SET ticks = -1 WHERE id = 1",
-       "ticks is out of its range: -1"},
+       "ticks is out of range: -1"},
       {"a block before the first", "UPDATE attempts SET block = 0 WHERE id = 1",
        "block is not 1 or more"},
       {"a trial before the first", "UPDATE attempts SET trial = 0 WHERE id = 1",
@@ -191,7 +191,7 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
       {"a number below the first", "UPDATE participants SET number = 0 WHERE id = 1", "damaged"},
       {"a run that ended otherwise", "UPDATE runs SET end_reason = 'x' WHERE id = 1", "damaged"},
       {"a trial number beyond int", "UPDATE attempts SET trial = 4294967297 WHERE id = 1",
-       "out of its range"},
+       "out of range"},
       {"a negative session", "UPDATE sessions SET number = -5 WHERE id = 1", "damaged"},
       {"no orientation", "UPDATE attempts SET orientation_w = 9e999 WHERE id = 1",
        "not a finite number"},
@@ -246,15 +246,16 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
        "trigger"},
       {"a view in place of a table",
        "ALTER TABLE notes RENAME TO old; CREATE VIEW notes AS SELECT * FROM old",
-       "not as palpate makes it"},
+       "not defined as palpate defines it"},
       {"a table without its checks",
        "ALTER TABLE notes RENAME TO old; CREATE TABLE notes (id INTEGER PRIMARY KEY, run_id, "
        "at_ns, text)",
-       "not as palpate makes it"},
+       "not defined as palpate defines it"},
       {"no index", "DROP INDEX attempts_of_run", "is missing"},
       {"an attempt of another's run", "UPDATE attempts SET run_id = 2 WHERE id = 1",
        "another session"},
-      {"a row of nobody", "DELETE FROM participants WHERE id = 1", "refer to others"},
+      {"a row of nobody", "DELETE FROM participants WHERE id = 1",
+       "refer to rows that are missing"},
   };
   for (const Crafted& one : all) {
     clean();
@@ -284,7 +285,7 @@ TEST_F(Hostile, ValuesThatNoProgramOfOursWrites) {
   }
 }
 
-TEST_F(Hostile, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
+TEST_F(DamagedDatabase, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
     db.exec("UPDATE attempts SET shape = '=1+1', response = ',\"\r\n\t' WHERE id = 1");
@@ -295,11 +296,11 @@ TEST_F(Hostile, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
   Store store = Store::open(path_, Store::Mode::read_only);
   EXPECT_TRUE(
       contains(error_of([&] { export_bids(store, folder_ / "out/bids2", ExportSettings{}); }),
-               "cannot stand in a TSV file"));
+               "cannot be written to a TSV file"));
   EXPECT_FALSE(fs::exists(folder_ / "out/bids2"));
 }
 
-TEST_F(Hostile, AHiddenRowIsMissed) {
+TEST_F(DamagedDatabase, ARowHiddenByADamagedIndexIsDetected) {
   // An index that was made without one row hides it from every export that goes by the index.
   SQLite::Database db(path_, SQLite::OPEN_READWRITE);
   db.exec(

@@ -71,7 +71,7 @@ bool on_a_small_disk(const std::string& folder, const std::function<void()>& bod
   return true;
 }
 
-TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionGoesOnAfterwards) {
+TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionResumesAfterwards) {
   const TemporaryFolder folder;
   const bool possible = on_a_small_disk(folder.path(), [&] {
     const std::string path = folder / "study.db";
@@ -193,8 +193,7 @@ TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
   const Unprivileged unprivileged(folder.path());
   open_to_write(folder / "study.db");
   fs::permissions(folder / "study.db", fs::perms::owner_read);
-  EXPECT_TRUE(
-      contains(error_of([&] { open_to_write(folder / "study.db"); }), "may not be written"));
+  EXPECT_TRUE(contains(error_of([&] { open_to_write(folder / "study.db"); }), "cannot be written"));
   EXPECT_EQ(Store::open(folder / "study.db", Store::Mode::read_only).counts().runs, 0);
 }
 

@@ -85,7 +85,7 @@ void expect_nothing_lost(const std::string& path, const Said& said) {
   EXPECT_GE(completed, said.acknowledged) << "an acknowledged trial is lost";
 }
 
-TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndGoesOn) {
+TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndResumes) {
   constexpr int kTrials = 30;
   constexpr int kKills = 120;
   std::mt19937 random(2000);

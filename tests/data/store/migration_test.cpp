@@ -98,7 +98,7 @@ TEST_F(Migrating, AMissingStepLeavesTheDatabaseAsItWas) {
   expect_untouched();
 }
 
-TEST_F(Migrating, RowsLeftAloneAreSeenBeforeTheCommit) {
+TEST_F(Migrating, BrokenReferencesAreDetectedBeforeTheCommit) {
   constexpr Migration kCruel[] = {{kNow, "DELETE FROM sessions"}};
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
@@ -108,7 +108,7 @@ TEST_F(Migrating, RowsLeftAloneAreSeenBeforeTheCommit) {
   expect_untouched();
 }
 
-TEST_F(Migrating, TheRealStepsLeadToThisVersion) {
+TEST_F(Migrating, TheMigrationsLeadToThisVersion) {
   int version = 1;
   for (const auto& step : migrations()) EXPECT_EQ(step.from, version++);
   EXPECT_EQ(version, kSchemaVersion);

@@ -160,7 +160,7 @@ TEST_F(StoreOpen, ADamagedPageIsFoundWhenTheFileIsOpened) {
   EXPECT_LE(unseen.size(), 1u) << "only the samples are not looked at";
 }
 
-TEST_F(StoreOpen, PathsThatAreNoFiles) {
+TEST_F(StoreOpen, PathsThatAreNotFiles) {
   EXPECT_TRUE(contains(error_of([&] { write(folder_.path()); }), "is not a file"));
   EXPECT_TRUE(contains(error_of([&] { read(path_); }), "no such file"));
   EXPECT_TRUE(contains(error_of([&] { write(folder_ / "none/study.db"); }), "folder exists"));
@@ -215,7 +215,7 @@ TEST_F(StoreOpen, AReaderDoesNotWrite) {
   EXPECT_THROW(reader.add_note({}, 1, "x"), StoreRefused);
 }
 
-TEST_F(StoreOpen, ALogWithoutItsDatabaseIsNotPlayedIntoANewOne) {
+TEST_F(StoreOpen, AWalWithoutItsDatabaseIsNotRecoveredIntoANewOne) {
   make_study();
   {
     Store store = write(path_);
@@ -224,15 +224,15 @@ TEST_F(StoreOpen, ALogWithoutItsDatabaseIsNotPlayedIntoANewOne) {
   }
   fs::remove(path_);
   fs::rename(folder_ / "log", path_ + "-wal");
-  EXPECT_TRUE(contains(error_of([&] { write(path_); }), "is gone but its log"));
+  EXPECT_TRUE(contains(error_of([&] { write(path_); }), "is missing, but its log"));
   EXPECT_FALSE(fs::exists(path_));
 }
 
-TEST_F(StoreOpen, ACreationThatDiedHalfWayIsBegunAgain) {
-  const std::string draft = folder_ / ".study.db.palpate-abcdef";
-  fs::create_directory(draft);
-  write_file(draft + "/new.db", "half a database");
-  write_file(draft + "/new.db-wal", "half a log");
+TEST_F(StoreOpen, AnInterruptedCreationIsRepeated) {
+  const std::string temporary = folder_ / ".study.db.palpate-abcdef";
+  fs::create_directory(temporary);
+  write_file(temporary + "/new.db", "half a database");
+  write_file(temporary + "/new.db-wal", "half a log");
   for (const char* text : {"", "palpate 12345\n"}) {
     write_file(path_ + ".palpate-lock", text);
     fs::permissions(path_ + ".palpate-lock", fs::perms::owner_read | fs::perms::owner_write);
@@ -241,7 +241,7 @@ TEST_F(StoreOpen, ACreationThatDiedHalfWayIsBegunAgain) {
   }
 }
 
-TEST_F(StoreOpen, WhatOnlySoundsLikeItsDraftOrLockIsLeftAlone) {
+TEST_F(StoreOpen, FilesWhoseNamesOnlyResembleItsTemporaryOrLockFilesStay) {
   const std::vector<std::string> others = {path_ + ".lock", path_ + ".palpate-new",
                                            path_ + ".palpate-new-wal"};
   for (const std::string& other : others) write_file(other, "mine");
@@ -258,7 +258,7 @@ TEST_F(StoreOpen, WhatOnlySoundsLikeItsDraftOrLockIsLeftAlone) {
   EXPECT_EQ(contents_of(path_ + ".lock"), "mine");
 }
 
-TEST_F(StoreOpen, OfManyThatStartAtOnceOneHoldsIt) {
+TEST_F(StoreOpen, OfManyConcurrentWritersOneHoldsTheLock) {
   for (int round = 0; round < 5; ++round) {
     // Once with nothing, then with the lock of one that was killed.
     std::vector<std::unique_ptr<ChildProcess>> all;
@@ -275,7 +275,7 @@ TEST_F(StoreOpen, OfManyThatStartAtOnceOneHoldsIt) {
   EXPECT_EQ(files(), 1);
 }
 
-TEST_F(StoreOpen, AnIndexThatIsCutShortWhileInUseCostsNothing) {
+TEST_F(StoreOpen, ATruncatedWalIndexLosesNothing) {
   constexpr int kTrials = 12;
   {
     Store store = write(path_);
@@ -299,7 +299,7 @@ TEST_F(StoreOpen, AnIndexThatIsCutShortWhileInUseCostsNothing) {
   EXPECT_EQ(files(), 1);
 }
 
-TEST_F(StoreOpen, NoDatabaseGetsTheNameOfWhatLiesBesideAnother) {
+TEST_F(StoreOpen, NoDatabaseIsNamedLikeASqliteFileOfAnother) {
   make_study(1);
   for (const char* end : {"-wal", "-shm", "-journal", ".palpate-lock"}) {
     EXPECT_TRUE(contains(error_of([&] { write(path_ + end); }), path_ + end));

@@ -230,7 +230,7 @@ TEST(StoreRoundTrip, NotesCarryTheirTime) {
   EXPECT_EQ(store.notes()[0].participant.code, "P1");
 }
 
-TEST(StoreRoundTrip, WhatNoDatabaseKeepsIsRefusedFieldByField) {
+TEST(StoreRoundTrip, InvalidValuesAreRefusedFieldByField) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const Participant person = store.enrol(a_protocol(), "P1");

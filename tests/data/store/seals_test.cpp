@@ -85,7 +85,7 @@ class Seals : public ::testing::Test {
   std::string original_;
 };
 
-TEST_F(Seals, WhatWasNotChangedIsTaken) {
+TEST_F(Seals, AnUnchangedDatabasePasses) {
   for (const std::string& message : refusals()) EXPECT_EQ(message, "");
   Store store = open();
   const Participant person = store.participants(a_protocol().sha256).at(0);
@@ -137,10 +137,10 @@ TEST_F(Seals, EveryColumnIsSealed) {
   EXPECT_GT(columns, 60);
 }
 
-TEST_F(Seals, RowsThatGoComeOrChangePlacesShow) {
-  expect_refused("DELETE FROM attempts WHERE trial = 1 AND run_id = 1", "that are gone");
-  expect_refused("DELETE FROM notes", "that are gone");
-  expect_refused("DELETE FROM attempts WHERE run_id = 3 AND trial = 2", "that are gone");
+TEST_F(Seals, RemovedAddedAndSwappedRowsAreDetected) {
+  expect_refused("DELETE FROM attempts WHERE trial = 1 AND run_id = 1", "are missing");
+  expect_refused("DELETE FROM notes", "are missing");
+  expect_refused("DELETE FROM attempts WHERE run_id = 3 AND trial = 2", "are missing");
   expect_refused("INSERT INTO notes (run_id, at_ns, text) VALUES (1, 8, 'late')",
                  "note 2: has no seal");
   expect_refused("UPDATE attempts SET link = NULL, seal = NULL WHERE run_id = 2",
@@ -149,10 +149,10 @@ TEST_F(Seals, RowsThatGoComeOrChangePlacesShow) {
       "UPDATE attempts SET trial = 9 WHERE run_id = 3 AND trial = 1; UPDATE attempts SET trial = 1 "
       "WHERE run_id = 3 AND trial = 2; UPDATE attempts SET trial = 2 WHERE trial = 9",
       "was changed");
-  expect_refused("UPDATE attempts SET link = 2 WHERE run_id = 3", "another row was sealed");
+  expect_refused("UPDATE attempts SET link = 2 WHERE run_id = 3", "position of another sealed row");
 }
 
-TEST_F(Seals, SamplesAreHeldAgainstTheirTrial) {
+TEST_F(Seals, SamplesAreVerifiedAgainstTheirTrial) {
   for (const char* sql : {"UPDATE samples SET data = x'00'", "UPDATE samples SET count = 1",
                           "DELETE FROM samples", "UPDATE samples SET attempt_id = 1"}) {
     edit(sql);
@@ -164,7 +164,7 @@ TEST_F(Seals, SamplesAreHeldAgainstTheirTrial) {
   }
 }
 
-TEST_F(Seals, ASessionThatWasChangedIsNotGoneOnWith) {
+TEST_F(Seals, AChangedSessionIsNotResumed) {
   edit("UPDATE attempts SET response = 'cube' WHERE run_id = 2");
   Store store = open();
   const Participant person = store.participants(a_protocol().sha256).at(0);
@@ -173,7 +173,7 @@ TEST_F(Seals, ASessionThatWasChangedIsNotGoneOnWith) {
   EXPECT_EQ(store.progress(other, 1).completed.size(), 2u) << "of others nothing is asked";
 }
 
-TEST_F(Seals, WhatADeadProgramLeftIsSealedByTheNext) {
+TEST_F(Seals, RowsOfACrashedProcessAreSealedByTheNextWriter) {
   {
     Store store = open();
     const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
@@ -218,7 +218,7 @@ TEST_F(Seals, AMergedDatabaseHasTheSealsOfItsStations) {
   expect_refused("UPDATE attempts SET response_time = 0.5 WHERE trial = 3", "trial 3, attempt 1");
 }
 
-TEST(SealsOfOldVersions, AreMadeWhenTheyAreBroughtUp) {
+TEST(SealsOfOldVersions, AreMadeByTheMigration) {
   const TemporaryFolder folder;
   const std::string path = folder / "old.db";
   make_version_1(path);

@@ -1,0 +1,129 @@
+"""The rules of the formats, and that every check of them can fail."""
+
+import gzip
+import json
+import shutil
+
+import bids_checks
+import psychds_checks
+from study import Study
+
+
+class Rules(Study):
+    def test_a_codebook_goes_with_the_csv(self):
+        self.export("csv", self.dir / "with-book.csv", "--codebook", self.dir / "book.csv", "--force")
+        book = bids_checks.read_csv(self.dir / "book.csv")
+        header = (self.dir / "with-book.csv").read_text().split("\n")[0].strip().split(",")
+        self.assertEqual([row["column"] for row in book if row["table"] == "trials" and not row["value"]], header)
+        bits = {int(row["value"]): row["meaning"] for row in book
+                if row["table"] == "trials" and row["column"] == "faults" and row["value"]}
+        self.assertEqual(sorted(bits), [1 << i for i in range(len(bits))])
+        seen = 0
+        for row in bids_checks.read_csv(self.dir / "with-book.csv"):
+            seen |= int(row["faults"])
+        self.assertTrue(seen & 16)
+        self.assertIn("slips off an edge", bits[16])
+        self.assertIn("--codebook is for csv",
+                      self.export("bids", self.dir / "no", "--codebook", self.dir / "no.csv", status=2).stderr)
+
+    def test_protocols_come_with_the_data(self):
+        text = (self.dir / "sampled.json").read_bytes()
+        self.assertEqual((self.dir / "sampled-bids" / "sourcedata" / "withsamples_protocol.json").read_bytes(), text)
+        self.assertEqual((self.dir / "sampled-psychds" / "materials" / "withsamples_protocol.json").read_bytes(), text)
+
+    def test_simulated_data_say_so(self):
+        for name in ("plain", "sampled"):
+            for form, key, readme in (("bids", "Name", "README"), ("psychds", "name", "README.md")):
+                folder = self.dir / f"{name}-{form}"
+                self.assertIn("SIMULATED", json.loads((folder / "dataset_description.json").read_text())[key])
+                self.assertIn("SIMULATED", (folder / readme).read_text())
+            _, rows = bids_checks.read_tsv(self.dir / f"{name}-bids" / "participants.tsv")
+            self.assertTrue(all(row[1] == "1" for row in rows))
+            self.assertTrue(all(beh["simulated"] == "1" for beh in bids_checks.tables(self.dir / f"{name}-bids").values()))
+
+    def test_only_the_owner_may_read_an_export(self):
+        for path in (self.dir / "sampled-bids").rglob("*"):
+            self.assertEqual(path.stat().st_mode & 0o077 if path.is_file() else 0, 0, path)
+        self.assertEqual((self.dir / "sampled-bids").stat().st_mode & 0o077, 0)
+
+    def copy(self, name):
+        target = self.dir / "broken"
+        shutil.rmtree(target, ignore_errors=True)
+        shutil.copytree(self.dir / name, target)
+        return target
+
+    def change(self, path, old, new, count=1):
+        text = path.read_bytes()
+        self.assertIn(old.encode(), text, path)
+        path.write_bytes(text.replace(old.encode(), new.encode(), count))
+
+    def test_bids_keeps_the_rules_that_the_validator_does_not_look_at(self):
+        for name in ("plain", "sampled"):
+            self.assertEqual(bids_checks.bids_faults(self.dir / f"{name}-bids"), [])
+
+    def test_every_bids_check_can_fail(self):
+        beh = "sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_beh"
+        for old, new, fault in (
+            ("\nsub-S001", "\nsub-S009", "participants.tsv lists"),
+        ):
+            folder = self.copy("plain-bids")
+            self.change(folder / "participants.tsv", old, new)
+            self.assertIn(fault, " ".join(bids_checks.bids_faults(folder)))
+        folder = self.copy("plain-bids")
+        header, rows = bids_checks.read_tsv(folder / f"{beh}.tsv")
+        def write(changed):
+            (folder / f"{beh}.tsv").write_text("".join("\t".join(row) + "\n" for row in [header] + changed))
+            return " ".join(bids_checks.bids_faults(folder))
+        self.assertIn("not sorted", write([rows[0], *rows[:0:-1]]))
+        self.assertIn("onset is not 0", write(rows[1:]))
+        self.assertIn("no number: soon", write([["0", "soon", *rows[0][2:]]]))
+        self.assertIn("no number: nan", write([["0", "nan", *rows[0][2:]]]))
+        self.assertIn("duration is missing", write([["0", "n/a", *rows[0][2:]]]))
+        self.assertIn("fields for", write([rows[0][:-1]]))
+        self.assertIn("is empty", write([["0", "", *rows[0][2:]]]))
+        self.assertIn("no level", write([[x.replace("point", "pin").replace("ray", "pin") for x in rows[0]]]))
+        folder = self.copy("plain-bids")
+        self.change(folder / f"{beh}.json", '"max_force"', '"mux_force"')
+        self.assertIn("max_force is not described", " ".join(bids_checks.bids_faults(folder)))
+        (folder / f"{beh}.json").unlink()
+        self.assertIn("no sidecar", " ".join(bids_checks.bids_faults(folder)))
+        folder = self.copy("sampled-bids")
+        physio = folder / "sub-S001/ses-1/beh/sub-S001_ses-1_task-withsamples_run-1_recording-haptic_physio.tsv.gz"
+        lines = gzip.open(physio, "rt").read().splitlines(keepends=True)
+        twice = lines[-1].split("\t")
+        twice[1] = "999999"
+        for changed, fault in ((lines[:5] + lines[6:], "does not stand"), (lines[:5] + [lines[4]] + lines[6:], "order"),
+                               (["\t".join(twice)] * 2 + lines, "not stand at its onset"),
+                               (lines + ["\t".join(twice)], "more samples"),
+                               (["x\t" + lines[0]] + lines[1:], "fields"),
+                               ([lines[0].replace("\t0", "\tnull")] + lines[1:], "no number")):
+            with gzip.open(physio, "wt") as file:
+                file.writelines(changed)
+            self.assertIn(fault, " ".join(bids_checks.bids_faults(folder)))
+        self.change(physio.with_name(physio.name[: -len(".tsv.gz")] + ".json"), '"SamplingFrequency"', '"Rate"')
+        self.assertIn("no SamplingFrequency", " ".join(bids_checks.bids_faults(folder)))
+
+    def test_psychds_keeps_its_rules(self):
+        for name in ("plain", "sampled"):
+            self.assertEqual(psychds_checks.psychds_faults(self.dir / f"{name}-psychds"), [])
+
+    def test_every_psychds_check_can_fail(self):
+        table = "data/subject-S001/study-quick_subject-S001_data.csv"
+        for path, old, new, fault in (
+            ("dataset_description.json", '"https://schema.org/"', '"schema"', "@context"),
+            ("dataset_description.json", '"Dataset"', '"Thing"', "@type"),
+            ("dataset_description.json", '"description"', '"about"', "no description"),
+            ("dataset_description.json", '"name": "block"', '"name": "blocks"', "column block is not in"),
+            ("dataset_description.json", '"name": "block"', '"name": "trial"', "twice"),
+            ("dataset_description.json", "{", "\ufeff{", "BOM"),
+            (table, "participant_id", "\ufeffparticipant_id", "BOM"),
+            (table, ",block", ",trial", "a header that is empty or twice"),
+            (table, ",max_force", "", "other lengths"),
+            (table, "S001,", "S002,", "another participant"),
+        ):
+            folder = self.copy("plain-psychds")
+            self.change(folder / path, old, new)
+            self.assertIn(fault, " ".join(psychds_checks.psychds_faults(folder)))
+        folder = self.copy("plain-psychds")
+        (folder / table).rename(folder / "data" / "quick.csv")
+        self.assertIn("no Psych-DS name", " ".join(psychds_checks.psychds_faults(folder)))
