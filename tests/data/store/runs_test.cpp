@@ -155,7 +155,7 @@ TEST_F(StoreSession, ATrialHasOneRecordAndOneOpenAttempt) {
   EXPECT_THROW(store.finish_attempt(run, a_record(1)), StoreRefused);
   store.begin_attempt(run, a_plan(2), 1);
   EXPECT_TRUE(
-      contains(error_of([&] { store.begin_attempt(run, a_plan(3), 1); }), "trial 2 is open"));
+      contains(error_of([&] { store.begin_attempt(run, a_plan(3), 1); }), "trial 2 has not ended"));
   store.cut_off_attempt(run, "device fault");
   EXPECT_EQ(store.begin_attempt(run, a_plan(2), 1), 2);
   EXPECT_THROW(store.begin_attempt(run, a_plan(3, 2), 1), StoreRefused)
