@@ -16,10 +16,10 @@
 #include <vector>
 
 #include "rendering/accuracy/methods.h"
-#include "rendering/accuracy/ways_out.h"
+#include "rendering/accuracy/local_depths.h"
 #include "rendering/renderer.h"
 #include "rendering/verification/reference.h"
-#include "rendering/verification/stroking_hand.h"
+#include "rendering/verification/surface_stroke.h"
 #include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
 
@@ -42,10 +42,10 @@ Path hand_over(const std::shared_ptr<const stimuli::ConvexMesh>& mesh, bool segm
       segment ? rendering::ray_renderer() : rendering::point_renderer();
   const rendering::Scene scene({{mesh, Pose{}, stimuli::Material{}, 0, nullptr}}, segment);
   rendering::RenderState state = scene.initial_state();
-  rendering::StrokeSettings settings;
+  rendering::SurfaceStrokeSettings settings;
   settings.side = segment;
   settings.lifted = 0.27;
-  rendering::StrokingHand hand(settings);
+  rendering::SurfaceStroke hand(settings);
   Path path(kWarm + kTicks);
   double depth = 0;
   for (rendering::LineProbe& probe : path) {
@@ -87,7 +87,7 @@ void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
   double error = std::abs(depth - std::max(0.0, exact.depth));
   if (error > kRounding * mesh.size() && follows_side && answer.touching) {
     const double to_least = error;
-    for (const rendering::WayOut& way : rendering::ways_out(mesh, probe, answer.normal, 1e-3))
+    for (const rendering::LocalDepth& way : rendering::local_depths(mesh, probe, answer.normal, 1e-3))
       error = std::min(error, std::abs(depth - way.depth));
     if (error < to_least) ++row.other_side;
   }

@@ -19,7 +19,7 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
       std::to_string(s.contact_ticks) +
       " ticks of contact each: a hand at 0.1 m/s, 1 to 2 mm deep, wandering over the shape "
       "with a stylus of " +
-      significant(1e3 * s.length) + " mm (rendering/accuracy/hand_path.h; seeds 1 to " +
+      significant(1e3 * s.length) + " mm (rendering/accuracy/analytic_stroke.h; seeds 1 to " +
       std::to_string(s.paths) +
       "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
       "mm. Forces at 800 N/m.");

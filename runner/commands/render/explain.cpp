@@ -11,7 +11,7 @@ namespace palpate::runner {
 namespace {
 
 /// ns a call: the least of several runs, each long enough for the clock.
-double cost_of(const rendering::Rehearsal& rehearsal) {
+double cost_of(const rendering::StageTiming& rehearsal) {
   constexpr int kRuns = 15;
   constexpr std::chrono::milliseconds kLong{1};
   volatile double sink = 0;
@@ -73,7 +73,7 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   }
   explanation.objects = objects.size();
   std::map<std::string, double> costs;
-  for (const rendering::Rehearsal& rehearsal : rendering::rehearse(scene, renderer)) {
+  for (const rendering::StageTiming& rehearsal : rendering::stage_timings(scene, renderer)) {
     if (rehearsal.calls > 0) costs[rehearsal.name] = cost_of(rehearsal);
   }
   const auto cost = [&](const std::string& name) -> std::optional<double> {

@@ -136,7 +136,7 @@ TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
       if (stage.time != StageTime::once) runs[stage.name] = stage.runs;
     }
     std::size_t rehearsed = 0;
-    for (const Rehearsal& rehearsal : rehearse(scene, renderer)) {
+    for (const StageTiming& rehearsal : stage_timings(scene, renderer)) {
       ++rehearsed;
       EXPECT_TRUE(runs[rehearsal.name]) << rehearsal.name;
       EXPECT_GT(rehearsal.calls, 0u) << rehearsal.name;
@@ -154,7 +154,7 @@ TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
 
 TEST_P(Explain, AnEmptySceneHasNothingToRehearse) {
   const Scene scene({}, GetParam()->side_contact());
-  EXPECT_TRUE(rehearse(scene, *GetParam()).empty());
+  EXPECT_TRUE(stage_timings(scene, *GetParam()).empty());
   EXPECT_FALSE(explain(scene, *GetParam()).empty());
 }
 

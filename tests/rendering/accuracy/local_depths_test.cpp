@@ -1,7 +1,7 @@
 // The exact ways out, against dense sampling of directions, small changes of direction, the
 // distances of stimuli/signed_distance and the brute-force reference.
 
-#include "rendering/accuracy/ways_out.h"
+#include "rendering/accuracy/local_depths.h"
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ std::vector<LineProbe> inside_poses(const stimuli::ObjectSpec& spec, int count,
     const double length = poses.size() % 4 == 0 ? 0 : uniform(random, 0.01, 0.15);
     const LineProbe probe = probe_at(uniform(random, 0, 0.045) * random_direction(random),
                                      random_direction(random), length, random.unit());
-    if (!ways_out(spec, probe).empty()) poses.push_back(probe);
+    if (!local_depths(spec, probe).empty()) poses.push_back(probe);
   }
   return poses;
 }
@@ -62,7 +62,7 @@ TEST(WaysOut, NoDirectionIsShorterThanTheLeast) {
     for (const LineProbe& probe : inside_poses(spec, 200, 1)) {
       double sampled = 1;
       for (const Vec3& n : sample) sampled = std::min(sampled, depth_along(spec, probe, n));
-      EXPECT_LE(ways_out(spec, probe).front().depth, sampled + 1e-15) << static_cast<int>(shape);
+      EXPECT_LE(local_depths(spec, probe).front().depth, sampled + 1e-15) << static_cast<int>(shape);
     }
   }
 }
@@ -72,7 +72,7 @@ TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 3)) {
-      for (const WayOut& way : ways_out(spec, probe)) {
+      for (const LocalDepth& way : local_depths(spec, probe)) {
         EXPECT_NEAR(glm::length(way.normal), 1, 1e-14);
         EXPECT_NEAR(depth_along(spec, probe, way.normal), way.depth, 1e-14);
         for (const double step : {1e-3, 1e-5}) {
@@ -101,8 +101,8 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
     spec.segments = 720;
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
     int all = 0, made_up = 0, missing = 0;
-    const auto alone = [](const WayOut& way, const std::vector<WayOut>& others) {
-      for (const WayOut& other : others) {
+    const auto alone = [](const LocalDepth& way, const std::vector<LocalDepth>& others) {
+      for (const LocalDepth& other : others) {
         if (glm::dot(way.normal, other.normal) > std::cos(0.05) &&
             std::abs(way.depth - other.depth) < 1e-4) {
           return 0;
@@ -112,11 +112,11 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
     };
     for (const LineProbe& probe : inside_poses(spec, 300, 5)) {
       if (reference_depth(mesh, probe).depth < 1e-3) continue;
-      const auto analytic = ways_out(spec, probe);
-      const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
-      for (const WayOut& way : analytic) made_up += alone(way, polyhedral);
+      const auto analytic = local_depths(spec, probe);
+      const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
+      for (const LocalDepth& way : analytic) made_up += alone(way, polyhedral);
       // Near the middle a fine polyhedron has a way out through every other facet.
-      for (const WayOut& way : polyhedral) missing += way.depth < 5e-3 ? alone(way, analytic) : 0;
+      for (const LocalDepth& way : polyhedral) missing += way.depth < 5e-3 ? alone(way, analytic) : 0;
       all += static_cast<int>(analytic.size());
     }
     EXPECT_LE(made_up, all / 50) << static_cast<int>(shape) << " of " << all;
@@ -131,7 +131,7 @@ TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
     for (int i = 0; i < 500; ++i) {
       const Vec3 p = uniform(random, 0, 0.06) * random_direction(random);
       const stimuli::SurfaceDistance distance = stimuli::signed_distance(spec, p);
-      const auto ways = ways_out(spec, {p, p});
+      const auto ways = local_depths(spec, {p, p});
       ASSERT_EQ(ways.empty(), distance.distance > 0);
       if (ways.empty()) continue;
       EXPECT_NEAR(ways.front().depth, -distance.distance, 1e-15);
@@ -152,13 +152,13 @@ TEST(WaysOut, SegmentsThatStayOutHaveNone) {
     for (int i = 0; i < 2000; ++i) {
       const LineProbe probe = probe_at(uniform(random, 0, 0.09) * random_direction(random),
                                        random_direction(random), 0.1, random.unit());
-      const bool inside = !ways_out(spec, probe).empty();
+      const bool inside = !local_depths(spec, probe).empty();
       const double depth = reference_depth(mesh, probe).depth;
       if (depth > 0) {
         EXPECT_TRUE(inside);
       }
       // Between mesh and shape there are at most 0.02 mm.
-      if (inside && ways_out(spec, probe).front().depth > 5e-5) {
+      if (inside && local_depths(spec, probe).front().depth > 5e-5) {
         EXPECT_GT(depth, 0);
       }
       out += inside ? 0 : 1;
@@ -177,13 +177,13 @@ TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
     for (const LineProbe& probe : inside_poses(spec, 300, 9)) {
       const ReferenceDepth reference = reference_depth(mesh, probe);
       if (reference.depth <= 0) continue;
-      const auto all = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+      const auto all = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
       ASSERT_FALSE(all.empty());
       EXPECT_NEAR(all.front().depth, reference.depth, 1e-16);
-      const auto near = ways_out(mesh, probe, reference.normal, 0.1);
+      const auto near = local_depths(mesh, probe, reference.normal, 0.1);
       ASSERT_FALSE(near.empty());
       EXPECT_NEAR(glm::dot(near.front().normal, reference.normal), 1, 1e-12);
-      for (const WayOut& way : all) {
+      for (const LocalDepth& way : all) {
         // Moved out it touches: it neither penetrates nor floats.
         const LineProbe ideal = testing::moved(probe, way.depth * way.normal);
         EXPECT_LE(reference_depth(mesh, ideal).depth, 1e-14);
@@ -199,8 +199,8 @@ TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
   const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::cube);
   const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
-    const auto analytic = ways_out(spec, probe);
-    const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+    const auto analytic = local_depths(spec, probe);
+    const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
     ASSERT_EQ(analytic.size(), polyhedral.size());
     for (std::size_t i = 0; i < analytic.size(); ++i) {
       EXPECT_NEAR(analytic[i].depth, polyhedral[i].depth, 1e-16);
@@ -211,8 +211,8 @@ TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
 }
 
 TEST(WaysOut, RefusesWhatIsNoPrimitive) {
-  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::mesh), LineProbe()), std::invalid_argument);
-  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::compound), LineProbe()),
+  EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::mesh), LineProbe()), std::invalid_argument);
+  EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::compound), LineProbe()),
                std::invalid_argument);
 }
 

@@ -1,4 +1,4 @@
-// Stages of the tick in isolation, over recorded ticks: what explain() can put a cost to.
+// Stages of the tick in isolation, over recorded ticks: those that explain() can state a cost of.
 
 #include <cmath>
 #include <memory>
@@ -7,7 +7,7 @@
 #include "rendering/segment_probe.h"
 #include "rendering/tick.h"
 #include "rendering/verification/explain.h"
-#include "rendering/verification/stroking_hand.h"
+#include "rendering/verification/surface_stroke.h"
 
 namespace palpate::rendering {
 namespace {
@@ -17,61 +17,61 @@ using Kind = ContactFeature::Kind;
 constexpr int kApproach = 2000;  // ticks until the hand has arrived
 constexpr int kTicks = 1000;     // recorded
 
-/// One tick of one part, with what its stages need.
-struct Moment {
+/// One tick of one part, with the input of its stages.
+struct RecordedTick {
   LineProbe probe, last;  ///< world
   LineProbe local;        ///< mesh frame
-  PartState before;       ///< the tick
+  PartState before;       ///< state before the tick
   WalkResult hit;
   LoadedContact loaded;  ///< before materials
 };
 
-/// What happened to the scene's first part.
+/// Ticks over the scene's first part.
 struct Recording {
   std::vector<LineProbe> poses;
   RenderState start;           ///< before the first pose
   std::vector<bool> touching;  ///< at each pose, whatever part
-  std::vector<Moment> contact, free, entry;
+  std::vector<RecordedTick> contact, free, entry;
 };
 
 template <class Probe>
-void note(const Scene& scene, const RenderState& state, const PartState& before,
+void record_tick(const Scene& scene, const RenderState& state, const PartState& before,
           const LineProbe& last, const LineProbe& probe, Recording& out) {
   const ScenePart& part = scene.parts()[0];
   const PartState& after = state.parts[0];
-  Moment moment;
-  moment.probe = probe;
-  moment.last = last;
-  moment.local = Probe::to_local(part, probe);
-  moment.before = before;
+  RecordedTick recorded;
+  recorded.probe = probe;
+  recorded.last = last;
+  recorded.local = Probe::to_local(part, probe);
+  recorded.before = before;
   if (before.feature.kind == Kind::none) {
-    (after.feature.kind == Kind::none ? out.free : out.entry).push_back(moment);
+    (after.feature.kind == Kind::none ? out.free : out.entry).push_back(recorded);
     return;
   }
-  const Vec3 d = moment.local.tail - moment.local.tip;
-  moment.hit = Probe::walk(*part.mesh, before.feature, moment.local.tip, d);
-  if (moment.hit.feature.kind == Kind::none) return;
-  LoadedContact& c = moment.loaded;
-  Probe::classify(*part.mesh, moment.hit, moment.local.tip, d, glm::length(d), c);
-  c.contact.normal = part.world_vector(moment.hit.normal);
-  c.contact.depth = moment.hit.depth;
+  const Vec3 d = recorded.local.tail - recorded.local.tip;
+  recorded.hit = Probe::walk(*part.mesh, before.feature, recorded.local.tip, d);
+  if (recorded.hit.feature.kind == Kind::none) return;
+  LoadedContact& c = recorded.loaded;
+  Probe::classify(*part.mesh, recorded.hit, recorded.local.tip, d, glm::length(d), c);
+  c.contact.normal = part.world_vector(recorded.hit.normal);
+  c.contact.depth = recorded.hit.depth;
   c.stiffness = part.material.stiffness;
   c.object = part.object;
   load(std::span<LoadedContact, 1>(&c, 1));
-  out.contact.push_back(moment);
+  out.contact.push_back(recorded);
 }
 
-/// \param lifted  share of the time off the object
+/// \param lifted  fraction of the time off the object
 template <class Probe>
 Recording record(const Scene& scene, const Renderer& renderer, double lifted) {
   const ScenePart& part = scene.parts()[0];
-  StrokeSettings settings;
+  SurfaceStrokeSettings settings;
   settings.centre = part.sphere_centre;
   settings.radius = part.sphere_radius;
   settings.side = Probe::kSegment;
   settings.lifted = lifted;
   settings.lift_period = 200;
-  StrokingHand hand(settings);
+  SurfaceStroke hand(settings);
   Recording out;
   RenderState state = scene.initial_state();
   double depth = 0;
@@ -85,54 +85,54 @@ Recording record(const Scene& scene, const Renderer& renderer, double lifted) {
     if (i < kApproach) continue;
     out.poses.push_back(probe);
     out.touching.push_back(rendering.contacts > 0);
-    note<Probe>(scene, state, before, last, probe, out);
+    record_tick<Probe>(scene, state, before, last, probe, out);
   }
   return out;
 }
 
 double sum(const Vec3& v) { return v.x + v.y + v.z; }
 
-/// The stages of one renderer over a recording.
+/// The stages of one renderer over recordings: sliding, lifting off, hovering.
 template <class Probe>
-class Stages {
+class StageTimings {
  public:
-  Stages(const Scene& scene, const Renderer& renderer)
+  StageTimings(const Scene& scene, const Renderer& renderer)
       : scene_(scene),
         renderer_(renderer),
         touching_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 0))),
         lifting_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 0.5))),
         hovering_(std::make_shared<const Recording>(record<Probe>(scene, renderer, 1))) {}
 
-  std::vector<Rehearsal> all() {
+  std::vector<StageTiming> all() {
     add_whole(kTickInContact, touching_, true);
     add_whole(kTickInFreeSpace, hovering_, false);
-    add("pose check", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
+    add("pose check", touching_, &Recording::contact, [](const ScenePart&, const RecordedTick& m) {
       return tick::within_range(m.probe.tip) && tick::within_range(m.probe.tail) ? 1.0 : 0.0;
     });
-    if (scene_.features().several_parts) add_survey();
+    if (scene_.features().several_parts) add_broad_phase();
     add("frame of the part", touching_, &Recording::contact,
-        [](const ScenePart& part, const Moment& m) {
+        [](const ScenePart& part, const RecordedTick& m) {
           const LineProbe local = Probe::to_local(part, m.probe);
           return sum(local.tip) + sum(local.tail);
         });
-    add("separating plane", hovering_, &Recording::free, [](const ScenePart&, const Moment& m) {
+    add("separating plane", hovering_, &Recording::free, [](const ScenePart&, const RecordedTick& m) {
       return m.before.plane.separates(m.local.tip, m.local.tail) ? 1.0 : 0.0;
     });
-    add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const Moment& m) {
+    add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const RecordedTick& m) {
       PartState state = m.before;
       return tick::detect_contact<Probe>(part, state, &m.last, m.local).depth;
     });
     add("neighbourhood watch", touching_, &Recording::contact,
-        [](const ScenePart& part, const Moment& m) {
+        [](const ScenePart& part, const RecordedTick& m) {
           return Probe::walk(*part.mesh, m.before.feature, m.local.tip, m.local.tail - m.local.tip)
               .depth;
         });
     if constexpr (Probe::kSegment) add_sides();
-    add("spring", touching_, &Recording::contact, [](const ScenePart&, const Moment& m) {
+    add("spring", touching_, &Recording::contact, [](const ScenePart&, const RecordedTick& m) {
       return sum(m.loaded.stiffness * m.loaded.normal_displacement * m.loaded.contact.normal);
     });
     add_materials();
-    return std::move(made_);
+    return std::move(timings_);
   }
 
  private:
@@ -156,7 +156,7 @@ class Stages {
         total += renderer->tick(*scene, *state, recording->poses[i], 1e-3).force.x;
       return total;
     };
-    made_.push_back({name, count,
+    timings_.push_back({name, count,
                      [state, recording, run, begin] {
                        *state = recording->start;
                        run(0, begin);
@@ -165,19 +165,19 @@ class Stages {
   }
 
   template <class Run>
-  void add(const char* name, const Recorded& recording, std::vector<Moment> Recording::*which,
+  void add(const char* name, const Recorded& recording, std::vector<RecordedTick> Recording::*which,
            Run stage) {
-    made_.push_back({name, (*recording.*which).size(), [] {},
+    timings_.push_back({name, (*recording.*which).size(), [] {},
                      [part = &scene_.parts()[0], recording, which, stage] {
                        double total = 0;
-                       for (const Moment& moment : *recording.*which) total += stage(*part, moment);
+                       for (const RecordedTick& recorded : *recording.*which) total += stage(*part, recorded);
                        return total;
                      }});
   }
 
-  void add_survey() {
+  void add_broad_phase() {
     const auto state = std::make_shared<RenderState>();
-    made_.push_back({"several parts", touching_->poses.size(),
+    timings_.push_back({"several parts", touching_->poses.size(),
                      [state, recording = touching_] { *state = recording->start; },
                      [scene = &scene_, state, recording = touching_] {
                        double total = 0;
@@ -190,14 +190,14 @@ class Stages {
   }
 
   void add_sides() {
-    add("side contact", touching_, &Recording::contact, [](const ScenePart& part, const Moment& m) {
+    add("side contact", touching_, &Recording::contact, [](const ScenePart& part, const RecordedTick& m) {
       LoadedContact c;
       const Vec3 d = m.local.tail - m.local.tip;
       Probe::classify(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
       return c.probe_fraction;
     });
     add("torque and second device", touching_, &Recording::contact,
-        [](const ScenePart&, const Moment& m) {
+        [](const ScenePart&, const RecordedTick& m) {
           const Vec3 force = m.loaded.force * m.loaded.contact.normal;
           const Vec3 torque =
               glm::cross(m.loaded.probe_fraction * (m.probe.tail - m.probe.tip), force);
@@ -205,19 +205,19 @@ class Stages {
         });
   }
 
-  /// One material's share of the tick, by the tick's own code.
+  /// What one material adds, by the tick's own code.
   template <TickFeatures kFeatures>
   void add_material(const char* name) {
     const auto state = std::make_shared<RenderState>();
-    made_.push_back({name, touching_->contact.size(),
+    timings_.push_back({name, touching_->contact.size(),
                      [state, recording = touching_] { *state = recording->start; },
                      [scene = &scene_, state, recording = touching_] {
                        double total = 0;
-                       for (const Moment& moment : recording->contact) {
-                         LoadedContact contact = moment.loaded;
-                         state->last = moment.last;
+                       for (const RecordedTick& recorded : recording->contact) {
+                         LoadedContact contact = recorded.loaded;
+                         state->last = recorded.last;
                          tick::apply_material_forces<kFeatures>(
-                             *scene, *state, moment.probe, std::span<LoadedContact, 1>(&contact, 1),
+                             *scene, *state, recorded.probe, std::span<LoadedContact, 1>(&contact, 1),
                              1000);
                          total += contact.force + contact.tangential_offset.x;
                        }
@@ -234,15 +234,15 @@ class Stages {
   const Scene& scene_;
   const Renderer& renderer_;
   Recorded touching_, lifting_, hovering_;
-  std::vector<Rehearsal> made_;
+  std::vector<StageTiming> timings_;
 };
 
 }  // namespace
 
-std::vector<Rehearsal> rehearse(const Scene& scene, const Renderer& renderer) {
+std::vector<StageTiming> stage_timings(const Scene& scene, const Renderer& renderer) {
   if (scene.parts().empty()) return {};
-  if (renderer.side_contact()) return Stages<tick::SegmentProbe>(scene, renderer).all();
-  return Stages<tick::PointProbe>(scene, renderer).all();
+  if (renderer.side_contact()) return StageTimings<tick::SegmentProbe>(scene, renderer).all();
+  return StageTimings<tick::PointProbe>(scene, renderer).all();
 }
 
 }  // namespace palpate::rendering
