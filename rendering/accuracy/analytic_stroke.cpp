@@ -89,7 +89,8 @@ class StrokingHand {
 
 }  // namespace
 
-AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive, const AnalyticStrokeSettings& settings) {
+AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive,
+                               const AnalyticStrokeSettings& settings) {
   AnalyticStroke stroke;
   StrokingHand hand(primitive, settings);
   const double distance = hand.distance_for(hand.wanted_depth());

@@ -27,11 +27,13 @@ struct AnalyticStrokeSettings {
 };
 
 /// The stroked point wanders at the given speed: a direction from the middle, at 30 mm, with a
-/// heading that turns at random (0.02 rad a tick, standard deviation). The stylus is stroked at 0 to 40 mm from its tip (period 1.9 s), spins
-/// about the direction (2.9 s a turn) and tilts by 0.8 rad to and fro (3.1 s), with phases by the
-/// seed: so tip and side touch, at faces, edges and rims. It is pressed so that the exact least
-/// depth runs between `shallow` and `deep` (period 0.7 s), to 1 nm. It comes in along the first
-/// direction at the same speed from 3 mm outside. The same for every tessellation.
-AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive, const AnalyticStrokeSettings& settings);
+/// heading that turns at random (0.02 rad a tick, standard deviation). The stylus is stroked at 0
+/// to 40 mm from its tip (period 1.9 s), spins about the direction (2.9 s a turn) and tilts by 0.8
+/// rad to and fro (3.1 s), with phases by the seed: so tip and side touch, at faces, edges and
+/// rims. It is pressed so that the exact least depth runs between `shallow` and `deep` (period 0.7
+/// s), to 1 nm. It comes in along the first direction at the same speed from 3 mm outside. The same
+/// for every tessellation.
+AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive,
+                               const AnalyticStrokeSettings& settings);
 
 }  // namespace palpate::rendering

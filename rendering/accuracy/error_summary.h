@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "rendering/accuracy/methods.h"
 #include "rendering/accuracy/local_depths.h"
+#include "rendering/accuracy/methods.h"
 
 namespace palpate::rendering {
 
@@ -35,9 +35,10 @@ constexpr double kFlat = 0.0349065850398866;
 /// Collects estimates and summarises their errors.
 class ErrorTally {
  public:
-  /// \param truth  all local depths, least first; empty: not touching. The estimate is compared with
-  /// the one nearest to it in direction
-  void add(const LineProbe& probe, const std::vector<LocalDepth>& truth, const ContactEstimate& estimate);
+  /// \param truth  all local depths, least first; empty: not touching. The estimate is compared
+  /// with the one nearest to it in direction
+  void add(const LineProbe& probe, const std::vector<LocalDepth>& truth,
+           const ContactEstimate& estimate);
   ErrorSummary summary() const;
 
  private:

@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
-#include "rendering/accuracy/local_depths_round.h"
 #include "rendering/accuracy/local_depths_collector.h"
+#include "rendering/accuracy/local_depths_round.h"
 
 namespace palpate::rendering {
 namespace depths {
@@ -24,13 +24,15 @@ void depths_in_sphere(Collector& collector) {
   add_end(false);
   if (collector.is_point()) return;
   add_end(true);
-  const double fraction = -glm::dot(collector.probe.tip, collector.d) / (collector.length * collector.length);
+  const double fraction =
+      -glm::dot(collector.probe.tip, collector.d) / (collector.length * collector.length);
   const Vec3 foot = collector.probe.tip + fraction * collector.d;
   const double from = glm::length(foot);
   // A probe through the centre: any direction across it.
-  const Vec3 normal = from > 1e-12 * radius   ? foot / from
-                      : std::abs(collector.u.z) < 0.9 ? glm::normalize(glm::cross(collector.u, Vec3(0, 0, 1)))
-                                              : glm::normalize(glm::cross(collector.u, Vec3(1, 0, 0)));
+  const Vec3 normal = from > 1e-12 * radius ? foot / from
+                      : std::abs(collector.u.z) < 0.9
+                          ? glm::normalize(glm::cross(collector.u, Vec3(0, 0, 1)))
+                          : glm::normalize(glm::cross(collector.u, Vec3(1, 0, 0)));
   collector.add_side(normal, radius - from, fraction, kRightAngle);
 }
 
@@ -68,7 +70,7 @@ void depths_in_cube(Collector& collector) {
       const double along = glm::dot(glm::cross(w, collector.d), across) / c2;
       if (along < 0 || along > 1) continue;
       collector.add_side(n, depth, glm::dot(glm::cross(w, 2 * h * line), across) / c2,
-             std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
+                         std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
     }
   }
 }

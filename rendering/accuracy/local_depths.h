@@ -19,13 +19,13 @@ namespace palpate::rendering {
 
 /// A local minimum of phi.
 struct LocalDepth {
-  Vec3 normal;       ///< unit, out of the object
-  double depth = 0;  ///< m
+  Vec3 normal;                ///< unit, out of the object
+  double depth = 0;           ///< m
   double probe_fraction = 0;  ///< of the contact point on the probe: 0 tip to 1 tail
   /// rad; the least angle between the probe and a flat of the object (plane or straight line of its
-  /// surface) next to the contact. Where it is 0 the probe lies on the flat and the contact point is
-  /// undefined along it: points are compared only well above 0. Pi/2 where nothing is flat, and for
-  /// a point.
+  /// surface) next to the contact. Where it is 0 the probe lies on the flat and the contact point
+  /// is undefined along it: points are compared only well above 0. Pi/2 where nothing is flat, and
+  /// for a point.
   double flat_angle = 0;
 };
 
@@ -38,7 +38,7 @@ std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const
 /// The same of a polyhedron, by visiting all facets and edges; only those with a normal within
 /// `angle` (rad) of `towards`.
 std::vector<LocalDepth> local_depths(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
-                             const Vec3& towards, double angle);
+                                     const Vec3& towards, double angle);
 
 /// m; support function of the analytic shape: how far it reaches along n; |n| need not be 1.
 double support(const stimuli::ObjectSpec& primitive, const Vec3& n);

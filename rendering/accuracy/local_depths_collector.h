@@ -48,8 +48,8 @@ class Collector {
     add(normal, depth, tail ? 1 : 0, flat_angle);
   }
 
-  /// Adds the side of the probe, if the contact point is between its ends; normal at right angles to
-  /// it.
+  /// Adds the side of the probe, if the contact point is between its ends; normal at right angles
+  /// to it.
   void add_side(const Vec3& normal, double depth, double probe_fraction, double flat_angle) {
     if (probe_fraction >= 0 && probe_fraction <= 1) add(normal, depth, probe_fraction, flat_angle);
   }

@@ -11,7 +11,7 @@
 namespace palpate::rendering {
 
 std::vector<LocalDepth> local_depths(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
-                             const Vec3& towards, double angle) {
+                                     const Vec3& towards, double angle) {
   const double least_cosine = angle < std::numbers::pi ? std::cos(angle) : -2;
   const double slack = 1e-12 * mesh.size();
   const Vec3 d = probe.tail - probe.tip;

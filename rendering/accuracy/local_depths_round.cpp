@@ -31,7 +31,8 @@ void cross_line(Collector& collector, const Vec3& normal, const Vec3& start, con
   if (c2 == 0) return;  // parallel: the ends and rims have it
   const double along = glm::dot(glm::cross(w, collector.d), c) / c2;
   if (along < 0 || along > 1) return;
-  collector.add_side(normal, depth, glm::dot(glm::cross(w, line), c) / c2, angle_to_line(collector.u, line));
+  collector.add_side(normal, depth, glm::dot(glm::cross(w, line), c) / c2,
+                     angle_to_line(collector.u, line));
 }
 
 /// Directions around a circle; not on the axes, where a rate may be exactly zero.
@@ -58,7 +59,9 @@ void cross_rim(Collector& collector, double z, Belongs belongs) {
   const Vec3 across = std::abs(collector.u.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
   const Vec3 e1 = glm::normalize(glm::cross(collector.u, across)), e2 = glm::cross(collector.u, e1);
   const auto normal = [&](const glm::dvec2& turn) { return turn.x * e1 + turn.y * e2; };
-  const auto touched = [&](const Vec3& n) { return collector.shape.radius * radial(n) + Vec3(0, 0, z); };
+  const auto touched = [&](const Vec3& n) {
+    return collector.shape.radius * radial(n) + Vec3(0, 0, z);
+  };
   const auto rate = [&](const glm::dvec2& turn) {  // n' is e2 cos - e1 sin
     return glm::dot(touched(normal(turn)) - collector.probe.tip, turn.x * e2 - turn.y * e1);
   };
@@ -74,12 +77,14 @@ void cross_rim(Collector& collector, double z, Belongs belongs) {
       const Vec3 n = normal({std::cos(high), std::sin(high)});
       if (belongs(n)) {
         const Vec3 x = touched(n);
-        const double fraction = glm::dot(x - collector.probe.tip, collector.d) / (collector.length * collector.length);
+        const double fraction =
+            glm::dot(x - collector.probe.tip, collector.d) / (collector.length * collector.length);
         const Vec3 line = collector.shape.shape == stimuli::ShapeKind::cone
                               ? cone_generator(collector.shape, radial(n))
                               : Vec3(0, 0, 1);
-        collector.add_side(n, glm::dot(n, x - collector.probe.tip), fraction,
-               std::min(angle_to_plane(collector.u, Vec3(0, 0, 1)), angle_to_line(collector.u, line)));
+        collector.add_side(
+            n, glm::dot(n, x - collector.probe.tip), fraction,
+            std::min(angle_to_plane(collector.u, Vec3(0, 0, 1)), angle_to_line(collector.u, line)));
       }
     }
     last = next;
@@ -101,10 +106,12 @@ void depths_in_cylinder(Collector& collector) {
     for (const double sign : {-1.0, 1.0}) {
       const Vec3 n(0, 0, sign);
       // Out past an end: on the disc only where the end of the probe is above it.
-      if (std::hypot(p.x, p.y) <= radius) collector.add_end(tail, n, h - sign * p.z, angle_to_plane(collector.u, n));
+      if (std::hypot(p.x, p.y) <= radius)
+        collector.add_end(tail, n, h - sign * p.z, angle_to_plane(collector.u, n));
     }
     if (std::abs(p.z) <= h)
-      collector.add_end(tail, radial(p), radius - std::hypot(p.x, p.y), angle_to_line(collector.u, up));
+      collector.add_end(tail, radial(p), radius - std::hypot(p.x, p.y),
+                        angle_to_line(collector.u, up));
   }
   if (collector.is_point()) return;
   const Vec3 c = glm::cross(up, collector.u);
@@ -126,9 +133,11 @@ void depths_in_cone(Collector& collector) {
     if (tail && collector.is_point()) break;
     if (std::hypot(p.x, p.y) <= radius)
       collector.add_end(tail, down, p.z + height / 2, angle_to_plane(collector.u, down));
-    const Vec3 out = radial(p), n = cone_normal(collector.shape, out), line = cone_generator(collector.shape, out);
+    const Vec3 out = radial(p), n = cone_normal(collector.shape, out),
+               line = cone_generator(collector.shape, out);
     const double along = glm::dot(p - apex, line) / glm::dot(line, line);
-    if (along >= 0 && along <= 1) collector.add_end(tail, n, glm::dot(n, apex - p), angle_to_line(collector.u, line));
+    if (along >= 0 && along <= 1)
+      collector.add_end(tail, n, glm::dot(n, apex - p), angle_to_line(collector.u, line));
   }
   if (collector.is_point()) return;
   // Normals of the side at right angles to the probe: height (u.out) + radius u.z = 0.
@@ -138,7 +147,8 @@ void depths_in_cone(Collector& collector) {
     const double about = std::atan2(collector.u.y, collector.u.x), turn = std::acos(cosine);
     for (const double angle : {about - turn, about + turn}) {
       const Vec3 out(std::cos(angle), std::sin(angle), 0);
-      cross_line(collector, cone_normal(collector.shape, out), apex, cone_generator(collector.shape, out));
+      cross_line(collector, cone_normal(collector.shape, out), apex,
+                 cone_generator(collector.shape, out));
     }
   }
   cross_rim(collector, -height / 2, [&](const Vec3& n) {

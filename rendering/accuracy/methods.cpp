@@ -99,7 +99,8 @@ class ColdWalk final : public ContactMethod {
  public:
   ColdWalk(const stimuli::ConvexMesh& mesh, bool) : walk_(mesh) {}
   ContactEstimate tick(const LineProbe& probe) override {
-    return estimate_of(walk_.walk({Kind::facet, false, 0}, probe.tip, probe.tail - probe.tip), probe);
+    return estimate_of(walk_.walk({Kind::facet, false, 0}, probe.tip, probe.tail - probe.tip),
+                       probe);
   }
 
  private:
@@ -112,8 +113,8 @@ class FullScan final : public ContactMethod {
   ContactEstimate tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
     return estimate_of(d == Vec3() ? nearest_feature_point(mesh_, probe.tip)
-                                 : nearest_feature_segment(mesh_, probe.tip, d),
-                     probe);
+                                   : nearest_feature_segment(mesh_, probe.tip, d),
+                       probe);
   }
 
  private:
@@ -163,8 +164,7 @@ std::vector<MethodDefinition> contact_methods() {
        make<WarmWalk<RendererWalk>>},
       {"walk-float", "the walk written out in single precision", true, true, false,
        make<WarmWalk<PlainWalk<float>>>},
-      {"walk-cold", "the walk from facet 0 at every tick", false, false, false,
-       make<ColdWalk>},
+      {"walk-cold", "the walk from facet 0 at every tick", false, false, false, make<ColdWalk>},
       {"scan", "the walk's features, all of them measured at every tick", false, false, true,
        make<FullScan>},
       {"brute-force", "the reference of the tests", false, false, true, make<BruteForce>},

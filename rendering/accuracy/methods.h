@@ -29,11 +29,11 @@ class ContactMethod {
 };
 
 struct MethodDefinition {
-  std::string name;           ///< "walk", ...
-  std::string description;    ///< a line for a legend
-  bool has_history = false;       ///< must get every tick of a path, in order
-  bool keeps_side = false;        ///< a god-object: stays on the side by which it entered
-  bool visits_all = false;        ///< every facet, at every tick: slow on fine meshes
+  std::string name;          ///< "walk", ...
+  std::string description;   ///< a line for a legend
+  bool has_history = false;  ///< must get every tick of a path, in order
+  bool keeps_side = false;   ///< a god-object: stays on the side by which it entered
+  bool visits_all = false;   ///< every facet, at every tick: slow on fine meshes
   std::unique_ptr<ContactMethod> (*make)(const stimuli::ConvexMesh& mesh, bool segment) = nullptr;
 };
 

@@ -132,7 +132,8 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
     Motion motion;
     motion.direction = random_direction(random);
     motion.axis = random_direction(random);
-    motion.axis = glm::normalize(motion.axis - glm::dot(motion.axis, motion.direction) * motion.direction);
+    motion.axis =
+        glm::normalize(motion.axis - glm::dot(motion.axis, motion.direction) * motion.direction);
     motion.turning = turning * random.unit();
     motion.fraction = random.unit();
     const Vec3 heading = random_direction(random);

@@ -39,8 +39,8 @@ struct FirstContactLoss {
 
 /// Straight motions at 1 kHz that bring a stylus of 0.12 m into the object from a random side, with
 /// random directions of stylus and motion, turning at a random rate up to `turning`. The tick of
-/// entry is known by brute force at a hundredth of the tick (deeper than 1e-9 of the size at the end
-/// of the tick or at one of the steps). Motions that miss the object are drawn again.
+/// entry is known by brute force at a hundredth of the tick (deeper than 1e-9 of the size at the
+/// end of the tick or at one of the steps). Motions that miss the object are drawn again.
 FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double speed, double turning,
                                     int entries, std::uint64_t seed);
 

@@ -30,8 +30,8 @@ struct TestStroke {
   std::vector<std::vector<LocalDepth>> of_polyhedron;  ///< every `stride`-th tick in contact
 };
 
-std::vector<TestStroke> test_strokes(const stimuli::ObjectSpec& shape, const AccuracySettings& settings,
-                            bool segment) {
+std::vector<TestStroke> test_strokes(const stimuli::ObjectSpec& shape,
+                                     const AccuracySettings& settings, bool segment) {
   std::vector<TestStroke> all;
   for (int i = 1; i <= settings.paths; ++i) {
     AnalyticStrokeSettings hand;
@@ -50,8 +50,8 @@ std::vector<TestStroke> test_strokes(const stimuli::ObjectSpec& shape, const Acc
 /// One method over all test strokes.
 class MethodRun {
  public:
-  MethodRun(const MethodDefinition& kind, const stimuli::ConvexMesh& mesh, bool segment, std::size_t stride,
-      const std::function<double()>& now)
+  MethodRun(const MethodDefinition& kind, const stimuli::ConvexMesh& mesh, bool segment,
+            std::size_t stride, const std::function<double()>& now)
       : kind_(kind), mesh_(mesh), segment_(segment), stride_(stride), now_(now) {}
 
   void over(const TestStroke& stroke, int timings) {
@@ -86,7 +86,8 @@ class MethodRun {
   static constexpr double kMostTime = 2e8;  // ns; timed again only while the total is below
 
   /// The approach untimed, then the contact. Returns ns.
-  double pass(const TestStroke& stroke, std::size_t step, std::vector<ContactEstimate>* estimates) const {
+  double pass(const TestStroke& stroke, std::size_t step,
+              std::vector<ContactEstimate>* estimates) const {
     const auto method = kind_.make(mesh_, segment_);
     const auto& poses = stroke.path.poses;
     if (kind_.has_history) {

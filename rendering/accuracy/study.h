@@ -54,8 +54,8 @@ struct ErrorLimits {
 };
 constexpr double kNoLimit = 1e9;
 
-/// Triangles of the coarsest tessellation from which on (the finer ones included) both renderers keep
-/// the limits and lose no contact; 0 when none is fine enough.
+/// Triangles of the coarsest tessellation from which on (the finer ones included) both renderers
+/// keep the limits and lose no contact; 0 when none is fine enough.
 int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
                   const ErrorLimits& limits);
 

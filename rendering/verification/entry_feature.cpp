@@ -8,7 +8,7 @@
 namespace palpate::rendering {
 
 bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& before,
-                   const LineProbe& after) {
+                              const LineProbe& after) {
   return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const stimuli::Facet& facet) {
     return std::min({glm::dot(facet.normal, before.tip), glm::dot(facet.normal, before.tail),
                      glm::dot(facet.normal, after.tip), glm::dot(facet.normal, after.tail)}) >
@@ -17,7 +17,7 @@ bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& 
 }
 
 std::optional<ReferenceDepth> measure_feature(const stimuli::ConvexMesh& mesh, bool is_edge,
-                                           std::uint32_t i, const LineProbe& probe) {
+                                              std::uint32_t i, const LineProbe& probe) {
   if (!is_edge) {
     const stimuli::Facet& facet = mesh.facets()[i];
     return ReferenceDepth{facet.offset - std::min(glm::dot(facet.normal, probe.tip),

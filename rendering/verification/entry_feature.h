@@ -16,12 +16,12 @@ inline constexpr double kNeighbouringDepths = 1e-4;
 
 /// Whether some facet's plane has both poses on its outer side, hence all poses between them.
 bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& before,
-                   const LineProbe& after);
+                              const LineProbe& after);
 
 /// Outward normal and depth of one facet of M (a facet of the mesh with the deeper end, or an edge)
 /// for a probe; edges that are no silhouette edges have none. Mesh frame.
 std::optional<ReferenceDepth> measure_feature(const stimuli::ConvexMesh& mesh, bool is_edge,
-                                           std::uint32_t i, const LineProbe& probe);
+                                              std::uint32_t i, const LineProbe& probe);
 
 /// The facet of M through which the probe enters, where that is unambiguous.
 struct EntryFeature {

@@ -30,7 +30,7 @@ MeshTally tally(const Scene& scene, Has has, Count count) {
 }
 
 TickStage structure(std::string name, const MeshTally& t, const std::string& things,
-                std::size_t limit) {
+                    std::size_t limit) {
   const bool built = t.with > 0;
   std::string why = built ? "for " + std::to_string(t.with) + " of " +
                                 counted(t.meshes, "mesh", "meshes") + ": more than " +

@@ -28,7 +28,8 @@ struct TickStage {
 /// tick over this scene contains it: Scene::features(), the trees that were built, the renderer.
 std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer);
 
-/// A stage of explain(), or a whole tick, as a function to be timed in isolation over recorded ticks.
+/// A stage of explain(), or a whole tick, as a function to be timed in isolation over recorded
+/// ticks.
 struct StageTiming {
   std::string name;               ///< TickStage::name; kTickInContact or kTickInFreeSpace
   std::size_t calls = 0;          ///< of the stage in one run; 0: it did not happen on the path

@@ -1,5 +1,6 @@
 #pragma once
-// What the extreme cases share: a scene whose every tick is audited. Included by extreme_*.cpp alone.
+// What the extreme cases share: a scene whose every tick is audited. Included by extreme_*.cpp
+// alone.
 
 #include <algorithm>
 #include <cstdint>
@@ -17,7 +18,8 @@ namespace palpate::rendering::extremes {
 
 using MeshPointer = std::shared_ptr<const stimuli::ConvexMesh>;
 
-inline constexpr double kRounding = 1e-9;  // of the object's size: smaller errors of lengths are none
+inline constexpr double kRounding =
+    1e-9;  // of the object's size: smaller errors of lengths are none
 inline constexpr const char* kLengthError = "worst error of a length, sizes of the object";
 
 /// One object under a renderer, every tick compared with the reference.

@@ -7,8 +7,7 @@ namespace palpate::rendering {
 std::span<const ExtremeCase> extreme_cases() {
   using namespace extremes;
   static constexpr ExtremeCase kCases[] = {
-      {"sliver", "faces 1,000,000 times as long as wide, all kinds of paths", kLengthError,
-       sliver},
+      {"sliver", "faces 1,000,000 times as long as wide, all kinds of paths", kLengthError, sliver},
       {"needle", "0.1 m long, 1 um thick", kLengthError, needle},
       {"thin-plate", "0.1 mm thick, crossed at 5 m/s (5 mm a tick)",
        "ticks not held on the side of entry", thin_plate},

@@ -38,7 +38,7 @@ struct Lap {
   double stored = 0;    ///< J, at the deepest
   double force = 0;     ///< N, the largest
   double rocking = 0;   ///< m, travel of one end against the other along z in the blend of (2)
-  double jumps = 0;  ///< J, error bound of the sum where the force jumps, from facet to facet
+  double jumps = 0;     ///< J, error bound of the sum where the force jumps, from facet to facet
   int ticks = 0, in_contact = 0, in_blend = 0;
   bool one_facet = true;  ///< held by one facet of M all the way
   bool upwards = true;    ///< its normal within some degrees of +z
@@ -48,7 +48,7 @@ struct Lap {
 class ClosedPathBench {
  public:
   ClosedPathBench(const Renderer& renderer, const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
-        const stimuli::Material& material)
+                  const stimuli::Material& material)
       : renderer_(renderer),
         stiffness_(material.stiffness),
         scene_({{mesh, {}, material, 0, nullptr}}, renderer.side_contact()),

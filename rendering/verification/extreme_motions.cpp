@@ -191,7 +191,8 @@ ExtremeResult starts_inside(const Renderer& renderer) {
     bits = bits && scene.audited_tick(probe(0.1)).contacts == 0;
     bits = bits && scene.audited_tick(probe(0.0)).contacts == 1;
     if (!bits)
-      scene.fail("seed " + std::to_string(seed) + ": wrong fault bits, or no contact after leaving");
+      scene.fail("seed " + std::to_string(seed) +
+                 ": wrong fault bits, or no contact after leaving");
     ExtremeResult result = scene.result();
     result.worst = forces;
     result.limit = 0;
@@ -226,8 +227,8 @@ ExtremeResult teleports(const Renderer& renderer) {
 }
 
 ExtremeResult bad_poses(const Renderer& renderer) {
-  // Before contact, in contact and behind a plate: no force and the fault bit; the next valid pose is
-  // rendered as if nothing had happened.
+  // Before contact, in contact and behind a plate: no force and the fault bit; the next valid pose
+  // is rendered as if nothing had happened.
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const MeshPointer mesh = solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}));

@@ -180,8 +180,7 @@ struct PathBuilder {
       const Vec3 across = glm::cross(normal, along);
       const Vec3 ways[] = {along, across, normal, unit_or_x(along + across),
                            unit_or_x(pick(mesh.vertices()) - v0)};
-      Vec3 direction =
-          unit_or_x(ways[random.below(5)] + tiny() * random_direction(random));
+      Vec3 direction = unit_or_x(ways[random.below(5)] + tiny() * random_direction(random));
       if (random.below(2)) direction = -direction;
       const Vec3 touch = random.below(2) ? v0 : v0 + random.unit() * (v1 - v0);
       const Vec3 motions[] = {normal, along, across, direction,
@@ -189,13 +188,14 @@ struct PathBuilder {
       const Vec3 way = motions[random.below(5)];
       const Vec3 second = motions[random.below(5)];
       const double fraction = side && random.below(2)
-                               ? random.unit()
-                               : (side ? static_cast<double>(random.below(2)) : 0);
+                                  ? random.unit()
+                                  : (side ? static_cast<double>(random.below(2)) : 0);
       const double reach = size * magnitude(random, -6, 0), beside = size * tiny();
       const double turning = random.below(2) ? tiny() : 0;
       const Vec3 axis = random_direction(random);
       const int legs = 4 + static_cast<int>(random.below(20));
-      path.push_back(probe(touch + 2 * size * unit_or_x(normal + 0.1 * across), direction, fraction));
+      path.push_back(
+          probe(touch + 2 * size * unit_or_x(normal + 0.1 * across), direction, fraction));
       for (int leg = 0; leg <= legs && !full(); ++leg) {
         const double turn = 2 * std::numbers::pi * leg / legs;
         const Vec3 at = touch + (reach * std::cos(turn) + beside) * way +

@@ -37,7 +37,8 @@ struct Block {
                                                       static_cast<Index>(soup.vertices.size()));
       if (is_new) {
         const double fraction = height(a) / (height(a) - height(b));
-        soup.vertices.push_back(soup.vertices[a] + fraction * (soup.vertices[b] - soup.vertices[a]));
+        soup.vertices.push_back(soup.vertices[a] +
+                                fraction * (soup.vertices[b] - soup.vertices[a]));
       }
       return at->second;
     };

@@ -20,9 +20,9 @@ stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors);
 stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& turn, double scale,
                                       const Vec3& to);
 
-/// A cut cube, its polar dual, a sphere, cone, cylinder or cube; half of them stretched into plates and
-/// needles of proportions down to 1e-4; turned at random or along the axes; 0.1 mm to 100 m across,
-/// up to a size away from the origin.
+/// A cut cube, its polar dual, a sphere, cone, cylinder or cube; half of them stretched into plates
+/// and needles of proportions down to 1e-4; turned at random or along the axes; 0.1 mm to 100 m
+/// across, up to a size away from the origin.
 stimuli::ConvexMesh random_solid(stimuli::Random& random);
 
 }  // namespace palpate::rendering

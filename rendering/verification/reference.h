@@ -23,9 +23,10 @@ ReferenceDepth reference_depth(const stimuli::ConvexMesh& mesh, const LineProbe&
 /// overlap.
 double reference_gap(const stimuli::ConvexMesh& mesh, const LineProbe& probe);
 
-/// Time of impact: the first time in [0, 1] at which the probe, its ends moving linearly from `before` to `after`,
-/// penetrates by more than 1e-12 of the mesh's size (touching is not penetrating); found by
-/// stepping `steps` times and then bisecting to rounding. Empty when no step ends inside.
+/// Time of impact: the first time in [0, 1] at which the probe, its ends moving linearly from
+/// `before` to `after`, penetrates by more than 1e-12 of the mesh's size (touching is not
+/// penetrating); found by stepping `steps` times and then bisecting to rounding. Empty when no step
+/// ends inside.
 std::optional<double> reference_first_contact(const stimuli::ConvexMesh& mesh,
                                               const LineProbe& before, const LineProbe& after,
                                               int steps);

@@ -11,20 +11,20 @@
 #include <utility>
 
 #include "rendering/first_contact.h"
+#include "rendering/verification/entry_feature.h"
 #include "rendering/verification/random_paths.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
 #include "rendering/verification/search.h"
-#include "rendering/verification/entry_feature.h"
 #include "rendering/verification/tick_audit.h"
 #include "stimuli/orientation.h"
 
 namespace palpate::rendering {
 namespace {
 
-constexpr int kFineSteps = 100;      // of a tick, by brute force
+constexpr int kFineSteps = 100;       // of a tick, by brute force
 constexpr double kFastestTurn = 0.1;  // rad a tick: 100 rad/s, faster than any hand
-constexpr double kAtSurface = 1e-6;  // sizes
+constexpr double kAtSurface = 1e-6;   // sizes
 
 LineProbe interpolated(const LineProbe& a, const LineProbe& b, double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
@@ -94,7 +94,8 @@ class Walk {
           audit.floats);
     wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
     wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
-    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless, "walk stopped at its limit of steps", 0);
+    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless,
+          "walk stopped at its limit of steps", 0);
     wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
     if (was_free && audit.finite) from_free_space(felt, r, held, audit.tolerance);
     last_ = felt;

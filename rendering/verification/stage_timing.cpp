@@ -36,7 +36,7 @@ struct Recording {
 
 template <class Probe>
 void record_tick(const Scene& scene, const RenderState& state, const PartState& before,
-          const LineProbe& last, const LineProbe& probe, Recording& out) {
+                 const LineProbe& last, const LineProbe& probe, Recording& out) {
   const ScenePart& part = scene.parts()[0];
   const PartState& after = state.parts[0];
   RecordedTick recorded;
@@ -115,13 +115,15 @@ class StageTimings {
           const LineProbe local = Probe::to_local(part, m.probe);
           return sum(local.tip) + sum(local.tail);
         });
-    add("separating plane", hovering_, &Recording::free, [](const ScenePart&, const RecordedTick& m) {
-      return m.before.plane.separates(m.local.tip, m.local.tail) ? 1.0 : 0.0;
-    });
-    add("first contact", lifting_, &Recording::entry, [](const ScenePart& part, const RecordedTick& m) {
-      PartState state = m.before;
-      return tick::detect_contact<Probe>(part, state, &m.last, m.local).depth;
-    });
+    add("separating plane", hovering_, &Recording::free,
+        [](const ScenePart&, const RecordedTick& m) {
+          return m.before.plane.separates(m.local.tip, m.local.tail) ? 1.0 : 0.0;
+        });
+    add("first contact", lifting_, &Recording::entry,
+        [](const ScenePart& part, const RecordedTick& m) {
+          PartState state = m.before;
+          return tick::detect_contact<Probe>(part, state, &m.last, m.local).depth;
+        });
     add("neighbourhood watch", touching_, &Recording::contact,
         [](const ScenePart& part, const RecordedTick& m) {
           return Probe::walk(*part.mesh, m.before.feature, m.local.tip, m.local.tail - m.local.tip)
@@ -157,45 +159,47 @@ class StageTimings {
       return total;
     };
     timings_.push_back({name, count,
-                     [state, recording, run, begin] {
-                       *state = recording->start;
-                       run(0, begin);
-                     },
-                     [run, begin, count] { return run(begin, begin + count); }});
+                        [state, recording, run, begin] {
+                          *state = recording->start;
+                          run(0, begin);
+                        },
+                        [run, begin, count] { return run(begin, begin + count); }});
   }
 
   template <class Run>
   void add(const char* name, const Recorded& recording, std::vector<RecordedTick> Recording::*which,
            Run stage) {
     timings_.push_back({name, (*recording.*which).size(), [] {},
-                     [part = &scene_.parts()[0], recording, which, stage] {
-                       double total = 0;
-                       for (const RecordedTick& recorded : *recording.*which) total += stage(*part, recorded);
-                       return total;
-                     }});
+                        [part = &scene_.parts()[0], recording, which, stage] {
+                          double total = 0;
+                          for (const RecordedTick& recorded : *recording.*which)
+                            total += stage(*part, recorded);
+                          return total;
+                        }});
   }
 
   void add_broad_phase() {
     const auto state = std::make_shared<RenderState>();
     timings_.push_back({"several parts", touching_->poses.size(),
-                     [state, recording = touching_] { *state = recording->start; },
-                     [scene = &scene_, state, recording = touching_] {
-                       double total = 0;
-                       for (const LineProbe& pose : recording->poses) {
-                         update_near_parts(*scene, *state, pose);
-                         total += static_cast<double>(state->near_parts.size());
-                       }
-                       return total;
-                     }});
+                        [state, recording = touching_] { *state = recording->start; },
+                        [scene = &scene_, state, recording = touching_] {
+                          double total = 0;
+                          for (const LineProbe& pose : recording->poses) {
+                            update_near_parts(*scene, *state, pose);
+                            total += static_cast<double>(state->near_parts.size());
+                          }
+                          return total;
+                        }});
   }
 
   void add_sides() {
-    add("side contact", touching_, &Recording::contact, [](const ScenePart& part, const RecordedTick& m) {
-      LoadedContact c;
-      const Vec3 d = m.local.tail - m.local.tip;
-      Probe::classify(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
-      return c.probe_fraction;
-    });
+    add("side contact", touching_, &Recording::contact,
+        [](const ScenePart& part, const RecordedTick& m) {
+          LoadedContact c;
+          const Vec3 d = m.local.tail - m.local.tip;
+          Probe::classify(*part.mesh, m.hit, m.local.tip, d, glm::length(d), c);
+          return c.probe_fraction;
+        });
     add("torque and second device", touching_, &Recording::contact,
         [](const ScenePart&, const RecordedTick& m) {
           const Vec3 force = m.loaded.force * m.loaded.contact.normal;
@@ -210,19 +214,19 @@ class StageTimings {
   void add_material(const char* name) {
     const auto state = std::make_shared<RenderState>();
     timings_.push_back({name, touching_->contact.size(),
-                     [state, recording = touching_] { *state = recording->start; },
-                     [scene = &scene_, state, recording = touching_] {
-                       double total = 0;
-                       for (const RecordedTick& recorded : recording->contact) {
-                         LoadedContact contact = recorded.loaded;
-                         state->last = recorded.last;
-                         tick::apply_material_forces<kFeatures>(
-                             *scene, *state, recorded.probe, std::span<LoadedContact, 1>(&contact, 1),
-                             1000);
-                         total += contact.force + contact.tangential_offset.x;
-                       }
-                       return total;
-                     }});
+                        [state, recording = touching_] { *state = recording->start; },
+                        [scene = &scene_, state, recording = touching_] {
+                          double total = 0;
+                          for (const RecordedTick& recorded : recording->contact) {
+                            LoadedContact contact = recorded.loaded;
+                            state->last = recorded.last;
+                            tick::apply_material_forces<kFeatures>(
+                                *scene, *state, recorded.probe,
+                                std::span<LoadedContact, 1>(&contact, 1), 1000);
+                            total += contact.force + contact.tangential_offset.x;
+                          }
+                          return total;
+                        }});
   }
 
   void add_materials() {

@@ -50,7 +50,7 @@ TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LinePro
   TickAudit audit;
   audit.tolerance =
       rounding * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
-                                     glm::length(probe.tip) + glm::length(probe.tail));
+                                        glm::length(probe.tip) + glm::length(probe.tail));
   audit.finite = all_finite(r);
   if (!audit.finite) return audit;
   audit.depth = reference_depth(mesh, felt_probe(scene, renderer, probe)).depth;

@@ -29,9 +29,9 @@ struct TickAudit {
   }
 };
 
-/// \param rounding  fraction of the object's size that counts as rounding; what its distance from the
-/// origin and the probe's length add is in the tolerance as well
-/// \pre  the scene has one part, of a plain spring
+/// \param rounding  fraction of the object's size that counts as rounding; what its distance from
+/// the origin and the probe's length add is in the tolerance as well \pre  the scene has one part,
+/// of a plain spring
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
                      const Rendering& rendering, double rounding = 1e-9);
 

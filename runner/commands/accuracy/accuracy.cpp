@@ -43,7 +43,8 @@ int accuracy_command(const std::vector<std::string>& args) {
       "[--json FILE]";
   line.summary =
       "Error of the rendered forces against run time: every method over every tessellation of\n"
-      "every analytic shape, and which tessellation to choose. Takes two minutes, with --quick ten\n"
+      "every analytic shape, and which tessellation to choose. Takes two minutes, with --quick "
+      "ten\n"
       "seconds. Status 1 when a tick of the search is wrong or an extreme case fails.";
   line.example =
       "  palpate accuracy --quick\n"
@@ -68,7 +69,8 @@ int accuracy_command(const std::vector<std::string>& args) {
   add("search", po::value(&search_ticks)->value_name("TICKS"),
       "instead of all that: search this many random ticks for wrong ones");
   add("seed", po::value(&seed)->value_name("N")->default_value(1), "of the search");
-  add("jobs", po::value(&jobs)->value_name("J"), "threads of the search; default: one for each core");
+  add("jobs", po::value(&jobs)->value_name("J"),
+      "threads of the search; default: one for each core");
   add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;

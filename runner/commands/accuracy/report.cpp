@@ -24,7 +24,8 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
       "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
       "mm. Forces at 800 N/m.");
   all.emplace_back(
-      "A result is compared with the exact local minimum of the penetration depth that is nearest to "
+      "A result is compared with the exact local minimum of the penetration depth that is nearest "
+      "to "
       "it in direction: a god-object keeps to the side by which it entered, which need not be that "
       "of least depth (\"not least\": such ticks). A lost contact counts with its whole depth and "
       "force.");
@@ -34,10 +35,12 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
       "contact, the fastest of three runs, on this machine.");
   all.emplace_back(
       "Contact points and torques are compared where the stylus is more than 2 degrees off every "
-      "flat that it touches; closer, it is touched along a length and the contact point is a convention (equation "
+      "flat that it touches; closer, it is touched along a length and the contact point is a "
+      "convention (equation "
       "(2)).");
   all.emplace_back(
-      "Worst: about once in 10,000 ticks the contact on a tessellation leaves a side one tick before "
+      "Worst: about once in 10,000 ticks the contact on a tessellation leaves a side one tick "
+      "before "
       "or after that on the shape does.");
   for (const rendering::MethodDefinition& method : rendering::contact_methods()) {
     std::string line = "Method ";

@@ -179,8 +179,9 @@ analysis::Table extreme_table(const AccuracyReport& report) {
 
 analysis::Table search_table(const rendering::SearchCounts& c, std::uint64_t seed) {
   analysis::Table table;
-  table.caption = "Search over random solids and paths, every tick compared with brute force (seed " +
-                  std::to_string(seed) + ")";
+  table.caption =
+      "Search over random solids and paths, every tick compared with brute force (seed " +
+      std::to_string(seed) + ")";
   table.header = {"wrong", "ticks"};
   const auto add = [&](const char* what, std::uint64_t count) {
     table.rows.push_back({what, std::to_string(count)});

@@ -1,8 +1,6 @@
 // The numbers of `palpate accuracy`: the paths are what they say, the sums are right, and the
 // methods' errors behave as theory says.
 
-#include "rendering/accuracy/error_summary.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <numbers>
 
 #include "rendering/accuracy/analytic_stroke.h"
+#include "rendering/accuracy/error_summary.h"
 #include "rendering/accuracy/plain_walk.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
@@ -76,7 +75,7 @@ TEST(AnalyticStroke, TouchesWithTipAndSide) {
       settings.contact_ticks = 200;
       const AnalyticStroke path = analytic_stroke(spec, settings);
       for (std::size_t i = path.approach; i < path.poses.size(); ++i) {
-        const double place = local_depths(spec, path.poses[i]).front().place;
+        const double place = local_depths(spec, path.poses[i]).front().probe_fraction;
         tip += place == 0 ? 1 : 0;
         side += place > 0 && place < 1 ? 1 : 0;
       }
@@ -99,7 +98,7 @@ TEST(ErrorTally, SumsUpByHand) {
   // A probe along y, its tip at the origin, held 1 mm deep at its middle, normal +z.
   const LineProbe probe{Vec3(0, 0, 0), Vec3(0, 0.1, 0)};
   const std::vector<LocalDepth> truth = {{Vec3(0, 0, 1), 1e-3, 0.5, 1.0},
-                                     {Vec3(1, 0, 0), 3e-3, 0, 1.0}};
+                                         {Vec3(1, 0, 0), 3e-3, 0, 1.0}};
   const Vec3 exact(0, 0.05, 1e-3);
   ErrorTally tally;
   tally.add(probe, truth, {true, 1e-3, Vec3(0, 0, 1), exact});                            // right
@@ -185,17 +184,18 @@ std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const stimul
     settings.contact_ticks = 300;
     paths.push_back(analytic_stroke(spec, settings));
   }
-  for (const MethodKind& kind : accuracy_methods()) {
+  for (const MethodDefinition& kind : contact_methods()) {
     if (!only.empty() && kind.name != only) continue;
     ErrorTally analytic, polyhedral;
     for (const AnalyticStroke& path : paths) {
       const auto method = kind.make(mesh, true);
       for (std::size_t i = 0; i < path.poses.size(); ++i) {
-        const Answer answer = method->tick(path.poses[i]);
+        const ContactEstimate estimate = method->tick(path.poses[i]);
         if (i < path.approach) continue;
-        analytic.add(path.poses[i], local_depths(spec, path.poses[i]), answer);
+        analytic.add(path.poses[i], local_depths(spec, path.poses[i]), estimate);
         if (only.empty())
-          polyhedral.add(path.poses[i], local_depths(mesh, path.poses[i], Vec3(0, 0, 1), 4), answer);
+          polyhedral.add(path.poses[i], local_depths(mesh, path.poses[i], Vec3(0, 0, 1), 4),
+                         estimate);
       }
     }
     result[kind.name] = {analytic.summary(), polyhedral.summary()};
