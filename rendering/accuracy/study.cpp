@@ -18,7 +18,7 @@ constexpr double kPi = 3.14159265358979324;
 std::vector<stimuli::ShapeKind> analytic_shapes() {
   std::vector<stimuli::ShapeKind> all;
   for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-    if (stimuli::needs_of(shape).analytic) all.push_back(shape);
+    if (stimuli::traits_of(shape).analytic) all.push_back(shape);
   }
   return all;
 }
@@ -148,7 +148,7 @@ std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int mos
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));
     if (triangles_of(spec) > most_triangles && !all.empty()) break;
     all.push_back(spec);
-    if (!stimuli::needs_of(shape).subdivisions && !stimuli::needs_of(shape).segments)
+    if (!stimuli::traits_of(shape).subdivisions && !stimuli::traits_of(shape).segments)
       break;  // nothing to refine
   }
   return all;
@@ -191,12 +191,12 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
           MethodRun run(kind, mesh, segment, stride, now);
           for (const TestStroke& stroke : all) run.over(stroke, settings.timings);
           AccuracyRow row;
-          row.shape = stimuli::needs_of(shape).name;
+          row.shape = stimuli::traits_of(shape).name;
           row.triangles = triangles_of(spec);
           row.facets = mesh.facets().size();
           row.edges = mesh.edges().size();
-          row.subdivisions = stimuli::needs_of(shape).subdivisions ? spec.subdivisions : 0;
-          row.segments = stimuli::needs_of(shape).segments ? spec.segments : 0;
+          row.subdivisions = stimuli::traits_of(shape).subdivisions ? spec.subdivisions : 0;
+          row.segments = stimuli::traits_of(shape).segments ? spec.segments : 0;
           row.probe = segment ? "ray" : "point";
           row.method = kind.name;
           run.report(row);

@@ -70,7 +70,7 @@ Json errors_json(const rendering::ErrorSummary& e) {
 }
 
 Json row_json(const rendering::AccuracyRow& row) {
-  const bool subdivided = needs_of_shape(row.shape).subdivisions;
+  const bool subdivided = traits_of_shape(row.shape).subdivisions;
   return {{"shape", row.shape},
           {"triangles", row.triangles},
           {"facets", row.facets},

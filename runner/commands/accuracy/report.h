@@ -45,7 +45,7 @@ constexpr rendering::ErrorLimits kDevice{3e-5, rendering::kNoLimit};  ///< 0.03 
 /// The shapes that were measured, in order.
 std::vector<std::string> measured_shapes(const AccuracyReport& report);
 /// Parameters of the shape of this name; none for an unknown name.
-stimuli::ShapeNeeds needs_of_shape(const std::string& name);
+stimuli::ShapeTraits traits_of_shape(const std::string& name);
 /// Whether it is a polyhedron: its one tessellation is the shape itself.
 bool is_flat_sided(const std::string& shape);
 

@@ -40,7 +40,7 @@ std::string share(std::size_t part, std::size_t all) {
 }
 
 std::string setting_of(const rendering::AccuracyRow& row) {
-  if (needs_of_shape(row.shape).subdivisions)
+  if (traits_of_shape(row.shape).subdivisions)
     return "subdivisions " + std::to_string(row.subdivisions);
   if (row.segments > 0) return "segments " + std::to_string(row.segments);
   return "";
@@ -236,16 +236,16 @@ std::string recommendation(const AccuracyReport& report, const std::string& shap
          " to be finer than the device resolves (within " + within(device) + ").";
 }
 
-stimuli::ShapeNeeds needs_of_shape(const std::string& name) {
+stimuli::ShapeTraits traits_of_shape(const std::string& name) {
   for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-    if (name == stimuli::needs_of(shape).name) return stimuli::needs_of(shape);
+    if (name == stimuli::traits_of(shape).name) return stimuli::traits_of(shape);
   }
   return {};
 }
 
 bool is_flat_sided(const std::string& shape) {
-  const stimuli::ShapeNeeds needs = needs_of_shape(shape);
-  return !needs.subdivisions && !needs.segments;
+  const stimuli::ShapeTraits traits = traits_of_shape(shape);
+  return !traits.subdivisions && !traits.segments;
 }
 
 std::vector<std::string> measured_shapes(const AccuracyReport& report) {
