@@ -23,7 +23,7 @@ bool is_in(const std::array<std::string_view, n>& names, const std::string& name
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Deepest places at which the two differ.
+/// Adds the deepest pointers at which the two differ.
 void compare(const json* before, const json* after, const std::string& pointer,
              std::vector<std::string>& out) {
   if (before == nullptr || after == nullptr || before->type() != after->type() ||

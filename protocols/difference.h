@@ -1,24 +1,24 @@
 #pragma once
-// What was changed in a protocol since somebody began with it.
+// What has changed in a protocol since a participant began with it.
 
 #include <string>
 #include <vector>
 
 namespace palpate::protocols {
 
-/// JSON pointers of what is there, or has another value, in one of two texts only.
+/// JSON pointers of the values that differ, or exist in one of the two only.
 struct ProtocolDifference {
   std::vector<std::string> texts;     ///< what participants read, and descriptions
   std::vector<std::string> design;    ///< stimuli, order, trials: what is shown, and when
-  std::vector<std::string> settings;  ///< all else: of the trial, the stylus, the servo, the noise
+  std::vector<std::string> settings;  ///< all else: of trials, stylus, servo, masking noise
 
-  /// Trials, their order and their conditions are the same, whatever is read beside them.
+  /// Trials, their order and their conditions are the same; only what is read differs.
   bool only_texts() const { return design.empty() && settings.empty(); }
-  /// The same in other words: spaces, order of keys, 1 as 1.0.
+  /// No value differs, only the layout: spaces, order of keys, 1 as 1.0.
   bool nothing() const { return only_texts() && texts.empty(); }
 };
 
-/// Of two texts that are protocols.
+/// Of two valid protocols.
 ProtocolDifference difference(const std::string& before, const std::string& after);
 
 /// "only texts: /texts/break", "stimuli and order: /seed, /stimuli; other settings: /home/rest_s"

@@ -19,7 +19,7 @@ constexpr std::size_t kMaxKeyBytes = 256;         // the longest that is known h
 constexpr std::size_t kMaxValues = 200'000;       // a long list of orientations has 50,000
 constexpr std::uintmax_t kMaxBytes = 16u << 20u;  // a long list of orientations has about 1 MB
 
-/// Walks over the text and tells how far the reader has come: its callbacks do not.
+/// Iterates over the text and records how far the parser has read: its callbacks do not say.
 struct TrackingIterator {
   using iterator_category = std::input_iterator_tag;
   using value_type = char;
@@ -82,7 +82,7 @@ class Builder : public nlohmann::json_sax<json> {
     }
     key_ = name;
     if (open_.back().value->contains(name)) {
-      faults_.set_line(open_.back().place.child(name), line());
+      faults_.set_line(open_.back().pointer.child(name), line());
       faults_.add(faults_.full() ? std::string() : child_pointer(here(), name),
                   "each key at most once; this one is given again");
     }
@@ -97,8 +97,7 @@ class Builder : public nlohmann::json_sax<json> {
     const std::size_t line_start = before.rfind('\n') + 1;  // npos + 1 is 0
     std::string what = error.what();
     // "[json.exception.parse_error.101] parse error at line 2, column 1: syntax error ...; last
-    // read:
-    // ...": ours says where in its own way, and leaves out what may be long or ill-formed.
+    // read: ...": the location is given separately, and the rest may be long or ill-formed.
     const std::size_t message = what.find(": ");
     if (what.find("parse error at") != std::string::npos && message != std::string::npos) {
       what = what.substr(message + 2);
@@ -114,20 +113,20 @@ class Builder : public nlohmann::json_sax<json> {
  private:
   struct Open {
     json* value;
-    PointerHash place;
+    PointerHash pointer;
     std::string token;  // key or index in the one around it
   };
 
-  /// The pointer of the innermost object or array that is open. Built where a fault needs it: a
-  /// pointer for every value would copy the keys around it as often as there are values.
+  /// The pointer of the innermost open object or array. Built only for a fault: a pointer for every
+  /// value would copy all keys above it each time.
   std::string here() const {
     std::string pointer;
     for (std::size_t i = 1; i < open_.size(); ++i) pointer = child_pointer(pointer, open_[i].token);
     return pointer;
   }
 
-  // The last character that was read may belong to what follows (a number ends where it does not
-  // go on), so it does not count yet.
+  // The last character read may belong to what follows (the end of a number is known from the next
+  // character), so it does not count yet.
   int line() {
     const char* const end = std::max(counted_, reached_ == text_.data() ? reached_ : reached_ - 1);
     line_ += static_cast<int>(std::count(counted_, end, '\n'));
@@ -143,7 +142,7 @@ class Builder : public nlohmann::json_sax<json> {
       return nullptr;
     }
     token_.clear();
-    place_ = PointerHash();
+    pointer_ = PointerHash();
     json* put = &root_;
     if (!open_.empty()) {
       Open& parent = open_.back();
@@ -156,11 +155,11 @@ class Builder : public nlohmann::json_sax<json> {
         put = &(*parent.value)[key_];
         *put = std::move(value);
       }
-      place_ = parent.place.child(token_);
+      pointer_ = parent.pointer.child(token_);
     } else {
       root_ = std::move(value);
     }
-    faults_.set_line(place_, line());
+    faults_.set_line(pointer_, line());
     return put;
   }
 
@@ -172,7 +171,7 @@ class Builder : public nlohmann::json_sax<json> {
     }
     json* const opened = put(std::move(value));
     if (opened == nullptr) return false;
-    open_.push_back({opened, place_, token_});
+    open_.push_back({opened, pointer_, token_});
     return true;
   }
 
@@ -189,8 +188,8 @@ class Builder : public nlohmann::json_sax<json> {
   json root_;
   std::vector<Open> open_;
   std::size_t values_ = 0;
-  std::string key_, token_;  // token_, place_: of the value that was put last
-  PointerHash place_;
+  std::string key_, token_;  // token_, pointer_: of the value that was put last
+  PointerHash pointer_;
 };
 
 /// With ~ and / escaped (RFC 6901).
@@ -232,21 +231,23 @@ void FaultList::add(const std::string& pointer, const std::string& expected) {
 }
 
 void FaultList::add_syntax_error(int line, int column, const std::string& expected) {
-  const std::string place = "line " + std::to_string(line) + ", column " + std::to_string(column);
-  faults_.push_back({file_, place, expected, line});
+  const std::string location =
+      "line " + std::to_string(line) + ", column " + std::to_string(column);
+  faults_.push_back({file_, location, expected, line});
 }
 
 void FaultList::throw_if_any() const {
   if (faults_.empty()) return;
   std::vector<Fault> all = faults_;
   if (unlisted_ > 0) {
-    all.push_back({file_, "further places", "and " + std::to_string(unlisted_) + " more faults"});
+    all.push_back(
+        {file_, "further locations", "and " + std::to_string(unlisted_) + " more faults"});
   }
   throw InputError(std::move(all));
 }
 
 int FaultList::line_of(std::string_view pointer) const {
-  // What is missing has no line; then that of the object that lacks it.
+  // A missing value has no line; then that of the object that lacks it.
   for (;;) {
     const auto found = lines_.find(PointerHash(pointer).value());
     if (found != lines_.end()) return found->second;

@@ -1,5 +1,5 @@
 #pragma once
-// A JSON text with what its own reader drops: the line of every value, and keys given twice.
+// A JSON document with what nlohmann-json drops: the line of every value, and duplicate keys.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace palpate::protocols {
 
-/// Stands for a JSON pointer: FNV-1a of its characters, which goes on from that of its parent. Two
-/// pointers with the same hash would at worst show each other's line.
+/// Hash of a JSON pointer: FNV-1a of its characters, continued from that of its parent. A collision
+/// would at worst show the wrong line in a message.
 class PointerHash {
  public:
   PointerHash() = default;
@@ -28,8 +28,8 @@ class PointerHash {
   std::uint64_t value_ = 14695981039346656037U;
 };
 
-/// What is wrong with one file, in the order in which it is found: the first ones in full, the rest
-/// as a number.
+/// The faults of one file in the order in which they are found: the first ones in full, the rest as
+/// a count.
 class FaultList {
  public:
   explicit FaultList(std::string file) : file_(std::move(file)) {}
@@ -40,7 +40,7 @@ class FaultList {
   void set_line(PointerHash pointer, int line) { lines_[pointer.value()] = line; }
 
   bool empty() const { return faults_.empty(); }
-  /// Whether faults are only counted from here on: then nobody reads what was expected.
+  /// Whether further faults are only counted: then their texts need not be made.
   bool full() const { return faults_.size() >= kMostListed; }
   const std::string& file() const { return file_; }
   /// \throws InputError unless the list is empty.
@@ -61,12 +61,12 @@ class FaultList {
 std::string child_pointer(const std::string& parent, const std::string& key);
 std::string child_pointer(const std::string& parent, std::size_t index);
 
-/// Reads JSON (RFC 8259, UTF-8). Keys given twice become faults. \throws InputError with line and
-/// column where the text is no JSON; with the place where it is nested too deeply, has too many
+/// Reads JSON (RFC 8259, UTF-8). Duplicate keys become faults. \throws InputError with line and
+/// column where the text is not JSON; with the location where it is nested too deeply, has too many
 /// values or too long a key. Memory is in proportion to the text.
 nlohmann::json read_json(const std::string& text, FaultList& faults);
 
-/// The bytes of a file. \throws InputError where it cannot be read or is beyond all reason large.
+/// The contents of a file. \throws InputError where it cannot be read or is above 16 MiB.
 std::string read_text_file(const std::string& path);
 
 }  // namespace palpate::protocols

@@ -1,10 +1,11 @@
 #pragma once
+// Counterbalancing of conditions over participants.
 
 #include <vector>
 
 namespace palpate::protocols {
 
-/// Number of different rows of a balanced Latin square of n conditions: n where n is even, 2 n
+/// Number of rows of a balanced Latin square of n conditions: n where n is even, 2 n
 /// where it is odd (1 for a single condition).
 int latin_square_rows(int n);
 

@@ -23,52 +23,51 @@ std::string plain(double value) {
   return out.str();
 }
 
-std::string describe(const char* kind, const Interval& interval) {
-  const std::string unit = *interval.unit == '\0' ? "" : std::string(" ") + interval.unit;
-  return "expected " + std::string(kind) + (interval.above_min ? " above " : " from ") +
-         plain(interval.min) + (interval.above_min ? " up to " : " to ") + plain(interval.max) +
-         unit;
+std::string describe(const char* kind, const NumberRange& range) {
+  const std::string unit = *range.unit == '\0' ? "" : std::string(" ") + range.unit;
+  return "expected " + std::string(kind) + (range.above_min ? " above " : " from ") +
+         plain(range.min) + (range.above_min ? " up to " : " to ") + plain(range.max) + unit;
 }
 
-bool contains(const Interval& interval, double value) {
-  return (interval.above_min ? value > interval.min : value >= interval.min) &&
-         value <= interval.max;
+bool contains(const NumberRange& range, double value) {
+  return (range.above_min ? value > range.min : value >= range.min) && value <= range.max;
 }
 
 bool read_number(const json& value, const std::string& pointer, double& out,
-                 const Interval& interval, FaultList& faults) {
-  if (value.is_number() && contains(interval, value.get<double>())) {
+                 const NumberRange& range, FaultList& faults) {
+  if (value.is_number() && contains(range, value.get<double>())) {
     out = value.get<double>();
     return true;
   }
-  faults.add(pointer, describe("a number", interval) + found(value));
+  faults.add(pointer, describe("a number", range) + found_text(value));
   return false;
 }
 
-bool read_integer(const json& value, const std::string& pointer, int& out, const Interval& interval,
+bool read_integer(const json& value, const std::string& pointer, int& out, const NumberRange& range,
                   FaultList& faults) {
   // JSON knows numbers only: 76.0 is an integer too.
   if (value.is_number()) {
     const double number = value.get<double>();
-    if (contains(interval, number) && std::floor(number) == number) {
+    if (contains(range, number) && std::floor(number) == number) {
       out = static_cast<int>(number);
       return true;
     }
   }
-  faults.add(pointer, describe("an integer", interval) + found(value));
+  faults.add(pointer, describe("an integer", range) + found_text(value));
   return false;
 }
 
 template <std::size_t N>
 bool read_numbers(const json& value, const std::string& pointer, std::array<double, N>& out,
-                  const Interval& interval, FaultList& faults) {
+                  const NumberRange& range, FaultList& faults) {
   if (!value.is_array() || value.size() != N) {
-    faults.add(pointer, "expected an array of " + std::to_string(N) + " numbers" + found(value));
+    faults.add(pointer,
+               "expected an array of " + std::to_string(N) + " numbers" + found_text(value));
     return false;
   }
   bool good = true;
   for (std::size_t i = 0; i < N; ++i) {
-    good &= read_number(value[i], child_pointer(pointer, i), out[i], interval, faults);
+    good &= read_number(value[i], child_pointer(pointer, i), out[i], range, faults);
   }
   return good;
 }
@@ -91,8 +90,8 @@ std::size_t edits(const std::string& a, const std::string& b) {
 
 constexpr std::size_t kShown = 60;  // characters of a value in a message
 
-/// The first `most` characters of a value as JSON, or some more: a long one is not written out to
-/// be cut.
+/// The first `most` characters of a value as JSON, or somewhat more: a long value is not written
+/// out in full.
 void put_start(const json& value, std::size_t most, std::string& out) {
   // A truncated character must not make the message ill-formed: other than ASCII is escaped.
   const auto ascii = [](const json& word) {
@@ -118,7 +117,7 @@ void put_start(const json& value, std::size_t most, std::string& out) {
 
 }  // namespace
 
-std::string found(const json& value) {
+std::string found_text(const json& value) {
   std::string text;
   put_start(value, kShown + 1, text);
   if (text.size() > kShown) text = text.substr(0, kShown - 3) + "...";
@@ -134,8 +133,8 @@ std::optional<Quat> read_quaternion(const json& value, const std::string& pointe
   const auto& [w, x, y, z] = wxyz;
   const double length = std::sqrt(w * w + x * x + y * y + z * z);
   if (std::abs(length - 1) > kUnitTolerance) {
-    faults.add(pointer, "expected a unit quaternion [w, x, y, z] (within 1e-6)" + found(value) +
-                            " of length " + plain(length));
+    faults.add(pointer, "expected a unit quaternion [w, x, y, z] (within 1e-6)" +
+                            found_text(value) + " of length " + plain(length));
     return std::nullopt;
   }
   return Quat(w / length, x / length, y / length, z / length);
@@ -143,51 +142,53 @@ std::optional<Quat> read_quaternion(const json& value, const std::string& pointe
 
 ObjectReader::ObjectReader(const json& value, std::string pointer, FaultList& faults)
     : object_(value.is_object() ? &value : nullptr), pointer_(std::move(pointer)), faults_(faults) {
-  if (object_ == nullptr) faults.add(pointer_, "expected an object" + found(value));
+  if (object_ == nullptr) faults.add(pointer_, "expected an object" + found_text(value));
 }
 
-const json* ObjectReader::member(const char* key, Need need) {
+const json* ObjectReader::member(const char* key, Presence presence) {
   known_.insert(key);
   if (object_ == nullptr) return nullptr;
   const auto place = object_->find(key);
   if (place != object_->end()) return &*place;
-  if (need == Need::required) faults_.add(pointer(key), "missing; this key is required");
+  if (presence == Presence::required) faults_.add(pointer(key), "missing; this key is required");
   return nullptr;
 }
 
-const json* ObjectReader::array(const char* key, std::size_t least, std::size_t most, Need need) {
-  const json* const value = member(key, need);
+const json* ObjectReader::array(const char* key, std::size_t least, std::size_t most,
+                                Presence presence) {
+  const json* const value = member(key, presence);
   if (value == nullptr) return nullptr;
   if (value->is_array() && value->size() >= least && value->size() <= most) return value;
-  faults_.add(pointer(key),
-              "expected an array of " + std::to_string(least) + " to " + std::to_string(most) +
-                  " elements" +
-                  (value->is_array() ? ", found " + std::to_string(value->size()) : found(*value)));
+  faults_.add(pointer(key), "expected an array of " + std::to_string(least) + " to " +
+                                std::to_string(most) + " elements" +
+                                (value->is_array() ? ", found " + std::to_string(value->size())
+                                                   : found_text(*value)));
   return nullptr;
 }
 
-void ObjectReader::number(const char* key, double& out, const Interval& interval, Need need) {
-  const json* const value = member(key, need);
-  if (value != nullptr) read_number(*value, pointer(key), out, interval, faults_);
+void ObjectReader::number(const char* key, double& out, const NumberRange& range,
+                          Presence presence) {
+  const json* const value = member(key, presence);
+  if (value != nullptr) read_number(*value, pointer(key), out, range, faults_);
 }
 
-void ObjectReader::number(const char* key, std::optional<double>& out, const Interval& interval) {
+void ObjectReader::number(const char* key, std::optional<double>& out, const NumberRange& range) {
   const json* const value = member(key);
   double number = 0;
   if (value == nullptr || value->is_null()) return;
-  if (read_number(*value, pointer(key), number, interval, faults_)) out = number;
+  if (read_number(*value, pointer(key), number, range, faults_)) out = number;
 }
 
-void ObjectReader::integer(const char* key, int& out, const Interval& interval, Need need) {
-  const json* const value = member(key, need);
-  if (value != nullptr) read_integer(*value, pointer(key), out, interval, faults_);
+void ObjectReader::integer(const char* key, int& out, const NumberRange& range, Presence presence) {
+  const json* const value = member(key, presence);
+  if (value != nullptr) read_integer(*value, pointer(key), out, range, faults_);
 }
 
-void ObjectReader::integer(const char* key, std::optional<int>& out, const Interval& interval) {
+void ObjectReader::integer(const char* key, std::optional<int>& out, const NumberRange& range) {
   const json* const value = member(key);
   int number = 0;
   if (value == nullptr || value->is_null()) return;
-  if (read_integer(*value, pointer(key), number, interval, faults_)) out = number;
+  if (read_integer(*value, pointer(key), number, range, faults_)) out = number;
 }
 
 void ObjectReader::seed(const char* key, std::uint64_t& out) {
@@ -200,7 +201,8 @@ void ObjectReader::seed(const char* key, std::uint64_t& out) {
              value->get<double>() <= kExact && std::floor(value->get<double>()) == *value) {
     out = static_cast<std::uint64_t>(value->get<double>());
   } else {
-    faults_.add(pointer(key), "expected an integer from 0 to 18446744073709551615" + found(*value));
+    faults_.add(pointer(key),
+                "expected an integer from 0 to 18446744073709551615" + found_text(*value));
   }
 }
 
@@ -210,7 +212,7 @@ void ObjectReader::boolean(const char* key, bool& out) {
   if (value->is_boolean()) {
     out = value->get<bool>();
   } else {
-    faults_.add(pointer(key), "expected true or false" + found(*value));
+    faults_.add(pointer(key), "expected true or false" + found_text(*value));
   }
 }
 
@@ -218,23 +220,23 @@ void ObjectReader::text(const char* key, std::string& out) {
   const json* const value = member(key);
   if (value == nullptr) return;
   if (!value->is_string()) {
-    faults_.add(pointer(key), "expected a text" + found(*value));
+    faults_.add(pointer(key), "expected a text" + found_text(*value));
   } else if (value->get_ref<const std::string&>().find('\0') != std::string::npos) {
-    faults_.add(pointer(key), "expected a text without U+0000" + found(*value));
+    faults_.add(pointer(key), "expected a text without U+0000" + found_text(*value));
   } else {
     out = value->get<std::string>();
   }
 }
 
 void ObjectReader::name(const char* key, std::string& out) {
-  const json* const value = member(key, Need::required);
+  const json* const value = member(key, Presence::required);
   if (value == nullptr) return;
   if (value->is_string()) {
     const auto& word = value->get_ref<const std::string&>();
     const auto fits = [](char c) {
       return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
     };
-    // At the start of a cell spreadsheets take '-' for a formula.
+    // Spreadsheets take a cell that starts with '-' for a formula.
     if (!word.empty() && word.size() <= kMaxName && word.front() != '-' &&
         std::all_of(word.begin(), word.end(), fits)) {
       out = word;
@@ -243,13 +245,13 @@ void ObjectReader::name(const char* key, std::string& out) {
   }
   faults_.add(pointer(key), "expected a name of 1 to " + std::to_string(kMaxName) +
                                 " letters (a-z, A-Z), digits and '-', which does not begin it" +
-                                found(*value));
+                                found_text(*value));
 }
 
-void ObjectReader::vector(const char* key, Vec3& out, const Interval& interval) {
+void ObjectReader::vector(const char* key, Vec3& out, const NumberRange& range) {
   const json* const value = member(key);
   std::array<double, 3> xyz{};
-  if (value != nullptr && read_numbers(*value, pointer(key), xyz, interval, faults_)) {
+  if (value != nullptr && read_numbers(*value, pointer(key), xyz, range, faults_)) {
     out = Vec3(xyz[0], xyz[1], xyz[2]);
   }
 }
@@ -269,7 +271,7 @@ void ObjectReader::refuse_unknown_keys() {
       continue;
     }
     std::string nearest, all;
-    std::size_t distance = key.size() / 2 + 1;  // more edits than that are another word
+    std::size_t distance = key.size() / 2 + 1;  // with more edits it is another word
     for (const std::string& known : known_) {
       all += (all.empty() ? "" : ", ") + known;
       if (const std::size_t d = edits(key, known); d < distance) {

@@ -1,5 +1,5 @@
 #pragma once
-// Reads the members of a JSON object into plain values and records every fault with its place.
+// Reads the members of a JSON object into plain values and records every fault with its location.
 // A value that is at fault leaves the variable as it was.
 
 #include <cstdint>
@@ -15,19 +15,19 @@
 
 namespace palpate::protocols {
 
-/// The numbers that a key takes.
-struct Interval {
+/// The range of numbers that a key accepts.
+struct NumberRange {
   double min, max;
   const char* unit = "";
-  bool above_min = false;  ///< min itself is not in it
+  bool above_min = false;  ///< min itself is excluded
 };
 
-enum class Need { optional, required };
+enum class Presence { optional, required };
 
-/// ", found ..." with the value as it stands, shortened.
-std::string found(const nlohmann::json& value);
+/// ", found ..." with the value as written, shortened.
+std::string found_text(const nlohmann::json& value);
 
-/// One of some words. False and a fault otherwise.
+/// One of several words. False and a fault otherwise.
 template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
 bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out,
                  const Options& options, FaultList& faults) {
@@ -40,7 +40,7 @@ bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out
     words += (words.empty() ? "'" : ", '") + std::string(word) + "'";
   }
   faults.add(pointer,
-             "expected " + (options.size() > 1 ? "one of " + words : words) + found(value));
+             "expected " + (options.size() > 1 ? "one of " + words : words) + found_text(value));
   return false;
 }
 
@@ -51,8 +51,8 @@ std::optional<Quat> read_quaternion(const nlohmann::json& value, const std::stri
 
 class ObjectReader {
  public:
-  /// Records a fault when the value is no object; then all members count as missing but unasked
-  /// for.
+  /// Records a fault when the value is not an object; then its members count as missing, without
+  /// further faults.
   ObjectReader(const nlohmann::json& value, std::string pointer, FaultList& faults);
 
   const std::string& pointer() const { return pointer_; }
@@ -60,41 +60,44 @@ class ObjectReader {
   FaultList& faults() { return faults_; }
   bool has(const std::string& key) const { return object_ != nullptr && object_->contains(key); }
 
-  void number(const char* key, double& out, const Interval& interval, Need need = Need::optional);
+  void number(const char* key, double& out, const NumberRange& range,
+              Presence presence = Presence::optional);
   void number(const char* key, std::optional<double>& out,
-              const Interval& interval);  ///< null: none
-  void integer(const char* key, int& out, const Interval& interval, Need need = Need::optional);
-  void integer(const char* key, std::optional<int>& out, const Interval& interval);  ///< null: none
+              const NumberRange& range);  ///< null: none
+  void integer(const char* key, int& out, const NumberRange& range,
+               Presence presence = Presence::optional);
+  void integer(const char* key, std::optional<int>& out, const NumberRange& range);  ///< null: none
   void seed(const char* key, std::uint64_t& out);
   void boolean(const char* key, bool& out);
   void text(const char* key, std::string& out);
   void name(const char* key, std::string& out);  ///< required; letters, digits, '-'
-  void vector(const char* key, Vec3& out, const Interval& interval);
+  void vector(const char* key, Vec3& out, const NumberRange& range);
   void quaternion(const char* key, Quat& out);
 
   template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
-  void choice(const char* key, T& out, const Options& options, Need need = Need::optional) {
-    const nlohmann::json* const value = member(key, need);
+  void choice(const char* key, T& out, const Options& options,
+              Presence presence = Presence::optional) {
+    const nlohmann::json* const value = member(key, presence);
     if (value != nullptr) read_choice(*value, pointer(key), out, options, faults_);
   }
 
-  /// The member for reading by hand; nullptr when it is missing (a fault when it is required).
-  const nlohmann::json* member(const char* key, Need need = Need::optional);
+  /// The member as JSON; nullptr when it is missing (a fault when it is required).
+  const nlohmann::json* member(const char* key, Presence presence = Presence::optional);
   /// The member if it is an array of least .. most elements; else nullptr and a fault.
   const nlohmann::json* array(const char* key, std::size_t least, std::size_t most,
-                              Need need = Need::optional);
+                              Presence presence = Presence::optional);
 
   /// Reads an object within this one: read(ObjectReader&). Its unknown keys become faults.
   template <class Read>
-  void section(const char* key, Read read, Need need = Need::optional) {
-    const nlohmann::json* const value = member(key, need);
+  void section(const char* key, Read read, Presence presence = Presence::optional) {
+    const nlohmann::json* const value = member(key, presence);
     if (value == nullptr) return;
     ObjectReader inner(*value, pointer(key), faults_);
     read(inner);
     inner.refuse_unknown_keys();
   }
 
-  /// Makes every key that nobody asked for a fault, with the nearest known one.
+  /// Makes every key that was not asked for a fault, with the most similar known one.
   void refuse_unknown_keys();
 
  private:

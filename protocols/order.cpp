@@ -9,7 +9,7 @@
 namespace palpate::protocols {
 namespace {
 
-/// An order under construction: what is placed, what remains, and whether it can be completed.
+/// An order under construction: what has been placed, what remains, whether it can be completed.
 class Arrangement {
  public:
   Arrangement(const std::vector<int>& counts, const Protocol::Order& order)
@@ -40,7 +40,7 @@ class Arrangement {
   }
 
   /// Whether the remaining trials can follow in some order. Exact. A distance of 2 or more forbids
-  /// any repeat, so it implies every max_run, and the two limits need no common treatment.
+  /// any repeat and so implies every max_run: the two limits are treated separately.
   bool completable() const {
     if (distance_ > 1) return completable_at_distance();
     return !max_run_ || completable_in_runs();
@@ -108,7 +108,7 @@ std::size_t draw(const Arrangement& arrangement, const std::vector<bool>& ruled_
   }
 }
 
-/// The first plain random order that holds the limits, as long as the budget lasts.
+/// The first unconstrained random order that satisfies the limits, while the budget lasts.
 std::optional<std::vector<int>> try_uniform(const Arrangement& start, std::size_t budget,
                                             stimuli::Random& random) {
   const std::vector<bool> none(start.stimuli(), false);
@@ -147,7 +147,7 @@ std::vector<int> construct(Arrangement arrangement, stimuli::Random& random) {
   return order;
 }
 
-/// Whether the trial at i holds the limits with those around it.
+/// Whether the trial at i satisfies the limits with those around it.
 bool fits(const std::vector<int>& order, std::size_t i, const Protocol::Order& limits) {
   const auto distance = static_cast<std::size_t>(limits.min_distance.value_or(1));
   for (std::size_t k = 1; k < distance && k < order.size(); ++k) {
@@ -187,8 +187,8 @@ std::vector<int> in_sequence(std::vector<int> counts) {
   return order;
 }
 
-bool holds(const std::vector<int>& order, const std::vector<int>& counts,
-           const Protocol::Order& limits) {
+bool satisfies(const std::vector<int>& order, const std::vector<int>& counts,
+               const Protocol::Order& limits) {
   Arrangement arrangement(counts, limits);
   return std::all_of(order.begin(), order.end(), [&](int stimulus) {
     const auto next = static_cast<std::size_t>(stimulus);
@@ -211,20 +211,20 @@ std::string reason(const std::vector<int>& counts, const Protocol::Order& order,
     do {
       --*looser.min_distance;
     } while (*looser.min_distance > 1 && !can_order(counts, looser));
-    return "min_distance " + std::to_string(*order.min_distance) + " cannot hold: " + shown +
-           "; a min_distance of at most " + std::to_string(*looser.min_distance) +
-           ", more stimuli or fewer repetitions a block would do";
+    return "min_distance " + std::to_string(*order.min_distance) +
+           " cannot be satisfied: " + shown + "; use a min_distance of at most " +
+           std::to_string(*looser.min_distance) + ", more stimuli or fewer repetitions in a block";
   }
   const long long gaps = total - *most + 1;
-  return "max_run " + std::to_string(*order.max_run) + " cannot hold: " + shown +
-         "; a max_run of at least " + std::to_string((*most + gaps - 1) / gaps) +
-         ", more of the other stimuli or fewer repetitions a block would do";
+  return "max_run " + std::to_string(*order.max_run) + " cannot be satisfied: " + shown +
+         "; use a max_run of at least " + std::to_string((*most + gaps - 1) / gaps) +
+         ", more of the other stimuli or fewer repetitions in a block";
 }
 
 }  // namespace
 
 std::size_t uniform_draw_budget(std::size_t trials) {
-  // Some milliseconds; enough that limits which one plain order in 200 holds are met uniformly.
+  // Some milliseconds; enough for limits that one random order in 200 satisfies.
   constexpr std::size_t kSmall = 200000, kPerTrial = 20;
   return std::max(kSmall, kPerTrial * trials);
 }
@@ -247,9 +247,9 @@ std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Ord
   if (!start.completable()) throw ScheduleError(reason(counts, order, names));
   if (order.kind == OrderKind::sequential) {
     std::vector<int> sequence = in_sequence(counts);
-    if (!holds(sequence, counts, order)) {
+    if (!satisfies(sequence, counts, order)) {
       throw ScheduleError(
-          "the sequential order breaks max_run or min_distance; a random order would hold them");
+          "the sequential order violates max_run or min_distance; use a random order");
     }
     return sequence;
   }

@@ -1,5 +1,5 @@
 #pragma once
-// The order of stimuli within a block, under limits on repetition.
+// The order of stimuli within a block, under limits on repetition (max_run, min_distance).
 
 #include <cstddef>
 #include <string>
@@ -10,23 +10,23 @@
 
 namespace palpate::protocols {
 
-/// How many single draws order_block may spend on plain random orders before it constructs one.
+/// How many single draws order_block may spend on rejection sampling before it constructs an order.
 std::size_t uniform_draw_budget(std::size_t trials);
 
-/// An order of stimuli 0, 1, ..., each shown counts[i] times. Holds the limits for sure and ends
-/// for sure, or throws before anything is drawn.
+/// An order of stimuli 0, 1, ..., each shown counts[i] times. Always satisfies the limits and
+/// always terminates, or throws before anything is drawn.
 ///
-/// Sequential: 0, 1, ..., 0, 1, ... as long as each lasts.
-/// Random: first plain random orders are drawn and the first that holds the limits is taken, so
-/// that every valid order is equally likely; without limits this is always the first. Where the
-/// budget of draws ends before one was found (limits that nearly no plain order holds, such as no
-/// repeats among 76 trials of 4 stimuli), an order is constructed: each next stimulus is drawn with
-/// a probability proportional to what remains of it, among those after which the rest can still be
+/// Sequential: 0, 1, ..., 0, 1, ... while each lasts.
+/// Random: rejection sampling. Unconstrained random orders are drawn until one satisfies the
+/// limits, so that every valid order is equally likely; without limits this is the first. Where the
+/// budget of draws is spent before that (limits that almost no order satisfies, such as no repeats
+/// among 76 trials of 4 stimuli), an order is constructed: each next stimulus is drawn with a
+/// probability proportional to its remaining trials, among those after which the rest can still be
 /// completed; then pairs of trials are swapped at random where the limits allow it. Such orders are
-/// valid for sure and very nearly, not exactly, equally likely: in cases small enough to count, the
-/// difference drowns in the sampling error of 200 draws an order.
+/// valid, and nearly but not exactly equally likely: in cases small enough to count, the difference
+/// is within the sampling error of 200 draws for each order.
 ///
-/// \throws ScheduleError naming the stimulus (by `names`) and what would help.
+/// \throws ScheduleError naming the stimulus (by `names`) and what can be changed.
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
                              const std::vector<std::string>& names, stimuli::Random& random);
 
@@ -35,7 +35,7 @@ std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Ord
                              const std::vector<std::string>& names, stimuli::Random& random,
                              std::size_t draw_budget);
 
-/// Whether any order of these counts holds the limits. Exact.
+/// Whether any order of these counts satisfies the limits. Exact.
 bool can_order(const std::vector<int>& counts, const Protocol::Order& order);
 
 }  // namespace palpate::protocols

@@ -7,14 +7,15 @@
 namespace palpate::protocols {
 namespace {
 
-// Keys and names from a file must not break the lines of the list.
+// Keys and names from a file must not add lines to the list.
 std::string list(const std::vector<Fault>& faults) {
   std::string text;
   for (const Fault& fault : faults) {
     text += (text.empty() ? "" : "\n") + stimuli::printable(fault.file);
-    // A place that is a line says it itself.
-    if (fault.line > 0 && fault.place.front() == '/') (text += ':') += std::to_string(fault.line);
-    text += ": " + stimuli::printable(fault.place) + ": " + stimuli::printable(fault.expected);
+    // A location that is a line says it itself.
+    if (fault.line > 0 && fault.location.front() == '/')
+      (text += ':') += std::to_string(fault.line);
+    text += ": " + stimuli::printable(fault.location) + ": " + stimuli::printable(fault.expected);
   }
   return text;
 }

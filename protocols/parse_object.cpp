@@ -16,16 +16,16 @@ namespace {
 
 using nlohmann::json;
 
-// Generous: a wrong unit (30 for 30 mm) is caught by the devices' workspace, not here.
-constexpr Interval kLength{0, 1000, "m", true};
-constexpr Interval kPosition{-1000, 1000, "m"};
-// Stiffer than the stiffest haptic devices by an order of magnitude: a slipped decimal point.
-constexpr Interval kStiffness{0, 1e5, "N/m", true};
-constexpr Interval kDamping{0, 1000, "N s/m"};
-constexpr Interval kFriction{0, 10};
+// Wide: a wrong unit (30 for 30 mm) is caught by the device's workspace, not here.
+constexpr NumberRange kLength{0, 1000, "m", true};
+constexpr NumberRange kPosition{-1000, 1000, "m"};
+// Ten times stiffer than the stiffest haptic devices: beyond it a decimal point has slipped.
+constexpr NumberRange kStiffness{0, 1e5, "N/m", true};
+constexpr NumberRange kDamping{0, 1000, "N s/m"};
+constexpr NumberRange kFriction{0, 10};
 constexpr std::size_t kMaxLayers = 16;
-constexpr Interval kSubdivisions{0, 8};  // 8: 1.3 million triangles
-constexpr Interval kSegments{3, 4096};
+constexpr NumberRange kSubdivisions{0, 8};  // 8: 1.3 million triangles
+constexpr NumberRange kSegments{3, 4096};
 constexpr int kMaxCompounds = 8;  // within each other
 constexpr std::size_t kMaxParts = 1000;
 
@@ -35,7 +35,7 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
 void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec& spec) {
   std::string name;
   reader.text("file", name);
-  const json* const value = reader.member("file", Need::required);
+  const json* const value = reader.member("file", Presence::required);
   if (value == nullptr || !value->is_string()) return;
   const std::filesystem::path path = std::filesystem::path(files.folder) / name;
   std::string extension = path.extension().string();
@@ -43,9 +43,10 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::error_code error;
   if (extension != ".obj" && extension != ".stl") {
-    reader.faults().add(reader.pointer("file"), "expected a file .obj or .stl" + found(*value));
-  } else if (const auto kept = files.kept.find(name); kept != files.kept.end()) {
-    spec.file_bytes = std::make_shared<const std::string>(kept->second);
+    reader.faults().add(reader.pointer("file"),
+                        "expected a file .obj or .stl" + found_text(*value));
+  } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
+    spec.file_bytes = std::make_shared<const std::string>(stored->second);
   } else if (!std::filesystem::is_regular_file(path, error)) {
     reader.faults().add(reader.pointer("file"),
                         "expected an existing file; there is no " + path.string());
@@ -63,7 +64,7 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
 
 void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
                 stimuli::ObjectSpec& spec) {
-  const json* const parts = reader.array("parts", 1, kMaxParts, Need::required);
+  const json* const parts = reader.array("parts", 1, kMaxParts, Presence::required);
   if (parts == nullptr) return;
   if (compounds == kMaxCompounds) {
     reader.faults().add(
@@ -90,10 +91,10 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   std::vector<std::pair<const char*, std::optional<stimuli::ShapeKind>>> shapes;
   shapes.reserve(std::size(stimuli::kShapes));
   for (const stimuli::ShapeKind kind : stimuli::kShapes)
-    shapes.emplace_back(stimuli::needs_of(kind).name, kind);
-  reader.choice<std::optional<stimuli::ShapeKind>>("shape", shape, shapes, Need::required);
+    shapes.emplace_back(stimuli::traits_of(kind).name, kind);
+  reader.choice<std::optional<stimuli::ShapeKind>>("shape", shape, shapes, Presence::required);
   if (!shape) {
-    // Which keys belong here cannot be told: none of the shapes' is called unknown.
+    // Without a shape no key of any shape is called unknown.
     for (const char* key :
          {"radius_m", "height_m", "edge_m", "subdivisions", "segments", "file", "parts"}) {
       reader.member(key);
@@ -101,18 +102,18 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
     return spec;
   }
   spec.shape = *shape;
-  const stimuli::ShapeNeeds needs = stimuli::needs_of(spec.shape);
-  if (needs.radius) reader.number("radius_m", spec.radius, kLength, Need::required);
-  if (needs.height) reader.number("height_m", spec.height, kLength, Need::required);
-  if (needs.edge) reader.number("edge_m", spec.edge, kLength, Need::required);
-  if (needs.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
-  if (needs.segments) reader.integer("segments", spec.segments, kSegments);
+  const stimuli::ShapeTraits traits = stimuli::traits_of(spec.shape);
+  if (traits.radius) reader.number("radius_m", spec.radius, kLength, Presence::required);
+  if (traits.height) reader.number("height_m", spec.height, kLength, Presence::required);
+  if (traits.edge) reader.number("edge_m", spec.edge, kLength, Presence::required);
+  if (traits.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
+  if (traits.segments) reader.integer("segments", spec.segments, kSegments);
   if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);
   if (spec.shape == stimuli::ShapeKind::compound) read_parts(reader, files, compounds, spec);
   return spec;
 }
 
-/// A coefficient given alone serves for both; given both, sticking holds at least as much.
+/// A coefficient given alone is used for both; static friction must be at least dynamic friction.
 void read_friction(ObjectReader& reader, stimuli::Material& material) {
   reader.number("friction_dynamic", material.friction_dynamic, kFriction);
   if (reader.has("friction_dynamic") && !reader.has("friction_static"))
@@ -122,8 +123,9 @@ void read_friction(ObjectReader& reader, stimuli::Material& material) {
     material.friction_dynamic = material.friction_static;
   if (reader.has("friction_static") && reader.has("friction_dynamic") &&
       material.friction_static < material.friction_dynamic) {
-    reader.faults().add(reader.pointer("friction_static"),
-                        "expected at least friction_dynamic: sticking holds more than sliding");
+    reader.faults().add(
+        reader.pointer("friction_static"),
+        "expected at least friction_dynamic: static friction is not below dynamic friction");
   }
 }
 
@@ -135,8 +137,8 @@ void read_layers(ObjectReader& reader, stimuli::Material& material) {
   for (std::size_t i = 0; i < list->size(); ++i) {
     ObjectReader layer((*list)[i], child_pointer(reader.pointer("layers"), i), reader.faults());
     stimuli::Layer read;
-    layer.number("depth_m", read.depth, kLength, Need::required);
-    layer.number("stiffness_n_per_m", read.stiffness, kStiffness, Need::required);
+    layer.number("depth_m", read.depth, kLength, Presence::required);
+    layer.number("stiffness_n_per_m", read.stiffness, kStiffness, Presence::required);
     layer.refuse_unknown_keys();
     if (layer.has("depth_m") && read.depth <= above && read.depth > 0) {
       reader.faults().add(layer.pointer("depth_m"), "expected to be deeper than the layer above");

@@ -1,4 +1,5 @@
 #pragma once
+// Reading of scene objects (scene.schema.json), for scenes and protocols.
 
 #include <string>
 
@@ -8,19 +9,18 @@
 
 namespace palpate::protocols {
 
-/// Where the files are that a scene or protocol names.
+/// Where the mesh files are that a scene or protocol names.
 struct MeshFiles {
-  std::string folder;     ///< on the disk
-  StoredFiles kept = {};  ///< that need not be there any more
+  std::string folder;       ///< on disk
+  StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
 };
 
-/// Reads an object of a scene (scene.schema.json) from an open reader, with the keys that its
-/// shape takes. The caller refuses unknown keys, for a
+/// Reads an object with the keys that its shape takes. The caller refuses unknown keys, since a
 /// stimulus has some more of its own.
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
                                 const MeshFiles& files);
 
-/// Reads stiffness_n_per_m and damping_ns_per_m.
+/// Reads stiffness_n_per_m, damping_ns_per_m, friction_static, friction_dynamic and layers.
 void read_material(ObjectReader& reader, stimuli::Material& material);
 
 /// The folder that a file's relative paths start from.

@@ -14,25 +14,25 @@ namespace {
 
 using nlohmann::json;
 
-// What a laboratory may need, with room to spare; beyond it a value is a slip.
+// More than a laboratory needs; a larger value is a mistake.
 constexpr std::size_t kMaxStimuli = 100;
 constexpr std::size_t kMaxOrientations = 10000;
 constexpr std::size_t kMaxKey = 32;    // bytes of a response key's name
-constexpr std::size_t kMaxLabel = 80;  // bytes of what an answer is called
+constexpr std::size_t kMaxLabel = 80;  // bytes of a label
 constexpr long long kMaxTrials = 1000000;
-constexpr Interval kRepetitions{1, 1e6};
-constexpr Interval kCount{1, 1e6};
-constexpr Interval kFewFromZero{0, 10000};
-constexpr Interval kFew{1, 10000};
+constexpr NumberRange kRepetitions{1, 1e6};
+constexpr NumberRange kCount{1, 1e6};
+constexpr NumberRange kFewFromZero{0, 10000};
+constexpr NumberRange kFew{1, 10000};
 constexpr int kRoundsWithCriterion = 5;  // of practice, unless max_rounds says otherwise
 
 void read_renderers(ObjectReader& reader, Protocol& protocol) {
-  const json* const list = reader.array("renderers", 1, 2, Need::required);
+  const json* const list = reader.array("renderers", 1, 2, Presence::required);
   if (list == nullptr) return;
   for (std::size_t i = 0; i < list->size(); ++i) {
-    const std::string place = child_pointer(reader.pointer("renderers"), i);
+    const std::string pointer = child_pointer(reader.pointer("renderers"), i);
     RendererKind kind{};
-    if (!read_choice((*list)[i], place, kind,
+    if (!read_choice((*list)[i], pointer, kind,
                      {{to_string(RendererKind::point), RendererKind::point},
                       {to_string(RendererKind::ray), RendererKind::ray}},
                      reader.faults())) {
@@ -40,7 +40,8 @@ void read_renderers(ObjectReader& reader, Protocol& protocol) {
     }
     const auto& renderers = protocol.renderers;
     if (std::find(renderers.begin(), renderers.end(), kind) != renderers.end()) {
-      reader.faults().add(place, "expected each renderer once" + found((*list)[i]) + " again");
+      reader.faults().add(pointer,
+                          "expected each renderer once" + found_text((*list)[i]) + " again");
     }
     protocol.renderers.push_back(kind);
   }
@@ -65,12 +66,12 @@ StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol, const
 }
 
 void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
-  const json* const list = reader.array("stimuli", 1, kMaxStimuli, Need::required);
+  const json* const list = reader.array("stimuli", 1, kMaxStimuli, Presence::required);
   if (list == nullptr) return;
   std::set<std::string> names;
   for (std::size_t i = 0; i < list->size(); ++i) {
-    const std::string place = child_pointer(reader.pointer("stimuli"), i);
-    ObjectReader item((*list)[i], place, reader.faults());
+    const std::string pointer = child_pointer(reader.pointer("stimuli"), i);
+    ObjectReader item((*list)[i], pointer, reader.faults());
     protocol.stimuli.push_back(read_stimulus(item, protocol, files));
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
@@ -89,28 +90,29 @@ void read_orientation(ObjectReader& reader, Protocol& protocol) {
                   {{"uniform", OrientationKind::uniform}, {"fixed", OrientationKind::fixed}},
                   reader.faults());
     } else {
-      reader.faults().add(reader.pointer("orientation"),
-                          "expected 'uniform', 'fixed' or an array of quaternions" + found(*value));
+      reader.faults().add(
+          reader.pointer("orientation"),
+          "expected 'uniform', 'fixed' or an array of quaternions" + found_text(*value));
     }
     return;
   }
   protocol.orientation = OrientationKind::listed;
   if (reader.array("orientation", 1, kMaxOrientations) == nullptr) return;
   for (std::size_t i = 0; i < value->size(); ++i) {
-    const std::string place = child_pointer(reader.pointer("orientation"), i);
-    if (const auto rotation = read_quaternion((*value)[i], place, reader.faults())) {
+    const std::string pointer = child_pointer(reader.pointer("orientation"), i);
+    if (const auto rotation = read_quaternion((*value)[i], pointer, reader.faults())) {
       protocol.orientations.push_back(*rotation);
     }
   }
 }
 
-/// The stimulus that a key stands for: its name, or an object of it and a label. No string and a
-/// fault otherwise.
-json read_answer(const json& value, const std::string& place, std::string& label,
+/// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
+/// a fault, otherwise.
+json read_answer(const json& value, const std::string& pointer, std::string& label,
                  FaultList& faults) {
   if (!value.is_object()) return value;
-  ObjectReader answer(value, place, faults);
-  const json* const stimulus = answer.member("stimulus", Need::required);
+  ObjectReader answer(value, pointer, faults);
+  const json* const stimulus = answer.member("stimulus", Presence::required);
   const json* const words = answer.member("label");
   answer.refuse_unknown_keys();
   if (words != nullptr) {
@@ -119,39 +121,40 @@ json read_answer(const json& value, const std::string& place, std::string& label
     if (label.empty() || label.size() > kMaxLabel ||
         !std::all_of(label.begin(), label.end(), printable)) {
       faults.add(answer.pointer("label"), "expected a text of 1 to " + std::to_string(kMaxLabel) +
-                                              " bytes without control characters" + found(*words));
+                                              " bytes without control characters" +
+                                              found_text(*words));
       label.clear();
     }
   }
   return stimulus != nullptr ? *stimulus : json();
 }
 
-/// Two answers that read the same cannot be told apart.
-void check_labels(const Protocol& protocol, const std::string& place, FaultList& faults) {
+/// Labels must differ: two responses that read the same cannot be told apart.
+void check_labels(const Protocol& protocol, const std::string& pointer, FaultList& faults) {
   std::map<std::string, std::string> key_of;  // by what is read
   for (const auto& [key, stimulus] : protocol.response.keys) {
     const std::string& label = answer_label(protocol, stimulus);
     const auto [before, is_new] = key_of.emplace(label, key);
     if (is_new || protocol.response.keys.at(before->second) == stimulus) continue;
-    faults.add(child_pointer(place, key), "expected a label of its own; '" + label +
-                                              "' is what the key '" + before->second +
-                                              "' says already");
+    faults.add(child_pointer(pointer, key), "expected a label of its own; '" + label +
+                                                "' is what the key '" + before->second +
+                                                "' says already");
   }
 }
 
 void read_keys(ObjectReader& response, Protocol& protocol) {
-  const json* const keys = response.member("keys", Need::required);
+  const json* const keys = response.member("keys", Presence::required);
   if (keys == nullptr) return;
   FaultList& faults = response.faults();
-  const std::string place = response.pointer("keys");
+  const std::string pointer = response.pointer("keys");
   if (!keys->is_object()) {
-    faults.add(place, "expected an object of a stimulus for each key" + found(*keys));
+    faults.add(pointer, "expected an object of a stimulus for each key" + found_text(*keys));
     return;
   }
   std::map<std::string, std::optional<std::string>> key_of;  // by stimulus
   for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
   for (const auto& [key, value] : keys->items()) {
-    const std::string here = child_pointer(place, key);
+    const std::string here = child_pointer(pointer, key);
     const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
     if (key.empty() || key.size() > kMaxKey || !std::all_of(key.begin(), key.end(), printable)) {
       faults.add(here, "expected a key's name of 1 to " + std::to_string(kMaxKey) +
@@ -163,10 +166,10 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
     if (stimulus == key_of.end()) {
       if (!value.is_object()) {
         faults.add(here, "expected the name of a stimulus, or an object of 'stimulus' and 'label'" +
-                             found(value));
+                             found_text(value));
       } else if (value.contains("stimulus")) {
         faults.add(child_pointer(here, "stimulus"),
-                   "expected the name of a stimulus" + found(name));
+                   "expected the name of a stimulus" + found_text(name));
       }
       continue;
     }
@@ -178,9 +181,9 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
     protocol.response.keys[key] = stimulus->first;
     if (!label.empty()) protocol.response.labels[stimulus->first] = label;
   }
-  check_labels(protocol, place, faults);
+  check_labels(protocol, pointer, faults);
   for (const auto& [name, key] : key_of) {
-    if (!key && !name.empty()) faults.add(place, "no key for the stimulus '" + name + "'");
+    if (!key && !name.empty()) faults.add(pointer, "no key for the stimulus '" + name + "'");
   }
 }
 
@@ -211,7 +214,7 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
         section.number("time_out_s", protocol.response.time_out, {0, 3600, "s", true});
         section.boolean("feedback", protocol.response.feedback);
       },
-      Need::required);
+      Presence::required);
   reader.section("texts", [&](ObjectReader& section) {
     section.text("instructions", protocol.texts.instructions);
     section.text("practice", protocol.texts.practice);
@@ -250,7 +253,7 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
     section.choice("kind", noise.kind,
                    {{to_string(NoiseKind::white), NoiseKind::white},
                     {to_string(NoiseKind::pink), NoiseKind::pink}});
-    // Louder, pink noise would be clipped; softer, it would be lost in 16 bits.
+    // Above, pink noise would be clipped; below, it would be lost in 16 bits.
     section.number("level_db", noise.level_db, {-80, -12, "dB"});
   });
   reader.section("home", [&](ObjectReader& section) {
@@ -260,10 +263,10 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
 }
 
 void read_version(ObjectReader& reader, Protocol& protocol) {
-  reader.integer("version", protocol.version, {1, 1}, Need::required);
+  reader.integer("version", protocol.version, {1, 1}, Presence::required);
 }
 
-/// What only the whole can tell: whether there is a schedule.
+/// Checks of the whole protocol: whether a schedule exists.
 void check_schedule(const Protocol& protocol, FaultList& faults) {
   const long long trials = main_trials(protocol);
   if (trials > kMaxTrials) {
@@ -313,7 +316,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, {folder_of(file_name), stored});
-  reader.integer("repetitions", protocol.repetitions, kRepetitions, Need::required);
+  reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
   reader.section("order", [&](ObjectReader& section) {
     section.choice("kind", protocol.order.kind,
                    {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});

@@ -11,7 +11,7 @@ std::vector<stimuli::ObjectSpec> parse_scene(const std::string& path) {
   ObjectReader scene(root, "", faults);
   scene.member("$schema");
   std::vector<stimuli::ObjectSpec> objects;
-  if (const auto* const list = scene.array("objects", 1, kMaxObjects, Need::required)) {
+  if (const auto* const list = scene.array("objects", 1, kMaxObjects, Presence::required)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       ObjectReader object((*list)[i], child_pointer("/objects", i), faults);
       objects.push_back(read_object(object, stimuli::Material{}, {folder_of(path)}));

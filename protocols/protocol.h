@@ -1,6 +1,6 @@
 #pragma once
-// An experiment's design as plain values; what each key means and its default:
-// protocol.schema.json.
+// The design of an experiment as plain values. Meaning and default of each key:
+// protocol.schema.json. SI units.
 
 #include <cstdint>
 #include <map>
@@ -18,14 +18,15 @@ const char* to_string(RendererKind kind);  ///< "point", "ray"
 enum class RendererOrder { fixed, counterbalanced, interleaved };
 enum class OrderKind { random, sequential };
 enum class OrientationKind { uniform, fixed, listed };
-/// What becomes of a material that the device cannot show without feeding energy to the hand.
+/// What is done about a material that the device cannot render passively: refuse the session, or
+/// limit the stiffness.
 enum class MaterialLimit { refuse, limit };
 
 enum class NoiseKind { white, pink };
 const char* to_string(NoiseKind kind);  ///< "white", "pink"
 
-/// In the participant's headphones while trials follow one another, so that the device's own sound
-/// tells nothing. Loudness is set at the amplifier.
+/// Masking noise in the participant's headphones during trials, against the sound of the device.
+/// Loudness is set at the amplifier.
 struct MaskingNoise {
   NoiseKind kind = NoiseKind::pink;
   double level_db = -24;  ///< root mean square, dB re full scale (an amplitude of 1)
@@ -54,7 +55,7 @@ struct Protocol {
   std::vector<Quat> orientations;  ///< when listed
   struct Practice {
     int repetitions = 0;
-    std::optional<double> criterion;  ///< share correct to go on
+    std::optional<double> criterion;  ///< proportion correct that ends practice
     int max_rounds = 1;
   } practice;
   struct Sessions {
@@ -82,7 +83,7 @@ struct Protocol {
   } workspace;
   stimuli::Material material;
   double servo_rate = 1000;           ///< Hz
-  bool passivity_controller = false;  ///< takes out the energy that sampling feeds to the hand
+  bool passivity_controller = false;  ///< dissipates the energy that sampling would generate
   MaterialLimit material_limit = MaterialLimit::refuse;
   struct Home {
     double rest = 0.5;     ///< s
@@ -90,7 +91,7 @@ struct Protocol {
   } home;
   struct Texts {
     std::string instructions, practice, break_text, end;
-    // Of every trial, and so in every session.
+    // Shown in every trial.
     std::string move_away = "Take the stylus away from the middle.";
     std::string ready = "Ready: hold it still.";
     std::string go = "Go";
@@ -105,7 +106,8 @@ struct Protocol {
   std::string sha256;       ///< of source_text, lower-case hexadecimal
 };
 
-/// What the participant reads for a stimulus: its label, else its name. Answers are stored by name.
+/// What the participant reads for a stimulus: its label, else its name. Responses are stored by
+/// name.
 const std::string& answer_label(const Protocol& protocol, const std::string& stimulus);
 
 }  // namespace palpate::protocols

@@ -13,23 +13,23 @@
 namespace palpate::protocols {
 namespace {
 
-// One stream of random numbers for each use, so that a change to one part of a protocol leaves the
-// draws of the others alone. The values are part of what a seed means: never renumber them.
+// A random stream for each use, so that a change to one part of a protocol does not change the
+// draws of the others. The values are part of the meaning of a seed: never renumber them.
 enum Stream : std::uint64_t { kOrder = 1, kOrientation = 2, kPractice = 3, kWarmUp = 4 };
 
 /// Renderers whose trials are shown together: one of them, or all when interleaved.
 using Group = std::vector<RendererKind>;
 
-/// Trials shown in a row.
+/// An uninterrupted sequence of trials.
 struct Block {
   int session = 1;
   int group = 0;  ///< index into the groups
   std::vector<Trial> trials;
 };
 
-/// Size of part `index` when `total` is spread over `parts` as evenly as it goes, larger parts
+/// Size of part `index` when `total` is divided into `parts` as evenly as possible, larger parts
 /// first.
-int share(long long total, int parts, int index) {
+int part_size(long long total, int parts, int index) {
   return static_cast<int>(total / parts + (index < total % parts ? 1 : 0));
 }
 
@@ -40,7 +40,6 @@ std::uint64_t code(const Group& group) { return group.size() == 1 ? code(group.f
 
 std::vector<std::string> names_of(const Protocol& protocol) {
   std::vector<std::string> names;
-  names.reserve(protocol.stimuli.size());
   names.reserve(protocol.stimuli.size());
   for (const StimulusSpec& stimulus : protocol.stimuli) names.push_back(stimulus.name);
   return names;
@@ -61,8 +60,8 @@ std::vector<Group> groups_in_order(const Protocol& protocol, int participant_num
   return groups;
 }
 
-/// Gives every trial its renderer: each stimulus meets each renderer of the group equally often.
-/// Together with a uniform order of the stimuli this makes every mixed order equally likely.
+/// Assigns renderers to trials: each stimulus is shown with each renderer of the group equally
+/// often. With a uniform order of the stimuli, every mixed order is equally likely.
 void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Trial>& trials,
                    stimuli::Random& random) {
   for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
@@ -97,7 +96,7 @@ std::vector<int> equal_counts(const Protocol& protocol, const Group& group, int 
   return counts;
 }
 
-/// Listed orientations: for each stimulus and renderer the list as evenly as it goes, shuffled.
+/// Listed orientations: for each stimulus and renderer the list as evenly as possible, shuffled.
 void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials,
                       stimuli::Random& random) {
   if (protocol.orientations.empty()) throw ScheduleError("the list of orientations is empty");
@@ -110,7 +109,7 @@ void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trial
       std::vector<Quat> turns;
       while (turns.size() < shown.size()) {
         std::vector<Quat> round = protocol.orientations;
-        random.shuffle(round);  // which ones fill the last, incomplete round is a matter of chance
+        random.shuffle(round);  // the last, incomplete round is a random choice
         turns.insert(turns.end(), round.begin(), round.end());
       }
       turns.resize(shown.size(), Quat(1, 0, 0, 0));
@@ -167,7 +166,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
   std::vector<int> counts;
   counts.reserve(protocol.stimuli.size());
   for (int i = 0; i < stimuli; ++i) {
-    counts.push_back(share(protocol.sessions.warm_up_trials, stimuli, i));
+    counts.push_back(part_size(protocol.sessions.warm_up_trials, stimuli, i));
   }
   if (protocol.order.kind == OrderKind::random) random.shuffle(counts);
   std::vector<Trial> trials = ordered_trials(protocol, group, counts, random);
@@ -184,7 +183,7 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
     for (int b = 0; b < protocol.blocks_per_renderer; ++b) {
       stimuli::Random random(protocol.seed,
                              {participant, kOrder, code(groups[g]), static_cast<std::uint64_t>(b)});
-      const int repetitions = share(protocol.repetitions, protocol.blocks_per_renderer, b);
+      const int repetitions = part_size(protocol.repetitions, protocol.blocks_per_renderer, b);
       blocks.push_back({1, static_cast<int>(g),
                         ordered_trials(protocol, groups[g],
                                        equal_counts(protocol, groups[g], repetitions), random)});
@@ -199,30 +198,31 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
   return blocks;
 }
 
-/// Whole blocks for each session where there are enough of them; else the trials are cut evenly.
+/// Whole blocks for each session where there are enough of them; else the trials are divided
+/// evenly.
 std::vector<Block> into_sessions(const Protocol& protocol, std::vector<Block> blocks) {
   const int sessions = protocol.sessions.count;
   const int count = static_cast<int>(blocks.size());
   if (sessions <= count) {
     std::size_t next = 0;
     for (int s = 0; s < sessions; ++s) {
-      for (int i = share(count, sessions, s); i > 0; --i) blocks[next++].session = s + 1;
+      for (int i = part_size(count, sessions, s); i > 0; --i) blocks[next++].session = s + 1;
     }
     return blocks;
   }
   std::vector<Block> parts;
   int session = 1;
-  int room = share(main_trials(protocol), sessions, 0);
+  int remaining = part_size(main_trials(protocol), sessions, 0);
   for (const Block& block : blocks) {
     Block part{session, block.group, {}};
     for (const Trial& trial : block.trials) {
-      if (room == 0) {
+      if (remaining == 0) {
         if (!part.trials.empty()) parts.push_back(part);
-        room = share(main_trials(protocol), sessions, session);
+        remaining = part_size(main_trials(protocol), sessions, session);
         part = {++session, block.group, {}};
       }
       part.trials.push_back(trial);
-      --room;
+      --remaining;
     }
     parts.push_back(part);
   }

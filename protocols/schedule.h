@@ -1,12 +1,12 @@
 #pragma once
-// Which trials a participant gets, in which order. Everything follows from the protocol's seed and
-// the participant number alone, on every machine and compiler.
+// The trials of a participant, in order. Everything follows from the protocol's seed and the
+// participant number alone, on every machine and compiler.
 //
 // Numbering. Sessions count from 1, trials from 1 within their session. Blocks count from 1 through
-// all sessions of the participant, and everything that is shown in a row is a block of its own: the
+// all sessions of the participant, and each uninterrupted sequence is a block of its own: the
 // practice before a renderer's first block, the warm-up at the start of the second and later
-// sessions, every block of trials; a block that a session's end cuts in two goes on under a new
-// number. So session and block never decrease, and (session, trial) is unique.
+// sessions, every block of trials; a block that is split by the end of a session continues under a
+// new number. So session and block never decrease, and (session, trial) is unique.
 //
 // The limits max_run and min_distance hold within each block and each round of practice, not across
 // their borders, where there are breaks or instructions.
@@ -24,10 +24,10 @@ struct Trial {
   RendererKind renderer = RendererKind::point;
   int stimulus = 0;  ///< index into Protocol::stimuli
   Quat orientation{1, 0, 0, 0};
-  bool practice = false;  ///< practice or warm-up: not analysed
+  bool practice = false;  ///< practice or warm-up: excluded from analysis
 };
 
-/// The constraint on the order of trials cannot be met; what() says why and what would help.
+/// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
 class ScheduleError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -48,7 +48,7 @@ std::vector<Trial> practice_round(const Protocol& protocol, int participant_numb
 /// After how many successive participant numbers the orders of renderers repeat.
 int renderer_orders(const Protocol& protocol);
 
-/// Trials that count, without practice and warm-up, in all sessions of a participant.
+/// Trials for analysis, without practice and warm-up, in all sessions of a participant.
 long long main_trials(const Protocol& protocol);
 
 }  // namespace palpate::protocols

@@ -19,8 +19,8 @@ namespace {
 
 using Index = std::uint32_t;
 
-// How far a corner may be behind the hull of all, in errors: as far as it may be in front of a
-// facet (convexity.cpp).
+// In errors: how far a corner may be below the hull of all; as far as it may be in front of a facet
+// (convexity.cpp).
 constexpr double kDeepest = 16 * kCoplanar;
 
 struct Bulk {
@@ -36,7 +36,7 @@ Bulk bulk_of(const HalfEdges& mesh, const std::vector<FaceShape>& shapes) {
   return bulk;
 }
 
-// Folds, thickness and orientation, face by face, before anything is merged.
+// Convex edges, volume and orientation, before any faces are merged.
 void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, MeshFaults& faults) {
   check_flatness(mesh, shapes, faults);
   const auto [volume, area] = bulk_of(mesh, shapes);
@@ -56,7 +56,7 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
     const Index twin = mesh.twin[h];
     if (twin == HalfEdges::kNone || twin < h) continue;
     if (shapes[mesh.face[h]].thin || shapes[mesh.face[twin]].thin) continue;
-    if (outward * fold_at(mesh, shapes, h) >= -kCoplanar) continue;
+    if (outward * plane_deviation_at(mesh, shapes, h) >= -kCoplanar) continue;
     faults.add("not convex", [&] {
       return mesh.name_edge(h) + " is a dent against " + mesh.name_face(mesh.face[twin]) +
              "; expected convex edges only";
@@ -64,19 +64,19 @@ void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Me
   }
 }
 
-// Interleaves the bits of a place within the bounding box: what is near in this order is near in
-// space (Morton 1966).
-std::uint64_t morton(const Vec3& place, const Vec3& low, double extent) {
-  const auto spread = [](double share) {
-    auto bits = static_cast<std::uint64_t>(std::clamp(share, 0.0, 1.0) * 0x1fffff);
+// Interleaves the bits of a position within the bounding box (Morton order, 1966): neighbours in
+// this order are neighbours in space.
+std::uint64_t morton(const Vec3& position, const Vec3& low, double extent) {
+  const auto spread = [](double fraction) {
+    auto bits = static_cast<std::uint64_t>(std::clamp(fraction, 0.0, 1.0) * 0x1fffff);
     bits = (bits | bits << 32U) & 0x001f00000000ffffU;
     bits = (bits | bits << 16U) & 0x001f0000ff0000ffU;
     bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
     bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
     return (bits | bits << 2U) & 0x1249249249249249U;
   };
-  const Vec3 share = (place - low) / extent;
-  return spread(share.x) | spread(share.y) << 1U | spread(share.z) << 2U;
+  const Vec3 fraction = (position - low) / extent;
+  return spread(fraction.x) | spread(fraction.y) << 1U | spread(fraction.z) << 2U;
 }
 
 std::vector<Index> order_in_space(const HalfEdges& mesh, const FacetOutlines& outlines) {
@@ -99,7 +99,7 @@ std::vector<Index> order_in_space(const HalfEdges& mesh, const FacetOutlines& ou
   return order;
 }
 
-// In the plane through a polygon, midway between the corners that stand out most and least.
+// The plane of a polygon, midway between the corners that stand out most and least.
 Facet facet_of(const std::vector<Vec3>& corners) {
   Facet facet{plane_of(corners).normal, 0, 0, static_cast<Index>(corners.size()), {}};
   double low = std::numeric_limits<double>::max(), high = -low;
@@ -125,16 +125,16 @@ class ConvexMesh::Builder {
         edge_of_(outlines.side_count(), HalfEdges::kNone),
         vertex_of_(mesh.points.size(), HalfEdges::kNone) {}
 
-  /// From regions of faces that lie in one plane each; half filled where there are faults.
+  /// From coplanar regions of faces; incomplete where there are faults.
   /// \return false where a region is no polygon
   static bool fill(ConvexMesh& out, const HalfEdges& mesh, const std::vector<Index>& region_of,
                    Index count, MeshFaults& faults);
 
-  /// Where corners crowd together their error hides the folds between some faces and not between
-  /// others, and what is merged then may be no polygon; the faces as they came have dents too fine
-  /// to be seen. The hull of their corners is a solid; it is taken if they are all but on it.
-  static bool fill_crowded(ConvexMesh& out, const HalfEdges& mesh,
-                           const std::vector<FaceShape>& shapes);
+  /// Where corners are closer than their error, some faces merge and others do not, so a merged
+  /// region may be no polygon, and the faces themselves have concave edges within the error. The
+  /// convex hull of the corners is used instead, if all of them lie on it within the error.
+  static bool fill_from_hull(ConvexMesh& out, const HalfEdges& mesh,
+                             const std::vector<FaceShape>& shapes);
 
   void build() {
     clear();
@@ -210,8 +210,8 @@ class ConvexMesh::Builder {
     out_.sides_.push_back({inward, offset, edge_of_[s], across});
   }
 
-  // Counter-clockwise round a vertex: from the side that leaves it, over the facet on the left, to
-  // the side that arrives at it, which leaves it on the other side of that edge.
+  // Counter-clockwise around a vertex: from the side that leaves it, over the facet on the left, to
+  // the side that arrives, whose opposite leaves the vertex.
   void add_fans() {
     std::vector<Index> opposite(out_.sides_.size()),
         leaving(out_.vertices_.size(), HalfEdges::kNone);
@@ -235,8 +235,8 @@ class ConvexMesh::Builder {
     out_.fan_first_.push_back(static_cast<Index>(out_.fan_edges_.size()));
   }
 
-  // Round the middle of the bounding box: at most 1.74 times the smallest sphere, and the smallest
-  // for anything with a centre of symmetry.
+  // About the middle of the bounding box: radius at most 1.74 times that of the smallest sphere,
+  // and the smallest for anything with a centre of symmetry.
   void add_sphere() {
     Vec3 low = out_.vertices_[0], high = low;
     for (const Vec3& vertex : out_.vertices_) {
@@ -271,15 +271,15 @@ bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
   return true;
 }
 
-bool ConvexMesh::Builder::fill_crowded(ConvexMesh& out, const HalfEdges& mesh,
-                                       const std::vector<FaceShape>& shapes) {
+bool ConvexMesh::Builder::fill_from_hull(ConvexMesh& out, const HalfEdges& mesh,
+                                         const std::vector<FaceShape>& shapes) {
   const GridHull hull = grid_hull(mesh.points, mesh.error);
   if (hull.soup.faces.empty() || hull.depth > kDeepest * mesh.error) return false;
   MeshFaults hull_faults;
   const HalfEdges hull_mesh = link_half_edges(hull.soup, hull_faults);
   if (!hull_faults.empty()) return false;
   const std::vector<FaceShape> hull_shapes = shapes_of(hull_mesh);
-  // What winds round twice, say, has corners like its hull and folds that are convex.
+  // A surface that winds round twice has the corners of its hull and convex edges: volumes differ.
   const Bulk is = bulk_of(mesh, shapes), could_be = bulk_of(hull_mesh, hull_shapes);
   if (std::abs(could_be.volume - is.volume) > kDeepest * mesh.error * is.area) return false;
   Index count = 0;
@@ -301,7 +301,7 @@ ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
   if (count == 0) faults.add("flat", [] { return "expected a solid, found lines only"; });
   faults.throw_if_any();
   if (!Builder::fill(*this, mesh, merged, count, faults) &&
-      Builder::fill_crowded(*this, mesh, shapes)) {
+      Builder::fill_from_hull(*this, mesh, shapes)) {
     return;
   }
   faults.throw_if_any();

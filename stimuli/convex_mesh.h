@@ -1,6 +1,6 @@
 #pragma once
-// A closed convex polyhedron, prepared for local search: merged coplanar facets, edges with their
-// two facets, the fan of edges around every vertex.
+// A closed convex polyhedron, prepared for local search: facets (coplanar faces merged), edges with
+// their two facets, the fan of edges around every vertex. The mesh's own frame, SI units.
 
 #include <array>
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace palpate::stimuli {
 
-/// What a mesh is made from: corners and faces as index loops, counter-clockwise seen from outside.
+/// The input of a mesh: vertices, and faces as index loops, counter-clockwise seen from outside.
 struct PolygonSoup {
   std::vector<Vec3> vertices;                     ///< m
   std::vector<std::vector<std::uint32_t>> faces;  ///< three or more corners each
-  /// m; how far each coordinate may be from where it was meant (digits of a text file, single
-  /// precision). 0: double precision. Tolerances never go below it.
+  /// m; error of each coordinate (from the digits of a text file, or single precision). 0: double
+  /// precision. Tolerances are never smaller.
   double coordinate_error = 0;
 };
 
-/// Why a polygon soup is no convex mesh: one message for each fault found (the first few of a
+/// Why a polygon soup is not a convex mesh: one message for each fault (the first few of each
 /// kind).
 class MeshError : public std::runtime_error {
  public:
@@ -66,8 +66,8 @@ struct alignas(64) Edge {
   Vec3 from, to;  ///< m; where v0 and v1 are
 };
 
-/// Immutable after construction. Facets, edges and vertices that are near each other in space are
-/// near each other in memory. Every vertex is a corner of at least three facets (vertices inside a
+/// Immutable after construction. Facets, edges and vertices that are close in space are close in
+/// memory. Every vertex is a corner of at least three facets (vertices inside a
 /// merged facet or along a straight edge are dropped).
 class ConvexMesh {
  public:

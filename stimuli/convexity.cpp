@@ -6,16 +6,16 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "stimuli/fold.h"
+#include "stimuli/plane_deviation.h"
 
 namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
 
-// The directions of the sides of a closed plane polygon without reflex corners: does it turn by 360
-// degrees and no more? Then their parts along any axis of the plane change sign exactly twice.
-// Several axes, because next to zero a sign may be rounding.
+// Whether a closed plane polygon without reflex corners, given by the directions of its sides,
+// turns by 360 degrees and no more: then their components along any axis of the plane change sign
+// exactly twice. Several axes, because close to zero a sign may be rounding.
 bool turns_once(const std::vector<Vec3>& directions, const Vec3& normal) {
   const Vec3 u = glm::normalize(directions[0]), v = glm::cross(normal, u);
   constexpr std::array<std::array<double, 2>, 3> kAxes{{{0.8, 0.6}, {-0.28, 0.96}, {0.6, -0.8}}};
@@ -47,7 +47,7 @@ class Checker {
     Index lowest = corner(facet, 0);
     for (Index k = 0; k < shape.side_count; ++k) {
       const Index here = corner(facet, k), next = corner(facet, (k + 1) % shape.side_count);
-      directions_.push_back(place(next) - place(here));
+      directions_.push_back(position(next) - position(here));
       if (valence(here) < valence(lowest)) lowest = here;
     }
     if (!turns_once(directions_, shape.normal)) {
@@ -60,15 +60,15 @@ class Checker {
     check_plane(facet, lowest);
   }
 
-  // Before facets were merged every fold was looked at. Dents within the error merge as well, and
-  // many of them make dents between facets that are beyond it.
+  // Edges were checked before facets were merged. But concave edges within the error merge as well,
+  // and many of them add up to concave edges between facets that are beyond it.
   void check_edge(Index number) {
     const Edge& edge = mesh_.edges()[number];
-    const Vec3 side = place(edge.v1) - place(edge.v0);
-    const double folded =
-        fold(mesh_.facets()[edge.left].normal, mesh_.facets()[edge.right].normal, side,
-             reach_of(edge.left, edge.v0, side), reach_of(edge.right, edge.v1, -side), error_);
-    if (folded >= -2 * kCoplanar) return;
+    const Vec3 side = position(edge.v1) - position(edge.v0);
+    const double deviation = plane_deviation(
+        mesh_.facets()[edge.left].normal, mesh_.facets()[edge.right].normal, side,
+        extent_of(edge.left, edge.v0, side), extent_of(edge.right, edge.v1, -side), error_);
+    if (deviation >= -2 * kCoplanar) return;
     faults_.add("not convex", [&] {
       return "the facets with the vertices " + names(edge.left) + " and " + names(edge.right) +
              " form a dent; expected convex edges only";
@@ -85,9 +85,9 @@ class Checker {
     corners_.clear();
     for (Index k = first; k < end; ++k) {
       const Vec3 along =
-          glm::normalize(place(other_end(mesh_.edges()[fan[k]], vertex)) - place(vertex));
+          glm::normalize(position(other_end(mesh_.edges()[fan[k]], vertex)) - position(vertex));
       const double ahead = glm::dot(along, inside);
-      if (!(ahead > 0)) return;  // as flat as rounding: nothing to see, and nothing to wind round
+      if (!(ahead > 0)) return;  // flat within rounding: nothing can wind round
       corners_.push_back(along / ahead);
     }
     directions_.clear();
@@ -102,7 +102,7 @@ class Checker {
   }
 
  private:
-  const Vec3& place(Index vertex) const { return mesh_.vertices()[vertex]; }
+  const Vec3& position(Index vertex) const { return mesh_.vertices()[vertex]; }
   Index valence(Index v) const { return mesh_.fan_first()[v + 1] - mesh_.fan_first()[v]; }
 
   Index corner(Index facet, Index k) const {
@@ -110,15 +110,15 @@ class Checker {
     return edge.left == facet ? edge.v0 : edge.v1;
   }
 
-  Reach reach_of(Index facet, Index from, const Vec3& side) const {
+  PolygonExtent extent_of(Index facet, Index from, const Vec3& side) const {
     const Index corners = mesh_.facets()[facet].side_count;
-    // Some tell enough of a facet with many.
+    // A sample of the corners of a large facet is enough.
     const Index stride = std::max<Index>(1, corners / 16);
-    Reach reach(side);
+    PolygonExtent extent(side);
     for (Index k = 0; k < corners; k += stride) {
-      reach.include(place(corner(facet, k)) - place(from));
+      extent.include(position(corner(facet, k)) - position(from));
     }
-    return reach;
+    return extent;
   }
 
   const Facet& leaving_facet(Index edge, Index vertex) const {
@@ -134,7 +134,8 @@ class Checker {
     return text + (mesh_.facets()[facet].side_count > 8 ? " ..." : "");
   }
 
-  // Climbs along the facet's normal from one of its corners; on a convex body it ends where it is.
+  // Hill climbing along the facet's normal from one of its corners; on a convex body it stays
+  // there.
   void check_plane(Index facet, Index from) {
     const Facet& shape = mesh_.facets()[facet];
     Index top = from;
@@ -144,7 +145,7 @@ class Checker {
       const Index here = top;
       for (Index k = mesh_.fan_first()[here]; k < mesh_.fan_first()[here + 1]; ++k) {
         const Index next = other_end(mesh_.edges()[mesh_.fan_edges()[k]], here);
-        const double above = glm::dot(shape.normal, place(next)) - shape.offset;
+        const double above = glm::dot(shape.normal, position(next)) - shape.offset;
         if (above <= height) continue;
         top = next;
         height = above;

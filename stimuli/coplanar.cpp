@@ -14,19 +14,19 @@ namespace {
 
 using Index = HalfEdges::Index;
 
-Reach reach_of(const HalfEdges& mesh, Index h) {
+PolygonExtent extent_of(const HalfEdges& mesh, Index h) {
   const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
-  // Some corners tell enough of a polygon with many: trying all would cost their number squared.
+  // A sample of the corners of a large polygon is enough: all would cost their number squared.
   const Index stride = std::max<Index>(1, corners / 16);
-  Reach reach(mesh.to(h) - mesh.from(h));
+  PolygonExtent extent(mesh.to(h) - mesh.from(h));
   for (Index k = 0; k < corners; k += stride) {
     const Index corner = mesh.first[face] + (h - mesh.first[face] + 2 + k) % corners;
-    reach.include(mesh.from(corner) - mesh.from(h));
+    extent.include(mesh.from(corner) - mesh.from(h));
   }
-  return reach;
+  return extent;
 }
 
-// A planar region while it grows.
+// A planar region under construction.
 class Region {
  public:
   Region(const HalfEdges& mesh, const FaceShape& seed, Index face)
@@ -44,15 +44,15 @@ class Region {
     }
   }
 
-  // Does the face beyond half-edge h lie in the plane? The plane is known to the error over the
-  // region's width, and the face reaches past it: allow for that.
-  bool holds(Index h) const {
+  // Whether the face across half-edge h lies in the plane. The plane is known to the error over the
+  // region's width, and the face extends past it: the tolerance allows for that.
+  bool contains_face_across(Index h) const {
     const Vec3 normal = glm::normalize(normal_);
     const Vec3 middle = mesh_.points[0] + moment_ / area_;
     const double width = area_ / glm::distance(low_, high_);
     const Index beyond = mesh_.twin[h], face = mesh_.face[beyond];
-    const double reach = reach_of(mesh_, beyond).across();
-    const double allowed = 2 * kCoplanar * mesh_.error * (1 + reach / width);
+    const double across = extent_of(mesh_, beyond).across();
+    const double allowed = 2 * kCoplanar * mesh_.error * (1 + across / width);
     for (Index k = mesh_.first[face]; k < mesh_.first[face + 1]; ++k) {
       if (std::abs(glm::dot(normal, mesh_.from(k) - middle)) > allowed) return false;
     }
@@ -76,7 +76,9 @@ void grow(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index see
     for (Index h = mesh.first[face]; h < mesh.first[face + 1]; ++h) {
       const Index beyond = mesh.face[mesh.twin[h]];
       if (region_of[beyond] != HalfEdges::kNone || shapes[beyond].thin) continue;
-      if (std::abs(fold_at(mesh, shapes, h)) > kCoplanar || !region.holds(h)) continue;
+      if (std::abs(plane_deviation_at(mesh, shapes, h)) > kCoplanar ||
+          !region.contains_face_across(h))
+        continue;
       region.add(shapes[beyond], beyond);
       region_of[beyond] = number;
       border.push_back(beyond);
@@ -95,10 +97,10 @@ Index longest_side(const HalfEdges& mesh, Index face) {
   return longest;
 }
 
-// A face that is as good as a line joins the region beyond its longest side; where that is such a
-// face as well, any region that it touches.
-void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
-                      std::vector<Index>& region_of) {
+// A degenerate face joins the region across its longest side; where that face is degenerate as
+// well, any region that it touches.
+void assign_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
+                       std::vector<Index>& region_of) {
   bool only_longest = true;
   while (!thin.empty()) {
     const std::size_t before = thin.size();
@@ -123,7 +125,7 @@ void place_thin_faces(const HalfEdges& mesh, std::vector<Index> thin,
   }
 }
 
-// Numbered as the faces come: what follows then walks through memory and does not jump.
+// Numbered in the order of faces, so that later passes run through memory in order.
 void renumber(std::vector<Index>& region_of, Index& count) {
   std::vector<Index> number(count, HalfEdges::kNone);
   Index next = 0;
@@ -164,15 +166,16 @@ void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
   }
 }
 
-double fold_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
+double plane_deviation_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
   const Index twin = mesh.twin[h];
-  return fold(shapes[mesh.face[h]].normal, shapes[mesh.face[twin]].normal,
-              mesh.to(h) - mesh.from(h), reach_of(mesh, h), reach_of(mesh, twin), mesh.error);
+  return plane_deviation(shapes[mesh.face[h]].normal, shapes[mesh.face[twin]].normal,
+                         mesh.to(h) - mesh.from(h), extent_of(mesh, h), extent_of(mesh, twin),
+                         mesh.error);
 }
 
 std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
                                     Index& count) {
-  // From the largest faces on: their planes are the best known.
+  // The largest faces first: their planes are known best.
   std::vector<std::pair<double, Index>> seeds;
   std::vector<Index> thin;
   for (Index f = 0; f < mesh.face_count(); ++f) {
@@ -189,7 +192,7 @@ std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<Fac
     if (region_of[face] == HalfEdges::kNone) grow(mesh, shapes, face, count++, region_of);
   }
   if (count == 0) return region_of;
-  place_thin_faces(mesh, std::move(thin), region_of);
+  assign_thin_faces(mesh, std::move(thin), region_of);
   renumber(region_of, count);
   return region_of;
 }
@@ -206,7 +209,7 @@ std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceS
     }
   }
   if (count == 0) return region_of;
-  place_thin_faces(mesh, std::move(thin), region_of);
+  assign_thin_faces(mesh, std::move(thin), region_of);
   renumber(region_of, count);
   return region_of;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// The outlines of the maximal planar regions of a linked surface. The third stage of building a
+// The outlines of the maximal planar regions of a linked surface. The third step of building a
 // ConvexMesh.
 
 #include <cstdint>

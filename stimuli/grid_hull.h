@@ -1,4 +1,5 @@
 #pragma once
+// Convex hull in exact arithmetic.
 
 #include <vector>
 
@@ -6,16 +7,15 @@
 
 namespace palpate::stimuli {
 
-/// The convex hull of points that are known to `error` only.
+/// The convex hull of points.
 struct GridHull {
-  /// Triangles, convex to the last bit; some may lie in one plane. Empty where the points are no
-  /// solid.
+  /// Triangles, exactly convex; some may be coplanar. Empty where the points span no volume.
   PolygonSoup soup;
-  double depth = 0;  ///< m; no point is farther below its surface
+  double depth = 0;  ///< m; the largest distance of a point below the surface
 };
 
-/// Points are moved to a grid finer than the error, on which all that is asked of them is answered
-/// exactly.
+/// Points are rounded to a grid finer than `error` (m, of each coordinate), on which every
+/// predicate is evaluated exactly.
 GridHull grid_hull(const std::vector<Vec3>& points, double error);
 
 }  // namespace palpate::stimuli

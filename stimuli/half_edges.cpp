@@ -37,7 +37,7 @@ void check_numbers(const PolygonSoup& soup) {
   if (soup.faces.empty()) faults.add("empty", [] { return "expected faces, found none"; });
   for (Index v = 0; v < soup.vertices.size(); ++v) {
     if (finite(soup.vertices[v])) continue;
-    faults.add("not a place", [&] {
+    faults.add("not finite", [&] {
       return "vertex " + std::to_string(v) + ": expected three finite coordinates (up to 1e30 m)";
     });
   }

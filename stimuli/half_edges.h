@@ -1,6 +1,6 @@
 #pragma once
 // A polygon soup as a linked surface: welded corners, and for every side of a face its twin in the
-// neighbouring face. The first stage of building a ConvexMesh.
+// neighbouring face. The first step of building a ConvexMesh.
 
 #include <cstdint>
 #include <string>
@@ -22,7 +22,7 @@ struct HalfEdges {
   std::vector<Index> first;        ///< face f has the half-edges first[f] .. first[f + 1]
   std::vector<Index> origin, face, twin;
   double size = 0;   ///< m, diagonal of the bounding box
-  double error = 0;  ///< m, how far a coordinate may be from where it was meant
+  double error = 0;  ///< m, of each coordinate
 
   Index face_count() const { return static_cast<Index>(soup_face.size()); }
   Index count() const { return static_cast<Index>(origin.size()); }

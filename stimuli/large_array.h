@@ -1,6 +1,6 @@
 #pragma once
-// A std::vector that asks for large pages where it is large: a walk over a mesh of many megabytes
-// otherwise waits for the page table at almost every step.
+// A std::vector that uses huge pages where it is large: a walk over a mesh of many megabytes
+// otherwise has a TLB miss at almost every step.
 
 #include <sys/mman.h>
 
@@ -10,8 +10,8 @@
 
 namespace palpate::stimuli {
 
-/// Below the size of one large page it allocates as usual. Asking is all it does: a kernel that
-/// has none to give hands out small ones, with nothing but speed lost.
+/// Below the size of one huge page it allocates as usual. It only advises the kernel (madvise):
+/// without huge pages nothing but speed is lost.
 template <class T>
 struct LargePageAllocator {
   using value_type = T;

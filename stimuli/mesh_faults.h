@@ -1,4 +1,5 @@
 #pragma once
+// The list of faults of a mesh.
 
 #include <cstddef>
 #include <string>
@@ -7,7 +8,7 @@
 
 namespace palpate::stimuli {
 
-/// Gathers what is wrong with a mesh: the first few faults of each kind in full, then a count.
+/// Collects the faults of a mesh: the first few of each kind in full, then a count.
 class MeshFaults {
  public:
   static constexpr std::size_t kShown = 3;  ///< faults of one kind that are given in full

@@ -1,4 +1,5 @@
 #pragma once
+// Reading of mesh files: Wavefront .obj and .stl.
 
 #include <string>
 
@@ -11,7 +12,7 @@ namespace palpate::stimuli {
 /// \throws MeshError with file, line (text formats) or byte (binary) and what was expected.
 PolygonSoup read_mesh_file(const std::string& path);
 
-/// The same of a file that has been read. \param path names it, for its format and in messages
+/// The same of a file that has been read. `path` gives its format and names it in messages.
 PolygonSoup read_mesh(const std::string& path, const std::string& bytes);
 
 /// The bytes of a mesh file, whatever they are. \throws MeshError: it cannot be read or is too

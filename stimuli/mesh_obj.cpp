@@ -1,4 +1,4 @@
-// Wavefront .obj, as far as a solid needs it: v and f statements.
+// Wavefront .obj: v and f statements; the others do not describe the solid.
 
 #include <charconv>
 #include <cstdint>
@@ -55,7 +55,7 @@ class ObjReader {
   }
 
   void add_vertex(const std::vector<std::string_view>& words) {
-    Vec3 place;
+    Vec3 position;
     for (std::size_t i = 0; i < 3; ++i) {
       const std::string_view word = i + 1 < words.size() ? words[i + 1] : std::string_view();
       double value = 0;
@@ -63,11 +63,11 @@ class ObjReader {
         faults_.add_line(line_number_, "three finite coordinates after v", word);
         break;
       }
-      place[static_cast<int>(i)] = value;
-      precision_.see(word, value);
+      position[static_cast<int>(i)] = value;
+      precision_.add(word, value);
     }
-    // Also after a fault, so that the numbers of the following vertices stay right.
-    soup_.vertices.push_back(place);
+    // Also after a fault, so that the following vertices keep their numbers.
+    soup_.vertices.push_back(position);
   }
 
   void add_face(const std::vector<std::string_view>& words) {

@@ -42,17 +42,19 @@ PolygonSoup read_binary(std::string_view bytes, FileFaults& faults) {
   for (std::size_t t = 0; t < count; ++t) {
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const std::size_t at = kHeader + kTriangle * t + 12 * (corner + 1);
-      Vec3 place;
+      Vec3 position;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        place[static_cast<int>(axis)] = std::bit_cast<float>(little_endian(bytes, at + 4 * axis));
+        position[static_cast<int>(axis)] =
+            std::bit_cast<float>(little_endian(bytes, at + 4 * axis));
       }
-      const double far = std::max({std::abs(place.x), std::abs(place.y), std::abs(place.z)});
-      if (!std::isfinite(place.x + place.y + place.z)) {
+      const double far =
+          std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
+      if (!std::isfinite(position.x + position.y + position.z)) {
         faults.add("byte " + std::to_string(at), "three finite coordinates",
                    "infinity or no number");
       }
       largest = std::max(largest, far);
-      soup.vertices.push_back(place);
+      soup.vertices.push_back(position);
     }
     add_triangle(soup);
   }
@@ -124,7 +126,7 @@ class AsciiReader {
     return true;
   }
 
-  bool take_place(Vec3& place, bool is_corner) {
+  bool take_position(Vec3& position, bool is_corner) {
     for (int axis = 0; axis < 3; ++axis) {
       double value = 0;
       // A normal is not used (it follows from the corners) and is often nan.
@@ -132,23 +134,23 @@ class AsciiReader {
         fault("three finite coordinates");
         return false;
       }
-      place[axis] = value;
-      if (is_corner) precision_.see(word_, value);
+      position[axis] = value;
+      if (is_corner) precision_.add(word_, value);
       advance();
     }
     return true;
   }
 
   bool read_facet() {
-    Vec3 place;
+    Vec3 position;
     advance();
-    if (!take("normal") || !take_place(place, false) || !take("outer") || !take("loop")) {
+    if (!take("normal") || !take_position(position, false) || !take("outer") || !take("loop")) {
       return false;
     }
     std::vector<Vec3> corners;
     for (int corner = 0; corner < 3; ++corner) {
-      if (!take("vertex") || !take_place(place, true)) return false;
-      corners.push_back(place);
+      if (!take("vertex") || !take_position(position, true)) return false;
+      corners.push_back(position);
     }
     if (!take("endloop") || !take("endfacet")) return false;
     soup_.vertices.insert(soup_.vertices.end(), corners.begin(), corners.end());

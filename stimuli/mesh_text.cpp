@@ -14,11 +14,11 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 }  // namespace
 
-void FileFaults::add(const std::string& place, const std::string& expected,
+void FileFaults::add(const std::string& location, const std::string& expected,
                      const std::string& found) {
   if (++count_ > kShownFaults) return;
-  messages_.push_back(file_ + ": " + (place.empty() ? "" : place + ": ") + "expected " + expected +
-                      ", found " + found);
+  messages_.push_back(file_ + ": " + (location.empty() ? "" : location + ": ") + "expected " +
+                      expected + ", found " + found);
 }
 
 void FileFaults::add_line(std::size_t line, const std::string& expected, std::string_view found) {
@@ -69,7 +69,7 @@ bool parse_number(std::string_view word, double& value) {
   return error == std::errc() && std::isfinite(value);
 }
 
-void NumberPrecision::see(std::string_view word, double value) {
+void NumberPrecision::add(std::string_view word, double value) {
   int digits = 0, decimals = 0, exponent = 0;
   bool point = false;
   for (std::size_t i = 0; i < word.size(); ++i) {
@@ -85,9 +85,9 @@ void NumberPrecision::see(std::string_view word, double value) {
       break;
     }
   }
-  const int place = exponent - decimals;
-  if (any_ && place != last_place_) same_place_ = false;
-  last_place_ = place;
+  const int decimal = exponent - decimals;
+  if (any_ && decimal != last_decimal_) same_decimal_ = false;
+  last_decimal_ = decimal;
   any_ = true;
   most_digits_ = std::max(most_digits_, digits);
   largest_ = std::max(largest_, std::abs(value));
@@ -99,8 +99,8 @@ double NumberPrecision::coordinate_error() const {
   constexpr double kSingle = 0x1p-24;
   const int digits = std::clamp(most_digits_, 6, 17);
   double error = 0.5 * std::pow(10.0, std::floor(std::log10(largest_)) + 1 - digits);
-  // With fewer places than four, 0.05 is more likely meant than a number that was rounded to it.
-  if (same_place_ && last_place_ <= -4) error = 0.5 * std::pow(10.0, last_place_);
+  // With fewer than four decimals, 0.05 is more likely exact than rounded.
+  if (same_decimal_ && last_decimal_ <= -4) error = 0.5 * std::pow(10.0, last_decimal_);
   if (digits <= 9 || all_single_) error = std::max(error, kSingle * largest_);
   return std::min(error, 1e-4 * largest_);
 }

@@ -1,6 +1,6 @@
 #pragma once
-// What the readers of mesh files share: faults with their places, words, numbers and how exact the
-// numbers are.
+// What the readers of mesh files share: faults with their location, words, numbers and the error of
+// the numbers.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace palpate::stimuli {
 
-/// Faults of one file, each "file: place: expected ..., found ...".
+/// Faults of one file, each "file: location: expected ..., found ...".
 class FileFaults {
  public:
   explicit FileFaults(std::string file) : file_(std::move(file)) {}
 
-  void add(const std::string& place, const std::string& expected, const std::string& found);
+  void add(const std::string& location, const std::string& expected, const std::string& found);
   void add_line(std::size_t line, const std::string& expected, std::string_view found);
   void throw_if_any() const;  ///< \throws MeshError: the first 20 faults and how many more
 
@@ -30,28 +30,28 @@ class FileFaults {
 /// A word as it can be shown in a message: quoted, cut short, without control characters.
 std::string in_quotes(std::string_view word);
 
-/// The words of a line, parted by blanks.
+/// The words of a line, separated by blanks.
 std::vector<std::string_view> words_of(std::string_view line);
 
-/// A finite decimal number, whatever the locale; what is too small for a double is 0.
+/// A finite decimal number, independent of the locale; underflow gives 0.
 /// False when the word is anything else.
 bool parse_number(std::string_view word, double& value);
 
-/// Watches the numbers of a file go by and tells how exact they are.
+/// Estimates from the numbers of a file how exact they are.
 class NumberPrecision {
  public:
-  void see(std::string_view word, double value);
+  void add(std::string_view word, double value);
 
-  /// m, how far a coordinate may be from where it was meant. Numbers that all end at the same place
-  /// (printf's %f) are known to half of that place; otherwise (%g, or written by hand) as many
+  /// m, error of a coordinate. Numbers that all end at the same decimal (printf's %f) are known to
+  /// half of that decimal; otherwise (%g, or written by hand) as many
   /// digits count as the longest number has, but at least six. Up to nine digits, or nothing but
   /// single-precision numbers: no better than single precision.
   double coordinate_error() const;
 
  private:
   int most_digits_ = 0;
-  int last_place_ = 0;  // power of ten of the last digit, where it is the same for all
-  bool any_ = false, same_place_ = true, all_single_ = true;
+  int last_decimal_ = 0;  // power of ten of the last digit, where it is the same for all
+  bool any_ = false, same_decimal_ = true, all_single_ = true;
   double largest_ = 0;
 };
 

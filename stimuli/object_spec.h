@@ -1,6 +1,6 @@
 #pragma once
-// What a scene file or a protocol says of an object, as plain values (the keys:
-// protocols/scene.schema.json).
+// An object as a scene file or protocol describes it, as plain values (the keys:
+// protocols/scene.schema.json). SI units.
 
 #include <array>
 #include <memory>
@@ -13,13 +13,13 @@ namespace palpate::stimuli {
 
 enum class ShapeKind { sphere, cone, cylinder, cube, mesh, compound };
 
-/// What an object is made of below `depth`.
+/// A layer of an object, from `depth` on downwards.
 struct Layer {
   double depth = 0;      ///< m, below the surface along the contact normal
   double stiffness = 0;  ///< N/m
 };
 
-/// How an object feels. What is 0 or empty is left out of the tick.
+/// Mechanical properties of an object. What is 0 or empty is left out of the tick.
 struct Material {
   double stiffness = 800;       ///< N/m, along the contact normal, from the surface on
   double damping = 0;           ///< N s/m, along the contact normal

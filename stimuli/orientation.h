@@ -1,4 +1,5 @@
 #pragma once
+// Random rotations.
 
 #include "stimuli/random.h"
 #include "stimuli/vec.h"

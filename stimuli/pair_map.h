@@ -44,11 +44,11 @@ class PairMap {
   Slot& find(std::uint64_t key) {
     std::uint64_t hash = (key ^ key >> 32U) * 0x9e3779b97f4a7c15U;
     hash = (hash ^ hash >> 29U) * 0xbf58476d1ce4e5b9U;
-    std::size_t place = hash >> shift_;
-    while (slots_[place].key != key && slots_[place].key != kEmpty) {
-      place = place + 1 == slots_.size() ? 0 : place + 1;
+    std::size_t at = hash >> shift_;
+    while (slots_[at].key != key && slots_[at].key != kEmpty) {
+      at = at + 1 == slots_.size() ? 0 : at + 1;
     }
-    return slots_[place];
+    return slots_[at];
   }
 
   void resize(std::size_t size) {

@@ -31,9 +31,9 @@ PolygonPlane plane_of(std::span<const Vec3> corners) {
     const std::size_t next = k + 1 == corners.size() ? 0 : k + 1;
     twice_area += glm::cross(corners[k] - plane.middle, corners[next] - plane.middle);
   }
-  // The products of a long and narrow polygon are large against their sum, and the rounding that is
-  // left tilts the normal along the length, where it does most harm: the far end of a needle would
-  // stand out. The length itself is known well, so take its part out.
+  // In a long and narrow polygon the products are large compared with their sum, and rounding tilts
+  // the normal along the length, where it matters most: the far end of a needle would stand out.
+  // The direction of the length is known well, so that component is removed.
   const Vec3 end = farthest_from(plane.middle, corners);
   const Vec3 chord = farthest_from(end, corners) - end;
   plane.diameter = glm::length(chord);

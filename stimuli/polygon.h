@@ -1,4 +1,5 @@
 #pragma once
+// Plane, area and diameter of a polygon.
 
 #include <span>
 
@@ -14,7 +15,7 @@ struct PolygonPlane {
   double diameter = 0;  ///< m, within a factor of two of the largest distance of two corners
 };
 
-/// As exact as the corners allow, for polygons a million times longer than wide as well.
+/// As exact as the corners allow, also for polygons a million times longer than wide.
 PolygonPlane plane_of(std::span<const Vec3> corners);
 
 }  // namespace palpate::stimuli

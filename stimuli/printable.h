@@ -1,6 +1,6 @@
 #pragma once
-// Text as it may reach a terminal. Nothing that came from a file, a device or the command line is
-// printed raw: it could move the cursor, hide what stands beside it or answer for the user.
+// Text made safe for a terminal. Nothing that came from a file, a device or the command line is
+// printed raw: control sequences could move the cursor, hide other text or answer for the user.
 
 #include <cstddef>
 #include <string>
@@ -8,13 +8,13 @@
 
 namespace palpate::stimuli {
 
-/// Whether all is well-formed UTF-8 that is shown as it stands: no control characters (C0, DEL,
+/// Whether all is well-formed UTF-8 that is shown unchanged: no control characters (C0, DEL,
 /// C1), nothing that turns the direction of what follows, no separators of lines, no
 /// noncharacters.
 bool is_plain_utf8(std::string_view text);
 
-/// Whatever is not plain is written out: "\u001b" for a character, "\xff" for a byte that is no
-/// UTF-8. Changes nothing the second time.
+/// Escapes whatever is not plain: "\u001b" for a character, "\xff" for a byte that is not UTF-8.
+/// Idempotent.
 std::string printable(std::string_view text);
 
 /// The same, at most `max_bytes` of it, cut between characters with an ellipsis.

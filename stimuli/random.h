@@ -1,6 +1,6 @@
 #pragma once
-// Our own generator, shuffle and draws: std::shuffle and the std distributions differ between
-// standard libraries, and a schedule must be the same on every machine.
+// Generator, shuffle and distributions of our own: std::shuffle and the std distributions differ
+// between standard libraries, and a schedule must be the same on every machine.
 
 #include <array>
 #include <cstddef>

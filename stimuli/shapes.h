@@ -1,7 +1,7 @@
 #pragma once
-// What each shape needs, in one place. A function that tells shapes apart otherwise is a switch
-// without `default:`, so that the compiler (-Wswitch) names every one that does not know a new
-// shape. README.md: how to add one.
+// The parameters of each shape, in one table. Every other function that distinguishes shapes is a
+// switch without `default:`, so that the compiler (-Wswitch) reports those that lack a new shape.
+// How to add one: README.md.
 
 #include <array>
 #include <cstddef>
@@ -11,16 +11,16 @@
 
 namespace palpate::stimuli {
 
-struct ShapeNeeds {
+struct ShapeTraits {
   const char* name;                                   ///< in files
   bool radius = false, height = false, edge = false;  ///< lengths that it has
   bool subdivisions = false, segments = false;        ///< how finely it is tessellated
-  /// Its surface is known exactly: signed distance, ways out, the accuracy study and simulated
-  /// participants know it.
+  /// Its surface is known exactly: it has a signed distance and local penetration depths, and the
+  /// accuracy study and simulated participants use it.
   bool analytic = false;
 };
 
-constexpr ShapeNeeds needs_of(ShapeKind shape) {
+constexpr ShapeTraits traits_of(ShapeKind shape) {
   switch (shape) {
     case ShapeKind::sphere:
       return {.name = "sphere", .radius = true, .subdivisions = true, .analytic = true};

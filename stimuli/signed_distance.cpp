@@ -80,8 +80,8 @@ bool above_polygon(const ConvexMesh& mesh, const Facet& facet, const Vec3& point
 Vec3 nearest_on(const Edge& edge, const Vec3& point) {
   const Vec3& from = edge.from;
   const Vec3 along = edge.to - from;
-  const double share = glm::dot(point - from, along) / glm::dot(along, along);
-  return from + std::clamp(share, 0.0, 1.0) * along;
+  const double fraction = glm::dot(point - from, along) / glm::dot(along, along);
+  return from + std::clamp(fraction, 0.0, 1.0) * along;
 }
 
 }  // namespace

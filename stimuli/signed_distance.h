@@ -1,5 +1,6 @@
 #pragma once
-// Exact distances: the yardstick for renderers and the percepts' geometry.
+// Exact signed distances: the reference for renderers and the geometry of simulated percepts.
+// Local frame, SI units.
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"

@@ -15,24 +15,24 @@ constexpr Index kNone = 0xffffffff;
 std::uint64_t hash_of(const Vec3& point) {
   std::uint64_t hash = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    // Adding 0 turns -0 into 0: they are one place.
+    // Adding 0 turns -0 into 0: the two are equal.
     hash = (hash ^ std::bit_cast<std::uint64_t>(point[axis] + 0.0)) * 0x9e3779b97f4a7c15U;
     hash ^= hash >> 32U;
   }
   return hash;
 }
 
-// Equal coordinates first: the corners of a triangle soup come about six times each.
+// Equal coordinates first: in a triangle soup each corner occurs about six times.
 std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
   std::vector<Index> slots(std::bit_ceil(2 * points.size() + 16), kNone);
   std::vector<Index> kept(points.size());
   for (Index i = 0; i < points.size(); ++i) {
-    std::size_t place = hash_of(points[i]) & (slots.size() - 1);
-    while (slots[place] != kNone && points[slots[place]] != points[i]) {
-      place = (place + 1) & (slots.size() - 1);
+    std::size_t slot = hash_of(points[i]) & (slots.size() - 1);
+    while (slots[slot] != kNone && points[slots[slot]] != points[i]) {
+      slot = (slot + 1) & (slots.size() - 1);
     }
-    if (slots[place] == kNone) slots[place] = i;
-    kept[i] = slots[place];
+    if (slots[slot] == kNone) slots[slot] = i;
+    kept[i] = slots[slot];
   }
   return kept;
 }
@@ -46,8 +46,8 @@ Index kept_for(std::vector<Index>& kept, Index i) {
 
 std::vector<Index> weld(const std::vector<Vec3>& points, double tolerance) {
   std::vector<Index> kept = weld_equal(points);
-  // Near neighbours are near in any projection. The direction is no axis and no diagonal, so that
-  // few corners of a man-made object project onto one place.
+  // Close points are close in any projection. The direction is no axis and no diagonal, so that few
+  // corners of a man-made object project onto one value.
   const Vec3 direction = glm::normalize(Vec3(0.5377, 0.3141, 0.7823));
   std::vector<std::pair<double, Index>> order;
   for (Index i = 0; i < points.size(); ++i) {

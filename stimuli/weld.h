@@ -1,4 +1,5 @@
 #pragma once
+// Merging of points that coincide.
 
 #include <cstdint>
 #include <vector>

@@ -17,14 +17,14 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-Answer answer_of(const WalkResult& hit, const LineProbe& probe) {
+ContactEstimate estimate_of(const WalkResult& hit, const LineProbe& probe) {
   if (hit.feature.kind == Kind::none) return {};
   return {true, hit.depth, hit.normal,
           probe.tip + hit.probe_fraction * (probe.tail - probe.tip) + hit.depth * hit.normal};
 }
 
-/// The product: a whole tick of a renderer, force and torque included.
-class WholeTick final : public Method {
+/// A whole tick of a renderer, force and torque included.
+class WholeTick final : public ContactMethod {
  public:
   WholeTick(const stimuli::ConvexMesh& mesh, bool segment)
       : renderer_(segment ? ray_renderer() : point_renderer()),
@@ -34,7 +34,7 @@ class WholeTick final : public Method {
             segment),
         state_(scene_.initial_state()) {}
 
-  Answer tick(const LineProbe& probe) override {
+  ContactEstimate tick(const LineProbe& probe) override {
     const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
     return {r.contacts > 0, r.deepest.depth, r.deepest.normal, r.deepest.point};
   }
@@ -45,22 +45,22 @@ class WholeTick final : public Method {
   RenderState state_;
 };
 
-struct ProductWalk {
-  explicit ProductWalk(const stimuli::ConvexMesh& m) : mesh(m) {}
+struct RendererWalk {
+  explicit RendererWalk(const stimuli::ConvexMesh& m) : mesh(m) {}
   WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
     return d == Vec3() ? walk_point(mesh, start, tip) : walk_segment(mesh, start, tip, d);
   }
   const stimuli::ConvexMesh& mesh;
 };
 
-/// The walk alone, from the facet of the last tick; entries by first contact.
+/// The walk alone, from the feature of the last tick; entries by first contact.
 template <class Walk>
-class WarmWalk final : public Method {
+class WarmWalk final : public ContactMethod {
  public:
   WarmWalk(const stimuli::ConvexMesh& mesh, bool segment)
       : mesh_(mesh), walk_(mesh), trees_(mesh, segment), tolerance_(1e-12 * mesh.size()) {}
 
-  Answer tick(const LineProbe& probe) override {
+  ContactEstimate tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
     WalkResult hit;
     if (feature_.kind != Kind::none) {
@@ -71,7 +71,7 @@ class WarmWalk final : public Method {
                       : first_contact_segment(mesh_, trees_, last_, probe, tolerance_).feature;
       if (first.kind != Kind::none) hit = walk_.walk(first, probe.tip, d);
       if (hit.feature.kind == Kind::none) {
-        // Lost to rounding, maybe: then there is no plane between them.
+        // Perhaps lost to rounding: then there is no separating plane.
         find_separating_plane(mesh_, probe.tip, probe.tail, tolerance_, plane_, support_);
         if (!plane_.valid) hit = nearest_feature_segment(mesh_, probe.tip, d);
       }
@@ -79,7 +79,7 @@ class WarmWalk final : public Method {
     feature_ = hit.feature;
     last_ = probe;
     has_last_ = true;
-    return answer_of(hit, probe);
+    return estimate_of(hit, probe);
   }
 
  private:
@@ -95,36 +95,37 @@ class WarmWalk final : public Method {
 };
 
 /// The walk from the same facet at every tick.
-class ColdWalk final : public Method {
+class ColdWalk final : public ContactMethod {
  public:
   ColdWalk(const stimuli::ConvexMesh& mesh, bool) : walk_(mesh) {}
-  Answer tick(const LineProbe& probe) override {
-    return answer_of(walk_.walk({Kind::facet, false, 0}, probe.tip, probe.tail - probe.tip), probe);
+  ContactEstimate tick(const LineProbe& probe) override {
+    return estimate_of(walk_.walk({Kind::facet, false, 0}, probe.tip, probe.tail - probe.tip),
+                       probe);
   }
 
  private:
-  ProductWalk walk_;
+  RendererWalk walk_;
 };
 
-class FullScan final : public Method {
+class FullScan final : public ContactMethod {
  public:
   FullScan(const stimuli::ConvexMesh& mesh, bool) : mesh_(mesh) {}
-  Answer tick(const LineProbe& probe) override {
+  ContactEstimate tick(const LineProbe& probe) override {
     const Vec3 d = probe.tail - probe.tip;
-    return answer_of(d == Vec3() ? nearest_feature_point(mesh_, probe.tip)
-                                 : nearest_feature_segment(mesh_, probe.tip, d),
-                     probe);
+    return estimate_of(d == Vec3() ? nearest_feature_point(mesh_, probe.tip)
+                                   : nearest_feature_segment(mesh_, probe.tip, d),
+                       probe);
   }
 
  private:
   const stimuli::ConvexMesh& mesh_;
 };
 
-/// Brute force: the yardstick of the tests, timed. It tells no contact point.
-class BruteForce final : public Method {
+/// Brute force: the reference of the tests, timed. It gives no contact point.
+class BruteForce final : public ContactMethod {
  public:
   BruteForce(const stimuli::ConvexMesh& mesh, bool) : mesh_(mesh) {}
-  Answer tick(const LineProbe& probe) override {
+  ContactEstimate tick(const LineProbe& probe) override {
     const ReferenceDepth reference = reference_depth(mesh_, probe);
     if (reference.depth < 0) return {};
     return {true, reference.depth, reference.normal,
@@ -136,10 +137,10 @@ class BruteForce final : public Method {
 };
 
 template <std::size_t kIndex>
-class PeerMethod final : public Method {
+class PeerMethod final : public ContactMethod {
  public:
   PeerMethod(const stimuli::ConvexMesh& mesh, bool) : peer_(peer_libraries()[kIndex].make(mesh)) {}
-  Answer tick(const LineProbe& probe) override {
+  ContactEstimate tick(const LineProbe& probe) override {
     const PeerContact contact = peer_->contact(probe);
     return {!(contact.depth < 0), contact.depth, contact.normal, contact.point};
   }
@@ -149,25 +150,26 @@ class PeerMethod final : public Method {
 };
 
 template <class M>
-std::unique_ptr<Method> make(const stimuli::ConvexMesh& mesh, bool segment) {
+std::unique_ptr<ContactMethod> make(const stimuli::ConvexMesh& mesh, bool segment) {
   return std::make_unique<M>(mesh, segment);
 }
 
 }  // namespace
 
-std::vector<MethodKind> accuracy_methods() {
-  std::vector<MethodKind> methods = {
-      {"tick", "the renderer's whole tick, force and torque included", true, true, make<WholeTick>},
-      {"walk", "its walk alone, from the last tick's facet", true, true,
-       make<WarmWalk<ProductWalk>>},
-      {"walk-float", "the walk written out in single precision", true, true,
+std::vector<MethodDefinition> contact_methods() {
+  std::vector<MethodDefinition> methods = {
+      {"tick", "the renderer's whole tick, force and torque included", true, true, false,
+       make<WholeTick>},
+      {"walk", "its walk alone, from the last tick's feature", true, true, false,
+       make<WarmWalk<RendererWalk>>},
+      {"walk-float", "the walk written out in single precision", true, true, false,
        make<WarmWalk<PlainWalk<float>>>},
-      {"walk-cold", "the walk from facet 0 at every tick", false, false, make<ColdWalk>},
-      {"scan", "the walk's start by looking at every facet, at every tick", false, false,
+      {"walk-cold", "the walk from facet 0 at every tick", false, false, false, make<ColdWalk>},
+      {"scan", "the walk's features, all of them measured at every tick", false, false, true,
        make<FullScan>},
-      {"brute-force", "the reference of the tests", false, false, make<BruteForce>},
+      {"brute-force", "the reference of the tests", false, false, true, make<BruteForce>},
   };
-  constexpr std::unique_ptr<Method> (*kMakePeer[])(const stimuli::ConvexMesh&, bool) = {
+  constexpr std::unique_ptr<ContactMethod> (*kMakePeer[])(const stimuli::ConvexMesh&, bool) = {
       make<PeerMethod<0>>, make<PeerMethod<1>>};
   const auto libraries = peer_libraries();
   for (std::size_t i = 0; i < libraries.size(); ++i) {
@@ -175,7 +177,7 @@ std::vector<MethodKind> accuracy_methods() {
     methods.push_back(
         {libraries[i].name,
          std::string(libraries[i].name) + " " + libraries[i].version + ", " + libraries[i].method,
-         true, false, kMakePeer[i]});
+         true, false, false, kMakePeer[i]});
   }
   return methods;
 }

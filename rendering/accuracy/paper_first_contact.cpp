@@ -43,17 +43,17 @@ Vec3 random_direction(stimuli::Random& random) {
   return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
-/// A stylus on a straight way, turning steadily.
-struct Way {
-  Vec3 start, velocity;  ///< of the place `share`; m, m/s
+/// A stylus in straight motion, turning steadily.
+struct Motion {
+  Vec3 start, velocity;  ///< of the point at `fraction` of the stylus; m, m/s
   Vec3 direction, axis;  ///< axis at right angles to direction
-  double turning = 0, share = 0;
+  double turning = 0, fraction = 0;
 
   LineProbe at(int tick) const {
     const double time = tick * kTick, angle = turning * time;
     const Vec3 u = std::cos(angle) * direction + std::sin(angle) * glm::cross(axis, direction);
-    const Vec3 place = start + time * velocity;
-    return {place - share * kLength * u, place + (1 - share) * kLength * u};
+    const Vec3 at = start + time * velocity;
+    return {at - fraction * kLength * u, at + (1 - fraction) * kLength * u};
   }
 };
 
@@ -61,22 +61,22 @@ bool inside(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   return reference_depth(mesh, probe).depth > kDeepest * mesh.size();
 }
 
-bool comes_in(const stimuli::ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
+bool enters(const stimuli::ConvexMesh& mesh, const LineProbe& before, const LineProbe& after) {
   for (int i = 1; i <= kFine; ++i) {
     if (inside(mesh, between(before, after, i / static_cast<double>(kFine)))) return true;
   }
   return false;
 }
 
-/// The first tick that ends after the probe has come in, from a way that starts off the object.
-std::optional<int> entry_tick(const stimuli::ConvexMesh& mesh, const Way& way, int ticks) {
+/// The first tick that ends after the probe has entered, of a motion that starts off the object.
+std::optional<int> entry_tick(const stimuli::ConvexMesh& mesh, const Motion& motion, int ticks) {
   for (int tick = 1; tick <= ticks; ++tick) {
-    const LineProbe before = way.at(tick - 1), after = way.at(tick);
-    // Too far apart to touch within the tick: not worth a hundred looks.
+    const LineProbe before = motion.at(tick - 1), after = motion.at(tick);
+    // Too far apart to touch within the tick: not worth a hundred steps.
     const double moved =
         std::max(glm::length(after.tip - before.tip), glm::length(after.tail - before.tail));
     if (reference_gap(mesh, before) > moved) continue;
-    if (comes_in(mesh, before, after)) return tick;
+    if (enters(mesh, before, after)) return tick;
   }
   return std::nullopt;
 }
@@ -102,7 +102,7 @@ bool crosses_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Li
   const Vec3& c = edge.from;
   const Vec3 e = edge.to - c;
   const Nearest n0 = nearest(c, e, before), n1 = nearest(c, e, after);
-  const auto no_end = [](double share) { return share > 0 && share < 1; };
+  const auto no_end = [](double fraction) { return fraction > 0 && fraction < 1; };
   return glm::dot(n0.apart, n1.apart) < 0 && no_end(n0.on_edge) && no_end(n1.on_edge) &&
          no_end(n0.on_probe) && no_end(n1.on_probe);
 }
@@ -129,41 +129,42 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
   const double step = speed * kTick, tolerance = 1e-12 * mesh.size();
   constexpr int kBefore = 5;  // ticks in free space, about
   while (loss.entries < entries) {
-    Way way;
-    way.direction = random_direction(random);
-    way.axis = random_direction(random);
-    way.axis = glm::normalize(way.axis - glm::dot(way.axis, way.direction) * way.direction);
-    way.turning = turning * random.unit();
-    way.share = random.unit();
-    const Vec3 motion = random_direction(random);
-    way.velocity = speed * motion;
-    // Back along the motion from a place within the object until the probe is off it, then some
+    Motion motion;
+    motion.direction = random_direction(random);
+    motion.axis = random_direction(random);
+    motion.axis =
+        glm::normalize(motion.axis - glm::dot(motion.axis, motion.direction) * motion.direction);
+    motion.turning = turning * random.unit();
+    motion.fraction = random.unit();
+    const Vec3 heading = random_direction(random);
+    motion.velocity = speed * heading;
+    // Back along the motion from a point within the object until the probe is off it, then some
     // ticks more: the same number of ticks in free space at every speed.
     const Vec3 aim = mesh.centre() + 0.8 * mesh.radius() * random.unit() * random_direction(random);
-    way.start = aim;
-    if (!inside(mesh, way.at(0))) continue;
+    motion.start = aim;
+    if (!inside(mesh, motion.at(0))) continue;
     double near = 0, far = 2 * mesh.size() + kLength;
-    way.start = aim - far * motion;
-    if (reference_gap(mesh, way.at(0)) == 0) continue;  // the stylus lies along the motion
+    motion.start = aim - far * heading;
+    if (reference_gap(mesh, motion.at(0)) == 0) continue;  // the stylus lies along the motion
     while (far - near > step / 8) {
       const double middle = (near + far) / 2;
-      way.start = aim - middle * motion;
-      (inside(mesh, way.at(0)) ? near : far) = middle;
+      motion.start = aim - middle * heading;
+      (inside(mesh, motion.at(0)) ? near : far) = middle;
     }
-    way.start = aim - (far + (kBefore - random.unit()) * step) * motion;
-    if (reference_gap(mesh, way.at(0)) == 0) continue;
-    const auto entry = entry_tick(mesh, way, 4 * kBefore);
+    motion.start = aim - (far + (kBefore - random.unit()) * step) * heading;
+    if (reference_gap(mesh, motion.at(0)) == 0) continue;
+    const auto entry = entry_tick(mesh, motion, 4 * kBefore);
     if (!entry) continue;
     ++loss.entries;
     const auto paper = [&](int tick) {
-      return paper_first_contact(mesh, way.at(tick - 1), way.at(tick));
+      return paper_first_contact(mesh, motion.at(tick - 1), motion.at(tick));
     };
     for (int tick = 1; tick < *entry; ++tick) {
       if (!paper(tick)) continue;
       ++loss.paper_early;
       break;
     }
-    const LineProbe before = way.at(*entry - 1), after = way.at(*entry);
+    const LineProbe before = motion.at(*entry - 1), after = motion.at(*entry);
     if (first_contact_segment(mesh, trees, before, after, tolerance).feature.kind ==
         ContactFeature::Kind::none) {
       ++loss.exact_missed;
@@ -172,7 +173,7 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
     ++loss.paper_missed;
     bool found = false;
     for (int tick = *entry + 1; !found && tick <= *entry + kAfterwards; ++tick) {
-      if (reference_gap(mesh, way.at(tick)) > 0) break;
+      if (reference_gap(mesh, motion.at(tick)) > 0) break;
       found = paper(tick);
     }
     loss.paper_never += found ? 0 : 1;

@@ -1,5 +1,6 @@
 #pragma once
-// First contact exactly as the paper has it, to show what it loses. Not used by any renderer.
+// First contact exactly as in Ho, Basdogan & Srinivasan 2000, to measure which contacts that test
+// misses. Not used by any renderer.
 
 #include <cstdint>
 
@@ -25,22 +26,21 @@ bool crosses_edge(const stimuli::ConvexMesh& mesh, std::uint32_t edge, const Lin
 bool paper_first_contact(const stimuli::ConvexMesh& mesh, const LineProbe& before,
                          const LineProbe& after);
 
-/// What first contacts come to at one speed of the hand.
+/// First contacts found and missed at one speed of the hand.
 struct FirstContactLoss {
-  double speed = 0;      ///< m/s, of the place that comes in first
+  double speed = 0;      ///< m/s, of the point of the stylus that leads
   double turning = 0;    ///< rad/s
-  int entries = 0;       ///< tries in which the probe comes in
-  int paper_missed = 0;  ///< no crossing found in the tick in which it does
+  int entries = 0;       ///< trials in which the probe enters
+  int paper_missed = 0;  ///< no crossing found in the tick of entry
   int paper_never = 0;   ///< of those: nor in any of the next 20 ticks that are in contact
   int paper_early = 0;   ///< a crossing reported in an earlier tick, without a touch
-  int exact_missed = 0;  ///< by first_contact_segment, in the tick in which it comes in
+  int exact_missed = 0;  ///< by first_contact_segment, in the tick of entry
 };
 
-/// Straight ways at 1 kHz that bring a stylus of 0.12 m into the object from a random side, with a
-/// random direction of the stylus and of the motion, turning at random up to `turning` per second.
-/// The tick in which it comes in is known by brute force at a hundredth of the tick (deeper than
-/// 1e-9 of the size at the end of the tick or at one of the steps). Tries whose way misses the
-/// object are drawn again.
+/// Straight motions at 1 kHz that bring a stylus of 0.12 m into the object from a random side, with
+/// random directions of stylus and motion, turning at a random rate up to `turning`. The tick of
+/// entry is known by brute force at a hundredth of the tick (deeper than 1e-9 of the size at the
+/// end of the tick or at one of the steps). Motions that miss the object are drawn again.
 FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double speed, double turning,
                                     int entries, std::uint64_t seed);
 

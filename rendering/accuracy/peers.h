@@ -1,7 +1,7 @@
 #pragma once
-// Other people's collision libraries on the renderer's question: how deep is this segment in this
-// convex mesh, and which way is out? For comparisons, not for the servo: they allocate, and they
-// remember no side. Optional: built where CMake finds them (PALPATE_PEERS).
+// Other collision libraries (Bullet, FCL) on the renderer's question: penetration depth and
+// direction of a segment in a convex mesh. For comparisons, not for the servo: they allocate, and
+// they do not keep to a side. Optional: built where CMake finds them (PALPATE_PEERS).
 
 #include <memory>
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace palpate::rendering {
 
-/// A library's answer. Mesh frame.
+/// A library's result. Mesh frame.
 struct PeerContact {
   double depth = 0;  ///< m; negative: the distance between them; NaN: the library gave up
   Vec3 normal;       ///< unit, out of the mesh; undefined where the depth is NaN
@@ -19,7 +19,7 @@ struct PeerContact {
 };
 
 /// One mesh in one library, with what the library remembers between queries. Every library gets its
-/// best: double precision, no margins, coordinates scaled to an object of radius 1 (their
+/// best settings: double precision, no margins, coordinates scaled to an object of radius 1 (their
 /// tolerances are absolute), a hull that climbs from near by instead of looking at every vertex,
 /// the probe as an exact segment, and the last normal as the first guess.
 class Peer {

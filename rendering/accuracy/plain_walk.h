@@ -1,6 +1,6 @@
 #pragma once
-// The walk of facet_walk again in any precision, as plainly as it can be written: what single
-// precision would cost and save. Not for the servo.
+// The walk of facet_walk.h written again, as plainly as possible, in any floating-point precision:
+// what single precision would cost and save. Not for the servo.
 
 #include <algorithm>
 #include <cmath>
@@ -40,7 +40,7 @@ class PlainWalk {
     fan_edges_.assign(mesh.fan_edges().begin(), mesh.fan_edges().end());
   }
 
-  /// As walk_segment; the answer is widened to double.
+  /// As walk_segment; the result is widened to double.
   WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
     const Vector t(tip), v(d);
     // As many last places as the walk in double precision allows for.

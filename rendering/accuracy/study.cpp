@@ -6,7 +6,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "rendering/accuracy/hand_path.h"
+#include "rendering/accuracy/analytic_stroke.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 
@@ -18,61 +18,60 @@ constexpr double kPi = 3.14159265358979324;
 std::vector<stimuli::ShapeKind> analytic_shapes() {
   std::vector<stimuli::ShapeKind> all;
   for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-    if (stimuli::needs_of(shape).analytic) all.push_back(shape);
+    if (stimuli::traits_of(shape).analytic) all.push_back(shape);
   }
   return all;
 }
 
-/// A path with the exact answers of the shape, and of the polyhedron at some ticks.
-struct Course {
-  HandPath path;
-  std::vector<std::vector<WayOut>> of_shape;
-  std::vector<std::vector<WayOut>> of_polyhedron;  ///< every `stride`-th tick in contact
+/// A stroke with the exact depths in the shape, and in the polyhedron at some ticks.
+struct TestStroke {
+  AnalyticStroke path;
+  std::vector<std::vector<LocalDepth>> of_shape;
+  std::vector<std::vector<LocalDepth>> of_polyhedron;  ///< every `stride`-th tick in contact
 };
 
-std::vector<Course> courses(const stimuli::ObjectSpec& shape, const AccuracySettings& settings,
-                            bool segment) {
-  std::vector<Course> all;
+std::vector<TestStroke> test_strokes(const stimuli::ObjectSpec& shape,
+                                     const AccuracySettings& settings, bool segment) {
+  std::vector<TestStroke> all;
   for (int i = 1; i <= settings.paths; ++i) {
-    HandPathSettings hand;
+    AnalyticStrokeSettings hand;
     hand.seed = static_cast<std::uint64_t>(i);
     hand.contact_ticks = settings.contact_ticks;
     hand.length = segment ? settings.length : 0;
-    Course course{hand_path(shape, hand), {}, {}};
-    for (const LineProbe& probe : course.path.poses) {
-      course.of_shape.push_back(ways_out(shape, probe));
+    TestStroke stroke{analytic_stroke(shape, hand), {}, {}};
+    for (const LineProbe& probe : stroke.path.poses) {
+      stroke.of_shape.push_back(local_depths(shape, probe));
     }
-    all.push_back(std::move(course));
+    all.push_back(std::move(stroke));
   }
   return all;
 }
 
-/// One method over all courses.
-class Run {
+/// One method over all test strokes.
+class MethodRun {
  public:
-  Run(const MethodKind& kind, const stimuli::ConvexMesh& mesh, bool segment, std::size_t stride,
-      const std::function<double()>& now)
+  MethodRun(const MethodDefinition& kind, const stimuli::ConvexMesh& mesh, bool segment,
+            std::size_t stride, const std::function<double()>& now)
       : kind_(kind), mesh_(mesh), segment_(segment), stride_(stride), now_(now) {}
 
-  void over(const Course& course, int timings) {
-    const std::size_t begin = course.path.approach, end = course.path.poses.size();
-    // What looks at everything needs no tick before: it is asked at the ticks that count only.
-    const bool all = kind_.remembers || kind_.name == "walk-cold";
-    const std::size_t step = all ? 1 : stride_;
-    std::vector<Answer> answers;
-    double fastest = pass(course, step, &answers);
+  void over(const TestStroke& stroke, int timings) {
+    const std::size_t begin = stroke.path.approach, end = stroke.path.poses.size();
+    // What visits everything has no history: it is run at the ticks that are compared only.
+    const std::size_t step = kind_.visits_all ? stride_ : 1;
+    std::vector<ContactEstimate> estimates;
+    double fastest = pass(stroke, step, &estimates);
     for (int i = 1; i < timings && total_ + fastest < kMostTime; ++i) {
-      fastest = std::min(fastest, pass(course, step, nullptr));
+      fastest = std::min(fastest, pass(stroke, step, nullptr));
     }
     total_ += fastest;
-    ticks_ += answers.size();
-    for (std::size_t i = 0; i < answers.size(); ++i) {
+    ticks_ += estimates.size();
+    for (std::size_t i = 0; i < estimates.size(); ++i) {
       const std::size_t tick = begin + i * step;
       if (tick >= end) break;
-      shape_.add(course.path.poses[tick], course.of_shape[tick], answers[i]);
+      shape_.add(stroke.path.poses[tick], stroke.of_shape[tick], estimates[i]);
       if ((tick - begin) % stride_ == 0) {
-        polyhedron_.add(course.path.poses[tick], course.of_polyhedron[(tick - begin) / stride_],
-                        answers[i]);
+        polyhedron_.add(stroke.path.poses[tick], stroke.of_polyhedron[(tick - begin) / stride_],
+                        estimates[i]);
       }
     }
   }
@@ -84,26 +83,27 @@ class Run {
   }
 
  private:
-  static constexpr double kMostTime = 2e8;  // ns; timed again only while the whole took less
+  static constexpr double kMostTime = 2e8;  // ns; timed again only while the total is below
 
   /// The approach untimed, then the contact. Returns ns.
-  double pass(const Course& course, std::size_t step, std::vector<Answer>* answers) const {
+  double pass(const TestStroke& stroke, std::size_t step,
+              std::vector<ContactEstimate>* estimates) const {
     const auto method = kind_.make(mesh_, segment_);
-    const auto& poses = course.path.poses;
-    if (kind_.remembers) {
-      for (std::size_t i = 0; i < course.path.approach; ++i) method->tick(poses[i]);
+    const auto& poses = stroke.path.poses;
+    if (kind_.has_history) {
+      for (std::size_t i = 0; i < stroke.path.approach; ++i) method->tick(poses[i]);
     }
-    Answer last;
-    if (answers) answers->reserve((poses.size() - course.path.approach) / step + 1);
+    ContactEstimate last;
+    if (estimates) estimates->reserve((poses.size() - stroke.path.approach) / step + 1);
     const double start = now_();
-    for (std::size_t i = course.path.approach; i < poses.size(); i += step) {
+    for (std::size_t i = stroke.path.approach; i < poses.size(); i += step) {
       last = method->tick(poses[i]);
-      if (answers) answers->push_back(last);
+      if (estimates) estimates->push_back(last);
     }
     return now_() - start;
   }
 
-  const MethodKind& kind_;
+  const MethodDefinition& kind_;
   const stimuli::ConvexMesh& mesh_;
   bool segment_;
   std::size_t stride_;
@@ -113,10 +113,10 @@ class Run {
   ErrorTally shape_, polyhedron_;
 };
 
-bool meets(const AccuracyRow& row, const Demand& demand) {
+bool meets(const AccuracyRow& row, const ErrorLimits& limits) {
   const ErrorSummary& e = row.shape_errors;
-  return e.lost == 0 && e.phantom == 0 && e.depth.p999 < demand.position &&
-         e.normal.p999 < demand.direction;
+  return e.lost == 0 && e.phantom == 0 && e.depth.p999 < limits.position &&
+         e.normal.p999 < limits.direction;
 }
 
 }  // namespace
@@ -148,7 +148,7 @@ std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int mos
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));
     if (triangles_of(spec) > most_triangles && !all.empty()) break;
     all.push_back(spec);
-    if (!stimuli::needs_of(shape).subdivisions && !stimuli::needs_of(shape).segments)
+    if (!stimuli::traits_of(shape).subdivisions && !stimuli::traits_of(shape).segments)
       break;  // nothing to refine
   }
   return all;
@@ -157,7 +157,7 @@ std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int mos
 std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
                                         const std::function<double()>& now,
                                         const std::function<void(double)>& progress) {
-  const std::vector<MethodKind> methods = accuracy_methods();
+  const std::vector<MethodDefinition> methods = contact_methods();
   // Finer tessellations take longer, though less than in proportion.
   const auto weight = [](const stimuli::ObjectSpec& spec) {
     return 100 + std::sqrt(triangles_of(spec));
@@ -173,30 +173,30 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
   for (const stimuli::ShapeKind shape : shapes) {
     const auto specs = tessellations(shape, settings.most_triangles);
     for (const bool segment : {true, false}) {
-      std::vector<Course> all = courses(specs.front(), settings, segment);
+      std::vector<TestStroke> all = test_strokes(specs.front(), settings, segment);
       for (const stimuli::ObjectSpec& spec : specs) {
         const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
         const double visits = static_cast<double>(mesh.facets().size() + mesh.edges().size()) *
                               settings.contact_ticks * settings.paths;
         const auto stride = static_cast<std::size_t>(std::ceil(visits / settings.visits));
-        for (Course& course : all) {
-          course.of_polyhedron.clear();
-          for (std::size_t i = course.path.approach; i < course.path.poses.size(); i += stride) {
-            course.of_polyhedron.push_back(
-                ways_out(mesh, course.path.poses[i], Vec3(0, 0, 1), kPi));
+        for (TestStroke& stroke : all) {
+          stroke.of_polyhedron.clear();
+          for (std::size_t i = stroke.path.approach; i < stroke.path.poses.size(); i += stride) {
+            stroke.of_polyhedron.push_back(
+                local_depths(mesh, stroke.path.poses[i], Vec3(0, 0, 1), kPi));
           }
         }
-        for (const MethodKind& kind : methods) {
+        for (const MethodDefinition& kind : methods) {
           progress(done / work);
-          Run run(kind, mesh, segment, stride, now);
-          for (const Course& course : all) run.over(course, settings.timings);
+          MethodRun run(kind, mesh, segment, stride, now);
+          for (const TestStroke& stroke : all) run.over(stroke, settings.timings);
           AccuracyRow row;
-          row.shape = stimuli::needs_of(shape).name;
+          row.shape = stimuli::traits_of(shape).name;
           row.triangles = triangles_of(spec);
           row.facets = mesh.facets().size();
           row.edges = mesh.edges().size();
-          row.subdivisions = stimuli::needs_of(shape).subdivisions ? spec.subdivisions : 0;
-          row.segments = stimuli::needs_of(shape).segments ? spec.segments : 0;
+          row.subdivisions = stimuli::traits_of(shape).subdivisions ? spec.subdivisions : 0;
+          row.segments = stimuli::traits_of(shape).segments ? spec.segments : 0;
           row.probe = segment ? "ray" : "point";
           row.method = kind.name;
           run.report(row);
@@ -211,12 +211,12 @@ std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
 }
 
 int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
-                  const Demand& demand) {
+                  const ErrorLimits& limits) {
   std::set<int> all, failing;
   for (const AccuracyRow& row : rows) {
     if (row.shape != shape || row.method != "tick") continue;
     all.insert(row.triangles);
-    if (!meets(row, demand)) failing.insert(row.triangles);
+    if (!meets(row, limits)) failing.insert(row.triangles);
   }
   const auto first = failing.empty() ? all.begin() : all.upper_bound(*failing.rbegin());
   return first == all.end() ? 0 : *first;

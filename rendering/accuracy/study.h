@@ -1,12 +1,13 @@
 #pragma once
-// The work-precision study: every method over every tessellation of the four shapes.
+// The work-precision study: the error of every method against its run time, over every tessellation
+// of the analytic shapes.
 
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy/accuracy.h"
+#include "rendering/accuracy/error_summary.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::rendering {
@@ -16,8 +17,8 @@ struct AccuracySettings {
   int contact_ticks = 1000;  ///< of each path
   double length = 0.12;      ///< m, of the stylus
   int most_triangles = 327680;
-  /// Facets and edges that may be visited in a look at everything (the exact polyhedron, and the
-  /// methods that scan); where all ticks would take more, every n-th is looked at.
+  /// Budget of facets and edges visited by what looks at all of them (the exact polyhedron, and the
+  /// methods that scan); where all ticks would take more, every n-th is compared.
   double visits = 2e8;
   int timings = 3;  ///< of which the fastest counts
 };
@@ -40,22 +41,22 @@ struct AccuracyRow {
 std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int most_triangles);
 int triangles_of(const stimuli::ObjectSpec& spec);
 
-/// Runs it all. \param now  a clock, ns \param progress  called with the share done before each row
+/// \param now       a clock, ns
+/// \param progress  called with the fraction done before each row
 std::vector<AccuracyRow> accuracy_study(const AccuracySettings& settings,
                                         const std::function<double()>& now,
                                         const std::function<void(double)>& progress);
 
-/// What a lab asks: the coarsest tessellation from which on (the finer ones included) the
-/// renderers' whole ticks, point and ray, keep 99.9 % of their errors below these, with no contact
-/// lost.
-struct Demand {
+/// Limits that 99.9 % of the errors of a renderer's whole ticks must keep.
+struct ErrorLimits {
   double position;   ///< m, of the surface along the normal
   double direction;  ///< rad, of the force
 };
-constexpr double kNoDemand = 1e9;
+constexpr double kNoLimit = 1e9;
 
-/// The rows ("ray" and "point") of that tessellation by its triangles; 0 when none is fine enough.
+/// Triangles of the coarsest tessellation from which on (the finer ones included) both renderers
+/// keep the limits and lose no contact; 0 when none is fine enough.
 int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
-                  const Demand& demand);
+                  const ErrorLimits& limits);
 
 }  // namespace palpate::rendering

@@ -11,8 +11,7 @@ std::string counted(std::size_t count, const std::string& one, const std::string
   return std::to_string(count) + ' ' + (count == 1 ? one : many);
 }
 
-/// How many of the scene's meshes have what `get` returns of their trees, and the largest count of
-/// primitives among the meshes.
+/// How many of the scene's meshes have a certain tree, and the largest count of its primitives.
 struct MeshTally {
   std::size_t meshes = 0, with = 0, most = 0;
 };
@@ -30,8 +29,8 @@ MeshTally tally(const Scene& scene, Has has, Count count) {
   return result;
 }
 
-Stage structure(std::string name, const MeshTally& t, const std::string& things,
-                std::size_t limit) {
+TickStage structure(std::string name, const MeshTally& t, const std::string& things,
+                    std::size_t limit) {
   const bool built = t.with > 0;
   std::string why = built ? "for " + std::to_string(t.with) + " of " +
                                 counted(t.meshes, "mesh", "meshes") + ": more than " +
@@ -41,7 +40,7 @@ Stage structure(std::string name, const MeshTally& t, const std::string& things,
   return {std::move(name), StageTime::once, built, std::move(why)};
 }
 
-void add_structures(const Scene& scene, const Renderer& renderer, std::vector<Stage>& stages) {
+void add_structures(const Scene& scene, const Renderer& renderer, std::vector<TickStage>& stages) {
   const auto facets = [](const stimuli::ConvexMesh& m) { return m.facets().size(); };
   const auto edges = [](const stimuli::ConvexMesh& m) { return m.edges().size(); };
   const auto vertices = [](const stimuli::ConvexMesh& m) { return m.vertices().size(); };
@@ -65,7 +64,7 @@ void add_structures(const Scene& scene, const Renderer& renderer, std::vector<St
       "vertices to climb", SupportMap::kSmallMesh));
 }
 
-/// Parts that are out of reach of a point anywhere on the first part's bounding sphere.
+/// Parts that a point anywhere on the first part's bounding sphere cannot reach.
 std::size_t out_of_reach(const Scene& scene) {
   const auto& parts = scene.parts();
   return static_cast<std::size_t>(
@@ -84,12 +83,12 @@ bool has_compound(const Scene& scene) {
          }) != parts.end();
 }
 
-void add_parts(const Scene& scene, std::vector<Stage>& stages) {
+void add_parts(const Scene& scene, std::vector<TickStage>& stages) {
   const std::size_t parts = scene.parts().size();
   const bool several = scene.features().several_parts;
   stages.push_back({"several parts", StageTime::tick, several,
-                    several ? "which of them are in reach, a list of contacts, sums over it"
-                            : "one part is always looked at; it has one contact at most"});
+                    several ? "broad phase by bounding spheres, a list of contacts, sums over it"
+                            : "a single part is always near and has one contact at most"});
   const std::size_t far = out_of_reach(scene);
   stages.push_back({"objects out of reach", StageTime::tick, false,
                     far == 0 ? "there are none while the first is touched"
@@ -97,13 +96,13 @@ void add_parts(const Scene& scene, std::vector<Stage>& stages) {
                                    " while the first is touched"});
 }
 
-void add_materials(const TickFeatures& features, std::vector<Stage>& stages) {
+void add_materials(const TickFeatures& features, std::vector<TickStage>& stages) {
   const auto add = [&](const char* name, bool runs, const char* what) {
     stages.push_back({name, StageTime::contact, runs, runs ? what : "no material asks for it"});
   };
   add("layers", features.layers, "the sum over the layers that the probe is in");
   add("damping", features.damping, "against the normal speed, never pulling");
-  add("friction", features.friction, "Coulomb's, through the ideal probe's lag along the surface");
+  add("friction", features.friction, "Coulomb's, by the ideal probe's tangential offset");
 }
 
 }  // namespace
@@ -124,35 +123,35 @@ const char* to_string(StageTime time) {
   return "";
 }
 
-std::vector<Stage> explain(const Scene& scene, const Renderer& renderer) {
+std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer) {
   const bool sides = renderer.side_contact();
-  std::vector<Stage> stages;
+  std::vector<TickStage> stages;
   add_structures(scene, renderer, stages);
   stages.push_back({"pose check", StageTime::tick, true,
                     "no force where a coordinate is not finite or beyond 1000 km"});
   add_parts(scene, stages);
   stages.push_back({"frame of the part", StageTime::tick, true, "the pose as the mesh sees it"});
   stages.push_back({"separating plane", StageTime::free, true,
-                    "while the plane of an earlier tick stands between them, that is all"});
+                    "while the plane of an earlier tick separates them, nothing else is computed"});
   stages.push_back({"first contact", StageTime::entry, true,
-                    "the facet by which the path comes in, once that plane is crossed"});
+                    "the feature through which the probe enters, once that plane is crossed"});
   stages.push_back({"neighbourhood watch", StageTime::contact, true,
-                    "from the last facet to the one that holds the probe now"});
+                    "the walk from the last feature to the one that holds the ideal probe now"});
   stages.push_back({"side contact", StageTime::contact, sides,
-                    sides ? "the watch crosses silhouette edges too (its cost is counted there); "
+                    sides ? "the walk crosses silhouette edges too (its cost is counted there); "
                             "equation (2) places the contact"
-                          : "only the tip is felt"});
+                          : "only the tip touches"});
   const bool compound = has_compound(scene);
   stages.push_back({"parts of one object", StageTime::contact, compound,
-                    compound ? "they share the shortest way out, so that seams are not felt"
+                    compound ? "they share the shortest displacement, so that seams are not felt"
                              : "no object has several"});
   stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
   add_materials(scene.features(), stages);
   stages.push_back({"torque and second device", StageTime::contact, sides,
                     sides ? "the moment about the tip; equations (1), (4) and (5)"
-                          : "a force at the tip has no lever"});
+                          : "a force at the tip has no moment about it"});
   stages.push_back({"sample log", StageTime::tick, false,
-                    "not the scene's: a protocol asks for it (\"samples\": true)"});
+                    "not part of the scene: a protocol asks for it (\"samples\": true)"});
   return stages;
 }
 

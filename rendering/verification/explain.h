@@ -1,6 +1,6 @@
 #pragma once
-// What a tick over a scene consists of, and what was left out of it: read off the scene as it was
-// compiled. Not for the servo.
+// The stages of a tick over a scene, which of them are left out and why, and what each costs: read
+// off the compiled scene. Not for the servo.
 
 #include <cstddef>
 #include <functional>
@@ -11,37 +11,38 @@
 
 namespace palpate::rendering {
 
-/// When a stage runs.
+/// When a stage of the tick runs.
 enum class StageTime { once, tick, free, entry, contact };
 
 const char* to_string(StageTime time);  ///< "once a scene", "every tick", "in free space", ...
 
-/// One stage of the way from a scene and a pose to forces.
-struct Stage {
+/// One stage on the way from a pose to forces.
+struct TickStage {
   std::string name;
   StageTime time = StageTime::tick;
   bool runs = false;  ///< false: left out
-  std::string why;    ///< what it does here, or why it is not needed
+  std::string why;    ///< what it does, or why it is not needed
 };
 
 /// All stages there are, in the order in which they run. A stage runs if and only if the renderer's
 /// tick over this scene contains it: Scene::features(), the trees that were built, the renderer.
-std::vector<Stage> explain(const Scene& scene, const Renderer& renderer);
+std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer);
 
-/// A stage of explain(), or a whole tick, to be timed in isolation over recorded ticks.
-struct Rehearsal {
-  std::string name;               ///< Stage::name; kTickInContact or kTickInFreeSpace
+/// A stage of explain(), or a whole tick, as a function to be timed in isolation over recorded
+/// ticks.
+struct StageTiming {
+  std::string name;               ///< TickStage::name; kTickInContact or kTickInFreeSpace
   std::size_t calls = 0;          ///< of the stage in one run; 0: it did not happen on the path
   std::function<void()> prepare;  ///< before each run
-  std::function<double()> run;    ///< the value has no meaning but that it was computed
+  std::function<double()> run;    ///< the value only keeps the work from being optimised away
 };
 
 inline constexpr const char* kTickInContact = "whole tick in contact";
 inline constexpr const char* kTickInFreeSpace = "whole tick in free space";
 
-/// Lets a hand stroke the scene's first part (StrokingHand) and records it. Scene and renderer must
-/// outlive what is returned. Stages that cannot be told apart from others have no rehearsal.
-/// Building trees is not rehearsed. Empty for a scene without parts.
-std::vector<Rehearsal> rehearse(const Scene& scene, const Renderer& renderer);
+/// Records a hand that strokes the scene's first part (SurfaceStroke). Scene and renderer must
+/// outlive what is returned. Stages that cannot be told apart from others, and building trees, are
+/// not timed. Empty for a scene without parts.
+std::vector<StageTiming> stage_timings(const Scene& scene, const Renderer& renderer);
 
 }  // namespace palpate::rendering

@@ -1,14 +1,13 @@
 #include "rendering/verification/extreme_cases.h"
 
-#include "rendering/verification/extreme_watch.h"
+#include "rendering/verification/extreme_case_audit.h"
 
 namespace palpate::rendering {
 
 std::span<const ExtremeCase> extreme_cases() {
   using namespace extremes;
   static constexpr ExtremeCase kCases[] = {
-      {"sliver", "faces 1,000,000 times as long as wide, under all kinds of paths", kLengthError,
-       sliver},
+      {"sliver", "faces 1,000,000 times as long as wide, all kinds of paths", kLengthError, sliver},
       {"needle", "0.1 m long, 1 um thick", kLengthError, needle},
       {"thin-plate", "0.1 mm thick, crossed at 5 m/s (5 mm a tick)",
        "ticks not held on the side of entry", thin_plate},
@@ -29,13 +28,13 @@ std::span<const ExtremeCase> extreme_cases() {
       {"nearly-coplanar", "facets that meet at 1e-3 to 1e-13 rad", kLengthError, nearly_coplanar},
       {"starts-inside", "a trial that begins inside: no force until it has been left once",
        "force before that, N", starts_inside},
-      {"teleports", "every tick somewhere else, up to 100 km away", kLengthError, teleports},
+      {"teleports", "an unrelated pose at every tick, up to 100 km away", kLengthError, teleports},
       {"bad-poses", "NaN, infinities and 1,000 km: no force, the fault bit, recovery",
        "force at or difference after a bad pose, N", bad_poses},
-      {"closed-paths", "round and back within one facet's reach, elastic",
-       "worst work of a cycle, of the energy stored", closed_paths},
+      {"closed-paths", "closed paths on one feature, elastic",
+       "worst work of a cycle, as a fraction of the energy stored", closed_paths},
       {"closed-paths-lossy", "the same with friction, with damping, with both",
-       "most work given to the hand in a cycle, of the energy stored", closed_paths_lossy},
+       "most work on the hand in a cycle, as a fraction of the energy stored", closed_paths_lossy},
       {"closed-paths-blend",
        "a stylus that rocks flat on a face, through the blend of equation (2)",
        "worst work of a cycle, J; allowed: force times rocking", closed_paths_in_the_blend},

@@ -1,6 +1,6 @@
 #pragma once
-// Extreme geometry and extreme hands: named cases, each with what it measures and what that may be.
-// Tests run them, `palpate accuracy` lists them. For checks, not for the servo.
+// Extreme geometry and extreme motions: named cases, each with a measure and its limit. Tests run
+// them, `palpate accuracy` lists them. For checks, not for the servo.
 
 #include <span>
 #include <string>
@@ -12,15 +12,15 @@ namespace palpate::rendering {
 struct ExtremeResult {
   bool passed = false;
   double worst = 0;         ///< the measure, in the case's unit
-  double limit = 0;         ///< what it may be at most
-  std::uint64_t ticks = 0;  ///< that were held against the reference
+  double limit = 0;         ///< largest allowed
+  std::uint64_t ticks = 0;  ///< that were compared with the reference
   std::uint64_t in_contact = 0;
   std::string detail;  ///< what is wrong, with numbers; empty when it passed
 };
 
 struct ExtremeCase {
   const char* name;     ///< "sliver"; letters, digits and -
-  const char* title;    ///< what is done, in a line
+  const char* title;    ///< what is done, in one line
   const char* measure;  ///< what `worst` is, with its unit
   ExtremeResult (*run)(const Renderer& renderer);
 };

@@ -1,10 +1,10 @@
-// Extreme geometry: the shapes.
+// Extreme cases by shape.
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rendering/verification/extreme_watch.h"
+#include "rendering/verification/extreme_case_audit.h"
 #include "rendering/verification/random_solids.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
@@ -67,17 +67,17 @@ stimuli::PolygonSoup nearly_flat_cone(double angle, int segments) {
 
 ExtremeResult paths_over(const Renderer& renderer, const MeshPointer& mesh, const Pose& pose,
                          const std::vector<double>& lengths, std::size_t ticks) {
-  Several all;
+  CombinedResult all;
   std::uint64_t stream = 0;
   for (const double length : lengths) {
     for (int kind = 0; kind < kPathKinds; ++kind) {
       stimuli::Random random(17, {++stream});
-      Watch watch(renderer, mesh, pose);
+      AuditedScene scene(renderer, mesh, pose);
       for (const LineProbe& probe : random_path(random, static_cast<PathKind>(kind), *mesh, length,
                                                 renderer.side_contact(), ticks)) {
-        watch.audited(probe);
+        scene.audited_tick(probe);
       }
-      all.add(watch.result());  // one path may pass a needle by, all together may not
+      all.add(scene.result());  // one path may pass a needle by, all together may not
     }
   }
   return all.result();
@@ -89,7 +89,7 @@ ExtremeResult sliver(const Renderer& renderer) {
   stimuli::PolygonSoup wedge;
   wedge.vertices = {{-0.05, 0, 0}, {0.05, 0, 0}, {0, -5e-8, 1e-7}, {0, 5e-8, 1e-7}};
   wedge.faces = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
-  Several all;
+  CombinedResult all;
   all.add(paths_over(renderer, blade, {}, {0.1, kStylus, 1e-6}, kTicks));
   all.add(paths_over(renderer, solid(wedge), some_pose({0.1, 0, 0}), {0.1, kStylus}, kTicks));
   return all.result();
@@ -101,7 +101,7 @@ ExtremeResult needle(const Renderer& renderer) {
 }
 
 ExtremeResult nearly_coplanar(const Renderer& renderer) {
-  Several all;
+  CombinedResult all;
   for (const double angle : {1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13}) {
     all.add(paths_over(renderer, solid(nearly_flat_cone(angle, 24)), {}, {kStylus}, kTicks));
   }
@@ -111,7 +111,7 @@ ExtremeResult nearly_coplanar(const Renderer& renderer) {
 ExtremeResult duplicate_vertices(const Renderer& renderer) {
   const stimuli::PolygonSoup shapes[] = {stimuli::cube(0.06), stimuli::icosphere(0.03, 2),
                                          stimuli::cone(0.03, 0.06, 32)};
-  Several all;
+  CombinedResult all;
   for (const stimuli::PolygonSoup& soup : shapes) {
     all.add(paths_over(renderer, solid(with_duplicates(soup)), {}, {kStylus}, kTicks));
   }
@@ -135,7 +135,7 @@ ExtremeResult far_object(const Renderer& renderer) {
 ExtremeResult million_triangles(const Renderer& renderer) {
   // 1,310,720 triangles; their edges are 0.1 mm long in the mean.
   const MeshPointer mesh = solid(stimuli::icosphere(0.0216, 8));
-  Watch watch(renderer, mesh);
+  AuditedScene scene(renderer, mesh);
   stimuli::Random random(5);
   // The reference looks at every triangle: few ticks, from free space to sliding at 0.1 m/s.
   const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
@@ -145,9 +145,9 @@ ExtremeResult million_triangles(const Renderer& renderer) {
     const Vec3 out = std::cos(turn) * axis + std::sin(turn) * across;
     const Vec3 direction = glm::normalize(out + (0.5 + 0.05 * i) * across);
     const Vec3 tip = (0.0216 - depth) * out;
-    watch.audited({tip, tip + kStylus * direction});
+    scene.audited_tick({tip, tip + kStylus * direction});
   }
-  return watch.result();
+  return scene.result();
 }
 
 }  // namespace palpate::rendering::extremes

@@ -55,8 +55,8 @@ struct Wave3 {
   Wave x, y, z;
 };
 
-/// The path under way.
-struct Way {
+/// Builds a path pose by pose.
+struct PathBuilder {
   stimuli::Random& random;
   const stimuli::ConvexMesh& mesh;
   double length;
@@ -66,12 +66,12 @@ struct Way {
 
   bool full() const { return path.size() >= ticks; }
 
-  /// The probe whose point at `share` of the way to the tail is at `at`.
-  LineProbe probe(const Vec3& at, const Vec3& direction, double share) const {
-    return {at - share * length * direction, at + (1 - share) * length * direction};
+  /// The probe whose point at this fraction from tip to tail is at `at`.
+  LineProbe probe(const Vec3& at, const Vec3& direction, double fraction) const {
+    return {at - fraction * length * direction, at + (1 - fraction) * length * direction};
   }
 
-  double some_share() { return side ? random.unit() : 0; }
+  double some_fraction() { return side ? random.unit() : 0; }
 
   Vec3 middle() const {
     Vec3 sum;
@@ -81,12 +81,12 @@ struct Way {
 
   void smooth() {
     const Wave3 place(random), turn(random);
-    const Wave share(random);
+    const Wave fraction(random);
     const double step = magnitude(random, -4, -1.5);
     const double reach = 1.5 * mesh.radius();
     for (double at = 0; !full(); at += step) {
       path.push_back(probe(mesh.centre() + reach * place(at), unit_or_x(turn(at)),
-                           side ? 0.5 + 0.5 * share(at) : 0));
+                           side ? 0.5 + 0.5 * fraction(at) : 0));
     }
   }
 
@@ -96,19 +96,19 @@ struct Way {
     const double press = magnitude(random, -3, 0.5) * thickness;
     const double step = magnitude(random, -4, -1);
     const Wave3 place(random), turn(random);
-    const Wave share(random), pressing(random);
+    const Wave fraction(random), pressing(random);
     for (double at = 0; !full(); at += step) {
       const Vec3 out = unit_or_x(place(at)), direction = unit_or_x(turn(at));
-      const double at_share = side ? 0.5 + 0.5 * share(at) : 0;
+      const double at_fraction = side ? 0.5 + 0.5 * fraction(at) : 0;
       double in = 0, outside = 2 * mesh.size() + length;
       for (int halving = 0; halving < 20; ++halving) {
         const double half = (in + outside) / 2;
-        LineProbe there = probe(inside + half * out, direction, at_share);
+        LineProbe there = probe(inside + half * out, direction, at_fraction);
         if (!side) there.tail = there.tip;
         (reference_depth(mesh, there).depth > 0 ? in : outside) = half;
       }
       const double depth = press * (0.35 + pressing(at));
-      path.push_back(probe(inside + (in - depth) * out, direction, at_share));
+      path.push_back(probe(inside + (in - depth) * out, direction, at_fraction));
     }
   }
 
@@ -121,12 +121,12 @@ struct Way {
       const Vec3 way = random_direction(random), from = random_direction(random);
       const Vec3 axis = random_direction(random);
       const double turn_a_tick = magnitude(random, -4, 0);
-      const double share = some_share();
+      const double fraction = some_fraction();
       const double legs = std::clamp((mesh.size() + length) / step, 2.0, 20.0);
       double gone = -step * (legs + random.unit());
       for (int leg = 0; leg <= 2 * legs && !full(); ++leg, gone += step) {
         const Vec3 direction = glm::angleAxis(turn_a_tick * leg, axis) * from;
-        path.push_back(probe(aim + gone * way, direction, share));
+        path.push_back(probe(aim + gone * way, direction, fraction));
       }
     }
   }
@@ -138,7 +138,7 @@ struct Way {
       for (int i = 1; i < 5; ++i) {
         at = glm::mix(at, mesh.vertices()[random.below(mesh.vertices().size())], random.unit());
       }
-      const LineProbe inside = probe(at, random_direction(random), some_share());
+      const LineProbe inside = probe(at, random_direction(random), some_fraction());
       const LineProbe felt{inside.tip, side ? inside.tail : inside.tip};
       const ReferenceDepth way_out = reference_depth(mesh, felt);
       if (way_out.depth <= 0) continue;
@@ -159,12 +159,12 @@ struct Way {
     while (!full()) {
       const double reach = random.below(2) ? mesh.radius() : 2 * mesh.size() + length;
       path.push_back(probe(mesh.centre() + reach * random.unit() * random_direction(random),
-                           random_direction(random), some_share()));
+                           random_direction(random), some_fraction()));
     }
   }
 
-  /// 0, rounding, or anything between that and a hundredth.
-  double next_to_nothing() {
+  /// 0, or of any magnitude from 1e-17 to 1e-2.
+  double tiny() {
     const double amount = random.below(3) ? magnitude(random, -17, -2) : 0;
     return random.below(2) ? amount : -amount;
   }
@@ -180,27 +180,27 @@ struct Way {
       const Vec3 across = glm::cross(normal, along);
       const Vec3 ways[] = {along, across, normal, unit_or_x(along + across),
                            unit_or_x(pick(mesh.vertices()) - v0)};
-      Vec3 direction =
-          unit_or_x(ways[random.below(5)] + next_to_nothing() * random_direction(random));
+      Vec3 direction = unit_or_x(ways[random.below(5)] + tiny() * random_direction(random));
       if (random.below(2)) direction = -direction;
       const Vec3 touch = random.below(2) ? v0 : v0 + random.unit() * (v1 - v0);
       const Vec3 motions[] = {normal, along, across, direction,
                               unit_or_x(normal + mesh.facets()[edge.right].normal)};
       const Vec3 way = motions[random.below(5)];
       const Vec3 second = motions[random.below(5)];
-      const double share = side && random.below(2)
-                               ? random.unit()
-                               : (side ? static_cast<double>(random.below(2)) : 0);
-      const double reach = size * magnitude(random, -6, 0), beside = size * next_to_nothing();
-      const double turning = random.below(2) ? next_to_nothing() : 0;
+      const double fraction = side && random.below(2)
+                                  ? random.unit()
+                                  : (side ? static_cast<double>(random.below(2)) : 0);
+      const double reach = size * magnitude(random, -6, 0), beside = size * tiny();
+      const double turning = random.below(2) ? tiny() : 0;
       const Vec3 axis = random_direction(random);
       const int legs = 4 + static_cast<int>(random.below(20));
-      path.push_back(probe(touch + 2 * size * unit_or_x(normal + 0.1 * across), direction, share));
+      path.push_back(
+          probe(touch + 2 * size * unit_or_x(normal + 0.1 * across), direction, fraction));
       for (int leg = 0; leg <= legs && !full(); ++leg) {
         const double turn = 2 * std::numbers::pi * leg / legs;
         const Vec3 at = touch + (reach * std::cos(turn) + beside) * way +
                         (random.below(4) ? 0 : reach * std::sin(turn)) * second;
-        path.push_back(probe(at, glm::angleAxis(turning * leg, axis) * direction, share));
+        path.push_back(probe(at, glm::angleAxis(turning * leg, axis) * direction, fraction));
       }
     }
   }
@@ -216,32 +216,32 @@ const char* to_string(PathKind kind) {
 std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
                                    const stimuli::ConvexMesh& mesh, double length, bool side,
                                    std::size_t ticks) {
-  Way way{random, mesh, length, side, ticks, {}};
-  way.path.reserve(ticks + 1);
+  PathBuilder builder{random, mesh, length, side, ticks, {}};
+  builder.path.reserve(ticks + 1);
   const double far = 3 * mesh.size() + length;
-  way.path.push_back(way.probe(mesh.centre() + far * Vec3(0, 0, 1), Vec3(0, 0, 1), 0));
+  builder.path.push_back(builder.probe(mesh.centre() + far * Vec3(0, 0, 1), Vec3(0, 0, 1), 0));
   switch (kind) {
     case PathKind::smooth:
-      way.smooth();
+      builder.smooth();
       break;
     case PathKind::sliding:
-      way.sliding();
+      builder.sliding();
       break;
     case PathKind::fast:
-      way.fast();
+      builder.fast();
       break;
     case PathKind::plunges:
-      way.plunges();
+      builder.plunges();
       break;
     case PathKind::jumps:
-      way.jumps();
+      builder.jumps();
       break;
     case PathKind::aligned:
-      way.aligned();
+      builder.aligned();
       break;
   }
-  way.path.resize(ticks);
-  return std::move(way.path);
+  builder.path.resize(ticks);
+  return std::move(builder.path);
 }
 
 }  // namespace palpate::rendering

@@ -1,5 +1,6 @@
 #pragma once
-// Random ways of a probe over one convex mesh, in the mesh's frame, meant to be hard. For searches.
+// Random paths of a probe over one convex mesh, meant to be hard for a renderer. For searches and
+// extreme cases. Mesh frame, m.
 
 #include <vector>
 
@@ -14,16 +15,15 @@ enum class PathKind {
   sliding,  ///< near the surface all the time, from just outside to beyond the middle
   fast,     ///< straight past and through, 5 m/s or 0.01 to 3 sizes a tick, turning on the way
   plunges,  ///< from outside, by 1e-16 to 1 sizes, straight in and out again
-  jumps,    ///< every tick somewhere else
-  aligned,  ///< along edges, in planes of facets, through corners: exactly or off by next to
-            ///< nothing
+  jumps,    ///< an unrelated pose at every tick
+  aligned,  ///< along edges, in planes of facets, through corners: exactly or nearly
 };
 inline constexpr int kPathKinds = 6;
 const char* to_string(PathKind kind);
 
 /// Starts far outside (its first pose); 1 kHz.
 /// \param length  m, of the probe
-/// \param side    false: it is the tip that is led over the surface
+/// \param side    false: the tip is led over the surface, not the side
 std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
                                    const stimuli::ConvexMesh& mesh, double length, bool side,
                                    std::size_t ticks);

@@ -25,7 +25,7 @@ struct Block {
   stimuli::PolygonSoup soup;
   std::vector<Plane> planes;
 
-  /// Takes away what is above the plane. Corners on it count as below, so the plane must not go
+  /// Removes what is above the plane. Corners on it count as below, so the plane must not go
   /// through one: random planes do not.
   void cut(const Plane& plane) {
     const auto height = [&](Index v) {
@@ -36,8 +36,9 @@ struct Block {
       const auto [at, is_new] = crossings.try_emplace({std::min(a, b), std::max(a, b)},
                                                       static_cast<Index>(soup.vertices.size()));
       if (is_new) {
-        const double share = height(a) / (height(a) - height(b));
-        soup.vertices.push_back(soup.vertices[a] + share * (soup.vertices[b] - soup.vertices[a]));
+        const double fraction = height(a) / (height(a) - height(b));
+        soup.vertices.push_back(soup.vertices[a] +
+                                fraction * (soup.vertices[b] - soup.vertices[a]));
       }
       return at->second;
     };
@@ -183,7 +184,7 @@ stimuli::ConvexMesh random_solid(stimuli::Random& random) {
     try {
       return stimuli::ConvexMesh(turned_and_moved(std::move(soup), turn, scale, to));
     } catch (const stimuli::MeshError&) {
-      // Cut and stretched too finely to be told from a flat one: another.
+      // Too thin to be told from a flat one: another.
     }
   }
 }

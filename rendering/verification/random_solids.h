@@ -1,5 +1,5 @@
 #pragma once
-// Convex solids of every kind, proportion and size, for searches and extreme cases.
+// Random convex solids of many kinds, proportions and sizes, for searches and extreme cases.
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/random.h"
@@ -10,19 +10,19 @@ namespace palpate::rendering {
 /// of any number of sides.
 stimuli::PolygonSoup cut_cube(stimuli::Random& random, int cuts);
 
-/// The polar of cut_cube: triangles, corners of any number of facets.
+/// The polar dual of cut_cube: triangles, corners of any number of facets.
 stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts);
 
-/// Every corner's coordinates times these factors; a convex solid stays one.
+/// Every corner's coordinates times these factors; convexity is kept.
 stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors);
 
 /// Turned, scaled by `scale` and then moved.
 stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& turn, double scale,
                                       const Vec3& to);
 
-/// A cut cube, its polar, a sphere, cone, cylinder or cube; half of them stretched into plates and
-/// needles of proportions down to 1e-4; turned at random or along the axes; 0.1 mm to 100 m across,
-/// up to a size away from the origin.
+/// A cut cube, its polar dual, a sphere, cone, cylinder or cube; half of them stretched into plates
+/// and needles of proportions down to 1e-4; turned at random or along the axes; 0.1 mm to 100 m
+/// across, up to a size away from the origin.
 stimuli::ConvexMesh random_solid(stimuli::Random& random);
 
 }  // namespace palpate::rendering

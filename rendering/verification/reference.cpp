@@ -13,7 +13,7 @@ namespace {
 // with the probe has no width.
 constexpr double kParallelSine = 1e-9;
 
-// Depths up to this share of the object's size count as touching, not as penetrating: an ideal
+// Depths up to this fraction of the object's size count as touching, not as penetrating: an ideal
 // probe resting on a facet carries rounding errors of this order when it is far from the origin.
 constexpr double kTouchingDepth = 1e-12;
 

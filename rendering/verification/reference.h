@@ -1,6 +1,7 @@
 #pragma once
-// The exact yardstick of rendering: every facet is visited. Independent of facet_walk on purpose;
-// it shares the mesh and nothing else. For checks, not for the servo.
+// Brute-force reference: penetration depth, distance and time of impact over all facets and edges.
+// Deliberately independent of facet_walk: it shares the mesh and nothing else. For checks, not for
+// the servo. Mesh frame, SI units.
 
 #include <optional>
 
@@ -9,10 +10,9 @@
 
 namespace palpate::rendering {
 
-/// Penetration of the segment into the mesh: the smallest translation that separates them, over all
-/// facets of M = mesh (+) (-segment) (its faces: facets of the mesh with the deeper end, silhouette
-/// edges with the probe's direction). Negative when they do not touch: then only the sign counts.
-/// Mesh frame. For a point, pass tip == tail.
+/// Penetration depth of the segment in the mesh: the shortest translation that separates them, over
+/// all facets of M = mesh (+) (-segment) (facet_walk.h). Negative when they do not touch: then only
+/// the sign counts. For a point, pass tip == tail.
 struct ReferenceDepth {
   double depth = 0;  ///< m
   Vec3 normal;       ///< unit, of the facet of M that attains it
@@ -23,9 +23,10 @@ ReferenceDepth reference_depth(const stimuli::ConvexMesh& mesh, const LineProbe&
 /// overlap.
 double reference_gap(const stimuli::ConvexMesh& mesh, const LineProbe& probe);
 
-/// First time in [0, 1] at which the probe, its ends moving linearly from `before` to `after`,
-/// penetrates by more than 1e-12 of the mesh's size (touching is not penetrating); found by
-/// stepping `steps` times and then bisecting to rounding. Empty when no step ends inside.
+/// Time of impact: the first time in [0, 1] at which the probe, its ends moving linearly from
+/// `before` to `after`, penetrates by more than 1e-12 of the mesh's size (touching is not
+/// penetrating); found by stepping `steps` times and then bisecting to rounding. Empty when no step
+/// ends inside.
 std::optional<double> reference_first_contact(const stimuli::ConvexMesh& mesh,
                                               const LineProbe& before, const LineProbe& after,
                                               int steps);

@@ -38,8 +38,4 @@ SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uin
   return counts;
 }
 
-SearchCounts search(std::uint64_t ticks, std::uint64_t seed) {
-  return search_walks(seed, 0, (ticks + kTicksPerWalk - 1) / kTicksPerWalk);
-}
-
 }  // namespace palpate::rendering

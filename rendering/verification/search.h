@@ -1,7 +1,7 @@
 #pragma once
-// The search for ticks that are wrong: random convex solids of all sizes, random hand paths and
-// fast ones, every tick held against the brute-force reference. For checks, not for the servo.
-// Deterministic: walk w of seed s is the same on every machine, whoever walks it.
+// Randomised search for wrong ticks: random convex solids of all sizes, random paths, every tick
+// compared with the brute-force reference. For checks, not for the servo. Deterministic: walk w of
+// seed s is the same on every machine and in every thread.
 
 #include <cstdint>
 #include <string>
@@ -14,41 +14,41 @@ namespace palpate::rendering {
 /// Ticks of one walk: one object, one probe, one path.
 inline constexpr std::uint64_t kTicksPerWalk = 500;
 
-/// A tick that is wrong. `palpate accuracy --search` prints it; search_walk(seed, walk) goes there
-/// again.
+/// A wrong tick. `palpate accuracy --search` prints it; search_walk(renderer, seed, walk) repeats
+/// it.
 struct SearchFault {
   std::uint64_t seed = 0, walk = 0, tick = 0;
   std::string what;  ///< renderer, object, and what is wrong, with numbers
 };
 
-/// What a search saw, and what it found wrong.
+/// What a search covered, and what it found wrong.
 struct SearchCounts {
   std::uint64_t walks = 0, ticks = 0;
   std::uint64_t in_contact = 0;  ///< ticks in contact
   std::uint64_t entries = 0;     ///< contacts that began
-  /// Ticks from free space that were walked again in a hundred steps by brute force.
+  /// Ticks from free space that were repeated in a hundred steps by brute force.
   std::uint64_t walked_finely = 0;
-  /// Of those: the probe came in by a facet that holds it at all further steps.
+  /// Of those: the probe entered through a feature that holds it at all further steps.
   std::uint64_t passages = 0;
 
   // Wrong ticks; all of these must be 0.
-  std::uint64_t missed = 0;  ///< inside by more than 1e-9 of the size and not felt
-  /// Passages that are not felt on the side by which they came in: a thin plate, crossed.
+  std::uint64_t missed = 0;  ///< inside by more than 1e-9 of the size, without contact
+  /// Passages without contact on the side of entry: a thin plate, passed through.
   std::uint64_t passed_through = 0;
-  std::uint64_t phantom = 0;      ///< a contact began where a hundredth of the tick shows no touch
+  std::uint64_t phantom = 0;      ///< a contact began where no hundredth of the tick touches
   std::uint64_t penetrating = 0;  ///< ideal probe inside by more than 1e-9 of the size
   std::uint64_t floating = 0;     ///< ideal probe off the surface by more than 1e-9 of size and
                                   ///< probe
-  std::uint64_t shallow = 0;      ///< shallower than the least depth that separates
+  std::uint64_t shallow = 0;      ///< shallower than the penetration depth
   std::uint64_t wrong_force = 0;  ///< force, torque or devices' forces are not those of the contact
   std::uint64_t not_finite = 0;
-  std::uint64_t endless = 0;  ///< walks that met their limit of steps
+  std::uint64_t endless = 0;  ///< facet walks that reached their limit of steps
   std::uint64_t faulted = 0;  ///< other fault bits
 
-  /// Not wrong, but counted: entries that no crossing explained, so that all facets were looked at.
+  /// Not wrong, but counted: entries without a crossing, so that all features were searched.
   std::uint64_t fallbacks = 0;
   /// Not wrong, but counted: passages of a probe that turned by more than 0.1 rad within the tick
-  /// (100 rad/s, no hand), held by another side or lost. It may come in, leave and come in again.
+  /// (100 rad/s, faster than any hand), held on another side or lost. It may enter more than once.
   std::uint64_t turned_elsewhere = 0;
   double worst_penetration = 0;  ///< of the ideal probe, in sizes of the object
 
@@ -59,7 +59,7 @@ struct SearchCounts {
     return missed + passed_through + phantom + penetrating + floating + shallow + wrong_force +
            not_finite + endless + faulted;
   }
-  /// Adds another's. Sums in the order of walks are the same whoever walked them.
+  /// Adds another's. Summed in the order of walks, the result does not depend on threads.
   SearchCounts& operator+=(const SearchCounts& other);
 };
 
@@ -67,10 +67,7 @@ struct SearchCounts {
 SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk);
 
 /// Walks first_walk, first_walk + 1, ...: every fourth with the point renderer, the others with the
-/// ray. Independent of each other: share them out among threads as you like.
+/// ray renderer. Walks are independent: distribute them among threads in any way.
 SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uint64_t walks);
-
-/// At least `ticks` ticks, from walk 0 on.
-SearchCounts search(std::uint64_t ticks, std::uint64_t seed);
 
 }  // namespace palpate::rendering

@@ -1,4 +1,4 @@
-// One walk of the search: its ticks, and what is wrong with them.
+// One walk of the search: its ticks, and the errors in them.
 
 #include <algorithm>
 #include <cmath>
@@ -11,30 +11,26 @@
 #include <utility>
 
 #include "rendering/first_contact.h"
+#include "rendering/verification/entry_feature.h"
 #include "rendering/verification/random_paths.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
 #include "rendering/verification/search.h"
-#include "rendering/verification/search_entry.h"
 #include "rendering/verification/tick_audit.h"
 #include "stimuli/orientation.h"
 
 namespace palpate::rendering {
 namespace {
 
-constexpr int kFineSteps = 100;      // of a tick, by brute force
-constexpr double kNoHand = 0.1;      // rad a tick: 100 rad/s
-constexpr double kAtSurface = 1e-6;  // sizes
+constexpr int kFineSteps = 100;       // of a tick, by brute force
+constexpr double kFastestTurn = 0.1;  // rad a tick: 100 rad/s, faster than any hand
+constexpr double kAtSurface = 1e-6;   // sizes
 
-LineProbe mixed(const LineProbe& a, const LineProbe& b, double t) {
+LineProbe interpolated(const LineProbe& a, const LineProbe& b, double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
 }
 
-LineProbe moved(const LineProbe& probe, const Vec3& by) {
-  return {probe.tip + by, probe.tail + by};
-}
-
-/// One walk under way.
+/// One walk in progress.
 class Walk {
  public:
   Walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk)
@@ -98,7 +94,8 @@ class Walk {
           audit.floats);
     wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
     wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
-    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless, "walk without end", 0);
+    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless,
+          "walk stopped at its limit of steps", 0);
     wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
     if (was_free && audit.finite) from_free_space(felt, r, held, audit.tolerance);
     last_ = felt;
@@ -110,7 +107,7 @@ class Walk {
   void from_free_space(const LineProbe& felt, const Rendering& r, bool held, double tolerance) {
     counts_.entries += held;
     if (held) count_fallback(felt);
-    if (!held && plane_between(*mesh_, last_, felt)) return;
+    if (!held && separated_by_facet_plane(*mesh_, last_, felt)) return;
     ++counts_.walked_finely;
     const auto time = reference_first_contact(*mesh_, last_, felt, kFineSteps);
     if (!time) {
@@ -119,15 +116,15 @@ class Walk {
     }
     // A start at the surface is within rounding of any facet there.
     if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
-    // It came in. Where the facet that it came in by holds it at every step, it must be felt there.
-    const auto entry = entry_at(*mesh_, mixed(last_, felt, *time));
+    // It entered. Where its feature of entry holds it at every step, the contact must be there.
+    const auto entry = entry_feature(*mesh_, interpolated(last_, felt, *time));
     if (!entry) return;
     ReferenceDepth at_end;
     for (int step = static_cast<int>(std::ceil(*time * kFineSteps)); step <= kFineSteps; ++step) {
-      const LineProbe there = mixed(last_, felt, step / double{kFineSteps});
-      const auto on = facet_of_sum(*mesh_, entry->is_edge, entry->index, there);
+      const LineProbe there = interpolated(last_, felt, step / double{kFineSteps});
+      const auto on = measure_feature(*mesh_, entry->is_edge, entry->index, there);
       if (!on || on->depth <= (step < kFineSteps ? -tolerance : tolerance)) return;
-      const LineProbe ideal = moved(there, on->depth * on->normal);
+      const LineProbe ideal = translated(there, on->depth * on->normal);
       if (reference_depth(*mesh_, ideal).depth > tolerance) return;
       if (step < kFineSteps ? reference_gap(*mesh_, ideal) > tolerance
                             : !firmly_on(ideal, on->normal, tolerance)) {
@@ -137,20 +134,20 @@ class Walk {
     }
     const bool elsewhere = !held || std::abs(r.deepest.depth - at_end.depth) >
                                         kNeighbouringDepths * (mesh_->size() + at_end.depth);
-    if (turned(felt) > kNoHand) {
+    if (turned(felt) > kFastestTurn) {
       counts_.turned_elsewhere += elsewhere;
       return;
     }
     ++counts_.passages;
     if (elsewhere) {
       ++counts_.passed_through;
-      report(held ? "held elsewhere, by" : "passed through, by",
+      report(held ? "held elsewhere, depth off by" : "passed through, depth",
              held ? r.deepest.depth - at_end.depth : at_end.depth, felt);
     }
   }
 
-  /// Whether the probe lies on a facet of M with some room on all sides: at its rim rounding
-  /// decides who holds it.
+  /// Whether the ideal probe lies well inside a facet of M: at its rim rounding decides which facet
+  /// holds it.
   bool firmly_on(const LineProbe& ideal, const Vec3& normal, double tolerance) const {
     constexpr int kWays = 8;
     const Vec3 u = glm::normalize(std::abs(normal.x) < 0.5 ? glm::cross(normal, Vec3(1, 0, 0))
@@ -159,24 +156,24 @@ class Walk {
     for (int i = 0; i < kWays; ++i) {
       const double turn = 2 * std::numbers::pi * i / kWays;
       const Vec3 aside = kAtSurface * mesh_->size() * (std::cos(turn) * u + std::sin(turn) * v);
-      if (reference_gap(*mesh_, moved(ideal, aside)) > tolerance) return false;
+      if (reference_gap(*mesh_, translated(ideal, aside)) > tolerance) return false;
     }
     return true;
   }
 
   /// A contact that began although no step shows the probe inside: it must at least come as near as
-  /// it moves in a step.
+  /// it moves in one step.
   void expect_touch(const LineProbe& felt, double tolerance) {
     const double step =
         std::max(glm::length(felt.tip - last_.tip), glm::length(felt.tail - last_.tail)) /
         kFineSteps;
     double gap = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= kFineSteps && gap > step; ++i) {
-      gap = std::min(gap, reference_gap(*mesh_, mixed(last_, felt, i / double{kFineSteps})));
+      gap = std::min(gap, reference_gap(*mesh_, interpolated(last_, felt, i / double{kFineSteps})));
     }
     if (gap <= step + tolerance) return;
     ++counts_.phantom;
-    report("contact without touch, gap", gap, felt);
+    report("phantom contact, gap", gap, felt);
   }
 
   void count_fallback(const LineProbe& felt) {

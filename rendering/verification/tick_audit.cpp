@@ -44,13 +44,13 @@ LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LinePro
 }
 
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
-                     const Rendering& r, double share) {
+                     const Rendering& r, double rounding) {
   const ScenePart& part = scene.parts()[0];
   const stimuli::ConvexMesh& mesh = *part.mesh;
   TickAudit audit;
   audit.tolerance =
-      share * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
-                                     glm::length(probe.tip) + glm::length(probe.tail));
+      rounding * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
+                                        glm::length(probe.tip) + glm::length(probe.tail));
   audit.finite = all_finite(r);
   if (!audit.finite) return audit;
   audit.depth = reference_depth(mesh, felt_probe(scene, renderer, probe)).depth;

@@ -1,18 +1,18 @@
 #pragma once
-// One tick of a renderer over a scene of one convex part, held against the brute-force reference.
-// For checks, not for the servo.
+// Errors of one tick of a renderer over a scene of one convex part, against the brute-force
+// reference. For checks, not for the servo.
 
 #include "rendering/renderer.h"
 
 namespace palpate::rendering {
 
-/// What the renderer could feel, in the frame of the part's mesh: for a point the tip alone.
+/// What can touch, in the frame of the part's mesh: for the point renderer the tip alone.
 LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe);
 
-/// Errors of one tick, each 0 where all is well. Lengths are in m.
+/// Errors of one tick, each 0 where all is right. Lengths in m.
 struct TickAudit {
   double depth = 0;       ///< of the virtual probe by the reference; negative: outside
-  double missed = 0;      ///< depth of a probe that is not felt
+  double missed = 0;      ///< depth of a probe without contact
   double penetrates = 0;  ///< depth of the ideal probe
   double floats = 0;      ///< gap between the ideal probe and the object, in contact
   double shallow = 0;     ///< by how much a contact is shallower than the reference
@@ -29,10 +29,10 @@ struct TickAudit {
   }
 };
 
-/// \param share  of the object's size that counts as rounding; what its distance from the origin
-/// and the probe's length add is in the tolerance as well \pre  the scene has one part, of a plain
-/// spring
+/// \param rounding  fraction of the object's size that counts as rounding; what its distance from
+/// the origin and the probe's length add is in the tolerance as well \pre  the scene has one part,
+/// of a plain spring
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
-                     const Rendering& rendering, double share = 1e-9);
+                     const Rendering& rendering, double rounding = 1e-9);
 
 }  // namespace palpate::rendering

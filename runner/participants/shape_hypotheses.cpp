@@ -86,12 +86,12 @@ bool usable(double length) { return std::isfinite(length) && length > 0; }
 }  // namespace
 
 std::string ShapeHypotheses::fault_of(const stimuli::ObjectSpec& stimulus) {
-  const stimuli::ShapeNeeds needs = stimuli::needs_of(stimulus.shape);
+  const stimuli::ShapeTraits needs = stimuli::traits_of(stimulus.shape);
   if (!needs.analytic) {
     std::string known;
     for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-      if (!stimuli::needs_of(shape).analytic) continue;
-      known += (known.empty() ? "" : ", ") + std::string(stimuli::needs_of(shape).name);
+      if (!stimuli::traits_of(shape).analytic) continue;
+      known += (known.empty() ? "" : ", ") + std::string(stimuli::traits_of(shape).name);
     }
     return std::string("a simulated participant knows ") + known + ", not " + needs.name;
   }
@@ -120,7 +120,7 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
   shape.kind = stimulus.shape;
   shape.radius = static_cast<float>(stimulus.radius);
   shape.half_size = static_cast<float>(
-      (stimuli::needs_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
+      (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
   shape.first = padded_size();
   shape.count = static_cast<int>(rotations.size());
   shapes_.push_back(shape);

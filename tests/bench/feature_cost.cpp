@@ -14,7 +14,7 @@
 #include "rendering/point_probe.h"
 #include "rendering/segment_probe.h"
 #include "rendering/tick.h"
-#include "rendering/verification/stroking_hand.h"
+#include "rendering/verification/surface_stroke.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
 #include "tests/bench/measured_tick.h"
@@ -100,13 +100,13 @@ const rendering::Renderer& shipped(bool ray) {
 /// leads it: so the path is the same for both cases of a pair.
 std::vector<rendering::LineProbe> path_over(const rendering::Scene& scene, bool ray,
                                             std::size_t ticks) {
-  rendering::StrokeSettings settings;
+  rendering::SurfaceStrokeSettings settings;
   settings.centre = scene.parts()[0].sphere_centre;
   settings.radius = scene.parts()[0].sphere_radius;
   settings.side = ray;
   settings.lifted = 0.3;
   settings.lift_period = 250;
-  rendering::StrokingHand hand(settings);
+  rendering::SurfaceStroke hand(settings);
   rendering::RenderState state = scene.initial_state();
   std::vector<rendering::LineProbe> poses;
   poses.reserve(ticks);

@@ -15,11 +15,11 @@
 #include <string>
 #include <vector>
 
+#include "rendering/accuracy/local_depths.h"
 #include "rendering/accuracy/methods.h"
-#include "rendering/accuracy/ways_out.h"
 #include "rendering/renderer.h"
 #include "rendering/verification/reference.h"
-#include "rendering/verification/stroking_hand.h"
+#include "rendering/verification/surface_stroke.h"
 #include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
 
@@ -42,10 +42,10 @@ Path hand_over(const std::shared_ptr<const stimuli::ConvexMesh>& mesh, bool segm
       segment ? rendering::ray_renderer() : rendering::point_renderer();
   const rendering::Scene scene({{mesh, Pose{}, stimuli::Material{}, 0, nullptr}}, segment);
   rendering::RenderState state = scene.initial_state();
-  rendering::StrokeSettings settings;
+  rendering::SurfaceStrokeSettings settings;
   settings.side = segment;
   settings.lifted = 0.27;
-  rendering::StrokingHand hand(settings);
+  rendering::SurfaceStroke hand(settings);
   Path path(kWarm + kTicks);
   double depth = 0;
   for (rendering::LineProbe& probe : path) {
@@ -65,44 +65,45 @@ struct Row {
   double worst_error = 0;  ///< m
 };
 
-double at(std::vector<std::uint64_t>& counts, double share) {
-  const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(counts.size() - 1));
+double quantile(std::vector<std::uint64_t>& counts, double fraction) {
+  const auto k = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(counts.size() - 1));
   std::nth_element(counts.begin(), counts.begin() + k, counts.end());
   return static_cast<double>(counts[static_cast<std::size_t>(k)]);
 }
 
-/// Holds answers against the exact least depth. A method that remembers its side may hold a longer
-/// way out, and is then held against that one.
+/// Compares an estimate with the penetration depth. A method that keeps to its side may hold
+/// another local minimum, and is then compared with that one.
 void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
-           const rendering::ReferenceDepth& exact, const rendering::Answer& answer,
-           bool follows_side, Row& row) {
+           const rendering::ReferenceDepth& exact, const rendering::ContactEstimate& estimate,
+           bool keeps_side, Row& row) {
   const double tolerance = kWrong * mesh.size();
   ++row.checked;
-  if (std::isnan(answer.depth)) {
+  if (std::isnan(estimate.depth)) {
     ++row.gave_up;
     ++row.wrong;
     return;
   }
-  const double depth = answer.touching ? answer.depth : 0;
+  const double depth = estimate.touching ? estimate.depth : 0;
   double error = std::abs(depth - std::max(0.0, exact.depth));
-  if (error > kRounding * mesh.size() && follows_side && answer.touching) {
+  if (error > kRounding * mesh.size() && keeps_side && estimate.touching) {
     const double to_least = error;
-    for (const rendering::WayOut& way : rendering::ways_out(mesh, probe, answer.normal, 1e-3))
-      error = std::min(error, std::abs(depth - way.depth));
+    for (const rendering::LocalDepth& local :
+         rendering::local_depths(mesh, probe, estimate.normal, 1e-3))
+      error = std::min(error, std::abs(depth - local.depth));
     if (error < to_least) ++row.other_side;
   }
   row.worst_error = std::max(row.worst_error, error);
   if (error <= tolerance) return;
   ++row.wrong;
-  if (!answer.touching) ++row.lost;
+  if (!estimate.touching) ++row.lost;
 }
 
 /// The exact depths of every so many ticks of a path.
-struct Yardstick {
+struct ExactDepths {
   std::size_t every = 1;
   std::map<std::size_t, rendering::ReferenceDepth> depths;
 
-  Yardstick(const stimuli::ConvexMesh& mesh, const Path& path) {
+  ExactDepths(const stimuli::ConvexMesh& mesh, const Path& path) {
     const std::size_t size = mesh.facets().size() + mesh.edges().size();
     every = std::max<std::size_t>(1, kTicks * size / kCheckedVisits);
     for (std::size_t i = kWarm; i < path.size(); i += every)
@@ -110,8 +111,8 @@ struct Yardstick {
   }
 };
 
-Row run(const rendering::MethodKind& kind, const stimuli::ConvexMesh& mesh, const Path& path,
-        const Yardstick& exact, bool segment, double seconds) {
+Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh, const Path& path,
+        const ExactDepths& exact, bool segment, double seconds) {
   const double ns = runner::nanoseconds_per_count();
   const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
   const std::unique_ptr<rendering::Method> method = kind.make(mesh, segment);
@@ -119,35 +120,35 @@ Row run(const rendering::MethodKind& kind, const stimuli::ConvexMesh& mesh, cons
   row.method = kind.name;
   std::vector<std::uint64_t> counts;
   counts.reserve(kTicks);
-  std::vector<rendering::Answer> answers;
-  answers.reserve(kTicks);
+  std::vector<rendering::ContactEstimate> estimates;
+  estimates.reserve(kTicks);
   std::uint64_t spent = 0;
-  // Who remembers comes in from outside; the others may begin anywhere.
-  for (std::size_t i = kind.remembers ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
+  // A method with history must come in from outside; the others may begin anywhere.
+  for (std::size_t i = kind.has_history ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
     const std::uint64_t start = runner::begin_count();
-    const rendering::Answer answer = method->tick(path[i]);
+    const rendering::ContactEstimate estimate = method->tick(path[i]);
     const std::uint64_t count = runner::end_count() - start;
     if (i < kWarm) continue;
     spent += count;
     counts.push_back(count);
-    answers.push_back(answer);
-    row.touching += answer.touching ? 1 : 0;
+    estimates.push_back(estimate);
+    row.touching += estimate.touching ? 1 : 0;
   }
   row.ticks = counts.size();
-  row.median_ns = at(counts, 0.5) * ns;
-  row.p99_ns = at(counts, 0.99) * ns;
-  row.worst_ns = at(counts, 1) * ns;
+  row.median_ns = quantile(counts, 0.5) * ns;
+  row.p99_ns = quantile(counts, 0.99) * ns;
+  row.worst_ns = quantile(counts, 1) * ns;
   for (const auto& [i, depth] : exact.depths) {
-    if (i - kWarm >= answers.size()) break;
-    check(mesh, path[i], depth, answers[i - kWarm], kind.follows_side, row);
+    if (i - kWarm >= estimates.size()) break;
+    check(mesh, path[i], depth, estimates[i - kWarm], kind.keeps_side, row);
   }
   return row;
 }
 
 /// Ours as it is shipped, the plainest that is exact, and the libraries that were found.
-std::vector<rendering::MethodKind> compared() {
-  std::vector<rendering::MethodKind> kinds;
-  for (rendering::MethodKind& kind : rendering::accuracy_methods()) {
+std::vector<rendering::MethodDefinition> compared() {
+  std::vector<rendering::MethodDefinition> kinds;
+  for (rendering::MethodDefinition& kind : rendering::contact_methods()) {
     if (!kind.name.starts_with("walk") && kind.name != "scan") kinds.push_back(std::move(kind));
   }
   return kinds;
@@ -183,9 +184,9 @@ void compare(bool segment, double seconds) {
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, level));
     const Path path = hand_over(mesh, segment);
-    const Yardstick exact(*mesh, path);
+    const ExactDepths exact(*mesh, path);
     std::vector<Row> rows;
-    for (const rendering::MethodKind& kind : compared()) {
+    for (const rendering::MethodDefinition& kind : compared()) {
       rows.push_back(run(kind, *mesh, path, exact, segment, seconds));
       rows.back().triangles = std::size_t{20} << (2 * level);
       if (level == 3) growth[kind.name][0] = rows.back().median_ns;
@@ -212,7 +213,7 @@ int main_with(int argc, char** argv) {
       "Icospheres of 30 mm radius, a hand at 0.1 m/s, 1 to 2 mm deep for 70 %% of the time, the "
       "same "
       "path for all.\nMethods:\n");
-  for (const rendering::MethodKind& kind : compared())
+  for (const rendering::MethodDefinition& kind : compared())
     std::printf("  %-12s %s\n", kind.name.c_str(), kind.description.c_str());
   std::printf(
       "wrong: depth off by more than 1e-6 of the size from the exact one (every facet looked at), "

@@ -165,13 +165,15 @@ TEST(Order, RefusalSaysWhyAndWhatWouldHelp) {
     }
     return std::string("none");
   };
-  EXPECT_EQ(refusal({2, 7}, limits(2)),
-            "max_run 2 cannot hold: 'b' is shown 7 times in a block of 9 trials; a max_run of at "
-            "least 3, more of the other stimuli or fewer repetitions a block would do");
+  EXPECT_EQ(
+      refusal({2, 7}, limits(2)),
+      "max_run 2 cannot be satisfied: 'b' is shown 7 times in a block of 9 trials; use a max_run "
+      "of at least 3, more of the other stimuli or fewer repetitions in a block");
   EXPECT_TRUE(can_order({2, 7}, limits(3)));
-  EXPECT_EQ(refusal({3, 3, 3}, limits({}, 5)),
-            "min_distance 5 cannot hold: 'a' is shown 3 times in a block of 9 trials; a "
-            "min_distance of at most 3, more stimuli or fewer repetitions a block would do");
+  EXPECT_EQ(
+      refusal({3, 3, 3}, limits({}, 5)),
+      "min_distance 5 cannot be satisfied: 'a' is shown 3 times in a block of 9 trials; use a "
+      "min_distance of at most 3, more stimuli or fewer repetitions in a block");
   EXPECT_NE(refusal({4}, limits({}, 2)).find("at most 1"), std::string::npos);
 }
 

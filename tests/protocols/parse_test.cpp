@@ -84,9 +84,9 @@ TEST(Parse, NamesEveryFaultOfBadFiles) {
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults()) {
         EXPECT_EQ(fault.file, file);
-        EXPECT_GT(fault.line, 0) << fault.place;
+        EXPECT_GT(fault.line, 0) << fault.location;
         EXPECT_FALSE(fault.expected.empty());
-        places.push_back(fault.place);
+        places.push_back(fault.location);
       }
     }
     std::sort(expected.begin(), expected.end());
@@ -217,9 +217,9 @@ TEST(Parse, SaysWhereAndWhat) {
 TEST(Parse, CountsLinesOfNumbersBeforeANewline) {
   const std::vector<Fault> faults = faults_of("{\n\"version\":\n7\n,\n\"seed\": -1\n}");
   ASSERT_GE(faults.size(), 2u);
-  EXPECT_EQ(faults.front().place, "/version");
+  EXPECT_EQ(faults.front().location, "/version");
   EXPECT_EQ(faults.front().line, 3);
-  EXPECT_EQ(faults.back().place, "/seed");
+  EXPECT_EQ(faults.back().location, "/seed");
   EXPECT_EQ(faults.back().line, 5);
 }
 
@@ -274,10 +274,10 @@ TEST(Parse, MemoryIsInProportionToTheText) {
 TEST(Parse, SaysWhatIsTooMuch) {
   const auto first = [](const std::string& text) { return faults_of(text).at(0); };
   const Fault key = first("{\n\"" + std::string(300, 'k') + "\": 1}");
-  EXPECT_EQ(key.place, "/");
+  EXPECT_EQ(key.location, "/");
   EXPECT_NE(key.expected.find("at most 256 bytes, found one of 300 on line 2"), std::string::npos);
   const Fault values = first("{\"a\": [\n" + repeated("1", 300'000) + "]}");
-  EXPECT_EQ(values.place, "/a");
+  EXPECT_EQ(values.location, "/a");
   EXPECT_NE(values.expected.find("at most 200000 values"), std::string::npos);
   const std::vector<Fault> many = faults_of("{" + repeated("\"\": 1", 5'000) + "}");
   EXPECT_EQ(many.size(), 1001u);

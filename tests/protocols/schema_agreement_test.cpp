@@ -224,7 +224,8 @@ std::optional<std::string> refusal(const std::string& place, const json& value) 
     parse_protocol_text(document.dump(), "p.json");
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults())
-      if (fault.place == place || (element && fault.place == pointer.parent_pointer().to_string()))
+      if (fault.location == place ||
+          (element && fault.location == pointer.parent_pointer().to_string()))
         return fault.expected;
     return std::nullopt;
   }

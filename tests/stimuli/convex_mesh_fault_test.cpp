@@ -247,7 +247,7 @@ TEST(ConvexMeshFaults, NamesPlacesThatAreNone) {
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200}) {
     PolygonSoup soup = cube(0.06);
     soup.vertices[5].y = bad;
-    EXPECT_FAULT(soup, "not a place: vertex 5");
+    EXPECT_FAULT(soup, "not finite: vertex 5");
   }
 }
 

@@ -1,140 +1,16 @@
 #include <algorithm>
-#include <cmath>
-#include <functional>
 #include <iostream>
-#include <span>
-#include <stdexcept>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
-#include "rendering/first_contact.h"
+#include "runner/commands/accuracy/measure.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "stimuli/primitives.h"
 
 namespace palpate::runner {
 namespace {
-
-void study_first_contacts(AccuracyReport& report, int entries) {
-  struct Shape {
-    const char* name;
-    stimuli::PolygonSoup soup;
-  };
-  const Shape shapes[] = {{"sphere of 1,280 triangles", stimuli::icosphere(0.03, 3)},
-                          {"cone of 64 segments", stimuli::cone(0.03, 0.06, 64)},
-                          {"cylinder of 64 segments", stimuli::cylinder(0.03, 0.06, 64)},
-                          {"cube", stimuli::cube(0.06)},
-                          {"plate of 60 x 60 x 1 mm", [] {
-                             stimuli::PolygonSoup plate = stimuli::cube(0.06);
-                             for (Vec3& v : plate.vertices) v.z /= 60;
-                             return plate;
-                           }()}};
-  ProgressLine progress("first contacts");
-  constexpr double kSpeeds[] = {0.1, 0.5, 1, 5};
-  const double steps = static_cast<double>(std::size(shapes) * std::size(kSpeeds));
-  double done = 0;
-  for (const Shape& shape : shapes) {
-    const stimuli::ConvexMesh mesh(shape.soup);
-    FirstContactStudy study{shape.name, {}};
-    for (const double speed : kSpeeds) {
-      progress.show(done / steps);
-      study.speeds.push_back(rendering::first_contact_loss(mesh, speed, 2, entries, 1));
-      done += 1;
-    }
-    report.first_contacts.push_back(std::move(study));
-  }
-}
-
-/// What one look costs where neither has a tree: 6 facets and 12 edges, a motion that stays off.
-void time_first_contact(AccuracyReport& report) {
-  const stimuli::ConvexMesh mesh(stimuli::cube(0.06));
-  const rendering::ContactTrees trees(mesh, true);
-  const auto pose = [](int i) {
-    const double height = 0.031 + 1e-5 * (i % 7);
-    return rendering::LineProbe{Vec3(-0.02, 0.01, height), Vec3(0.1, 0.02, height + 0.01)};
-  };
-  constexpr int kLooks = 20000;
-  int found = 0;
-  const auto time = [&](const std::function<bool(const rendering::LineProbe&,
-                                                 const rendering::LineProbe&)>& look) {
-    double fastest = HUGE_VAL;
-    for (int round = 0; round < 5; ++round) {
-      const double start = now_ns();
-      for (int i = 0; i < kLooks; ++i) found += look(pose(i), pose(i + 1)) ? 1 : 0;
-      fastest = std::min(fastest, (now_ns() - start) / kLooks);
-    }
-    return fastest;
-  };
-  report.paper_test_ns =
-      time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
-        return rendering::paper_first_contact(mesh, before, after);
-      });
-  report.exact_test_ns =
-      time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
-        return rendering::first_contact_segment(mesh, trees, before, after, 1e-12 * mesh.size())
-                   .feature.kind != rendering::ContactFeature::Kind::none;
-      });
-  if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
-}
-
-/// The walks shared out among threads; the sums do not depend on how.
-rendering::SearchCounts search_all(std::uint64_t ticks, std::uint64_t seed, int jobs) {
-  const std::uint64_t walks = (ticks + rendering::kTicksPerWalk - 1) / rendering::kTicksPerWalk;
-  constexpr std::uint64_t kShare = 20;  // walks a thread takes at a time
-  rendering::SearchCounts all;
-  ProgressLine progress("search");
-  for (std::uint64_t first = 0; first < walks;) {
-    progress.show(static_cast<double>(first) / static_cast<double>(walks));
-    std::vector<rendering::SearchCounts> parts(static_cast<std::size_t>(jobs));
-    std::vector<std::thread> threads;
-    for (rendering::SearchCounts& part : parts) {
-      const std::uint64_t count = std::min(kShare, walks - first);
-      threads.emplace_back(
-          [&part, seed, first, count] { part = rendering::search_walks(seed, first, count); });
-      first += count;
-      if (first == walks) break;
-    }
-    for (std::thread& thread : threads) thread.join();
-    for (const rendering::SearchCounts& part : parts) all += part;
-  }
-  return all;
-}
-
-/// \param quick  without the case whose mesh takes seconds to build
-void study_extremes(AccuracyReport& report, bool quick) {
-  ProgressLine progress("extreme cases");
-  const std::span<const rendering::ExtremeCase> cases = rendering::extreme_cases();
-  double done = 0;
-  for (const rendering::ExtremeCase& one : cases) {
-    progress.show(done++ / static_cast<double>(cases.size()));
-    if (quick && std::string_view(one.name) == "million-triangles") continue;
-    for (const rendering::Renderer* renderer :
-         {&rendering::ray_renderer(), &rendering::point_renderer()}) {
-      report.extremes.push_back(
-          {one.name, one.title, one.measure, renderer->name(), one.run(*renderer)});
-    }
-  }
-}
-
-void study(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
-  {
-    ProgressLine progress("errors and times");
-    report.rows = rendering::accuracy_study(report.settings, now_ns,
-                                            [&](double done) { progress.show(done); });
-  }
-  // In step with the rest: 2000 of each by default.
-  study_first_contacts(report,
-                       std::max(10, report.settings.paths * report.settings.contact_ticks / 2));
-  time_first_contact(report);
-  study_extremes(report, quick);
-  constexpr std::uint64_t kShortSearch = 100'000;
-  report.search_seed = seed;
-  report.search = search_all(kShortSearch, seed, jobs);
-}
 
 rendering::AccuracySettings quick_settings() {
   rendering::AccuracySettings quick;
@@ -147,14 +23,14 @@ rendering::AccuracySettings quick_settings() {
 
 void check_range(const char* option, int value, int low, int high) {
   if (value >= low && value <= high) return;
-  throw UsageError(std::string("--") + option + ": expected " + std::to_string(low) + " to " +
+  throw UsageError(std::string("--") + option + ": must be " + std::to_string(low) + " to " +
                    std::to_string(high) + ", not " + std::to_string(value));
 }
 
 void check_ticks(std::uint64_t ticks, bool searching) {
   constexpr std::uint64_t kMost = 1'000'000'000'000;
   if (searching && (ticks == 0 || ticks > kMost)) {
-    throw UsageError("--search: expected 1 to " + std::to_string(kMost) + " ticks");
+    throw UsageError("--search: must be 1 to " + std::to_string(kMost) + " ticks");
   }
 }
 
@@ -166,10 +42,10 @@ int accuracy_command(const std::vector<std::string>& args) {
       "palpate accuracy [--quick | --search TICKS] [--report FILE.html] [--figure FILE.svg] "
       "[--json FILE]";
   line.summary =
-      "How far the rendered forces are from the exact ones, and at what cost: every method over\n"
-      "every tessellation of every analytic shape, and which tessellation a lab should choose.\n"
-      "Takes two minutes, with --quick ten seconds. Status 1 when a tick of\nthe search is wrong "
-      "or an extreme case does not hold.";
+      "Error of the rendered forces against run time: every method over every tessellation of\n"
+      "every analytic shape, and which tessellation to choose. Takes two minutes, with --quick "
+      "ten\n"
+      "seconds. Status 1 when a tick of the search is wrong or an extreme case fails.";
   line.example =
       "  palpate accuracy --quick\n"
       "  palpate accuracy --report accuracy.html --json accuracy.json\n"
@@ -187,14 +63,15 @@ int accuracy_command(const std::vector<std::string>& args) {
       "of the finest tessellation; default 327680");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("figure", po::value(&figure)->value_name("FILE"),
-      "write the figure of error over time as SVG");
+      "write the figure of error against run time as SVG");
   add("report", po::value(&page)->value_name("FILE"),
       "write all of it, with the figure, as one HTML page");
   add("search", po::value(&search_ticks)->value_name("TICKS"),
-      "instead of all that: search so many random ticks for wrong ones");
+      "instead of all that: search this many random ticks for wrong ones");
   add("seed", po::value(&seed)->value_name("N")->default_value(1), "of the search");
-  add("jobs", po::value(&jobs)->value_name("J"), "threads of the search; default: one a core");
-  add("force", "replace files that are there");
+  add("jobs", po::value(&jobs)->value_name("J"),
+      "threads of the search; default: one for each core");
+  add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;
   const bool searching = values->count("search") > 0;
@@ -209,17 +86,17 @@ int accuracy_command(const std::vector<std::string>& args) {
   take("ticks", settings.contact_ticks, 1, 1000000);
   take("most-triangles", settings.most_triangles, 20, 1310720);
   if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
-  if (searching && !figure.empty()) throw UsageError("--figure: a search draws nothing");
+  if (searching && !figure.empty()) throw UsageError("--figure: a search has no figure");
   Outputs outputs(*values, {"json", "figure", "report"}, {});
 
   AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (searching) {
     report.search_seed = seed;
-    report.search = search_all(search_ticks, seed, jobs);
+    report.search = search_in_threads(search_ticks, seed, jobs);
   } else {
     report.settings = settings;
-    study(report, values->count("quick") > 0, jobs, seed);
+    measure_accuracy(report, values->count("quick") > 0, jobs, seed);
   }
   if (outputs.wanted("json")) outputs.put("json", accuracy_json(report).dump(1) + "\n");
   if (outputs.wanted("figure")) outputs.put("figure", accuracy_figure(report));

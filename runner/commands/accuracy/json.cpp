@@ -1,3 +1,4 @@
+#include "rendering/accuracy/methods.h"
 #include "rendering/accuracy/peers.h"
 #include "runner/commands/accuracy/report.h"
 
@@ -5,6 +6,50 @@ namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+Json or_null(int value) { return value != 0 ? Json(value) : Json(); }
+
+Json settings_json(const rendering::AccuracySettings& s) {
+  return {{"paths", s.paths},
+          {"contact_ticks", s.contact_ticks},
+          {"stylus_length_m", s.length},
+          {"most_triangles", s.most_triangles},
+          {"stiffness_n_per_m", rendering::kStiffness},
+          {"least_flat_angle_rad", rendering::kFlat}};
+}
+
+Json methods_json() {
+  Json methods = Json::array();
+  for (const rendering::MethodDefinition& method : rendering::contact_methods()) {
+    methods.push_back({{"name", method.name},
+                       {"description", method.description},
+                       {"keeps_its_side", method.keeps_side}});
+  }
+  return methods;
+}
+
+Json peers_json() {
+  Json peers = Json::array();
+  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
+    peers.push_back({{"name", library.name},
+                     {"present", library.make != nullptr},
+                     {"version", library.make ? Json(library.version) : Json()}});
+  }
+  return peers;
+}
+
+Json recommended_json(const AccuracyReport& report) {
+  Json recommended = Json::array();
+  for (const std::string& shape : measured_shapes(report)) {
+    const int hand = rendering::triangles_for(report.rows, shape, kHand);
+    const int device = rendering::triangles_for(report.rows, shape, kDevice);
+    recommended.push_back({{"shape", shape},
+                           {"triangles_for_hand", or_null(hand)},
+                           {"triangles_for_device", or_null(device)},
+                           {"sentence", recommendation(report, shape)}});
+  }
+  return recommended;
+}
 
 Json spread_json(const rendering::ErrorSpread& s, const char* unit) {
   const std::string u(unit);
@@ -24,104 +69,84 @@ Json errors_json(const rendering::ErrorSummary& e) {
           {"torque", spread_json(e.torque, "nm")}};
 }
 
+Json row_json(const rendering::AccuracyRow& row) {
+  const bool subdivided = traits_of_shape(row.shape).subdivisions;
+  return {{"shape", row.shape},
+          {"triangles", row.triangles},
+          {"facets", row.facets},
+          {"edges", row.edges},
+          {"subdivisions", subdivided ? Json(row.subdivisions) : Json()},
+          {"segments", or_null(row.segments)},
+          {"probe", row.probe},
+          {"method", row.method},
+          {"ns_per_tick", row.ns_per_tick},
+          {"against_shape", errors_json(row.shape_errors)},
+          {"against_polyhedron", errors_json(row.polyhedron_errors)}};
+}
+
+Json first_contact_json(const AccuracyReport& report) {
+  Json json;
+  for (const FirstContactStudy& study : report.first_contacts) {
+    for (const rendering::FirstContactLoss& loss : study.speeds) {
+      json["rows"].push_back({{"shape", study.shape},
+                              {"speed_m_per_s", loss.speed},
+                              {"turning_rad_per_s", loss.turning},
+                              {"entries", loss.entries},
+                              {"paper_missed", loss.paper_missed},
+                              {"paper_never", loss.paper_never},
+                              {"paper_early", loss.paper_early},
+                              {"exact_missed", loss.exact_missed}});
+    }
+  }
+  json["paper_test_ns"] = report.paper_test_ns;
+  json["exact_test_ns"] = report.exact_test_ns;
+  return json;
+}
+
+Json extreme_json(const ExtremeRow& row) {
+  return {{"name", row.name},           {"title", row.title},
+          {"measure", row.measure},     {"probe", row.probe},
+          {"ticks", row.result.ticks},  {"in_contact", row.result.in_contact},
+          {"worst", row.result.worst},  {"allowed", row.result.limit},
+          {"holds", row.result.passed}, {"detail", row.result.detail}};
+}
+
+Json search_json(const rendering::SearchCounts& c, std::uint64_t seed) {
+  return {{"seed", seed},
+          {"ticks", c.ticks},
+          {"walks", c.walks},
+          {"in_contact", c.in_contact},
+          {"entries", c.entries},
+          {"missed", c.missed},
+          {"passed_through", c.passed_through},
+          {"phantom", c.phantom},
+          {"penetrating", c.penetrating},
+          {"worst_penetration_of_size", c.worst_penetration},
+          {"floating", c.floating},
+          {"shallow", c.shallow},
+          {"wrong_force", c.wrong_force},
+          {"not_finite", c.not_finite},
+          {"endless", c.endless},
+          {"faulted", c.faulted},
+          {"wrong", c.wrong()}};
+}
+
 }  // namespace
 
 Json accuracy_json(const AccuracyReport& report) {
-  Json json;
-  json["version"] = 1;
-  json["program_version"] = PALPATE_VERSION;
-  if (!report.rows.empty()) {
-    const rendering::AccuracySettings& s = report.settings;
-    json["settings"] = {{"paths", s.paths},
-                        {"contact_ticks", s.contact_ticks},
-                        {"stylus_length_m", s.length},
-                        {"most_triangles", s.most_triangles},
-                        {"stiffness_n_per_m", rendering::kStiffness},
-                        {"least_flat_angle_rad", rendering::kFlat}};
-    for (const rendering::MethodKind& method : rendering::accuracy_methods()) {
-      json["methods"].push_back({{"name", method.name},
-                                 {"description", method.description},
-                                 {"keeps_its_side", method.follows_side}});
-    }
+  const bool studied = !report.rows.empty();
+  Json json = {{"version", 1}, {"program_version", PALPATE_VERSION}};
+  if (studied) {
+    json["settings"] = settings_json(report.settings);
+    json["methods"] = methods_json();
   }
-  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
-    json["peers"].push_back({{"name", library.name},
-                             {"present", library.make != nullptr},
-                             {"version", library.make ? Json(library.version) : Json()}});
-  }
-  if (!report.rows.empty()) {
-    for (const std::string& shape : measured_shapes(report)) {
-      const int hand = rendering::triangles_for(report.rows, shape, kHand);
-      const int device = rendering::triangles_for(report.rows, shape, kDevice);
-      json["recommended"].push_back({{"shape", shape},
-                                     {"triangles_for_hand", hand ? Json(hand) : Json()},
-                                     {"triangles_for_device", device ? Json(device) : Json()},
-                                     {"sentence", recommendation(report, shape)}});
-    }
-  }
+  json["peers"] = peers_json();
+  if (studied) json["recommended"] = recommended_json(report);
   json["rows"] = Json::array();
-  for (const rendering::AccuracyRow& row : report.rows) {
-    json["rows"].push_back(
-        {{"shape", row.shape},
-         {"triangles", row.triangles},
-         {"facets", row.facets},
-         {"edges", row.edges},
-         {"subdivisions", needs_of_shape(row.shape).subdivisions ? Json(row.subdivisions) : Json()},
-         {"segments", row.segments ? Json(row.segments) : Json()},
-         {"probe", row.probe},
-         {"method", row.method},
-         {"ns_per_tick", row.ns_per_tick},
-         {"against_shape", errors_json(row.shape_errors)},
-         {"against_polyhedron", errors_json(row.polyhedron_errors)}});
-  }
-  for (const FirstContactStudy& study : report.first_contacts) {
-    for (const rendering::FirstContactLoss& loss : study.speeds) {
-      json["first_contact"]["rows"].push_back({{"shape", study.shape},
-                                               {"speed_m_per_s", loss.speed},
-                                               {"turning_rad_per_s", loss.turning},
-                                               {"entries", loss.entries},
-                                               {"paper_missed", loss.paper_missed},
-                                               {"paper_never", loss.paper_never},
-                                               {"paper_early", loss.paper_early},
-                                               {"exact_missed", loss.exact_missed}});
-    }
-  }
-  if (!report.first_contacts.empty()) {
-    json["first_contact"]["paper_test_ns"] = report.paper_test_ns;
-    json["first_contact"]["exact_test_ns"] = report.exact_test_ns;
-  }
-  for (const ExtremeRow& row : report.extremes) {
-    json["extremes"].push_back({{"name", row.name},
-                                {"title", row.title},
-                                {"measure", row.measure},
-                                {"probe", row.probe},
-                                {"ticks", row.result.ticks},
-                                {"in_contact", row.result.in_contact},
-                                {"worst", row.result.worst},
-                                {"allowed", row.result.limit},
-                                {"holds", row.result.passed},
-                                {"detail", row.result.detail}});
-  }
-  if (report.search) {
-    const rendering::SearchCounts& c = *report.search;
-    json["search"] = {{"seed", report.search_seed},
-                      {"ticks", c.ticks},
-                      {"walks", c.walks},
-                      {"in_contact", c.in_contact},
-                      {"entries", c.entries},
-                      {"missed", c.missed},
-                      {"passed_through", c.passed_through},
-                      {"phantom", c.phantom},
-                      {"penetrating", c.penetrating},
-                      {"worst_penetration_of_size", c.worst_penetration},
-                      {"floating", c.floating},
-                      {"shallow", c.shallow},
-                      {"wrong_force", c.wrong_force},
-                      {"not_finite", c.not_finite},
-                      {"endless", c.endless},
-                      {"faulted", c.faulted},
-                      {"wrong", c.wrong()}};
-  }
+  for (const rendering::AccuracyRow& row : report.rows) json["rows"].push_back(row_json(row));
+  if (!report.first_contacts.empty()) json["first_contact"] = first_contact_json(report);
+  for (const ExtremeRow& row : report.extremes) json["extremes"].push_back(extreme_json(row));
+  if (report.search) json["search"] = search_json(*report.search, report.search_seed);
   return json;
 }
 

@@ -10,7 +10,7 @@
 namespace palpate::runner {
 namespace {
 
-/// What was measured, how the numbers are meant, and what the methods are.
+/// What was measured, how the numbers are defined, and what the methods are.
 std::vector<std::string> how_to_read(const AccuracyReport& report) {
   const rendering::AccuracySettings& s = report.settings;
   std::vector<std::string> all;
@@ -19,27 +19,30 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
       std::to_string(s.contact_ticks) +
       " ticks of contact each: a hand at 0.1 m/s, 1 to 2 mm deep, wandering over the shape "
       "with a stylus of " +
-      significant(1e3 * s.length) + " mm (rendering/accuracy/hand_path.h; seeds 1 to " +
+      significant(1e3 * s.length) + " mm (rendering/accuracy/analytic_stroke.h; seeds 1 to " +
       std::to_string(s.paths) +
       "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
       "mm. Forces at 800 N/m.");
   all.emplace_back(
-      "An answer is held against the exact way out of the object that is nearest to it in "
-      "direction: a god-object keeps to the side that it came in by, which need not be the least "
-      "way out (\"not least\": ticks held so). A lost contact counts with its whole depth and "
+      "A result is compared with the exact local minimum of the penetration depth that is nearest "
+      "to "
+      "it in direction: a god-object keeps to the side by which it entered, which need not be that "
+      "of least depth (\"not least\": such ticks). A lost contact counts with its whole depth and "
       "force.");
   all.emplace_back(
-      "Depths are along the way out, angles in degrees, forces and torques (about the tip) "
+      "Depths are along that direction, angles in degrees, forces and torques (about the tip) "
       "differences of vectors, points on the ideal probe. Times are means over the ticks in "
       "contact, the fastest of three runs, on this machine.");
   all.emplace_back(
       "Contact points and torques are compared where the stylus is more than 2 degrees off every "
-      "flat that it touches; nearer, where it is touched along a length is a convention (equation "
+      "flat that it touches; closer, it is touched along a length and the contact point is a "
+      "convention (equation "
       "(2)).");
   all.emplace_back(
-      "Worst: once in some 10,000 ticks a tessellation lets go of a side one tick before or after "
-      "the shape does.");
-  for (const rendering::MethodKind& method : rendering::accuracy_methods()) {
+      "Worst: about once in 10,000 ticks the contact on a tessellation leaves a side one tick "
+      "before "
+      "or after that on the shape does.");
+  for (const rendering::MethodDefinition& method : rendering::contact_methods()) {
     std::string line = "Method ";
     line += method.name;
     line += ": ";

@@ -1,5 +1,5 @@
 #pragma once
-// What `palpate accuracy` found, as text, JSON, a figure and a page.
+// What `palpate accuracy` measured (measure.h), and its text, tables, JSON, figure and page.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -32,21 +32,21 @@ struct AccuracyReport {
   rendering::AccuracySettings settings;
   std::vector<rendering::AccuracyRow> rows;
   std::vector<FirstContactStudy> first_contacts;
-  double paper_test_ns = 0, exact_test_ns = 0;  ///< of a first contact with a cube, all tried
+  double paper_test_ns = 0, exact_test_ns = 0;  ///< of a test for first contact with a cube
   std::vector<ExtremeRow> extremes;
   std::optional<rendering::SearchCounts> search;
   std::uint64_t search_seed = 0;
 };
 
-/// What a hand can feel, and what a device resolves.
-constexpr rendering::Demand kHand{1e-3, 0.17453292519943295};     ///< 1 mm, 10 degrees
-constexpr rendering::Demand kDevice{3e-5, rendering::kNoDemand};  ///< 0.03 mm
+/// Errors that a hand cannot feel, and that a device does not resolve.
+constexpr rendering::ErrorLimits kHand{1e-3, 0.17453292519943295};    ///< 1 mm, 10 degrees
+constexpr rendering::ErrorLimits kDevice{3e-5, rendering::kNoLimit};  ///< 0.03 mm
 
 /// The shapes that were measured, in order.
 std::vector<std::string> measured_shapes(const AccuracyReport& report);
-/// What the shape of this name needs; nothing for a name that is none.
-stimuli::ShapeNeeds needs_of_shape(const std::string& name);
-/// It is made of flats: its one tessellation is the shape itself.
+/// Parameters of the shape of this name; none for an unknown name.
+stimuli::ShapeTraits traits_of_shape(const std::string& name);
+/// Whether it is a polyhedron: its one tessellation is the shape itself.
 bool is_flat_sided(const std::string& shape);
 
 /// Three significant figures, plain where that is short: "0.0345", "1.2e-17".
@@ -56,17 +56,17 @@ std::string thousands(long long n);
 /// For a terminal.
 void put_table(std::ostream& out, const analysis::Table& table);
 
-/// "sphere: ...", the tessellation a lab should choose.
+/// "sphere: ...", the tessellation to choose.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);
 std::vector<std::string> recommendations(const AccuracyReport& report);
-/// All of what was measured, in the order of display.
+/// All that was measured, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 
 std::string accuracy_text(const AccuracyReport& report);
 nlohmann::ordered_json accuracy_json(const AccuracyReport& report);
 /// The work-precision figure as SVG: error over nanoseconds a tick, two panels for each shape.
 std::string accuracy_figure(const AccuracyReport& report);
-/// All of it as one page without scripts.
+/// All of it as one HTML page without scripts.
 std::string accuracy_page(const AccuracyReport& report);
 
 }  // namespace palpate::runner

@@ -40,7 +40,7 @@ std::string share(std::size_t part, std::size_t all) {
 }
 
 std::string setting_of(const rendering::AccuracyRow& row) {
-  if (needs_of_shape(row.shape).subdivisions)
+  if (traits_of_shape(row.shape).subdivisions)
     return "subdivisions " + std::to_string(row.subdivisions);
   if (row.segments > 0) return "segments " + std::to_string(row.segments);
   return "";
@@ -78,7 +78,7 @@ double worse(const AccuracyReport& report, const std::string& shape, int triangl
 double depth_of(const rendering::ErrorSummary& e) { return e.depth.p999; }
 double normal_of(const rendering::ErrorSummary& e) { return e.normal.p999; }
 
-/// The product over the tessellations of one shape.
+/// The renderers over the tessellations of one shape.
 analysis::Table tessellation_table(const AccuracyReport& report, const std::string& shape) {
   analysis::Table table;
   table.caption = "Whole ticks on the " + shape + ", against the analytic shape";
@@ -127,7 +127,7 @@ analysis::Table method_table(const AccuracyReport& report, const std::string& sh
 
 analysis::Table first_contact_table(const AccuracyReport& report) {
   analysis::Table table;
-  table.caption = "First contact: the paper's test (appendix 7 and 8, to the letter) and ours";
+  table.caption = "First contact: the paper's test (appendix 7 and 8, to the letter) and palpate's";
   table.header = {
       "shape",         "hand m/s",      "turning rad/s", "entries", "paper: missed in the tick %",
       "never found %", "ours: missed %"};
@@ -141,7 +141,7 @@ analysis::Table first_contact_table(const AccuracyReport& report) {
                             share(static_cast<std::size_t>(loss.exact_missed), n)});
     }
   }
-  table.notes.push_back("A try against a cube, everything looked at: the paper's " +
+  table.notes.push_back("One test against a cube, all facets and edges: the paper's " +
                         significant(report.paper_test_ns) + " ns, ours " +
                         significant(report.exact_test_ns) + " ns.");
   return table;
@@ -164,7 +164,7 @@ std::vector<int> tessellations_shown(const AccuracyReport& report, const std::st
 
 analysis::Table extreme_table(const AccuracyReport& report) {
   analysis::Table table;
-  table.caption = "Extreme geometry and extreme hands";
+  table.caption = "Extreme geometry and extreme motions";
   table.header = {"case", "probe", "ticks", "in contact", "worst", "allowed", "", "measured"};
   table.n_names = 2;
   for (const ExtremeRow& row : report.extremes) {
@@ -179,21 +179,22 @@ analysis::Table extreme_table(const AccuracyReport& report) {
 
 analysis::Table search_table(const rendering::SearchCounts& c, std::uint64_t seed) {
   analysis::Table table;
-  table.caption = "Search over random solids and paths, every tick against brute force (seed " +
-                  std::to_string(seed) + ")";
+  table.caption =
+      "Search over random solids and paths, every tick compared with brute force (seed " +
+      std::to_string(seed) + ")";
   table.header = {"wrong", "ticks"};
   const auto add = [&](const char* what, std::uint64_t count) {
     table.rows.push_back({what, std::to_string(count)});
   };
   add("missed contacts", c.missed);
   add("passed through", c.passed_through);
-  add("contacts out of air", c.phantom);
+  add("phantom contacts", c.phantom);
   add("ideal probe inside by more than 1e-9 of the size", c.penetrating);
-  add("ideal probe floating", c.floating);
-  add("shallower than exact", c.shallow);
+  add("ideal probe off the surface", c.floating);
+  add("shallower than the penetration depth", c.shallow);
   add("wrong force or torque", c.wrong_force);
   add("not finite", c.not_finite);
-  add("walks without end", c.endless);
+  add("walks stopped at their limit of steps", c.endless);
   add("other faults", c.faulted);
   table.notes.push_back("Of " + thousands(static_cast<long long>(c.ticks)) + " ticks in " +
                         thousands(static_cast<long long>(c.walks)) + " walks, " +
@@ -235,16 +236,16 @@ std::string recommendation(const AccuracyReport& report, const std::string& shap
          " to be finer than the device resolves (within " + within(device) + ").";
 }
 
-stimuli::ShapeNeeds needs_of_shape(const std::string& name) {
+stimuli::ShapeTraits traits_of_shape(const std::string& name) {
   for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-    if (name == stimuli::needs_of(shape).name) return stimuli::needs_of(shape);
+    if (name == stimuli::traits_of(shape).name) return stimuli::traits_of(shape);
   }
   return {};
 }
 
 bool is_flat_sided(const std::string& shape) {
-  const stimuli::ShapeNeeds needs = needs_of_shape(shape);
-  return !needs.subdivisions && !needs.segments;
+  const stimuli::ShapeTraits traits = traits_of_shape(shape);
+  return !traits.subdivisions && !traits.segments;
 }
 
 std::vector<std::string> measured_shapes(const AccuracyReport& report) {

@@ -10,8 +10,8 @@
 namespace palpate::runner {
 namespace {
 
-/// ns a call: the least of several runs, each long enough for the clock.
-double cost_of(const rendering::Rehearsal& rehearsal) {
+/// ns for a call: the least of several runs, each long enough for the clock.
+double cost_of(const rendering::StageTiming& timing) {
   constexpr int kRuns = 15;
   constexpr std::chrono::milliseconds kLong{1};
   volatile double sink = 0;
@@ -20,11 +20,11 @@ double cost_of(const rendering::Rehearsal& rehearsal) {
     std::chrono::steady_clock::duration passed{};
     std::size_t calls = 0;
     while (passed < kLong) {
-      rehearsal.prepare();
+      timing.prepare();
       const auto start = std::chrono::steady_clock::now();
-      sink = sink + rehearsal.run();
+      sink = sink + timing.run();
       passed += std::chrono::steady_clock::now() - start;
-      calls += rehearsal.calls;
+      calls += timing.calls;
     }
     const std::chrono::duration<double, std::nano> ns = passed;
     least = std::min(least, ns.count() / static_cast<double>(calls));
@@ -39,8 +39,8 @@ std::string nanoseconds(const std::optional<double>& ns) {
   return text;
 }
 
-/// Of the whole tick, where the stage is part of it.
-std::optional<double> share(const Explanation& e, const StageCost& cost) {
+/// Fraction of the whole tick in contact, where the stage is part of it.
+std::optional<double> share_of_contact(const Explanation& e, const StageCost& cost) {
   if (!cost.ns || !e.contact_ns) return std::nullopt;
   if (cost.stage.time != rendering::StageTime::tick &&
       cost.stage.time != rendering::StageTime::contact)
@@ -73,8 +73,8 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   }
   explanation.objects = objects.size();
   std::map<std::string, double> costs;
-  for (const rendering::Rehearsal& rehearsal : rendering::rehearse(scene, renderer)) {
-    if (rehearsal.calls > 0) costs[rehearsal.name] = cost_of(rehearsal);
+  for (const rendering::StageTiming& timing : rendering::stage_timings(scene, renderer)) {
+    if (timing.calls > 0) costs[timing.name] = cost_of(timing);
   }
   const auto cost = [&](const std::string& name) -> std::optional<double> {
     const auto found = costs.find(name);
@@ -83,14 +83,14 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   };
   explanation.contact_ns = cost(rendering::kTickInContact);
   explanation.free_ns = cost(rendering::kTickInFreeSpace);
-  for (rendering::Stage& stage : rendering::explain(scene, renderer)) {
+  for (rendering::TickStage& stage : rendering::explain(scene, renderer)) {
     StageCost with{std::move(stage), std::nullopt};
     if (with.stage.runs) with.ns = cost(with.stage.name);
     explanation.stages.push_back(std::move(with));
   }
   explanation.rest_ns = explanation.contact_ns;
   for (const StageCost& c : explanation.stages) {
-    if (share(explanation, c)) *explanation.rest_ns -= *c.ns;
+    if (share_of_contact(explanation, c)) *explanation.rest_ns -= *c.ns;
   }
   return explanation;
 }
@@ -112,7 +112,7 @@ std::string to_text(const Explanation& e) {
     std::string line = c.stage.name;
     pad(line, 25);
     line += c.stage.runs ? rendering::to_string(c.stage.time) : "left out";
-    const std::string ns = nanoseconds(c.ns), part = percent(share(e, c));
+    const std::string ns = nanoseconds(c.ns), part = percent(share_of_contact(e, c));
     pad(line, 49 - ns.size());
     line += ns;
     pad(line, 56 - part.size());
@@ -122,13 +122,14 @@ std::string to_text(const Explanation& e) {
   }
   if (e.rest_ns) {
     out += "\nThe rest of a tick in contact: " + nanoseconds(e.rest_ns) +
-           " ns: results are written, memory is asked for ahead, other parts are followed.";
+           " ns: writing results, prefetching, tracking other parts.";
   }
   out +=
-      "\nEach stage was timed by itself over a hand that strokes the first part (0.1 m/s, 1 to 2 "
-      "mm "
-      "deep);\nin a tick they overlap, so shares of the tick in contact need not add up to 100 %. "
-      "-: does not run,\ndid not happen, or cannot be told apart.\n";
+      "\nEach stage was timed in isolation, over a hand that strokes the first part (0.1 m/s, 1 to "
+      "2\n"
+      "mm deep); in a tick they overlap, so shares of the tick in contact need not add up to 100 "
+      "%.\n"
+      "-: does not run, did not happen, or cannot be told apart.\n";
   return out;
 }
 
@@ -144,7 +145,7 @@ nlohmann::ordered_json to_json(const Explanation& e) {
                       {"runs", c.stage.runs},
                       {"why", c.stage.why},
                       {"ns", figure(c.ns)},
-                      {"share_of_contact", figure(share(e, c))}});
+                      {"share_of_contact", figure(share_of_contact(e, c))}});
   }
   return {{"program_version", PALPATE_VERSION},
           {"build", PALPATE_BUILD},

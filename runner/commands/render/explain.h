@@ -1,5 +1,5 @@
 #pragma once
-// `palpate render --explain`: what a tick over a scene consists of, and what each stage costs.
+// `palpate render --explain`: the stages of a tick over a scene, and what each costs.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,11 +10,11 @@
 
 namespace palpate::runner {
 
-/// A stage with what it costs on this machine.
+/// A stage with its cost on this machine.
 struct StageCost {
-  rendering::Stage stage;
-  /// ns a call, run by itself over recorded ticks; empty: left out, did not happen, or not to be
-  /// told apart from others.
+  rendering::TickStage stage;
+  /// ns for a call, run in isolation over recorded ticks; empty: left out, did not happen, or
+  /// cannot be told apart from others.
   std::optional<double> ns;
 };
 
@@ -22,7 +22,7 @@ struct Explanation {
   std::string renderer;
   std::size_t objects = 0, parts = 0, facets = 0, edges = 0;
   std::optional<double> contact_ns, free_ns;  ///< of a whole tick
-  std::optional<double> rest_ns;              ///< of contact_ns: what the stages leave over
+  std::optional<double> rest_ns;              ///< of contact_ns: not accounted for by the stages
   std::vector<StageCost> stages;
 };
 

@@ -62,10 +62,9 @@ int render_command(const std::vector<std::string>& args) {
       "               [--force]\n"
       "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
   line.summary =
-      "Renders the forces along a recorded path, offline. A row goes out for each row that comes "
-      "in; what a tick could not render stands in its column 'faults'. Or tells what a tick over "
-      "the scene consists of, what was left out and why, and what "
-      "each stage costs.";
+      "Renders the forces along a recorded path, offline: one row out for each row in, with the "
+      "faults of its tick in the column 'faults'. Or, with --explain, lists the stages of a tick "
+      "over the scene, which are left out and why, and what each costs.";
   line.example =
       "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
       "  palpate render --scene cube.json --renderer ray --explain\n";
@@ -79,12 +78,12 @@ int render_command(const std::vector<std::string>& args) {
       ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
       ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
       ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON")  //
-      ("force", "replace a file that is there");
+      ("force", "replace an existing file");
   const auto values = line.parse(args);
   if (!values) return 0;
   const std::string name = (*values)["renderer"].as<std::string>();
   if (name != "point" && name != "ray") {
-    throw UsageError("--renderer: point or ray was expected, not '" + name + "'");
+    throw UsageError("--renderer: must be point or ray, not '" + name + "'");
   }
   const bool explains = (*values)["explain"].as<bool>();
   if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))

@@ -25,7 +25,7 @@ analysis::CsvReader open(const std::string& path) {
     return analysis::CsvReader(path);
   } catch (const std::runtime_error& error) {
     throw protocols::InputError(
-        {{path, "(file)", std::string("a readable file was expected: ") + error.what()}});
+        {{path, "(file)", std::string("expected a readable file: ") + error.what()}});
   }
 }
 
@@ -87,38 +87,37 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
     if (!header) {
       if (joined(reader.fields()) != kTrajectoryHeader) {
         throw protocols::InputError(
-            {{path, place, std::string("the header ") + kTrajectoryHeader + " was expected"}});
+            {{path, place, std::string("expected the header ") + kTrajectoryHeader}});
       }
       header = true;
       continue;
     }
     const auto values = seven_numbers(reader.fields());
     if (!values) {
-      faults.push_back({path, place, "seven numbers were expected"});
+      faults.push_back({path, place, "expected seven numbers"});
       continue;
     }
     const auto& v = *values;
     if (!std::isfinite(v[0])) {
-      faults.push_back({path, place, "a finite time was expected"});
+      faults.push_back({path, place, "expected a finite time"});
     } else if (!poses.empty() && v[0] <= poses.back().t) {
-      faults.push_back({path, place, "a time later than the line before was expected"});
+      faults.push_back({path, place, "expected a time later than that of the line before"});
     } else if (poses.size() == kMostPoses) {
       faults.push_back({path, place,
-                        "at most " + std::to_string(kMostPoses) +
-                            " rows were expected; cut the path into several files"});
+                        "expected at most " + std::to_string(kMostPoses) +
+                            " rows; split the path into several files"});
       break;
     } else {
       poses.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}, reader.line()});
     }
   }
   if (faults.size() == kFaultsShown) {
-    faults.push_back({path, "further lines", "and perhaps more; the first are shown"});
+    faults.push_back({path, "further lines", "possibly more faults; only the first are shown"});
   } else if (!reader.fault().empty()) {
     faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
   }
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
-  if (poses.empty())
-    throw protocols::InputError({{path, "(file)", "at least one row was expected"}});
+  if (poses.empty()) throw protocols::InputError({{path, "(file)", "expected at least one row"}});
   return poses;
 }
 

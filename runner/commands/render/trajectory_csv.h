@@ -1,5 +1,5 @@
 #pragma once
-// The path of a stylus as CSV, in, and the forces along it, out.
+// CSV files: the path of a stylus, read, and the forces along it, written.
 
 #include <cstdint>
 #include <string>
@@ -18,17 +18,17 @@ struct TimedPose {
   std::size_t line = 0;  ///< of the file
 };
 
-/// Coordinates that are not finite are let through: what the renderer makes of them is its answer.
-/// \throws InputError with the faults, some of many
+/// Coordinates that are not finite are accepted: the renderer reports them in the faults column.
+/// \throws InputError with the faults, the first of many
 std::vector<TimedPose> read_trajectory(const std::string& path);
 
-/// What goes out for a tick.
+/// The forces as CSV: a row for each tick.
 class ForceTable {
  public:
   ForceTable();
   void add(const TimedPose& pose, const rendering::Rendering& rendering);
   const std::string& text() const { return text_; }
-  /// A line for each fault that ticks had: in how many of them, and where first. Empty: none had.
+  /// A line for each kind of fault: in how many ticks, and where first. Empty: no faults.
   std::string warnings(const std::string& path) const;
 
  private:

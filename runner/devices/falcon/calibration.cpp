@@ -61,7 +61,7 @@ ForceCalibration read_force(protocols::ObjectReader& reader) {
   reader.text("serial", force.serial);
   reader.number("counts_per_newton_metre", force.counts_per_torque,
                 {kCountsPerTorque * kMostSlope, kCountsPerTorque * kLeastSlope, "1/(N m)"},
-                protocols::Need::required);
+                protocols::Presence::required);
   reader.number("residual_n", force.residual, {0, 1e3, "N"});
   reader.number("sideways_n_per_n", force.sideways, {0, 1e3, "N/N"});
   reader.number("arm_weight_n", force.arm_weight, {-1e3, 1e3, "N"});
@@ -86,7 +86,8 @@ PairRegistration read_pair(protocols::ObjectReader& reader) {
   reader.text("tail_serial", pair.tail_serial);
   reader.vector("tail_position_m", pair.tail_in_tip.position, {-2, 2, "m"});
   reader.quaternion("tail_orientation_wxyz", pair.tail_in_tip.orientation);
-  reader.number("stylus_length_m", pair.stylus_length, {0.02, 1, "m"}, protocols::Need::required);
+  reader.number("stylus_length_m", pair.stylus_length, {0.02, 1, "m"},
+                protocols::Presence::required);
   reader.number("residual_m", pair.residual, {0, 1, "m"});
   reader.integer("points", pair.points, {0, 1e6});
   read_date(reader, pair.made_utc);
@@ -186,7 +187,7 @@ Calibration parse_calibration(const std::string& text, const std::string& path) 
   Calibration calibration;
   protocols::ObjectReader root(json, "", faults);
   int version = kVersion;
-  root.integer("version", version, {kVersion, kVersion}, protocols::Need::required);
+  root.integer("version", version, {kVersion, kVersion}, protocols::Presence::required);
   read_list(root, "forces", calibration.forces, read_force);
   read_list(root, "pairs", calibration.pairs, read_pair);
   root.refuse_unknown_keys();

@@ -55,7 +55,7 @@ TEST(AccuracyStudy, MeasuresEveryMethodOnEveryTessellationWithBothProbes) {
     EXPECT_DOUBLE_EQ(row.ns_per_tick, 1000.0 / static_cast<double>(row.shape_errors.ticks));
   }
   // 2 spheres, 3 cones, 2 cylinders, 1 cube.
-  EXPECT_EQ(rows.size(), 8 * 2 * accuracy_methods().size());
+  EXPECT_EQ(rows.size(), 8 * 2 * contact_methods().size());
 }
 
 TEST(AccuracyStudy, EveryNthTickGivesTheSameAnswersThere) {
@@ -95,8 +95,8 @@ TEST(AccuracyStudy, ChoosesTheCoarsestThatIsGoodEnoughForBothProbes) {
   }
   EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.2}), 320);    // 80 loses a contact
   EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.12}), 1280);  // the point's direction
-  EXPECT_EQ(triangles_for(rows, "sphere", {3e-5, kNoDemand}), 1280);
-  EXPECT_EQ(triangles_for(rows, "sphere", {1e-6, kNoDemand}), 0);
+  EXPECT_EQ(triangles_for(rows, "sphere", {3e-5, kNoLimit}), 1280);
+  EXPECT_EQ(triangles_for(rows, "sphere", {1e-6, kNoLimit}), 0);
   EXPECT_EQ(triangles_for(rows, "cube", {1, 1}), 0);
   // A finer one that fails: chance, so the coarser does not count either.
   rows.push_back(row(5120, "ray", 2e-3, 0.01, 0));

@@ -1,8 +1,6 @@
 // The numbers of `palpate accuracy`: the paths are what they say, the sums are right, and the
 // methods' errors behave as theory says.
 
-#include "rendering/accuracy/accuracy.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +8,8 @@
 #include <map>
 #include <numbers>
 
-#include "rendering/accuracy/hand_path.h"
+#include "rendering/accuracy/analytic_stroke.h"
+#include "rendering/accuracy/error_summary.h"
 #include "rendering/accuracy/plain_walk.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
@@ -29,22 +28,22 @@ stimuli::ObjectSpec primitive(stimuli::ShapeKind shape, int fineness = 0) {
   return spec;
 }
 
-TEST(HandPath, ComesFromOutsideAndStaysAtItsDepth) {
+TEST(AnalyticStroke, ComesFromOutsideAndStaysAtItsDepth) {
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (const double length : {0.0, 0.12}) {
-      HandPathSettings settings;
+      AnalyticStrokeSettings settings;
       settings.seed = 3;
       settings.length = length;
       settings.contact_ticks = 800;
-      const HandPath path = hand_path(spec, settings);
+      const AnalyticStroke path = analytic_stroke(spec, settings);
       ASSERT_EQ(path.poses.size(), path.approach + 800);
-      EXPECT_TRUE(ways_out(spec, path.poses[0]).empty());
+      EXPECT_TRUE(local_depths(spec, path.poses[0]).empty());
       double least = 1, most = 0, farthest = 0;
       for (std::size_t i = path.approach; i < path.poses.size(); ++i) {
         const LineProbe& probe = path.poses[i];
         EXPECT_NEAR(glm::length(probe.tail - probe.tip), length, 1e-15);
-        const auto ways = ways_out(spec, probe);
+        const auto ways = local_depths(spec, probe);
         ASSERT_FALSE(ways.empty());
         least = std::min(least, ways.front().depth);
         most = std::max(most, ways.front().depth);
@@ -65,18 +64,18 @@ TEST(HandPath, ComesFromOutsideAndStaysAtItsDepth) {
   }
 }
 
-TEST(HandPath, TouchesWithTipAndSide) {
+TEST(AnalyticStroke, TouchesWithTipAndSide) {
   for (const stimuli::ShapeKind shape :
        {stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     const stimuli::ObjectSpec spec = primitive(shape);
     int tip = 0, side = 0;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-      HandPathSettings settings;
+      AnalyticStrokeSettings settings;
       settings.seed = seed;
       settings.contact_ticks = 200;
-      const HandPath path = hand_path(spec, settings);
+      const AnalyticStroke path = analytic_stroke(spec, settings);
       for (std::size_t i = path.approach; i < path.poses.size(); ++i) {
-        const double place = ways_out(spec, path.poses[i]).front().place;
+        const double place = local_depths(spec, path.poses[i]).front().probe_fraction;
         tip += place == 0 ? 1 : 0;
         side += place > 0 && place < 1 ? 1 : 0;
       }
@@ -86,20 +85,20 @@ TEST(HandPath, TouchesWithTipAndSide) {
   }
 }
 
-TEST(HandPath, SeedsDiffer) {
-  HandPathSettings settings;
+TEST(AnalyticStroke, SeedsDiffer) {
+  AnalyticStrokeSettings settings;
   settings.contact_ticks = 1;
-  const Vec3 first = hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip;
-  EXPECT_EQ(first, hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
+  const Vec3 first = analytic_stroke(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip;
+  EXPECT_EQ(first, analytic_stroke(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
   settings.seed = 2;
-  EXPECT_NE(first, hand_path(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
+  EXPECT_NE(first, analytic_stroke(primitive(stimuli::ShapeKind::sphere), settings).poses[0].tip);
 }
 
 TEST(ErrorTally, SumsUpByHand) {
   // A probe along y, its tip at the origin, held 1 mm deep at its middle, normal +z.
   const LineProbe probe{Vec3(0, 0, 0), Vec3(0, 0.1, 0)};
-  const std::vector<WayOut> truth = {{Vec3(0, 0, 1), 1e-3, 0.5, 1.0},
-                                     {Vec3(1, 0, 0), 3e-3, 0, 1.0}};
+  const std::vector<LocalDepth> truth = {{Vec3(0, 0, 1), 1e-3, 0.5, 1.0},
+                                         {Vec3(1, 0, 0), 3e-3, 0, 1.0}};
   const Vec3 exact(0, 0.05, 1e-3);
   ErrorTally tally;
   tally.add(probe, truth, {true, 1e-3, Vec3(0, 0, 1), exact});                            // right
@@ -178,24 +177,25 @@ std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const stimul
                                                                     const std::string& only = "") {
   std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> result;
   const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
-  std::vector<HandPath> paths;
+  std::vector<AnalyticStroke> paths;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    HandPathSettings settings;
+    AnalyticStrokeSettings settings;
     settings.seed = seed;
     settings.contact_ticks = 300;
-    paths.push_back(hand_path(spec, settings));
+    paths.push_back(analytic_stroke(spec, settings));
   }
-  for (const MethodKind& kind : accuracy_methods()) {
+  for (const MethodDefinition& kind : contact_methods()) {
     if (!only.empty() && kind.name != only) continue;
     ErrorTally analytic, polyhedral;
-    for (const HandPath& path : paths) {
+    for (const AnalyticStroke& path : paths) {
       const auto method = kind.make(mesh, true);
       for (std::size_t i = 0; i < path.poses.size(); ++i) {
-        const Answer answer = method->tick(path.poses[i]);
+        const ContactEstimate estimate = method->tick(path.poses[i]);
         if (i < path.approach) continue;
-        analytic.add(path.poses[i], ways_out(spec, path.poses[i]), answer);
+        analytic.add(path.poses[i], local_depths(spec, path.poses[i]), estimate);
         if (only.empty())
-          polyhedral.add(path.poses[i], ways_out(mesh, path.poses[i], Vec3(0, 0, 1), 4), answer);
+          polyhedral.add(path.poses[i], local_depths(mesh, path.poses[i], Vec3(0, 0, 1), 4),
+                         estimate);
       }
     }
     result[kind.name] = {analytic.summary(), polyhedral.summary()};

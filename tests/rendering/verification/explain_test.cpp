@@ -33,7 +33,7 @@ std::string without_digits(std::string text) {
 using Names = std::vector<std::string>;
 
 /// The names of the lines that differ between two scenes.
-Names changed(const std::vector<Stage>& a, const std::vector<Stage>& b) {
+Names changed(const std::vector<TickStage>& a, const std::vector<TickStage>& b) {
   Names names;
   EXPECT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -132,29 +132,29 @@ TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
     }
     const Scene scene = all ? scene_of({object, other}, renderer) : scene_of({object}, renderer);
     std::map<std::string, bool> runs{{kTickInContact, true}, {kTickInFreeSpace, true}};
-    for (const Stage& stage : explain(scene, renderer)) {
+    for (const TickStage& stage : explain(scene, renderer)) {
       if (stage.time != StageTime::once) runs[stage.name] = stage.runs;
     }
-    std::size_t rehearsed = 0;
-    for (const Rehearsal& rehearsal : rehearse(scene, renderer)) {
-      ++rehearsed;
-      EXPECT_TRUE(runs[rehearsal.name]) << rehearsal.name;
-      EXPECT_GT(rehearsal.calls, 0u) << rehearsal.name;
-      rehearsal.prepare();
-      const double first = rehearsal.run();
-      rehearsal.prepare();
-      EXPECT_EQ(first, rehearsal.run()) << rehearsal.name;
-      EXPECT_TRUE(std::isfinite(first)) << rehearsal.name;
+    std::size_t timed = 0;
+    for (const StageTiming& timing : stage_timings(scene, renderer)) {
+      ++timed;
+      EXPECT_TRUE(runs[timing.name]) << timing.name;
+      EXPECT_GT(timing.calls, 0u) << timing.name;
+      timing.prepare();
+      const double first = timing.run();
+      timing.prepare();
+      EXPECT_EQ(first, timing.run()) << timing.name;
+      EXPECT_TRUE(std::isfinite(first)) << timing.name;
     }
     std::size_t expected = 0;
     for (const auto& [name, run] : runs) expected += run ? 1 : 0;
-    EXPECT_EQ(rehearsed, expected);
+    EXPECT_EQ(timed, expected);
   }
 }
 
 TEST_P(Explain, AnEmptySceneHasNothingToRehearse) {
   const Scene scene({}, GetParam()->side_contact());
-  EXPECT_TRUE(rehearse(scene, *GetParam()).empty());
+  EXPECT_TRUE(stage_timings(scene, *GetParam()).empty());
   EXPECT_FALSE(explain(scene, *GetParam()).empty());
 }
 

@@ -1,11 +1,11 @@
-// Extreme geometry: the ways that a hand may take.
+// Extreme cases by motion of the hand.
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 
-#include "rendering/verification/extreme_watch.h"
+#include "rendering/verification/extreme_case_audit.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
 #include "stimuli/orientation.h"
@@ -24,26 +24,22 @@ double between(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
-LineProbe moved(const LineProbe& probe, const Vec3& by) {
-  return {probe.tip + by, probe.tail + by};
-}
-
 Vec3 random_direction(stimuli::Random& random) {
   return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
-/// 0, or so little that rounding may take it for 0, or a little more.
-constexpr double kNextToNothing[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3};
+/// 0, or so small that rounding may take it for 0, or a little more.
+constexpr double kTiny[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3};
 
 }  // namespace
 
 ExtremeResult thin_plate(const Renderer& renderer) {
   constexpr double kThickness = 1e-4, kEdge = 0.1, kStep = 0.005;  // m; 5 m/s at 1 kHz
   const MeshPointer plate = solid(stretched(stimuli::cube(kEdge), {1, 1, kThickness / kEdge}));
-  Several all;
+  CombinedResult all;
   for (std::uint64_t round = 0; round < 2000; ++round) {
     stimuli::Random random(round, {1});
-    Watch watch(renderer, plate);
+    AuditedScene scene(renderer, plate);
     const double side = round % 2 ? 1 : -1;
     Vec3 direction = random_direction(random);
     direction.z = side * (std::abs(direction.z) + 0.02);
@@ -52,13 +48,13 @@ ExtremeResult thin_plate(const Renderer& renderer) {
     const LineProbe probe{start, start + kStylus * glm::normalize(direction)};
     double went_wrong = 0;
     for (int i = 0; i < 8; ++i) {
-      const Rendering r = watch.audited(moved(probe, Vec3(0, 0, -side * kStep * i)));
+      const Rendering r = scene.audited_tick(translated(probe, Vec3(0, 0, -side * kStep * i)));
       const double depth = side * (side * kThickness / 2 - (start.z - side * kStep * i));
       const bool held = r.contacts == 1 && r.deepest.normal.z * side > 0.999999 &&
                         std::abs(r.deepest.depth - depth) < 1e-12;
       went_wrong += depth > 0 ? !held : r.contacts != 0;
     }
-    ExtremeResult result = watch.result();
+    ExtremeResult result = scene.result();
     result.worst = went_wrong;
     result.limit = 0;
     if (went_wrong > 0 && result.detail.empty()) {
@@ -72,27 +68,27 @@ ExtremeResult thin_plate(const Renderer& renderer) {
 
 ExtremeResult parallel_edge(const Renderer& renderer) {
   const MeshPointer box = solid(stimuli::cube(0.06));
-  Several all;
+  CombinedResult all;
   stimuli::Random random(2);
-  for (const double tilt : kNextToNothing) {
-    for (const double beside : kNextToNothing) {
+  for (const double tilt : kTiny) {
+    for (const double beside : kTiny) {
       for (int round = 0; round < 12; ++round) {
-        Watch watch(renderer, box);
+        AuditedScene scene(renderer, box);
         // Along the edge at y = z = 0.03, coming from above or from the corner, then round the
         // edge, along it and off its end.
         Vec3 u = Vec3(round % 2 ? 1 : -1, 0, 0) + tilt * random_direction(random);
         u = glm::normalize(u);
         const double back = (round % 3) * 0.06;
         Vec3 at(0.005, 0.03 + beside - 2 * beside * (round % 4 == 0), 0.05);
-        watch.audited({at - back * u, at + (kStylus - back) * u});
+        scene.audited_tick({at - back * u, at + (kStylus - back) * u});
         const Vec3 ways[] = {{0, 0, -0.001}, {0, 0.001, 0}, {0, -0.001, 0},
                              {0.003, 0, 0},  {0, 0, 0.001}, {0, 0.0005, -0.0005}};
         for (int leg = 0; leg < 60; ++leg) {
           const Vec3 way = leg < 21 ? ways[0] : ways[random.below(6)];
           at += way;
-          watch.audited({at - back * u, at + (kStylus - back) * u});
+          scene.audited_tick({at - back * u, at + (kStylus - back) * u});
         }
-        all.add(watch.result());
+        all.add(scene.result());
       }
     }
   }
@@ -102,20 +98,20 @@ ExtremeResult parallel_edge(const Renderer& renderer) {
 ExtremeResult through_vertices(const Renderer& renderer) {
   const MeshPointer shapes[] = {solid(stimuli::cube(0.06)), solid(stimuli::icosphere(0.03, 1)),
                                 solid(stimuli::cone(0.03, 0.06, 16))};
-  Several all;
+  CombinedResult all;
   stimuli::Random random(4);
   for (const MeshPointer& mesh : shapes) {
     for (const Vec3& vertex : mesh->vertices()) {
       for (const double beside : {0.0, 1e-16, 1e-12, 1e-9}) {
-        Watch watch(renderer, mesh);
+        AuditedScene scene(renderer, mesh);
         const Vec3 out = glm::normalize(vertex), u = random_direction(random);
         const double back = renderer.side_contact() ? kStylus * random.unit() : 0;
         const Vec3 aside = beside * random_direction(random);
         for (const double height : {0.3, 0.001, 1e-9, 0.0, -1e-9, -0.0005, -0.001, -0.0015}) {
           const Vec3 at = vertex + height * out + aside;
-          watch.audited({at - back * u, at + (kStylus - back) * u});
+          scene.audited_tick({at - back * u, at + (kStylus - back) * u});
         }
-        ExtremeResult result = watch.result();
+        ExtremeResult result = scene.result();
         all.add(result);
       }
     }
@@ -124,17 +120,17 @@ ExtremeResult through_vertices(const Renderer& renderer) {
 }
 
 ExtremeResult zero_length(const Renderer& renderer) {
-  // A probe without length is a point: the point renderer's force, none of it on device 2.
+  // A probe without length is a point: force as of the point renderer, none of it on device 2.
   const MeshPointer mesh = solid(stimuli::icosphere(0.03, 2));
-  Watch watch(renderer, mesh), point(point_renderer(), mesh);
+  AuditedScene scene(renderer, mesh), point(point_renderer(), mesh);
   stimuli::Random random(6);
   double worst = 0;
   for (const LineProbe& probe : random_path(random, PathKind::smooth, *mesh, 0, false, 3000)) {
-    const Rendering r = watch.audited(probe), p = point.audited(probe);
+    const Rendering r = scene.audited_tick(probe), p = point.audited_tick(probe);
     worst = std::max({worst, glm::length(r.force - p.force), glm::length(r.torque),
                       glm::length(r.device2), glm::length(r.device1 - p.force)});
   }
-  ExtremeResult result = watch.result();
+  ExtremeResult result = scene.result();
   result.worst = worst;
   result.limit = 1e-12;
   result.passed = result.passed && worst <= result.limit;
@@ -143,10 +139,10 @@ ExtremeResult zero_length(const Renderer& renderer) {
 }
 
 ExtremeResult tiny_length(const Renderer& renderer) {
-  // Lengths below the rounding of coordinates show at the mesh's origin alone: meshes of which the
+  // Lengths below the rounding of coordinates exist near the mesh's origin alone: meshes whose
   // surface passes there.
   const stimuli::PolygonSoup shapes[] = {stimuli::icosphere(0.03, 1), stimuli::cube(0.06)};
-  Several all;
+  CombinedResult all;
   for (const stimuli::PolygonSoup& shape : shapes) {
     for (int i = 0; i < 8; ++i) {
       stimuli::Random random(static_cast<std::uint64_t>(i), {8});
@@ -156,17 +152,17 @@ ExtremeResult tiny_length(const Renderer& renderer) {
       const MeshPointer mesh = solid(turned_and_moved(shape, Quat(1, 0, 0, 0), 1, to));
       for (const double length : {1e-6, 1e-12, 1e-20, 1e-100, 1e-150, 1e-153, 1e-155, 1e-158,
                                   1e-160, 1e-162, 1e-200, 1e-308, 5e-324}) {
-        Watch watch(renderer, mesh);
+        AuditedScene scene(renderer, mesh);
         const Vec3 u = i % 3 == 0 ? Vec3(1, 0, 0) : random_direction(random);
         const Vec3 out = glm::normalize(corner);
-        watch.audited({0.1 * out, 0.1 * out + length * u});
+        scene.audited_tick({0.1 * out, 0.1 * out + length * u});
         for (int round = 0; round < 10; ++round) {
-          watch.audited({Vec3(0), length * u});
+          scene.audited_tick({Vec3(0), length * u});
           // From under another facet back to the origin.
           const Vec3 at = 0.02 * random.unit() * random_direction(random);
-          watch.audited({at, at + length * u});
+          scene.audited_tick({at, at + length * u});
         }
-        all.add(watch.result());
+        all.add(scene.result());
       }
     }
   }
@@ -175,10 +171,10 @@ ExtremeResult tiny_length(const Renderer& renderer) {
 
 ExtremeResult starts_inside(const Renderer& renderer) {
   const MeshPointer mesh = solid(stimuli::cone(0.03, 0.06, 32));
-  Several all;
+  CombinedResult all;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     stimuli::Random random(seed, {9});
-    Watch watch(renderer, mesh);
+    AuditedScene scene(renderer, mesh);
     const Vec3 inside = Vec3(0, 0, -0.01) + 0.005 * random.unit() * random_direction(random);
     const Vec3 u = random_direction(random);
     const auto probe = [&](double out) {
@@ -187,16 +183,17 @@ ExtremeResult starts_inside(const Renderer& renderer) {
     double forces = 0;
     bool bits = true;
     for (int i = 0; i < 5; ++i) {
-      const Rendering r = watch.tick(probe(0.0005 * i));
+      const Rendering r = scene.tick(probe(0.0005 * i));
       forces += glm::length(r.force) + glm::length(r.torque);
       bits = bits && r.faults == render_fault::kStartedInside && r.contacts == 0;
     }
-    // Left once, and back in: felt.
-    bits = bits && watch.audited(probe(0.1)).contacts == 0;
-    bits = bits && watch.audited(probe(0.0)).contacts == 1;
+    // Left once, and back in: contact.
+    bits = bits && scene.audited_tick(probe(0.1)).contacts == 0;
+    bits = bits && scene.audited_tick(probe(0.0)).contacts == 1;
     if (!bits)
-      watch.fail("seed " + std::to_string(seed) + ": wrong bits, or not felt after leaving");
-    ExtremeResult result = watch.result();
+      scene.fail("seed " + std::to_string(seed) +
+                 ": wrong fault bits, or no contact after leaving");
+    ExtremeResult result = scene.result();
     result.worst = forces;
     result.limit = 0;
     result.passed = result.passed && forces == 0;
@@ -206,55 +203,55 @@ ExtremeResult starts_inside(const Renderer& renderer) {
 }
 
 ExtremeResult teleports(const Renderer& renderer) {
-  Several all;
+  CombinedResult all;
   const MeshPointer shapes[] = {solid(stimuli::cube(0.06)), solid(stimuli::icosphere(0.03, 2)),
                                 solid(stimuli::cylinder(0.03, 0.06, 64)),
                                 solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}))};
   for (const MeshPointer& mesh : shapes) {
     for (std::uint64_t seed = 0; seed < 10; ++seed) {
       stimuli::Random random(seed, {10});
-      Watch watch(renderer, mesh);
-      watch.audited({Vec3(0, 0, 1), Vec3(0, 0, 1 + kStylus)});
+      AuditedScene scene(renderer, mesh);
+      scene.audited_tick({Vec3(0, 0, 1), Vec3(0, 0, 1 + kStylus)});
       for (int i = 0; i < 200; ++i) {
         // Near, far, very far; along the axes as often as not.
         const double reach = i % 5 == 0 ? 1e5 : i % 5 == 1 ? 1 : 0.05;
         const Vec3 tip = reach * random.unit() * random_direction(random);
         const Vec3 axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
         const Vec3 u = random.below(2) ? axes[random.below(3)] : random_direction(random);
-        watch.audited({tip, tip + kStylus * u});
+        scene.audited_tick({tip, tip + kStylus * u});
       }
-      all.add(watch.result());
+      all.add(scene.result());
     }
   }
   return all.result();
 }
 
 ExtremeResult bad_poses(const Renderer& renderer) {
-  // Before contact, in contact and behind a plate: no force and the fault bit; the next good pose
-  // is felt as if nothing had been.
+  // Before contact, in contact and behind a plate: no force and the fault bit; the next valid pose
+  // is rendered as if nothing had happened.
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const MeshPointer mesh = solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}));
-  Watch watch(renderer, mesh);
+  AuditedScene scene(renderer, mesh);
   double worst = 0;
   for (const double height : {0.01, -0.0001, -0.01}) {
     for (const double value : {kNaN, kInfinity, -kInfinity, 1e300, -1e20, 1.1e6}) {
       for (int k = 0; k < 6; ++k) {
-        watch.audited({Vec3(0.01, 0, 0.02), Vec3(0.01, 0.01, 0.14)});
+        scene.audited_tick({Vec3(0.01, 0, 0.02), Vec3(0.01, 0.01, 0.14)});
         const LineProbe good{Vec3(0.01, 0, height), Vec3(0.01, 0.01, height + kStylus)};
-        const Rendering before = watch.audited(good);
+        const Rendering before = scene.audited_tick(good);
         LineProbe bad = good;
         (k < 3 ? bad.tip : bad.tail)[k % 3] = value;
-        const Rendering broken = watch.tick(bad);
+        const Rendering broken = scene.tick(bad);
         worst = std::max({worst, glm::length(broken.force), glm::length(broken.torque),
                           glm::length(broken.device1), glm::length(broken.device2)});
-        if (!(broken.faults & render_fault::kNonFinite)) watch.fail("no fault bit");
-        const Rendering after = watch.audited(good);
+        if (!(broken.faults & render_fault::kNonFinite)) scene.fail("no fault bit");
+        const Rendering after = scene.audited_tick(good);
         worst = std::max(worst, glm::length(after.force - before.force));
       }
     }
   }
-  ExtremeResult result = watch.result();
+  ExtremeResult result = scene.result();
   result.worst = worst;
   result.limit = 0;
   result.passed = result.passed && worst == 0;

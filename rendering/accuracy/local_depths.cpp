@@ -1,56 +1,58 @@
-// The ways out of the analytic shapes; sphere and cube.
+// Local penetration depths in the analytic shapes; sphere and cube.
 
-#include "rendering/accuracy/ways_out.h"
+#include "rendering/accuracy/local_depths.h"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
-#include "rendering/accuracy/ways_out_round.h"
-#include "rendering/accuracy/ways_out_search.h"
+#include "rendering/accuracy/local_depths_collector.h"
+#include "rendering/accuracy/local_depths_round.h"
 
 namespace palpate::rendering {
-namespace ways {
+namespace depths {
 namespace {
 
-void out_of_sphere(Search& s) {
-  const double radius = s.shape.radius;
+void depths_in_sphere(Collector& collector) {
+  const double radius = collector.shape.radius;
   const auto add_end = [&](bool tail) {
-    const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+    const Vec3& p = tail ? collector.probe.tail : collector.probe.tip;
     const double from = glm::length(p);
-    s.end(tail, from > 0 ? p / from : Vec3(0, 0, 1), radius - from, kRight);
+    collector.add_end(tail, from > 0 ? p / from : Vec3(0, 0, 1), radius - from, kRightAngle);
   };
   add_end(false);
-  if (s.is_point()) return;
+  if (collector.is_point()) return;
   add_end(true);
-  const double place = -glm::dot(s.probe.tip, s.d) / (s.length * s.length);
-  const Vec3 foot = s.probe.tip + place * s.d;
+  const double fraction =
+      -glm::dot(collector.probe.tip, collector.d) / (collector.length * collector.length);
+  const Vec3 foot = collector.probe.tip + fraction * collector.d;
   const double from = glm::length(foot);
   // A probe through the centre: any direction across it.
-  const Vec3 normal = from > 1e-12 * radius   ? foot / from
-                      : std::abs(s.u.z) < 0.9 ? glm::normalize(glm::cross(s.u, Vec3(0, 0, 1)))
-                                              : glm::normalize(glm::cross(s.u, Vec3(1, 0, 0)));
-  s.side(normal, radius - from, place, kRight);
+  const Vec3 normal = from > 1e-12 * radius ? foot / from
+                      : std::abs(collector.u.z) < 0.9
+                          ? glm::normalize(glm::cross(collector.u, Vec3(0, 0, 1)))
+                          : glm::normalize(glm::cross(collector.u, Vec3(1, 0, 0)));
+  collector.add_side(normal, radius - from, fraction, kRightAngle);
 }
 
-void out_of_cube(Search& s) {
-  const double h = s.shape.edge / 2;
+void depths_in_cube(Collector& collector) {
+  const double h = collector.shape.edge / 2;
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
       Vec3 normal;
       normal[axis] = sign;
-      const double flat = angle_to_plane(s.u, normal);
+      const double flat = angle_to_plane(collector.u, normal);
       for (const bool tail : {false, true}) {
-        const Vec3& p = tail ? s.probe.tail : s.probe.tip;
+        const Vec3& p = tail ? collector.probe.tail : collector.probe.tip;
         if (std::abs(p[(axis + 1) % 3]) <= h && std::abs(p[(axis + 2) % 3]) <= h)
-          s.end(tail, normal, h - sign * p[axis], flat);
+          collector.add_end(tail, normal, h - sign * p[axis], flat);
       }
-      if (s.is_point()) continue;
+      if (collector.is_point()) continue;
       // The edges along this axis: the normal chooses which.
       Vec3 line;
       line[axis] = 1;
-      const Vec3 c = sign * glm::cross(line, s.u);
+      const Vec3 c = sign * glm::cross(line, collector.u);
       const double width = glm::length(c);
       if (width == 0) continue;
       const Vec3 n = c / width;
@@ -60,15 +62,15 @@ void out_of_cube(Search& s) {
       start[axis] = -h;
       start[i] = std::copysign(h, n[i]);
       start[k] = std::copysign(h, n[k]);
-      const double before = s.u[i], beside = s.u[k];
-      const double depth = glm::dot(n, start - s.probe.tip);
-      const Vec3 w = s.probe.tip + depth * n - start;
-      const Vec3 across = glm::cross(2 * h * line, s.d);
+      const double before = collector.u[i], beside = collector.u[k];
+      const double depth = glm::dot(n, start - collector.probe.tip);
+      const Vec3 w = collector.probe.tip + depth * n - start;
+      const Vec3 across = glm::cross(2 * h * line, collector.d);
       const double c2 = glm::dot(across, across);
-      const double along = glm::dot(glm::cross(w, s.d), across) / c2;
+      const double along = glm::dot(glm::cross(w, collector.d), across) / c2;
       if (along < 0 || along > 1) continue;
-      s.side(n, depth, glm::dot(glm::cross(w, 2 * h * line), across) / c2,
-             std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
+      collector.add_side(n, depth, glm::dot(glm::cross(w, 2 * h * line), across) / c2,
+                         std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
     }
   }
 }
@@ -91,7 +93,7 @@ double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
     case stimuli::ShapeKind::compound:
       break;
   }
-  throw std::invalid_argument("ways_out: a mesh or compound is no analytic primitive");
+  throw std::invalid_argument("local_depths: a mesh or compound is no analytic primitive");
 }
 
 /// Some point of the probe is within the shape: the least of a convex function by thirds.
@@ -108,7 +110,7 @@ bool overlaps(const stimuli::ObjectSpec& shape, const LineProbe& probe) {
 }
 
 }  // namespace
-}  // namespace ways
+}  // namespace depths
 
 double support(const stimuli::ObjectSpec& primitive, const Vec3& n) {
   const double out = primitive.radius * std::hypot(n.x, n.y), up = primitive.height / 2 * n.z;
@@ -132,28 +134,28 @@ double depth_along(const stimuli::ObjectSpec& primitive, const LineProbe& probe,
   return support(primitive, n) - std::min(glm::dot(n, probe.tip), glm::dot(n, probe.tail));
 }
 
-std::vector<WayOut> ways_out(const stimuli::ObjectSpec& primitive, const LineProbe& probe) {
+std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const LineProbe& probe) {
   support(primitive, Vec3());  // refuses what is no primitive
-  if (!ways::overlaps(primitive, probe)) return {};
-  ways::Search s(primitive, probe);
+  if (!depths::overlaps(primitive, probe)) return {};
+  depths::Collector collector(primitive, probe);
   switch (primitive.shape) {
     case stimuli::ShapeKind::sphere:
-      ways::out_of_sphere(s);
+      depths::depths_in_sphere(collector);
       break;
     case stimuli::ShapeKind::cube:
-      ways::out_of_cube(s);
+      depths::depths_in_cube(collector);
       break;
     case stimuli::ShapeKind::cylinder:
-      ways::out_of_cylinder(s);
+      depths::depths_in_cylinder(collector);
       break;
     case stimuli::ShapeKind::cone:
-      ways::out_of_cone(s);
+      depths::depths_in_cone(collector);
       break;
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;  // refused above
   }
-  return s.sorted();
+  return collector.sorted();
 }
 
 }  // namespace palpate::rendering

@@ -1,12 +1,12 @@
-// Closed paths: what the renderer does to the hand on a way that ends where it began. A wall must
-// give back what was put in, or less; never more.
+// Extreme cases by energy: the work of the renderer on the hand over closed paths. A virtual wall
+// must be passive: it gives back what was put in, or less, never more.
 
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rendering/verification/extreme_watch.h"
+#include "rendering/verification/extreme_case_audit.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
@@ -15,10 +15,10 @@ namespace {
 
 constexpr double kStylus = 0.12;                   // m
 constexpr double kBlend = std::numbers::pi / 180;  // rad; equation (2)
-constexpr double kExtrapolated = 1e-6;  // of the stored energy, what extrapolation leaves
+constexpr double kExtrapolated = 1e-6;  // of the stored energy: error of the extrapolation
 constexpr double kDepth = 1e-3;         // m, about which a cycle goes
 
-/// tip = middle + across sin(turn) + along (1 - cos(turn)), and the tail likewise; without end.
+/// tip = middle + across sin(turn) + along (1 - cos(turn)), and the tail likewise; periodic.
 struct Cycle {
   LineProbe middle, across, along;
 
@@ -34,21 +34,21 @@ struct Cycle {
 
 struct Lap {
   double work = 0;      ///< J, done on the hand
-  double wound_up = 0;  ///< J, that friction's spring holds more at the end
+  double wound_up = 0;  ///< J, by which the friction spring's energy grew
   double stored = 0;    ///< J, at the deepest
   double force = 0;     ///< N, the largest
-  double rocking = 0;   ///< m, way of one end against the other along z while equation (2) blends
-  double jumps = 0;  ///< J, what the sum may be off by where the force jumps, from facet to facet
+  double rocking = 0;   ///< m, travel of one end against the other along z in the blend of (2)
+  double jumps = 0;     ///< J, error bound of the sum where the force jumps, from facet to facet
   int ticks = 0, in_contact = 0, in_blend = 0;
   bool one_facet = true;  ///< held by one facet of M all the way
-  bool upwards = true;    ///< within a degree or two of it
+  bool upwards = true;    ///< its normal within some degrees of +z
 };
 
-/// One object, its material, and the hand that goes round.
-class Track {
+/// One object, its material, and a hand on closed paths.
+class ClosedPathBench {
  public:
-  Track(const Renderer& renderer, const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
-        const stimuli::Material& material)
+  ClosedPathBench(const Renderer& renderer, const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
+                  const stimuli::Material& material)
       : renderer_(renderer),
         stiffness_(material.stiffness),
         scene_({{mesh, {}, material, 0, nullptr}}, renderer.side_contact()),
@@ -56,8 +56,8 @@ class Track {
 
   Rendering tick(const LineProbe& probe) { return renderer_.tick(scene_, state_, probe, 1e-3); }
 
-  /// Straight in along `way` (unit) until it is kDepth deep; where it is then. \param probe at the
-  /// object's middle
+  /// Straight in along `way` (unit) until it is kDepth deep; returns the pose there.
+  /// \param probe  at the object's middle
   LineProbe press(const LineProbe& probe, const Vec3& way, double from) {
     constexpr double kStep = 1e-4;
     LineProbe now = probe;
@@ -68,9 +68,9 @@ class Track {
     return now;
   }
 
-  /// Once round, going on from the last tick. The sum of force times speed over equal steps nears
-  /// the integral faster than any power of their number where the force is smooth; where the way
-  /// back is not the way there (friction drifts) its ends are weighted as the trapezium rule does.
+  /// Once round, continuing from the last tick. Over a period the sum of force times speed at equal
+  /// steps converges faster than any power of their number where the force is smooth; where the lap
+  /// is not periodic (friction drifts) its ends are weighted as in the trapezium rule.
   Lap lap(const Cycle& cycle, int ticks) {
     Lap lap;
     const double step = 2 * std::numbers::pi / ticks, power_before = power_;
@@ -133,27 +133,27 @@ const std::shared_ptr<const stimuli::ConvexMesh>& shape(std::uint64_t index) {
   return kShapes[index % kShapes.size()];
 }
 
-/// A stylus in any pose pressed into a shape, and a small way round.
-Cycle cycle_anywhere(stimuli::Random& random, Track& track) {
+/// A stylus in any pose pressed into a shape, on a small closed path.
+Cycle cycle_anywhere(stimuli::Random& random, ClosedPathBench& bench) {
   const Vec3 out = direction(random), d = kStylus * direction(random);
-  const double share = random.unit();
+  const double fraction = random.unit();
   Cycle cycle;
-  cycle.middle = track.press({-share * d, (1 - share) * d}, -out, 0.3);
+  cycle.middle = bench.press({-fraction * d, (1 - fraction) * d}, -out, 0.3);
   cycle.across = small(random, 4e-4);
   cycle.along = small(random, 2e-4);
   return cycle;
 }
 
-/// A stylus nearly flat on the top of the cube, that rocks through the blend.
-Cycle cycle_over_a_flat(stimuli::Random& random, Track& track) {
+/// A stylus nearly flat on the top of the cube, rocking through the blend of equation (2).
+Cycle cycle_over_a_flat(stimuli::Random& random, ClosedPathBench& bench) {
   const double turn = 2 * std::numbers::pi * random.unit();
-  // As long as it is, its ends are past the face; a short one's are over it.
+  // The ends of the full length are past the face; those of a short one over it.
   const double length = random.unit() < 0.5 ? kStylus : 0.3 * kStylus;
   const Vec3 d = length * Vec3(std::cos(turn), std::sin(turn), 0);
-  const double share = random.unit();
-  const Vec3 place(0.02 * random.unit(), 0.02 * random.unit(), 0);
+  const double fraction = random.unit();
+  const Vec3 centre(0.02 * random.unit(), 0.02 * random.unit(), 0);
   Cycle cycle;
-  cycle.middle = track.press({place - share * d, place + (1 - share) * d}, {0, 0, -1}, 0.1);
+  cycle.middle = bench.press({centre - fraction * d, centre + (1 - fraction) * d}, {0, 0, -1}, 0.1);
   cycle.across = small(random, 1e-3);
   cycle.along = small(random, 5e-4);
   // The rise of one end over the other at 2 degrees, less what the ends move besides.
@@ -169,7 +169,7 @@ stimuli::Material springy() {
   return material;
 }
 
-std::string in_figures(const char* what, std::uint64_t round, const Lap& lap) {
+std::string describe(const char* what, std::uint64_t round, const Lap& lap) {
   std::ostringstream out;
   out << "cycle " << round << ": " << what << " " << lap.work << " J (friction's spring "
       << lap.wound_up << " J), stored " << lap.stored << " J at the deepest";
@@ -184,19 +184,19 @@ void count(ExtremeResult& result, const Lap& lap) {
 }  // namespace
 
 ExtremeResult closed_paths(const Renderer& renderer) {
-  Several all;
+  CombinedResult all;
   for (std::uint64_t round = 0; round < 400; ++round) {
     stimuli::Random random(round, {21});
-    Track track(renderer, shape(round), springy());
-    const Cycle cycle = cycle_anywhere(random, track);
-    track.lap(cycle, 400);  // the first begins with a jump
-    const Lap lap = track.lap(cycle, 400);
+    ClosedPathBench bench(renderer, shape(round), springy());
+    const Cycle cycle = cycle_anywhere(random, bench);
+    bench.lap(cycle, 400);  // the first begins with a jump
+    const Lap lap = bench.lap(cycle, 400);
     if (!lap.one_facet || (renderer.side_contact() && lap.in_blend > 0)) continue;
     ExtremeResult result;
     count(result, lap);
-    result.limit = kShare;
+    result.limit = kRounding;
     result.worst = std::abs(lap.work) / lap.stored;
-    if (!(result.worst <= result.limit)) result.detail = in_figures("work", round, lap);
+    if (!(result.worst <= result.limit)) result.detail = describe("work", round, lap);
     result.passed = result.detail.empty();
     all.add(result);
   }
@@ -214,28 +214,28 @@ Lap lossy_lap(const Renderer& renderer, std::uint64_t round, int ticks) {
     material.friction_static = 0.05 + random.unit();
     material.friction_dynamic = material.friction_static * random.unit();
   }
-  Track track(renderer, shape(round / 3), material);
-  const Cycle cycle = cycle_anywhere(random, track);
-  track.lap(cycle, ticks);  // the first begins with a jump, and winds friction's spring up
-  return track.lap(cycle, ticks);
+  ClosedPathBench bench(renderer, shape(round / 3), material);
+  const Cycle cycle = cycle_anywhere(random, bench);
+  bench.lap(cycle, ticks);  // the first begins with a jump, and winds friction's spring up
+  return bench.lap(cycle, ticks);
 }
 
 }  // namespace
 
 ExtremeResult closed_paths_lossy(const Renderer& renderer) {
   constexpr int kTicks = 400;
-  Several all;
+  CombinedResult all;
   for (std::uint64_t round = 0; round < 400; ++round) {
     const Lap coarse = lossy_lap(renderer, round, kTicks);
     const Lap fine = lossy_lap(renderer, round, 2 * kTicks);
     if (!fine.one_facet || (renderer.side_contact() && fine.in_blend > 0)) continue;
-    // Steps of half the length, half the error: what is left with steps of none.
+    // Richardson extrapolation: half the step, half the error.
     const double given = 2 * (fine.work + fine.wound_up) - (coarse.work + coarse.wound_up);
     ExtremeResult result;
     count(result, fine);
     result.limit = kExtrapolated;
     result.worst = std::max(0.0, given / fine.stored);
-    if (!(result.worst <= result.limit)) result.detail = in_figures("gives", round, fine);
+    if (!(result.worst <= result.limit)) result.detail = describe("gives", round, fine);
     result.passed = result.detail.empty();
     all.add(result);
   }
@@ -243,23 +243,23 @@ ExtremeResult closed_paths_lossy(const Renderer& renderer) {
 }
 
 ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
-  Several all;
+  CombinedResult all;
   const auto block = shape(3);
   for (std::uint64_t round = 0; round < 400; ++round) {
     stimuli::Random random(round, {23});
-    Track track(renderer, block, springy());
-    const Cycle cycle = cycle_over_a_flat(random, track);
-    track.lap(cycle, 4000);  // the first begins with a jump
-    const Lap lap = track.lap(cycle, 4000);
+    ClosedPathBench bench(renderer, block, springy());
+    const Cycle cycle = cycle_over_a_flat(random, bench);
+    bench.lap(cycle, 4000);  // the first begins with a jump
+    const Lap lap = bench.lap(cycle, 4000);
     if (!lap.upwards) continue;
-    // Equation (2) applies the spring of the deeper end at a place between the ends, so it does
-    // work by at most the force times what one end moves against the other meanwhile.
-    const double bound = lap.force * lap.rocking + lap.jumps + kShare * lap.stored;
+    // Equation (2) applies the force of the deeper end at a point between the ends, so it does work
+    // of at most the force times what one end moves against the other meanwhile.
+    const double bound = lap.force * lap.rocking + lap.jumps + kRounding * lap.stored;
     ExtremeResult result;
     count(result, lap);
     result.worst = std::abs(lap.work);
     result.limit = bound;
-    if (!(result.worst <= bound)) result.detail = in_figures("work", round, lap);
+    if (!(result.worst <= bound)) result.detail = describe("work", round, lap);
     result.passed = result.detail.empty();
     all.add(result);
   }

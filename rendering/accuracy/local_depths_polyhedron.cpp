@@ -1,4 +1,4 @@
-// The ways out of a polyhedron, by visiting all its facets and edges.
+// Local penetration depths in a polyhedron, by visiting all its facets and edges.
 
 #include <algorithm>
 #include <cmath>
@@ -6,21 +6,21 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rendering/accuracy/ways_out_search.h"
+#include "rendering/accuracy/local_depths_collector.h"
 
 namespace palpate::rendering {
 
-std::vector<WayOut> ways_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
-                             const Vec3& towards, double angle) {
+std::vector<LocalDepth> local_depths(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
+                                     const Vec3& towards, double angle) {
   const double least_cosine = angle < std::numbers::pi ? std::cos(angle) : -2;
   const double slack = 1e-12 * mesh.size();
   const Vec3 d = probe.tail - probe.tip;
   const double length = glm::length(d);
   const Vec3 u = length > 0 ? d / length : Vec3();
   const auto flatness = [&](const stimuli::Facet& facet) {
-    return length > 0 ? ways::angle_to_plane(u, facet.normal) : ways::kRight;
+    return length > 0 ? depths::angle_to_plane(u, facet.normal) : depths::kRightAngle;
   };
-  std::vector<WayOut> found;
+  std::vector<LocalDepth> found;
   for (const stimuli::Facet& facet : mesh.facets()) {
     if (glm::dot(facet.normal, towards) < least_cosine) continue;
     const bool tail = glm::dot(facet.normal, d) < 0;
@@ -52,14 +52,14 @@ std::vector<WayOut> ways_out(const stimuli::ConvexMesh& mesh, const LineProbe& p
     if (depth < 0) return {};
     const Vec3 w = probe.tip + depth * n - v0;
     const double along = glm::dot(glm::cross(w, d), c) / c2;
-    const double place = glm::dot(glm::cross(w, line), c) / c2;
+    const double fraction = glm::dot(glm::cross(w, line), c) / c2;
     const double beyond_edge = slack / glm::length(line), beyond_end = slack / length;
     if (along < -beyond_edge || along > 1 + beyond_edge) continue;
-    if (place < -beyond_end || place > 1 + beyond_end) continue;
+    if (fraction < -beyond_end || fraction > 1 + beyond_end) continue;
     found.push_back(
-        {n, depth, std::clamp(place, 0.0, 1.0), std::min(flatness(left), flatness(right))});
+        {n, depth, std::clamp(fraction, 0.0, 1.0), std::min(flatness(left), flatness(right))});
   }
-  ways::sort_by_depth(found);
+  depths::sort_by_depth(found);
   return found;
 }
 

@@ -1,4 +1,4 @@
-#include "rendering/accuracy/accuracy.h"
+#include "rendering/accuracy/error_summary.h"
 
 #include <algorithm>
 #include <cmath>
@@ -27,16 +27,16 @@ double angle_between(const Vec3& a, const Vec3& b) {
 
 }  // namespace
 
-void ErrorTally::add(const LineProbe& probe, const std::vector<WayOut>& truth,
-                     const Answer& answer) {
+void ErrorTally::add(const LineProbe& probe, const std::vector<LocalDepth>& truth,
+                     const ContactEstimate& estimate) {
   ++counts_.ticks;
-  const bool gave_up = std::isnan(answer.depth);
-  const bool touching = answer.touching && !gave_up;
+  const bool gave_up = std::isnan(estimate.depth);
+  const bool touching = estimate.touching && !gave_up;
   if (truth.empty()) {
     if (!touching) return;
     ++counts_.phantom;
-    depth_.push_back(answer.depth);
-    force_.push_back(kStiffness * answer.depth);
+    depth_.push_back(estimate.depth);
+    force_.push_back(kStiffness * estimate.depth);
     return;
   }
   if (!touching) {
@@ -46,22 +46,22 @@ void ErrorTally::add(const LineProbe& probe, const std::vector<WayOut>& truth,
     force_.push_back(kStiffness * truth.front().depth);
     return;
   }
-  const WayOut& held =
-      *std::max_element(truth.begin(), truth.end(), [&](const WayOut& a, const WayOut& b) {
-        return glm::dot(a.normal, answer.normal) < glm::dot(b.normal, answer.normal);
+  const LocalDepth& held =
+      *std::max_element(truth.begin(), truth.end(), [&](const LocalDepth& a, const LocalDepth& b) {
+        return glm::dot(a.normal, estimate.normal) < glm::dot(b.normal, estimate.normal);
       });
-  // Equal to rounding is the least as well: an edge's two faces, a way that two facets share.
+  // Equal within rounding counts as the least: an edge's two facets have one direction there.
   counts_.deeper += held.depth > truth.front().depth + 1e-12 ? 1 : 0;
   const Vec3 exact_force = kStiffness * held.depth * held.normal;
-  const Vec3 force = kStiffness * answer.depth * answer.normal;
-  depth_.push_back(std::abs(answer.depth - held.depth));
-  normal_.push_back(angle_between(answer.normal, held.normal));
+  const Vec3 force = kStiffness * estimate.depth * estimate.normal;
+  depth_.push_back(std::abs(estimate.depth - held.depth));
+  normal_.push_back(angle_between(estimate.normal, held.normal));
   force_.push_back(glm::length(force - exact_force));
-  if (held.flat_angle < kFlat || std::isnan(answer.point.x)) return;
+  if (held.flat_angle < kFlat || std::isnan(estimate.point.x)) return;
   const Vec3 exact_point =
-      probe.tip + held.place * (probe.tail - probe.tip) + held.depth * held.normal;
-  point_.push_back(glm::length(answer.point - exact_point));
-  torque_.push_back(glm::length(glm::cross(answer.point - probe.tip, force) -
+      probe.tip + held.probe_fraction * (probe.tail - probe.tip) + held.depth * held.normal;
+  point_.push_back(glm::length(estimate.point - exact_point));
+  torque_.push_back(glm::length(glm::cross(estimate.point - probe.tip, force) -
                                 glm::cross(exact_point - probe.tip, exact_force)));
 }
 

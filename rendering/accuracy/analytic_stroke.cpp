@@ -1,10 +1,10 @@
-#include "rendering/accuracy/hand_path.h"
+#include "rendering/accuracy/analytic_stroke.h"
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "rendering/accuracy/ways_out.h"
+#include "rendering/accuracy/local_depths.h"
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
@@ -18,9 +18,9 @@ constexpr double kOutside = 0.3;    // m; farther out than any touch
 constexpr double kApproach = 3e-3;  // m
 constexpr double kPlaced = 1e-9;    // m; how exactly the depth is kept
 
-class Hand {
+class StrokingHand {
  public:
-  Hand(const stimuli::ObjectSpec& shape, const HandPathSettings& settings)
+  StrokingHand(const stimuli::ObjectSpec& shape, const AnalyticStrokeSettings& settings)
       : shape_(shape), settings_(settings), random_(settings.seed) {
     const Quat turn = stimuli::uniform_rotation(random_);
     out_ = turn * Vec3(0, 0, 1);
@@ -37,7 +37,7 @@ class Hand {
     time_ += kTick;
   }
 
-  /// The stylus with the stroked place at this distance from the middle.
+  /// The stylus with the stroked point at this distance from the middle.
   LineProbe at(double distance) const {
     if (settings_.length == 0) return {distance * out_, distance * out_};
     const double spin = wave(0, 2.9), tilt = 0.8 * std::sin(wave(1, 3.1));
@@ -73,12 +73,12 @@ class Hand {
     return phase_[which] + 2 * std::numbers::pi * time_ / period;
   }
   bool deeper(double distance, double depth) const {
-    const auto ways = ways_out(shape_, at(distance));
-    return !ways.empty() && ways.front().depth > depth;
+    const auto depths = local_depths(shape_, at(distance));
+    return !depths.empty() && depths.front().depth > depth;
   }
 
   const stimuli::ObjectSpec& shape_;
-  const HandPathSettings& settings_;
+  const AnalyticStrokeSettings& settings_;
   stimuli::Random random_;
   Vec3 out_, heading_;
   Vec3 level_;  // carried along without turning about out_
@@ -89,20 +89,21 @@ class Hand {
 
 }  // namespace
 
-HandPath hand_path(const stimuli::ObjectSpec& primitive, const HandPathSettings& settings) {
-  HandPath path;
-  Hand hand(primitive, settings);
+AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive,
+                               const AnalyticStrokeSettings& settings) {
+  AnalyticStroke stroke;
+  StrokingHand hand(primitive, settings);
   const double distance = hand.distance_for(hand.wanted_depth());
   const double step = settings.speed * kTick;
   for (double back = settings.deep + kApproach; back > step / 2; back -= step) {
-    path.poses.push_back(hand.at(distance + back));
+    stroke.poses.push_back(hand.at(distance + back));
   }
-  path.approach = path.poses.size();
+  stroke.approach = stroke.poses.size();
   for (int i = 0; i < settings.contact_ticks; ++i) {
-    path.poses.push_back(hand.at(hand.distance_for(hand.wanted_depth())));
+    stroke.poses.push_back(hand.at(hand.distance_for(hand.wanted_depth())));
     hand.move();
   }
-  return path;
+  return stroke;
 }
 
 }  // namespace palpate::rendering

@@ -1,5 +1,6 @@
 #pragma once
-// A seeded hand that strokes one object, for measurements: the same poses for all who are compared.
+// A seeded hand that strokes any object by what it feels, for measurements: the same poses for all
+// that are compared. World frame, SI units.
 
 #include <algorithm>
 #include <cmath>
@@ -11,29 +12,28 @@
 
 namespace palpate::rendering {
 
-struct StrokeSettings {
+struct SurfaceStrokeSettings {
   Vec3 centre;                ///< m, of the object's bounding sphere
   double radius = 0.03;       ///< m, of it; below 30 mm depth and speed shrink with it
   double length = 0.12;       ///< m, of the stylus
-  bool side = true;           ///< the contact wanders between the tip and the side; else the tip's
-  double lifted = 0;          ///< share of the time in which the hand hovers 1 to 2 mm off
+  bool side = true;           ///< the contact wanders between tip and side; else at the tip
+  double lifted = 0;          ///< fraction of the time that the hand hovers 1 to 2 mm off
   double lift_period = 2000;  ///< ticks from one lift to the next
   std::uint64_t seed = 1;
 };
 
 /// 0.1 mm a tick along the surface (0.1 m/s at 1 kHz), up to twice that towards it or away, 1 to 2
-/// mm deep. For the point the tip slides; for the ray the
-/// contact wanders between the tip and 40 mm along the side. It comes in from half a radius off, 15
-/// mm at most.
-class StrokingHand {
+/// mm deep. For the point renderer the tip slides; for the ray renderer the contact wanders between
+/// the tip and 40 mm along the side. It starts half a radius off, 15 mm at most.
+class SurfaceStroke {
  public:
-  explicit StrokingHand(const StrokeSettings& settings)
+  explicit SurfaceStroke(const SurfaceStrokeSettings& settings)
       : settings_(settings),
         random_(settings.seed),
         radius_(settings.radius + std::min(0.5 * settings.radius, 0.015)) {}
 
-  /// How far out the path runs follows what was felt, so that it keeps to the surface of any
-  /// object: `depth` m deep at the last tick; negative: above it; 0: off it, unknown how far.
+  /// The distance from the centre follows the penetration depth (m) at the last tick, so that the
+  /// path keeps to the surface of any object; negative: above it; 0: off it, unknown how far.
   LineProbe next(double depth) {
     const double scale = std::min(1.0, settings_.radius / 0.03);
     const double step = 1e-4 * scale;  // m, the way of a tick
@@ -59,7 +59,7 @@ class StrokingHand {
  private:
   double wave(double period) const { return std::sin(2 * std::numbers::pi * tick_ / period); }
 
-  StrokeSettings settings_;
+  SurfaceStrokeSettings settings_;
   stimuli::Random random_;
   Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
   double radius_;

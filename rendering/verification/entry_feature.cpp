@@ -1,4 +1,4 @@
-#include "rendering/verification/search_entry.h"
+#include "rendering/verification/entry_feature.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 namespace palpate::rendering {
 
-bool plane_between(const stimuli::ConvexMesh& mesh, const LineProbe& before,
-                   const LineProbe& after) {
+bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& before,
+                              const LineProbe& after) {
   return std::any_of(mesh.facets().begin(), mesh.facets().end(), [&](const stimuli::Facet& facet) {
     return std::min({glm::dot(facet.normal, before.tip), glm::dot(facet.normal, before.tail),
                      glm::dot(facet.normal, after.tip), glm::dot(facet.normal, after.tail)}) >
@@ -16,8 +16,8 @@ bool plane_between(const stimuli::ConvexMesh& mesh, const LineProbe& before,
   });
 }
 
-std::optional<ReferenceDepth> facet_of_sum(const stimuli::ConvexMesh& mesh, bool is_edge,
-                                           std::uint32_t i, const LineProbe& probe) {
+std::optional<ReferenceDepth> measure_feature(const stimuli::ConvexMesh& mesh, bool is_edge,
+                                              std::uint32_t i, const LineProbe& probe) {
   if (!is_edge) {
     const stimuli::Facet& facet = mesh.facets()[i];
     return ReferenceDepth{facet.offset - std::min(glm::dot(facet.normal, probe.tip),
@@ -33,22 +33,22 @@ std::optional<ReferenceDepth> facet_of_sum(const stimuli::ConvexMesh& mesh, bool
   return ReferenceDepth{glm::dot(normal, edge.from - probe.tip), normal};
 }
 
-std::optional<MinkowskiEntry> entry_at(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
-  std::optional<MinkowskiEntry> best;
+std::optional<EntryFeature> entry_feature(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
+  std::optional<EntryFeature> best;
   double least = std::numeric_limits<double>::infinity(), second = least;
   const auto look = [&](bool is_edge, std::uint32_t i) {
-    const auto at = facet_of_sum(mesh, is_edge, i, probe);
+    const auto at = measure_feature(mesh, is_edge, i, probe);
     if (!at) return;
     second = std::min(second, std::max(at->depth, least));
     if (at->depth < least) {
       second = least;
       least = at->depth;
-      best = MinkowskiEntry{is_edge, i};
+      best = EntryFeature{is_edge, i};
     }
   };
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) look(false, i);
   for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) look(true, i);
-  // Where another is as near as this, rounding decides.
+  // Where another depth is this near, rounding decides.
   if (second - least < kNeighbouringDepths * mesh.size()) return std::nullopt;
   return best;
 }

@@ -1,7 +1,7 @@
-// The exact ways out, against dense sampling of directions, small changes of direction, the
-// distances of stimuli/signed_distance and the brute-force reference.
+// The exact local penetration depths, against dense sampling of directions, small changes of
+// direction, the distances of stimuli/signed_distance and the brute-force reference.
 
-#include "rendering/accuracy/ways_out.h"
+#include "rendering/accuracy/local_depths.h"
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ std::vector<LineProbe> inside_poses(const stimuli::ObjectSpec& spec, int count,
     const double length = poses.size() % 4 == 0 ? 0 : uniform(random, 0.01, 0.15);
     const LineProbe probe = probe_at(uniform(random, 0, 0.045) * random_direction(random),
                                      random_direction(random), length, random.unit());
-    if (!ways_out(spec, probe).empty()) poses.push_back(probe);
+    if (!local_depths(spec, probe).empty()) poses.push_back(probe);
   }
   return poses;
 }
@@ -55,36 +55,37 @@ std::vector<Vec3> directions(int count) {
   return all;
 }
 
-TEST(WaysOut, NoDirectionIsShorterThanTheLeast) {
+TEST(LocalDepths, NoDirectionIsShorterThanTheLeast) {
   const auto sample = directions(4000);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 1)) {
       double sampled = 1;
       for (const Vec3& n : sample) sampled = std::min(sampled, depth_along(spec, probe, n));
-      EXPECT_LE(ways_out(spec, probe).front().depth, sampled + 1e-15) << static_cast<int>(shape);
+      EXPECT_LE(local_depths(spec, probe).front().depth, sampled + 1e-15)
+          << static_cast<int>(shape);
     }
   }
 }
 
-TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
+TEST(LocalDepths, EachIsALocalMinimumWithTheDepthItSays) {
   stimuli::Random random(2);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 3)) {
-      for (const WayOut& way : ways_out(spec, probe)) {
-        EXPECT_NEAR(glm::length(way.normal), 1, 1e-14);
-        EXPECT_NEAR(depth_along(spec, probe, way.normal), way.depth, 1e-14);
+      for (const LocalDepth& local : local_depths(spec, probe)) {
+        EXPECT_NEAR(glm::length(local.normal), 1, 1e-14);
+        EXPECT_NEAR(depth_along(spec, probe, local.normal), local.depth, 1e-14);
         for (const double step : {1e-3, 1e-5}) {
           for (int i = 0; i < 20; ++i) {
-            const Vec3 n = glm::normalize(way.normal + step * random_direction(random));
-            EXPECT_GE(depth_along(spec, probe, n), way.depth - 1e-15)
+            const Vec3 n = glm::normalize(local.normal + step * random_direction(random));
+            EXPECT_GE(depth_along(spec, probe, n), local.depth - 1e-15)
                 << static_cast<int>(shape) << " step " << step;
           }
         }
         // The contact is on the surface: on the plane, and not outside along any other direction.
-        const Vec3 touch =
-            probe.tip + way.place * (probe.tail - probe.tip) + way.depth * way.normal;
+        const Vec3 touch = probe.tip + local.probe_fraction * (probe.tail - probe.tip) +
+                           local.depth * local.normal;
         EXPECT_NEAR(stimuli::signed_distance(spec, touch).distance, 0, 1e-13)
             << static_cast<int>(shape);
       }
@@ -92,7 +93,7 @@ TEST(WaysOut, EachIsALocalMinimumWithTheDepthItSays) {
   }
 }
 
-TEST(WaysOut, AreThoseOfAFinePolyhedron) {
+TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
   // Each has its like among the polyhedron's, both ways round, but for a few that are about to be
   // born or to vanish.
   for (const stimuli::ShapeKind shape : kShapes) {
@@ -101,10 +102,10 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
     spec.segments = 720;
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
     int all = 0, made_up = 0, missing = 0;
-    const auto alone = [](const WayOut& way, const std::vector<WayOut>& others) {
-      for (const WayOut& other : others) {
-        if (glm::dot(way.normal, other.normal) > std::cos(0.05) &&
-            std::abs(way.depth - other.depth) < 1e-4) {
+    const auto alone = [](const LocalDepth& local, const std::vector<LocalDepth>& others) {
+      for (const LocalDepth& other : others) {
+        if (glm::dot(local.normal, other.normal) > std::cos(0.05) &&
+            std::abs(local.depth - other.depth) < 1e-4) {
           return 0;
         }
       }
@@ -112,11 +113,12 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
     };
     for (const LineProbe& probe : inside_poses(spec, 300, 5)) {
       if (reference_depth(mesh, probe).depth < 1e-3) continue;
-      const auto analytic = ways_out(spec, probe);
-      const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
-      for (const WayOut& way : analytic) made_up += alone(way, polyhedral);
-      // Near the middle a fine polyhedron has a way out through every other facet.
-      for (const WayOut& way : polyhedral) missing += way.depth < 5e-3 ? alone(way, analytic) : 0;
+      const auto analytic = local_depths(spec, probe);
+      const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
+      for (const LocalDepth& local : analytic) made_up += alone(local, polyhedral);
+      // Near the middle a fine polyhedron has a local minimum through every other facet.
+      for (const LocalDepth& local : polyhedral)
+        missing += local.depth < 5e-3 ? alone(local, analytic) : 0;
       all += static_cast<int>(analytic.size());
     }
     EXPECT_LE(made_up, all / 50) << static_cast<int>(shape) << " of " << all;
@@ -124,14 +126,14 @@ TEST(WaysOut, AreThoseOfAFinePolyhedron) {
   }
 }
 
-TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
+TEST(LocalDepths, OfAPointTheLeastIsTheSignedDistance) {
   stimuli::Random random(6);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (int i = 0; i < 500; ++i) {
       const Vec3 p = uniform(random, 0, 0.06) * random_direction(random);
       const stimuli::SurfaceDistance distance = stimuli::signed_distance(spec, p);
-      const auto ways = ways_out(spec, {p, p});
+      const auto ways = local_depths(spec, {p, p});
       ASSERT_EQ(ways.empty(), distance.distance > 0);
       if (ways.empty()) continue;
       EXPECT_NEAR(ways.front().depth, -distance.distance, 1e-15);
@@ -140,7 +142,7 @@ TEST(WaysOut, OfAPointTheLeastIsTheSignedDistance) {
   }
 }
 
-TEST(WaysOut, SegmentsThatStayOutHaveNone) {
+TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
   // The reference on a fine mesh inside of the shape says who overlaps for certain.
   stimuli::Random random(7);
   for (const stimuli::ShapeKind shape : kShapes) {
@@ -152,13 +154,13 @@ TEST(WaysOut, SegmentsThatStayOutHaveNone) {
     for (int i = 0; i < 2000; ++i) {
       const LineProbe probe = probe_at(uniform(random, 0, 0.09) * random_direction(random),
                                        random_direction(random), 0.1, random.unit());
-      const bool inside = !ways_out(spec, probe).empty();
+      const bool inside = !local_depths(spec, probe).empty();
       const double depth = reference_depth(mesh, probe).depth;
       if (depth > 0) {
         EXPECT_TRUE(inside);
       }
       // Between mesh and shape there are at most 0.02 mm.
-      if (inside && ways_out(spec, probe).front().depth > 5e-5) {
+      if (inside && local_depths(spec, probe).front().depth > 5e-5) {
         EXPECT_GT(depth, 0);
       }
       out += inside ? 0 : 1;
@@ -167,7 +169,7 @@ TEST(WaysOut, SegmentsThatStayOutHaveNone) {
   }
 }
 
-TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
+TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
   stimuli::Random random(8);
   for (const stimuli::ShapeKind shape : kShapes) {
     stimuli::ObjectSpec spec = primitive(shape);
@@ -177,42 +179,43 @@ TEST(WaysOut, OfAPolyhedronTheLeastIsTheReference) {
     for (const LineProbe& probe : inside_poses(spec, 300, 9)) {
       const ReferenceDepth reference = reference_depth(mesh, probe);
       if (reference.depth <= 0) continue;
-      const auto all = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+      const auto all = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
       ASSERT_FALSE(all.empty());
       EXPECT_NEAR(all.front().depth, reference.depth, 1e-16);
-      const auto near = ways_out(mesh, probe, reference.normal, 0.1);
+      const auto near = local_depths(mesh, probe, reference.normal, 0.1);
       ASSERT_FALSE(near.empty());
       EXPECT_NEAR(glm::dot(near.front().normal, reference.normal), 1, 1e-12);
-      for (const WayOut& way : all) {
+      for (const LocalDepth& local : all) {
         // Moved out it touches: it neither penetrates nor floats.
-        const LineProbe ideal = testing::moved(probe, way.depth * way.normal);
+        const LineProbe ideal = testing::moved(probe, local.depth * local.normal);
         EXPECT_LE(reference_depth(mesh, ideal).depth, 1e-14);
         EXPECT_LE(reference_gap(mesh, ideal), 1e-14);
-        const Vec3 touch = ideal.tip + way.place * (ideal.tail - ideal.tip);
+        const Vec3 touch = ideal.tip + local.probe_fraction * (ideal.tail - ideal.tip);
         EXPECT_LE(reference_gap(mesh, {touch, touch}), 1e-13);
       }
     }
   }
 }
 
-TEST(WaysOut, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
+TEST(LocalDepths, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
   const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::cube);
   const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
-    const auto analytic = ways_out(spec, probe);
-    const auto polyhedral = ways_out(mesh, probe, Vec3(0, 0, 1), 4);
+    const auto analytic = local_depths(spec, probe);
+    const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
     ASSERT_EQ(analytic.size(), polyhedral.size());
     for (std::size_t i = 0; i < analytic.size(); ++i) {
       EXPECT_NEAR(analytic[i].depth, polyhedral[i].depth, 1e-16);
-      EXPECT_NEAR(analytic[i].place, polyhedral[i].place, 1e-12);
+      EXPECT_NEAR(analytic[i].probe_fraction, polyhedral[i].probe_fraction, 1e-12);
       EXPECT_NEAR(analytic[i].flat_angle, polyhedral[i].flat_angle, 1e-9);
     }
   }
 }
 
-TEST(WaysOut, RefusesWhatIsNoPrimitive) {
-  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::mesh), LineProbe()), std::invalid_argument);
-  EXPECT_THROW(ways_out(primitive(stimuli::ShapeKind::compound), LineProbe()),
+TEST(LocalDepths, RefusesWhatIsNoPrimitive) {
+  EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::mesh), LineProbe()),
+               std::invalid_argument);
+  EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::compound), LineProbe()),
                std::invalid_argument);
 }
 

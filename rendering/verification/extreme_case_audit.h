@@ -1,5 +1,6 @@
 #pragma once
-// What the extreme cases share. Included by extreme_*.cpp alone.
+// What the extreme cases share: a scene whose every tick is audited. Included by extreme_*.cpp
+// alone.
 
 #include <algorithm>
 #include <cstdint>
@@ -17,13 +18,14 @@ namespace palpate::rendering::extremes {
 
 using MeshPointer = std::shared_ptr<const stimuli::ConvexMesh>;
 
-inline constexpr double kShare = 1e-9;  // of the object's size: errors of lengths up to it are none
+inline constexpr double kRounding =
+    1e-9;  // of the object's size: smaller errors of lengths are none
 inline constexpr const char* kLengthError = "worst error of a length, sizes of the object";
 
-/// One object under a renderer, every tick held against the reference.
-class Watch {
+/// One object under a renderer, every tick compared with the reference.
+class AuditedScene {
  public:
-  Watch(const Renderer& renderer, MeshPointer mesh, const Pose& pose = {})
+  AuditedScene(const Renderer& renderer, MeshPointer mesh, const Pose& pose = {})
       : renderer_(renderer),
         mesh_(std::move(mesh)),
         pose_(pose),
@@ -40,15 +42,15 @@ class Watch {
 
   Rendering tick(const LineProbe& world) { return renderer_.tick(scene_, state_, world, 1e-3); }
 
-  /// A tick that must be right; the object's frame.
-  Rendering audited(const LineProbe& local) {
+  /// A tick that must be right; probe in the object's frame.
+  Rendering audited_tick(const LineProbe& local) {
     const LineProbe world = to_world(local);
     Rendering r = tick(world);
-    const TickAudit audit = audit_tick(scene_, renderer_, world, r, kShare);
+    const TickAudit audit = audit_tick(scene_, renderer_, world, r, kRounding);
     ++result_.ticks;
     result_.in_contact += r.contacts > 0;
-    // What rounding adds far from the origin and along a long probe is not the object's.
-    const double rounding = audit.tolerance - kShare * mesh_->size();
+    // The rounding that a distance from the origin and a long probe add does not count.
+    const double rounding = audit.tolerance - kRounding * mesh_->size();
     const double error = std::max({audit.missed, audit.penetrates, audit.floats, audit.shallow});
     result_.worst = std::max(result_.worst, std::max(0.0, error - rounding) / mesh_->size());
     if ((!audit.good() || r.faults != 0) && result_.detail.empty()) {
@@ -70,7 +72,7 @@ class Watch {
   /// Errors of lengths so far.
   ExtremeResult result() const {
     ExtremeResult result = result_;
-    result.limit = kShare;
+    result.limit = kRounding;
     result.passed = result.detail.empty();
     return result;
   }
@@ -84,8 +86,8 @@ class Watch {
   ExtremeResult result_;
 };
 
-/// The sum of many.
-class Several {
+/// The worst of several results.
+class CombinedResult {
  public:
   void add(const ExtremeResult& one) {
     all_.worst = std::max(all_.worst, one.worst);
@@ -94,7 +96,7 @@ class Several {
     all_.in_contact += one.in_contact;
     if (!one.passed && all_.detail.empty()) all_.detail = one.detail;
   }
-  /// One that touched nothing at all shows nothing.
+  /// A case without any contact proves nothing.
   ExtremeResult result() const {
     ExtremeResult all = all_;
     if (all.in_contact == 0) all.detail = "nothing was touched";
@@ -120,7 +122,7 @@ ExtremeResult large_object(const Renderer& renderer);
 ExtremeResult far_object(const Renderer& renderer);
 ExtremeResult million_triangles(const Renderer& renderer);
 
-// By the way that the hand takes.
+// By motion of the hand.
 ExtremeResult thin_plate(const Renderer& renderer);
 ExtremeResult parallel_edge(const Renderer& renderer);
 ExtremeResult through_vertices(const Renderer& renderer);
@@ -130,7 +132,7 @@ ExtremeResult starts_inside(const Renderer& renderer);
 ExtremeResult teleports(const Renderer& renderer);
 ExtremeResult bad_poses(const Renderer& renderer);
 
-// By the energy of a way that ends where it began.
+// By energy over a closed path.
 ExtremeResult closed_paths(const Renderer& renderer);
 ExtremeResult closed_paths_lossy(const Renderer& renderer);
 ExtremeResult closed_paths_in_the_blend(const Renderer& renderer);

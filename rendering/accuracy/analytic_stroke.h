@@ -1,0 +1,39 @@
+#pragma once
+// A hand that strokes an analytic shape at a prescribed depth: the paths on which methods are
+// compared. Frame of the shape, SI units.
+
+#include <cstdint>
+#include <vector>
+
+#include "rendering/probe.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::rendering {
+
+/// A pose for each tick of 1 ms. The first `approach` poses come in from the outside; from then on
+/// the probe is in contact with the analytic shape.
+struct AnalyticStroke {
+  std::vector<LineProbe> poses;
+  std::size_t approach = 0;
+};
+
+struct AnalyticStrokeSettings {
+  std::uint64_t seed = 1;
+  int contact_ticks = 1000;
+  double length = 0.12;   ///< m, of the stylus; 0: a point
+  double speed = 0.1;     ///< m/s, of the point that the hand strokes
+  double shallow = 1e-3;  ///< m; least and
+  double deep = 2e-3;     ///< m; most depth while in contact
+};
+
+/// The stroked point wanders at the given speed: a direction from the middle, at 30 mm, with a
+/// heading that turns at random (0.02 rad a tick, standard deviation). The stylus is stroked at 0
+/// to 40 mm from its tip (period 1.9 s), spins about the direction (2.9 s a turn) and tilts by 0.8
+/// rad to and fro (3.1 s), with phases by the seed: so tip and side touch, at faces, edges and
+/// rims. It is pressed so that the exact least depth runs between `shallow` and `deep` (period 0.7
+/// s), to 1 nm. It comes in along the first direction at the same speed from 3 mm outside. The same
+/// for every tessellation.
+AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive,
+                               const AnalyticStrokeSettings& settings);
+
+}  // namespace palpate::rendering
