@@ -4,9 +4,10 @@
 #include <cmath>
 #include <sstream>
 
+#include "analysis/report/html_page.h"
+#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
-#include "runner/commands/shared/page.h"
 
 namespace palpate::runner {
 namespace {
@@ -61,11 +62,11 @@ analysis::Table gain_table(const StabilityReport& report) {
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
     const LoopSettings& s = g.loop.settings;
-    table.rows.push_back({to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
-                          significant(s.rate), significant(g.damping),
-                          significant(1e6 * s.resolution), std::to_string(s.delay),
-                          significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
-                          significant(g.with), significant(g.with / g.without)});
+    table.rows.push_back(
+        {protocols::to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
+         significant(s.rate), significant(g.damping), significant(1e6 * s.resolution),
+         std::to_string(s.delay), significant(g.damping * s.rate / (0.5 + s.delay)),
+         significant(g.without), significant(g.with), significant(g.with / g.without)});
   }
   return table;
 }
@@ -129,7 +130,7 @@ std::vector<std::string> how_to_read() {
 
 Json loop_json(const LoopCase& loop) {
   const LoopSettings& s = loop.settings;
-  return {{"scene", to_string(loop.situation)},
+  return {{"scene", protocols::to_string(loop.situation)},
           {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
@@ -259,14 +260,20 @@ Json stability_json(const StabilityReport& report) {
 }
 
 std::string stability_page(const StabilityReport& report) {
-  ReportPage page;
-  page.title = "At what stiffness does it buzz?";
-  page.sentences = stability_sentences(report);
-  page.figures.push_back({stability_figure(report), ""});
-  if (!report.integrators.empty()) page.figures.push_back({integrator_figure(report), ""});
-  page.tables = stability_tables(report);
-  page.notes = how_to_read();
-  return page_html(page);
+  analysis::HtmlPage page("At what stiffness does it buzz?");
+  analysis::put_list(page.below_title(), stability_sentences(report));
+  page.put_figure_section(stability_figure(report), "Boundaries");
+  if (!report.integrators.empty()) {
+    page.put_figure_section(integrator_figure(report), "Integrators");
+  }
+  page.begin_section("tables", "The numbers", "Numbers");
+  for (const analysis::Table& table : stability_tables(report))
+    analysis::put_table(page.body(), table);
+  page.end_section();
+  page.begin_section("reading", "How to read it", "How to read it");
+  analysis::put_list(page.body(), how_to_read());
+  page.end_section();
+  return page.html("palpate " PALPATE_VERSION ".");
 }
 
 }  // namespace palpate::runner
