@@ -40,7 +40,7 @@ FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, 
   axis.grid = false;
   axis.names = true;
   for (std::size_t i = 0; i < shown; ++i) {
-    axis.ticks.push_back({static_cast<double>(i) + 0.5, printable(names[i], 160)});
+    axis.ticks.push_back({static_cast<double>(i) + 0.5, stimuli::printable(names[i], 160)});
   }
   return axis;
 }

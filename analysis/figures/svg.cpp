@@ -178,7 +178,7 @@ double text_width(std::string_view text, double size, bool bold) {
 }
 
 std::string fitting(std::string_view text, double width, double size) {
-  std::size_t columns = palpate::width(text);
+  std::size_t columns = analysis::width(text);
   while (columns > 1 && text_width(shortened(text, columns), size) > width) --columns;
   return shortened(text, columns);
 }
