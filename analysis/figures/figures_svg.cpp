@@ -36,7 +36,9 @@ class Drawing {
     const double drawn = y + 8;
     y = draw_notes(y + 16) + margin_ - 10;
     std::optional<Svg::Part> shown;
-    if (in_page_) shown = Svg::Part{below_title_, drawn};
+    // A page has margins of its own.
+    if (in_page_)
+      shown = Svg::Part{margin_ - 2, std::min(total_, total_ - margin_ + 14), below_title_, drawn};
     Svg page;
     page.rect(0, 0, total_, y, colour(Role::page));
     page.append(svg_);
@@ -103,6 +105,7 @@ class Drawing {
   }
 
   double subtitle(double y) {
+    if (figure_.label.empty() && figure_.subtitle.empty()) return y;
     double x = margin_;
     if (!figure_.label.empty()) {
       const double pill = text_width(figure_.label, 12, true) + 44;

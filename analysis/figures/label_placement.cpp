@@ -1,6 +1,7 @@
 #include "analysis/figures/label_placement.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -12,7 +13,7 @@ namespace {
 
 constexpr double kPoint = 7;               // px: half of a point with a little air
 constexpr double kBeside = 11;             // px from the point to its label
-constexpr double kLeft = 12, kRight = 20;  // px beside the panel that a label may take
+constexpr double kLeft = 12, kRight = 12;  // px beside the panel that a label may take
 
 /// In px from the panel's upper left corner, y down.
 struct Box {
@@ -27,10 +28,12 @@ class Placement {
  public:
   Placement(const Panel& panel, double width) : panel_(panel), width_(width) {
     for (const Mark& mark : panel.marks) {
-      if (mark.kind == Mark::Kind::line || mark.kind == Mark::Kind::interval) {
-        const auto [left, right] = std::ranges::minmax(mark.x);
-        const auto [low, high] = std::ranges::minmax(mark.y);
-        taken_.push_back({x(left) - 2, x(right) + 2, y(high) - 2, y(low) + 2});
+      if (mark.kind == Mark::Kind::line) {
+        for (std::size_t i = 1; i < mark.x.size(); ++i) {
+          take_segment(mark.x[i - 1], mark.y[i - 1], mark.x[i], mark.y[i]);
+        }
+      } else if (mark.kind == Mark::Kind::interval) {
+        take_segment(mark.x[0], mark.y[0], mark.x[0], mark.y[1]);
       } else if (mark.kind == Mark::Kind::label) {
         const double px = x(mark.x[0]), py = y(mark.y[0]);
         taken_.push_back({px - kPoint, px + kPoint, py - kPoint, py + kPoint});
@@ -63,6 +66,19 @@ class Placement {
   }
 
  private:
+  void take_segment(double x0, double y0, double x1, double y1) {
+    constexpr int kPieces = 4;  // of one that slants: a box around the whole would hide free room
+    const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
+    for (int i = 0; i < pieces; ++i) {
+      const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
+      const auto [left, right] =
+          std::minmax({x(std::lerp(x0, x1, from)), x(std::lerp(x0, x1, to))});
+      const auto [top, bottom] =
+          std::minmax({y(std::lerp(y0, y1, from)), y(std::lerp(y0, y1, to))});
+      taken_.push_back({left - 2, right + 2, top - 2, bottom + 2});
+    }
+  }
+
   double x(double value) const {
     return (value - panel_.x.low) / (panel_.x.high - panel_.x.low) * width_;
   }

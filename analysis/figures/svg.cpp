@@ -141,14 +141,18 @@ std::string Svg::document(double width, double height, std::string_view title,
                           std::string_view description, std::string_view id,
                           const std::optional<Part>& shown) const {
   const auto whole_px = [](double length) { return std::to_string(static_cast<int>(length)); };
-  const Part part = shown.value_or(Part{0, height});
-  const std::string w = whole_px(width), h = whole_px(part.bottom - part.top), name = escaped(id);
-  std::string size = attribute("width", w) + attribute("height", h) +
-                     attribute("viewBox", "0 " + whole_px(part.top) + " " + w + " " + h);
-  if (shown) size += attribute("data-whole", "0 0 " + w + " " + whole_px(height));
+  const Part part = shown.value_or(Part{0, width, 0, height});
+  const std::string w = whole_px(part.right - part.left), h = whole_px(part.bottom - part.top);
+  const std::string name = escaped(id);
+  std::string size =
+      attribute("width", w) + attribute("height", h) +
+      attribute("viewBox", whole_px(part.left) + " " + whole_px(part.top) + " " + w + " " + h);
+  if (shown) {
+    size += attribute("data-whole", "0 0 " + whole_px(width) + " " + whole_px(height));
+  }
   return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + size +
-         " style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
-         "px;max-width:" + w + "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
+         " style=\"min-width:" + whole_px(0.65 * (part.right - part.left)) + "px;max-width:" + w +
+         "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
          "-description\" font-family=\"" + std::string(kFont) + "\">\n<title id=\"" + name +
          "-title\">" + escaped(title) + "</title>\n<desc id=\"" + name + "-description\">" +
          escaped(description) + "</desc>\n" + body_ + "</svg>\n";

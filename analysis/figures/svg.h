@@ -45,9 +45,8 @@ class Svg {
   /// Puts the elements of another on top.
   void append(const Svg& other) { body_ += other.body_; }
 
-  /// From top to bottom, px.
   struct Part {
-    double top = 0, bottom = 0;
+    double left = 0, right = 0, top = 0, bottom = 0;  ///< px
   };
 
   /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small,

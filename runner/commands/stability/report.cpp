@@ -62,11 +62,11 @@ analysis::Table gain_table(const StabilityReport& report) {
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
     const LoopSettings& s = g.loop.settings;
-    table.rows.push_back(
-        {protocols::to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
-         significant(s.rate), significant(g.damping), significant(1e6 * s.resolution),
-         std::to_string(s.delay), significant(g.damping * s.rate / (0.5 + s.delay)),
-         significant(g.without), significant(g.with), significant(g.with / g.without)});
+    table.rows.push_back({to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
+                          significant(s.rate), significant(g.damping),
+                          significant(1e6 * s.resolution), std::to_string(s.delay),
+                          significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
+                          significant(g.with), significant(g.with / g.without)});
   }
   return table;
 }
@@ -130,7 +130,7 @@ std::vector<std::string> how_to_read() {
 
 Json loop_json(const LoopCase& loop) {
   const LoopSettings& s = loop.settings;
-  return {{"scene", protocols::to_string(loop.situation)},
+  return {{"scene", to_string(loop.situation)},
           {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
