@@ -119,7 +119,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   print_summary(protocol, store.path(), simulated, plan.seed, progress, took.count());
   if (progress.recorded < progress.expected) {
-    std::fprintf(stderr, "stopped; the same command goes on from here\n");
+    std::fprintf(stderr, "stopped; the same command resumes from here\n");
     return 1;
   }
   return 0;

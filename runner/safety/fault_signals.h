@@ -1,5 +1,5 @@
 #pragma once
-// Signals that end the program, or ask it to: the forces go off first.
+// Signal handlers: zero force before any signal ends the program.
 
 #include <atomic>
 

@@ -16,7 +16,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kZeroEvery_ns = 1'000'000;  // while the runner is silent
-constexpr std::int64_t kSpin_ns = 20'000;          // after a reading its command is near
+constexpr std::int64_t kSpin_ns = 20'000;  // busy wait: the command soon follows its reading
 
 std::int64_t to_ns(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
@@ -134,7 +134,7 @@ class Guard {
   bool armed_ = false, answered_last_ = false;
 };
 
-/// Nothing of the runner's but the shared memory: no signal of its terminal, no file, no lock.
+/// Detaches from the runner but for the shared memory: from its terminal's signals and its files.
 void stand_alone() {
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGPIPE, SIGALRM, SIGUSR1, SIGUSR2})

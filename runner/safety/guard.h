@@ -23,7 +23,7 @@ struct GuardSettings {
 
 using DeviceFactory = std::function<std::unique_ptr<Device>()>;
 
-/// The guard's whole life, in a process that has just been forked; returns when it is to exit.
+/// Runs the guard in a process that has just been forked; returns when the process is to exit.
 /// Forces pass only once a zero command has come from a runner that knows of every time the guard
 /// has cut them off, so nothing stale is ever felt. \param runner  process id
 void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,

@@ -1,6 +1,6 @@
 #pragma once
-// What the servo knows of a haptic device. The servo calls read, then write, once a tick; both must
-// be quick and must not throw: trouble is reported as faults.
+// A haptic device as the servo sees it. The servo calls read, then write, once a tick; both must be
+// quick and must not throw: trouble is reported in the reading.
 
 #include <cstdint>
 #include <string>
@@ -58,13 +58,13 @@ class Device {
   virtual DeviceReading read() noexcept = 0;
   /// Forces on the hand, N: device 1 at the tip, device 2 at the tail (eq. 1).
   virtual void write(const Vec3& device1, const Vec3& device2) noexcept = 0;
-  /// Gets a device back that was unplugged or fell silent; nothing to do for one that is well.
-  /// Takes as long as it takes, and no force is shown meanwhile: not for the servo's thread.
+  /// Opens a device again that was unplugged or fell silent; does nothing where it works.
+  /// May take seconds, without forces: never in the servo thread.
   /// Between reads and writes. \throws std::runtime_error saying what is in the way
   virtual void reopen() {}
 };
 
-/// Where the time of a session comes from: the machine, or simulation.
+/// The session clock: the computer's (RealClock) or a simulated one.
 class Clock {
  public:
   virtual ~Clock() = default;
@@ -73,7 +73,7 @@ class Clock {
   virtual void wait_until(std::int64_t when_ns) noexcept = 0;
 };
 
-/// Goes where it is told: a simulated session takes no longer than it must.
+/// Jumps to the time that is waited for: a simulated session runs as fast as the processor goes.
 class VirtualClock final : public Clock {
  public:
   explicit VirtualClock(std::int64_t start_ns = 0) : now_(start_ns) {}

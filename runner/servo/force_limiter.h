@@ -1,6 +1,6 @@
 #pragma once
-// The last stage before the hand: whatever comes in, what goes out is finite, small and changes
-// slowly, or zero.
+// The last step before the device: limits the size and the change of commanded forces; zero where a
+// force is not finite.
 
 #include "stimuli/vec.h"
 

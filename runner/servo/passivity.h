@@ -30,7 +30,7 @@ class PassivityController {
 
   /// The damping forces on the hand, N, to be added to `scene`; they never push along the motion.
   /// \param at     where the devices are
-  /// \param scene  N, what would be commanded without this stage, after the limits
+  /// \param scene  N, what would be commanded without the controller, after the limits
   DeviceForces damping(const Ends& at, const DeviceForces& scene) noexcept;
   /// What was commanded in the end, N: the next tick's energy is counted with it.
   void commanded(const DeviceForces& forces) noexcept { commanded_ = forces; }

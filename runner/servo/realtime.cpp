@@ -68,24 +68,24 @@ AwakeProcessors::~AwakeProcessors() {
   if (file_ >= 0) close(file_);
 }
 
-RealtimeRights request_realtime(const RealtimeSettings& wish) {
+RealtimeRights request_realtime(const RealtimeSettings& settings) {
   RealtimeRights rights;
   // An ordinary thread's sleep may be prolonged by 50 us to save wake-ups. Needs no right.
   prctl(PR_SET_TIMERSLACK, 1UL);
-  if (wish.priority > 0) {
+  if (settings.priority > 0) {
     sched_param param{};
-    param.sched_priority = wish.priority;
+    param.sched_priority = settings.priority;
     const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
     rights.fifo = error == 0;
     if (error != 0) {
       add(rights.missing,
           std::string("No real-time priority (") + std::strerror(error) +
               "): other programs can make ticks late; grant CAP_SYS_NICE or a limit 'rtprio' of " +
-              std::to_string(wish.priority) +
+              std::to_string(settings.priority) +
               " (members of the package's group 'palpate' have it).");
     }
   }
-  if (wish.lock_memory) {
+  if (settings.lock_memory) {
     rights.locked_memory = lock_memory();
     if (!rights.locked_memory) {
       add(rights.missing,
@@ -94,15 +94,15 @@ RealtimeRights request_realtime(const RealtimeSettings& wish) {
               "limit 'memlock' (members of the package's group 'palpate' have it).");
     }
   }
-  if (wish.core >= 0) {
+  if (settings.core >= 0) {
     cpu_set_t set;
     CPU_ZERO(&set);
-    if (wish.core < CPU_SETSIZE) CPU_SET(wish.core, &set);
+    if (settings.core < CPU_SETSIZE) CPU_SET(settings.core, &set);
     const int error = pthread_setaffinity_np(pthread_self(), sizeof set, &set);
     if (error == 0) {
-      rights.core = wish.core;
+      rights.core = settings.core;
     } else {
-      add(rights.missing, "Processor " + std::to_string(wish.core) + " was not given (" +
+      add(rights.missing, "Processor " + std::to_string(settings.core) + " was not given (" +
                               std::strerror(error) + "): the thread may move between processors.");
     }
   }

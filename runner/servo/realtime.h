@@ -1,5 +1,5 @@
 #pragma once
-// The machine's time, and the rights that make ticks come in time.
+// The computer's clock, and real-time scheduling and locked memory, which make ticks come in time.
 
 #include <string>
 
@@ -44,6 +44,6 @@ class AwakeProcessors {
 };
 
 /// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.
-RealtimeRights request_realtime(const RealtimeSettings& wish);
+RealtimeRights request_realtime(const RealtimeSettings& settings);
 
 }  // namespace palpate::runner

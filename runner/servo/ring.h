@@ -1,4 +1,5 @@
 #pragma once
+// The queue that carries every sample from the servo thread to the session.
 
 #include <atomic>
 #include <bit>

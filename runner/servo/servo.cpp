@@ -31,7 +31,7 @@ Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limit
 
 void Servo::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                     const HomeZone& home) {
-  own_ = std::make_unique<Stage>(scene, renderer, home);
+  own_ = std::make_unique<TrialScene>(scene, renderer, home);
   begin(*own_);
   due_ns_ = clock_.now_ns();
   sample_.time_ns = 0;  // the first period is the nominal one
@@ -43,8 +43,8 @@ void Servo::start() noexcept {
   if (due_ns_ < now) due_ns_ += period_ns_;
 }
 
-void Servo::begin(Stage& stage) noexcept {
-  stage_ = &stage;
+void Servo::begin(TrialScene& shown) noexcept {
+  shown_ = &shown;
   rested_ = 0;
   quality_ = {};
   limiter_.release();
@@ -61,7 +61,7 @@ void Servo::clear_fault() noexcept {
 }
 
 bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
-  const HomeZone& home = stage_->home;
+  const HomeZone& home = shown_->home;
   const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home.stillness;
   if (!still) {
     rested_ = 0;
@@ -93,7 +93,7 @@ void Servo::keep_time() noexcept {
 
 void Servo::warm_up() noexcept {
   if (!warm_ || sample_.phase != Phase::feeling) return;
-  stage_->renderer->tick(stage_->scene, stage_->shadow, sample_.probe, period_);
+  shown_->renderer->tick(shown_->scene, shown_->shadow, sample_.probe, period_);
   sample_.warm_up_ns = clock_.now_ns() - sample_.time_ns;
 }
 
@@ -163,7 +163,7 @@ const Sample& Servo::tick() noexcept {
     limiter_.release();  // the ramp begins with the forces
     return sample_;
   }
-  sample_.rendering = stage_->renderer->tick(stage_->scene, stage_->state, sample_.probe,
+  sample_.rendering = shown_->renderer->tick(shown_->scene, shown_->state, sample_.probe,
                                              static_cast<double>(sample_.period_ns) * 1e-9);
   sample_.faults |= sample_.rendering.faults;
   if (sample_.rendering.faults & rendering::render_fault::kNonFinite) limiter_.trip();
@@ -182,7 +182,7 @@ ServoQuality Servo::stop() noexcept {
   sample_.waiting = Waiting::nothing;
   sample_.device1 = sample_.device2 = Vec3(0);
   sample_.rendering = {};
-  stage_ = nullptr;
+  shown_ = nullptr;
   return std::exchange(quality_, {});
 }
 

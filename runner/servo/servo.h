@@ -1,6 +1,6 @@
 #pragma once
-// The servo tick: device.read -> renderer -> force limit -> device.write. The same code for a
-// simulated participant (as fast as the processor goes) and a live one (paced by the clock).
+// The servo loop's tick: device.read -> renderer -> force limits -> device.write. The same code for
+// a simulated participant (as fast as the processor goes) and a live one (paced by the clock).
 
 #include <atomic>
 #include <cstdint>
@@ -25,9 +25,9 @@ struct WorkspaceMap {
   Vec3 to_device(const Vec3& virtual_point) const { return virtual_point / scale + centre; }
 };
 
-/// What one trial puts before the stylus, with the memory that rendering it needs.
-struct Stage {
-  Stage(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where)
+/// The scene of one trial with its renderer and the renderer's state.
+struct TrialScene {
+  TrialScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where)
       : scene(what),
         renderer(&how),
         state(scene.initial_state()),
@@ -36,7 +36,7 @@ struct Stage {
 
   const rendering::Scene scene;
   const rendering::Renderer* renderer;
-  rendering::RenderState state;   ///< the servo's alone while it has the stage
+  rendering::RenderState state;   ///< the servo's alone while the scene is shown
   rendering::RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
 };
@@ -54,31 +54,32 @@ class Servo final : public TickSource {
   const Sample& next() noexcept override { return tick(); }
   ServoQuality stop() noexcept override;
 
-  /// As prepare, but with what was made elsewhere: no allocation, and time runs on. `stage` must
-  /// outlive the next begin(), prepare() or stop().
-  void begin(Stage& stage) noexcept;
-  /// Zero force from the tick under way on, until clear_fault(). From any thread or signal handler.
+  /// As prepare, but without allocating and without a new start of the ticks' times. `shown` must
+  /// live until the next begin(), prepare() or stop().
+  void begin(TrialScene& shown) noexcept;
+  /// Zero force from the current tick on, until clear_fault(). From any thread or signal handler.
   void emergency_zero() noexcept { emergency_.store(true); }
   /// The experimenter allows forces again. From any thread.
   void clear_fault() noexcept;
   /// The same, but zero force that was asked for stays asked for.
   void clear_trip() noexcept { clear_.store(true); }
 
-  /// Takes out the energy that sampling feeds to the hand; off unless asked for. Before start().
+  /// Turns on the passivity controller, which dissipates the energy that sampling feeds to the
+  /// hand. Before start().
   void control_passivity() {
     constexpr double kLightestEnd = 0.1;  // kg, of a stylus at its tip
     passivity_.emplace(PassivitySettings{0.5 * kLightestEnd / period_}, period_);
   }
 
-  /// Each tick renders the last one again, for nobody, before it reads the device: what other
-  /// programs have put out of the processor's caches meanwhile is back when the reading comes, and
-  /// the command follows it sooner. For ticks with sleep between them. Before start().
+  /// Before it reads the device, each tick renders the last one again and discards the result: the
+  /// scene is then in the processor's caches, from which other programs may have displaced it, and
+  /// the command follows the reading sooner. For ticks with sleep between them. Before start().
   void keep_warm() noexcept { warm_ = true; }
 
-  /// The next tick is due within a period, and all are a quarter to three quarters of a period past
-  /// its multiples, as chance has it: at some of these the kernel has a tick of its own (Linux 6.4
-  /// and later), and a servo's tick that begins just before is interrupted for some 30 us, time and
-  /// again.
+  /// The next tick is due within a period. All ticks are a quarter to three quarters of a period
+  /// (at random) after its multiples, because the kernel has timer ticks at multiples (Linux 6.4
+  /// and later), and a servo tick that begins just before one is interrupted for some 30 us every
+  /// time.
   void start() noexcept;
 
   double period() const { return period_; }  ///< s
@@ -92,7 +93,7 @@ class Servo final : public TickSource {
   void command(const Vec3& device1, const Vec3& device2) noexcept;
   DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
 
-  static constexpr int kMissedInARow = 5;  ///< so many and the forces go off
+  static constexpr int kMissedInARow = 5;  ///< missed ticks at which forces go off
 
   Device& device_;
   Clock& clock_;
@@ -103,8 +104,8 @@ class Servo final : public TickSource {
   ForceLimiter limiter_;
   WorkspaceMap workspace_;
   std::optional<PassivityController> passivity_;
-  std::unique_ptr<Stage> own_;  ///< of prepare()
-  Stage* stage_ = nullptr;
+  std::unique_ptr<TrialScene> own_;  ///< of prepare()
+  TrialScene* shown_ = nullptr;
   Vec3 rest_tip_;
   bool warm_ = false;
   int rested_ = 0;  ///< ticks

@@ -45,7 +45,7 @@ std::int64_t TimeHistogram::quantile(double p) const noexcept {
   return longest();
 }
 
-double TimeHistogram::share_above(std::int64_t ns) const noexcept {
+double TimeHistogram::fraction_above(std::int64_t ns) const noexcept {
   std::uint64_t above = 0;
   for (int i = bin(ns) + 1; i < kBins; ++i)
     above += bins_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
@@ -102,7 +102,7 @@ std::string to_json_text(const ServoHealth& health, double rate) {
         {"ticks", kept.ticks},
         {"missed_ticks", kept.missed_ticks},
         {"elapsed_ns", kept.elapsed_ns},
-        {"late_by_a_period_share", health.lateness().share_above(period_ns)},
+        {"late_by_a_period_share", health.lateness().fraction_above(period_ns)},
         {"lost_samples", health.lost_samples()},
         {"faults", health.faults()},
         {"longest_period_ns", health.longest_period_ns()},

@@ -1,5 +1,5 @@
 #pragma once
-// How well the servo kept time, tick by tick, cheap enough to be kept always.
+// Timing statistics of the servo loop over every tick: lateness, computing time, missed ticks.
 
 #include <array>
 #include <atomic>
@@ -20,10 +20,11 @@ class TimeHistogram {
   void add(std::int64_t ns) noexcept;
   std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
   std::int64_t longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
-  /// The time that the share `p` of the counts does not exceed, as the upper edge of its step, ns.
+  /// The time that the fraction `p` of the counts does not exceed, as the upper edge of its step,
+  /// ns.
   std::int64_t quantile(double p) const noexcept;
-  /// Share of counts in steps that lie above `ns`.
-  double share_above(std::int64_t ns) const noexcept;
+  /// Fraction of counts in steps that lie above `ns`.
+  double fraction_above(std::int64_t ns) const noexcept;
   /// The steps that hold any, as upper edge (ns) and count, in order.
   std::vector<std::pair<std::int64_t, std::uint64_t>> steps() const;
 

@@ -18,7 +18,7 @@ constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as
 }  // namespace
 
 ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& settings)
-    : wish_(settings.realtime),
+    : realtime_(settings.realtime),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
       awake_(settings.realtime.awake),
       ring_(settings.ring) {
@@ -26,7 +26,7 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
   thread_ = std::jthread([this, &granted] {
-    granted.set_value(request_realtime(wish_));
+    granted.set_value(request_realtime(realtime_));
     run();
   });
   rights_ = granted.get_future().get();
@@ -44,13 +44,13 @@ void ServoThread::run() noexcept {
   thread_id_ = current_thread();
   servo_.start();
   while (!quit_.load(std::memory_order_relaxed)) {
-    take_orders();
+    take_requests();
     publish(servo_.tick());
   }
   servo_.stop();
 }
 
-void ServoThread::take_orders() noexcept {
+void ServoThread::take_requests() noexcept {
   if (incoming_.load(std::memory_order_relaxed) != nullptr) {
     servo_.begin(*incoming_.exchange(nullptr, std::memory_order_acquire));
     gap_ = lost_samples_ = false;
@@ -82,15 +82,15 @@ void ServoThread::publish(const Sample& sample) noexcept {
 
 void ServoThread::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                           const HomeZone& home) {
-  auto stage = std::make_unique<Stage>(scene, renderer, home);
-  if (staged_) stop();
-  if (!staged_) stages_.clear();
+  auto shown = std::make_unique<TrialScene>(scene, renderer, home);
+  if (scene_set_) stop();
+  if (!scene_set_) scenes_.clear();
   while (ring_.pop(popped_)) {
   }
   popped_ = {};
-  stages_.push_back(std::move(stage));
-  staged_ = true;
-  incoming_.store(stages_.back().get(), std::memory_order_release);
+  scenes_.push_back(std::move(shown));
+  scene_set_ = true;
+  incoming_.store(scenes_.back().get(), std::memory_order_release);
 }
 
 const Sample& ServoThread::next() noexcept {
@@ -118,7 +118,7 @@ ServoQuality ServoThread::stop() noexcept {
     }
     std::this_thread::sleep_for(kNap);
   }
-  staged_ = false;
+  scene_set_ = false;
   return quality_;
 }
 

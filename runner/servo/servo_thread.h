@@ -1,7 +1,7 @@
 #pragma once
-// The servo of a live session: a thread of its own that nothing else can make wait. Scenes go in by
-// an exchange of pointers, every sample comes out through a fixed ring, the newest through a triple
-// buffer. No locks.
+// The servo loop of a live session: a real-time thread of its own that waits for nothing but the
+// clock and the device. Scenes go in by an exchange of pointers, every sample comes out through a
+// ring of fixed size, the newest through a triple buffer. No locks.
 
 #include <atomic>
 #include <memory>
@@ -63,20 +63,21 @@ class ServoThread final : public TickSource {
  private:
   static int current_thread() noexcept;
   void run() noexcept;
-  void take_orders() noexcept;
+  void take_requests() noexcept;
   void publish(const Sample& sample) noexcept;
 
-  const RealtimeSettings wish_;
+  const RealtimeSettings realtime_;
   Servo servo_;
   const AwakeProcessors awake_;
   RealtimeRights rights_;
   ServoHealth health_;
 
-  std::vector<std::unique_ptr<Stage>> stages_;  ///< the session's; freed once the servo left them
-  std::atomic<Stage*> incoming_{nullptr};
+  std::vector<std::unique_ptr<TrialScene>>
+      scenes_;  ///< the session thread's; freed once the servo has left them
+  std::atomic<TrialScene*> incoming_{nullptr};
   std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
-  ServoQuality quality_;  ///< written before stops_done_ moves
-  bool staged_ = false;   ///< the session's: something stands before the stylus, or may
+  ServoQuality quality_;    ///< written before stops_done_ moves
+  bool scene_set_ = false;  ///< the session thread's: a scene is shown, or may be
 
   Ring<Sample> ring_;
   TripleBuffer<Sample> latest_;

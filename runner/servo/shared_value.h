@@ -1,4 +1,5 @@
 #pragma once
+// A seqlock: hands values between threads, or between the runner and its watchdog process.
 
 #include <array>
 #include <atomic>

@@ -1,11 +1,11 @@
 #pragma once
+// The servo loop as a session sees it.
 
 #include "runner/servo/sample.h"
 
 namespace palpate::runner {
 
-/// The servo as a session sees it: in this thread for a simulated participant, in a thread of its
-/// own for a live one.
+/// In the caller's thread for a simulated participant, in a thread of its own for a live one.
 class TickSource {
  public:
   virtual ~TickSource() = default;

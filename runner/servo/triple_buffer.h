@@ -1,4 +1,5 @@
 #pragma once
+// Hands the newest sample from the servo thread to the session.
 
 #include <array>
 #include <atomic>

@@ -33,7 +33,7 @@ std::string day_and_minute(std::int64_t ns) {
 
 }  // namespace
 
-std::string clock_doubt(const ClockEvidence& evidence) {
+std::string clock_warning(const ClockEvidence& evidence) {
   const std::int64_t now = evidence.now_ns;
   const auto doubt = [now](const std::string& why) {
     return "the computer's clock says " + day_and_minute(now) + ", " + why +
@@ -48,7 +48,7 @@ std::string clock_doubt(const ClockEvidence& evidence) {
     if (ahead(*record) < -kRecordSlack) return doubt(span(-ahead(*record)) + " before " + of);
     if (ahead(*record) > kStudyRests) return doubt(span(ahead(*record)) + " after " + of);
   }
-  if (now < kBeforeThisProgram_ns) return doubt("which was before there was this program");
+  if (now < kBeforeThisProgram_ns) return doubt("which is before this program existed");
   if (const auto& file = evidence.newest_file_ns) {
     const std::string of =
         "the protocol or the program was written last (" + day_and_minute(*file) + ")";

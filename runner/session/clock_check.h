@@ -1,5 +1,5 @@
 #pragma once
-// Is the computer's clock to be believed? Every date on record follows it.
+// Plausibility of the computer's clock, which every date on record follows.
 
 #include <cstdint>
 #include <optional>
@@ -14,7 +14,7 @@ struct ClockEvidence {
   std::optional<std::int64_t> newest_file_ns;    ///< when the protocol or the program was written
 };
 
-/// What speaks against the clock, in words; empty: nothing.
-std::string clock_doubt(const ClockEvidence& evidence);
+/// Why the clock seems wrong, in words; empty: it does not.
+std::string clock_warning(const ClockEvidence& evidence);
 
 }  // namespace palpate::runner

@@ -13,10 +13,10 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr const char* kLimitedEvent = "material_limited";
 
-template <class... Parts>
-std::string sentence(const Parts&... parts) {
+template <class... Values>
+std::string sentence(const Values&... values) {
   std::ostringstream text;
-  (text << ... << parts);
+  (text << ... << values);
   return text.str();
 }
 
@@ -34,10 +34,10 @@ void visit_materials(Object& object, const Visit& visit) {
   for (auto& part : object.parts) visit_materials(part, visit);
 }
 
-void scale_down(stimuli::Material& material, double share) {
-  material.stiffness *= share;
-  material.damping *= share;
-  for (stimuli::Layer& layer : material.layers) layer.stiffness *= share;
+void scale_down(stimuli::Material& material, double fraction) {
+  material.stiffness *= fraction;
+  material.damping *= fraction;
+  for (stimuli::Layer& layer : material.layers) layer.stiffness *= fraction;
 }
 
 /// \throws std::invalid_argument
@@ -58,7 +58,7 @@ stimuli::Material& material_of(protocols::Protocol& protocol, const std::string&
   return *found;
 }
 
-/// The device runs no faster than it can, whatever the protocol asks (another misfit).
+/// Hz: the protocol's, or the device's highest (a protocol that asks for more is refused as such).
 double shown_rate(const protocols::Protocol& protocol, const DeviceCapabilities& device) {
   return std::min(protocol.servo_rate, device.max_rate);
 }
@@ -69,8 +69,8 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
   if (protocol.passivity_controller) return "";
   const double with =
       showable(material, device, shown_rate(protocol, device), protocol.workspace.scale, true)
-          .share;
-  if (with <= without.share) return "(/servo/passivity_controller would not help here) ";
+          .fraction;
+  if (with <= without.fraction) return "(/servo/passivity_controller would not help here) ";
   return sentence("set /servo/passivity_controller to true (",
                   with < 1 ? sentence("then up to ", stiffest(material) * with, " N/m")
                            : std::string("then it can be shown"),
@@ -83,10 +83,10 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
                           double rate, double scale, bool passivity_controller) {
   ShowableMaterial out;
   const double stiffness = stiffest(material) * scale, damping = std::abs(material.damping) * scale;
-  const auto bound = [&out](double share, const auto&... reason) {
+  const auto bound = [&out](double fraction, const auto&... reason) {
     // A hair of rounding does not refuse a material that stands at the bound.
-    if (share >= out.share || share >= 1 - 1e-9) return;
-    out = {std::max(0.0, share), sentence(reason...)};
+    if (fraction >= out.fraction || fraction >= 1 - 1e-9) return;
+    out = {std::max(0.0, fraction), sentence(reason...)};
   };
   const std::string shown = scale == 1 ? "" : sentence(" (", stiffness, " N/m at the hand)");
   if (stiffness > 0) {
@@ -123,8 +123,8 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
       const ShowableMaterial can =
           showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
                    protocol.passivity_controller);
-      if (can.reason.empty() || can.share == 0) return;  // nothing to show: a misfit
-      const double shown = can.share * (1 - 1e-12);      // rounding stays below the bound
+      if (can.reason.empty() || can.fraction == 0) return;  // nothing to show: incompatible
+      const double shown = can.fraction * (1 - 1e-12);      // rounding stays below the bound
       out.push_back(
           {stimulus.name, part, shown, material.stiffness, material.damping,
            sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
@@ -141,11 +141,11 @@ std::string to_json_text(const std::vector<LimitedMaterial>& limited,
   for (const LimitedMaterial& one : limited) {
     materials.push_back({{"stimulus", one.stimulus},
                          {"part", one.part},
-                         {"share", one.share},
+                         {"share", one.fraction},
                          {"asked_stiffness_n_per_m", one.stiffness},
                          {"asked_damping_ns_per_m", one.damping},
-                         {"shown_stiffness_n_per_m", one.stiffness * one.share},
-                         {"shown_damping_ns_per_m", one.damping * one.share}});
+                         {"shown_stiffness_n_per_m", one.stiffness * one.fraction},
+                         {"shown_damping_ns_per_m", one.damping * one.fraction}});
   }
   return Json{{kLimitedEvent, std::move(materials)}, {"device", device.name}, {"rate_hz", rate}}
       .dump();

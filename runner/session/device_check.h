@@ -1,4 +1,6 @@
 #pragma once
+// Whether a device can show a protocol: degrees of freedom, rate, workspace, and stiffness without
+// instability.
 
 #include <string>
 #include <vector>
@@ -15,8 +17,8 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
 
 /// What of a material a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {
-  double share = 1;    ///< of its stiffness and damping together; 1: all, 0: nothing
-  std::string reason;  ///< what is in the way; empty: nothing
+  double fraction = 1;  ///< of its stiffness and damping together; 1: all, 0: nothing
+  std::string reason;   ///< what is in the way; empty: nothing
 };
 
 /// Sampled spring and damper: K T / 2 + |B| <= b (Colgate & Schenkel 1997), K <= 2 f_c / Delta
@@ -35,8 +37,8 @@ inline constexpr double kPassivityExtension = 2;
 /// A material that was scaled down to what a device can show.
 struct LimitedMaterial {
   std::string stimulus;
-  int part = 0;      ///< of a compound: 0 itself, then its parts with theirs, in order
-  double share = 1;  ///< of stiffness and damping that is left
+  int part = 0;         ///< of a compound: 0 itself, then its parts with theirs, in order
+  double fraction = 1;  ///< of stiffness and damping that is left
   double stiffness = 0, damping = 0;  ///< N/m and N s/m, as the protocol asks
   std::string text;                   ///< a sentence
 };

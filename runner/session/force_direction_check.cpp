@@ -17,12 +17,12 @@ std::string newtons(const char* before, double a, const char* between, double b)
 }
 
 /// Holds what was commanded, tick by tick, against what may be.
-class Watcher {
+class CommandCheck {
  public:
-  explicit Watcher(const ForceDirectionCheck& push) : push_(push) {}
+  explicit CommandCheck(const ForceDirectionCheck& settings) : settings_(settings) {}
 
   /// \return what is wrong with the tick; empty: nothing
-  std::string look(const Sample& sample) {
+  std::string check(const Sample& sample) {
     if (sample.faults & servo_fault::kTripped) {
       const std::string why = advice(sample.trouble);
       return "the forces went off" + (why.empty() ? why : ": " + why);
@@ -35,11 +35,11 @@ class Watcher {
         std::max(glm::length(sample.device1 - last1_), glm::length(sample.device2 - last2_));
     last1_ = sample.device1;
     last2_ = sample.device2;
-    const ForceLimits& limits = push_.limits();
+    const ForceLimits& limits = settings_.limits();
     if (size_ > limits.max_force + kRounding)
       return newtons("", size_, " were commanded, above the limit of ", limits.max_force);
-    if (size_ > push_.force() + kRounding)
-      return newtons("", size_, " were commanded for a push of ", push_.force());
+    if (size_ > settings_.force() + kRounding)
+      return newtons("", size_, " were commanded for a push of ", settings_.force());
     const bool gap = (sample.faults & servo_fault::kSamplesLost) != 0;
     if (change > limits.max_change + kRounding && !gap)
       return newtons("the force changed by ", change, " in a tick, above the limit of ",
@@ -48,12 +48,12 @@ class Watcher {
   }
   bool over() const { return elapsed_ >= ForceDirectionCheck::kSeconds; }
   std::string verdict() const {
-    if (size_ >= push_.force() - kEnough) return "";
-    return newtons("no more than ", size_, " were commanded for a push of ", push_.force());
+    if (size_ >= settings_.force() - kEnough) return "";
+    return newtons("no more than ", size_, " were commanded for a push of ", settings_.force());
   }
 
  private:
-  const ForceDirectionCheck& push_;
+  const ForceDirectionCheck& settings_;
   std::int64_t began_ns_ = 0;
   double elapsed_ = 0, size_ = 0;
   Vec3 last1_, last2_;
@@ -75,17 +75,17 @@ rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, renderin
   return out;
 }
 
-std::string ForceDirectionCheck::give(TickSource& servo, const std::function<bool()>& stop) const {
+std::string ForceDirectionCheck::push(TickSource& servo, const std::function<bool()>& stop) const {
   const rendering::Scene nothing({}, false);
   constexpr HomeZone kAnywhere{0, 0};
-  Watcher watcher(*this);
+  CommandCheck check(*this);
   std::string fault;
   servo.prepare(nothing, *this, kAnywhere);
-  while (fault.empty() && !watcher.over()) {
-    fault = stop() ? "it was stopped" : watcher.look(servo.next());
+  while (fault.empty() && !check.over()) {
+    fault = stop() ? "it was stopped" : check.check(servo.next());
   }
   servo.stop();
-  return fault.empty() ? watcher.verdict() : fault;
+  return fault.empty() ? check.verdict() : fault;
 }
 
 }  // namespace palpate::runner

@@ -1,6 +1,6 @@
 #pragma once
-// A feeble push before the first trial: do the forces reach the hand the right way round, and do
-// the limits hold on the device that is open?
+// A weak push to the right before the first trial: the participant feels whether forces have the
+// right direction, and the commands are checked against the limits.
 
 #include <functional>
 #include <string>
@@ -10,11 +10,10 @@
 
 namespace palpate::runner {
 
-/// To the right, the same wherever the stylus is: a newton, or half of what the limits leave where
-/// that is less.
+/// A constant force to the right: 1 N, or half of the largest force allowed where that is less.
 class ForceDirectionCheck final : public rendering::Renderer {
  public:
-  static constexpr double kSeconds = 1;
+  static constexpr double kSeconds = 1;  ///< of the push
 
   /// \param limits     that are in force: the smaller of the program's and the device's
   /// \param both_ends  of a stylus that two devices hold; else all of it at the tip
@@ -23,11 +22,11 @@ class ForceDirectionCheck final : public rendering::Renderer {
   double force() const { return force_; }  ///< N, at each end
   const ForceLimits& limits() const { return limits_; }
 
-  /// Pushes through the servo and its limits as in a trial, then takes the force off. Must outlive
-  /// the servo, which a stop() that was not answered leaves with it.
+  /// Pushes for kSeconds through the servo and its limits as in a trial, then takes the force off.
+  /// Must outlive the servo, which may still use it after a stop() that was not answered.
   /// \param stop  asked at each tick; true ends it at once
   /// \return what was wrong with the commands; empty: nothing
-  std::string give(TickSource& servo, const std::function<bool()>& stop) const;
+  std::string push(TickSource& servo, const std::function<bool()>& stop) const;
 
   const char* name() const override { return "push"; }
   bool side_contact() const override { return false; }

@@ -1,6 +1,5 @@
 #pragma once
-// The forces of a live session as the experimenter switches them: off at once, on again only where
-// nothing stands against it.
+// Switches the forces of a live session: off at once, on again only where device and watchdog work.
 
 #include <functional>
 #include <string>
@@ -20,9 +19,9 @@ class LiveForces {
   /// Zero force at once, until allow().
   void off() noexcept;
   /// Allows forces again, once the device has given a good reading. One that is unplugged or silent
-  /// is opened again first, which takes as long as it takes.
+  /// is opened again first, which may take seconds.
   /// \param stop  asked every few milliseconds: true gives it up
-  /// \return what stands against it, in words; empty: forces may go on
+  /// \return why forces stay off, in words; empty: they are allowed
   std::string allow(const std::function<bool()>& stop);
 
   /// The servo's newest sample.

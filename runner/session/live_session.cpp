@@ -38,7 +38,7 @@ LiveSession::Outcome LiveSession::run() {
   RunRecord& record = station_.record;
   if (outcome.end == data::RunEnd::withdrawn) record.begin();  // whenever it comes
   const std::int64_t now = station_.clock.now_ns();
-  for (const std::string& text : record.waiting()) {
+  for (const std::string& text : record.pending_notes()) {
     if (text.front() != '{') outcome.unkept.push_back(text);
   }
   if (!outcome.reason.empty()) record.note(now, "ended: " + outcome.reason);
@@ -64,7 +64,7 @@ LiveSession::Outcome LiveSession::run_trials() {
       if (fault.trouble == DeviceTrouble::guard_lost)
         return {data::RunEnd::aborted, fault.reason, 0, 0, true};
       hold_.hold(fault.reason, fault.is_transient(), fault.trouble);
-      say(std::string(fault.what()) + "; " + hold_.ways_on());
+      say(std::string(fault.what()) + "; " + hold_.how_to_continue());
     } catch (const EndOfSession& end) {
       if (session_.plan().finished() && end.end != data::RunEnd::withdrawn) break;
       return {end.end, end.what(), 0, 0, end.failed};
@@ -109,7 +109,7 @@ void LiveSession::stop_if_due() {
   const bool block_begins = now == Session::State::practice || now == Session::State::block;
   const bool began = session_.plan().done() > 0 || now != Session::State::instruction;
   if (stop_ == Stop::after_trial || (stop_ == Stop::after_block && block_begins && began))
-    throw EndOfSession(data::RunEnd::paused, "stopped by the experimenter, to be continued");
+    throw EndOfSession(data::RunEnd::paused, "stopped by the experimenter, to be resumed");
 }
 
 void LiveSession::wait_while_held() {
@@ -161,7 +161,7 @@ void LiveSession::check_device() {
   const DeviceTrouble trouble = forces_.newest().trouble;
   const std::string reason = trip_reason(servo_fault::kDeviceLost, trouble);
   hold_.hold(reason, false, trouble);
-  say(reason + "; " + hold_.ways_on());
+  say(reason + "; " + hold_.how_to_continue());
 }
 
 void LiveSession::obey(const ConsoleCommand& command) {
@@ -193,7 +193,7 @@ void LiveSession::obey(const ConsoleCommand& command) {
         say("there is no fault to clear");
       } else if (hold_.clear_fault()) {
         note(command.time_ns, "fault cleared");
-        say("fault cleared; " + hold_.ways_on() + " when all are ready");
+        say("fault cleared; " + hold_.how_to_continue() + " when all are ready");
       }
       break;
     case Kind::note:
@@ -210,14 +210,14 @@ void LiveSession::plan_stop(ConsoleCommand::Kind kind) {
   if (stop_ == asked) {
     stop_ = Stop::no;
     monitor_.plan_stop("");
-    say("the stop is taken back: the session goes on");
+    say("the stop is cancelled: the session continues");
     return;
   }
   stop_ = asked;
   const std::string when = stop_ == Stop::after_trial ? "after this trial" : "after this block";
   monitor_.plan_stop(when);
   say("the session will stop " + when + " (" + station_.console.name_of(kind) +
-      " again takes it back)");
+      " again cancels it)");
 }
 
 void LiveSession::note(std::int64_t at_ns, const std::string& text) {

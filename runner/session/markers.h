@@ -1,7 +1,6 @@
 #pragma once
-// Marks in other recordings (EEG, motion capture): what happened in the session, at once, to
-// whoever wants to know. Nothing here makes the session wait; what a receiver does not take is
-// counted and dropped.
+// Event markers for other recordings (EEG, motion capture), sent as they happen. The session never
+// waits for a receiver; markers that are not taken are counted and dropped.
 
 #include <atomic>
 #include <condition_variable>

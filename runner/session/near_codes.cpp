@@ -10,7 +10,7 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-/// What is read alike is alike: case, O and 0, I and l and 1, zeros before a number.
+/// Without what is easily misread: case, O and 0, I and l and 1, zeros before a number.
 std::string read_alike(const std::string& code) {
   std::string all;
   for (char c : code) {
@@ -26,12 +26,12 @@ std::string read_alike(const std::string& code) {
   return out;
 }
 
-struct Parts {
+struct CodeParts {
   std::string letters, digits;
 };
 
-Parts parts_of(const std::string& code) {
-  Parts parts;
+CodeParts parts_of(const std::string& code) {
+  CodeParts parts;
   for (const char c : code) (is_digit(c) ? parts.digits : parts.letters) += lower(c);
   return parts;
 }
@@ -53,7 +53,7 @@ bool one_changed_or_two_swapped(const std::string& a, const std::string& b) {
 bool a_letter_away(const std::string& a, const std::string& b) {
   // Short codes are a letter away from each other on purpose: A1 and B1, initials of three letters.
   constexpr std::size_t kTelling = 4;
-  const Parts x = parts_of(a), y = parts_of(b);
+  const CodeParts x = parts_of(a), y = parts_of(b);
   if (x.digits != y.digits) return false;
   const std::size_t letters = std::max(x.letters.size(), y.letters.size());
   if ((!x.digits.empty() || letters >= kTelling) &&

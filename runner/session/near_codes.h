@@ -1,4 +1,5 @@
 #pragma once
+// Participant codes that are easily taken for each other.
 
 #include <string>
 #include <vector>

@@ -142,9 +142,9 @@ std::string Preflight::instruction() const {
         return advice(trouble_);
       return "home the device: pull the grip fully out, then push it straight in";
     case Step::limits:
-      if (push_ == Push::given) return "was a feeble push to the right felt?";
+      if (push_ == Push::given) return "was a weak push to the right felt?";
       return (push_fault_.empty() ? "limits: " + limits_in_words()
-                                  : "the push was not as it should be: " + push_fault_) +
+                                  : "the force direction check failed: " + push_fault_) +
              "; hold the grip: a push of " + newtons(needs_.push->force()) +
              " to the right comes for a second";
     case Step::range:
@@ -163,7 +163,7 @@ Checklist Preflight::checklist() const {
   using Kind = ConsoleCommand::Kind;
   Checklist list;
   for (const auto& [step, words] : {std::pair(Step::homing, "Home the device"),
-                                    std::pair(Step::limits, "Feel a feeble push to the right"),
+                                    std::pair(Step::limits, "Feel a weak push to the right"),
                                     std::pair(Step::range, "Move to every side"),
                                     std::pair(Step::buttons, "Press the buttons")}) {
     if (!asked_for(step)) continue;

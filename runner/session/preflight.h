@@ -1,6 +1,7 @@
 #pragma once
-// Before the first trial, with a device that can push: is it homed, do its forces keep to their
-// limits and reach the hand, does it move as far as the stimuli need, do its buttons work.
+// The checklist before the first trial: the device is homed; with force feedback also that forces
+// have the right direction and keep to their limits, that the device moves as far as the stimuli
+// need, and that its buttons work.
 
 #include <string>
 #include <vector>

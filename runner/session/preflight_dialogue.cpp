@@ -109,7 +109,7 @@ class PreflightDialogue {
     LiveForces forces(station_.servo_thread, station_.guard, station_.clock);
     const std::string trouble = forces.allow([this] { return station_.end_requested() != 0; });
     if (trouble.empty()) state_.fault.clear();
-    say(trouble.empty() ? "the device is well" : "not cleared: " + trouble);
+    say(trouble.empty() ? "the device works" : "not cleared: " + trouble);
   }
 
   /// Also where the push or the homing is waited for. \throws EndOfSession
@@ -125,7 +125,7 @@ class PreflightDialogue {
 
   void check_force_direction() {
     station_.servo_thread.clear_fault();  // before homing there were no readings
-    preflight_.pushed(station_.direction_check->give(station_.servo_thread, [this] {
+    preflight_.pushed(station_.direction_check->push(station_.servo_thread, [this] {
       bool quit = station_.end_requested() != 0;
       for (ConsoleCommand& more : station_.console.commands()) {
         quit = quit || more.kind == Kind::quit;

@@ -1,4 +1,5 @@
 #pragma once
+// From a parsed protocol to the record of it.
 
 #include "data/record.h"
 #include "protocols/protocol.h"

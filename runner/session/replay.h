@@ -1,4 +1,5 @@
 #pragma once
+// Renders a recorded trial again, tick by tick.
 
 #include <functional>
 
@@ -11,7 +12,7 @@ namespace palpate::runner {
 /// Puts a recorded trial through the servo and a renderer again.
 /// \param recorded  with samples
 /// \param renderer  the recorded one gives the recorded forces, to the bit; the other what it would
-///                  have shown on the same way
+///                  have shown along the same path
 /// \param visit     each recorded tick and what comes of it now, in order
 /// \throws std::invalid_argument where the protocol has no such stimulus
 void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded,

@@ -20,7 +20,7 @@ void RunRecord::begin() {
   participant_ = store_.enrol(protocol_, participant_.code, participant_.number,
                               participant_.simulated, participant_.seed);
   run_ = store_.begin_run(participant_, info_, shown_with_ ? &*shown_with_ : nullptr);
-  for (const Note& note : std::exchange(waiting_, {}))
+  for (const Note& note : std::exchange(pending_, {}))
     store_.add_note(*run_, note.at_ns, note.text);
 }
 
@@ -30,16 +30,16 @@ void RunRecord::note(std::int64_t at_ns, const std::string& text) {
     return;
   }
   store_.validate_note(text);
-  waiting_.push_back({at_ns, text});
+  pending_.push_back({at_ns, text});
 }
 
 void RunRecord::end(data::RunEnd how, std::int64_t ended_ns) {
   if (run_) store_.end_run(*run_, how, ended_ns);
 }
 
-std::vector<std::string> RunRecord::waiting() const {
+std::vector<std::string> RunRecord::pending_notes() const {
   std::vector<std::string> texts;
-  for (const Note& note : waiting_) texts.push_back(note.text);
+  for (const Note& note : pending_) texts.push_back(note.text);
   return texts;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What a live session puts on record of itself: who, which run, its notes, its trials.
+// The record of a live session: its participant, run, notes and trials.
 
 #include <optional>
 #include <string>
@@ -12,9 +12,9 @@
 
 namespace palpate::runner {
 
-/// Somebody new is enrolled, and takes a number, when the first trial begins and not before: who
-/// came as far as the pre-flight only, or stood before a display that did not open, is nobody to
-/// the counterbalancing. What is noted until then waits here.
+/// A new participant is enrolled, and takes a number of the counterbalancing, when the first trial
+/// begins: not where the pre-flight was abandoned or a display did not open. Notes of before then
+/// are kept here and written with the run.
 class RunRecord final : public TrialLog {
  public:
   /// \param participant  from Store::look_up. \throws StoreRefused: the store takes no such run.
@@ -33,8 +33,8 @@ class RunRecord final : public TrialLog {
   void note(std::int64_t at_ns, const std::string& text);
   /// Where nothing has begun, nothing is on record.
   void end(data::RunEnd how, std::int64_t ended_ns);
-  /// Notes that wait for the run to begin.
-  std::vector<std::string> waiting() const;
+  /// Notes that will be written when the run begins.
+  std::vector<std::string> pending_notes() const;
 
   int begin(const data::TrialRecord& planned, std::int64_t began_ns) override;
   void finish(const data::TrialRecord& record) override { store_.finish_attempt(*run_, record); }
@@ -51,7 +51,7 @@ class RunRecord final : public TrialLog {
   const data::RunInfo info_;
   const std::optional<data::ProtocolInfo> shown_with_;
   std::optional<data::Run> run_;  ///< none: not begun
-  std::vector<Note> waiting_;
+  std::vector<Note> pending_;
 };
 
 }  // namespace palpate::runner

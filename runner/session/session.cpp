@@ -117,8 +117,8 @@ std::optional<Answer> Session::wait_for_answer(std::uint32_t& faults, DeviceTrou
     trouble = sample.trouble;
     if (faults & servo_fault::kTripped) return std::nullopt;
     if (sample.phase == Phase::feeling) {
-      note(sample);
-      if (station_.protocol.samples) keep(sample);
+      record_onset_and_contact(sample);
+      if (station_.protocol.samples) record_sample(sample);
       record_.response_ns = sample.time_ns;
     }
     const std::optional<Answer> answer = participant_.step(sample);
@@ -183,7 +183,7 @@ bool Session::run_trial() {
   return true;
 }
 
-void Session::note(const Sample& sample) {
+void Session::record_onset_and_contact(const Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
     record_.onset_utc = data::format_utc(data::to_unix_ns(station_.utc, sample.time_ns));
@@ -199,7 +199,7 @@ void Session::note(const Sample& sample) {
   }
 }
 
-void Session::keep(const Sample& sample) {
+void Session::record_sample(const Sample& sample) {
   const rendering::Rendering& rendering = sample.rendering;
   data::SampleRecord kept;
   kept.tick = sample.tick;

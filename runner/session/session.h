@@ -12,15 +12,15 @@
 
 namespace palpate::runner {
 
-/// What was in front of the participant was no trial any more: lost device, forces tripped. The
-/// attempt is on record as cut off, the forces are zero.
+/// A trial could not go on: the device was lost or forces went off. The attempt is on record as cut
+/// off, forces are zero.
 class SessionFault : public std::runtime_error {
  public:
   SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
       : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
   /// It is over by itself: the machine was late, nothing is wrong with device or stylus.
   bool is_transient() const;
-  std::string reason;    ///< that forces are off
+  std::string reason;    ///< why forces are off
   std::uint32_t faults;  ///< of the tick
   DeviceTrouble trouble;
 };
@@ -77,8 +77,8 @@ class Session {
   std::optional<Answer> wait_for_answer(std::uint32_t& faults, DeviceTrouble& trouble);
   void cut_off(const std::string& reason);
   void end_rest();
-  void note(const Sample& sample);
-  void keep(const Sample& sample);  ///< among the record's samples
+  void record_onset_and_contact(const Sample& sample);
+  void record_sample(const Sample& sample);
 
   Station station_;  ///< with the session's own plan
   Respondent& participant_;

@@ -27,21 +27,22 @@ void SessionHold::emergency_zero(const std::string& by, bool in_trial) {
   if (!in_trial) hold(emergency_reason(), false, DeviceTrouble::none);
 }
 
-std::string SessionHold::ways_on() const {
+std::string SessionHold::how_to_continue() const {
   const std::string go = station_.console.name_of(ConsoleCommand::Kind::go_on);
-  if (kind_ != Kind::fault) return go + " goes on";
-  return station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ", then " + go + ", goes on";
+  if (kind_ != Kind::fault) return "to continue: " + go;
+  return "to continue: " + station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ", then " +
+         go;
 }
 
 std::string SessionHold::held_by() const {
-  return reason_ + (reason_.empty() ? "" : "; ") + ways_on();
+  return reason_ + (reason_.empty() ? "" : "; ") + how_to_continue();
 }
 
 bool SessionHold::allow_forces() {
   const DeviceTrouble before = forces_.newest().trouble;
   if (station_.guard != nullptr &&
       (before == DeviceTrouble::unplugged || before == DeviceTrouble::silent))
-    say_("opening the device again");
+    say_("reopening the device");
   const std::string trouble = forces_.allow([this] { return station_.end_requested() != 0; });
   const DeviceTrouble now = forces_.newest().trouble;
   forces_.end_without_guard();
@@ -50,7 +51,7 @@ bool SessionHold::allow_forces() {
     return true;
   }
   hold(trouble, false, now);
-  say_("not cleared, forces stay off: " + trouble + "; after that " + ways_on());
+  say_("not cleared, forces stay off: " + trouble + "; after that, " + how_to_continue());
   return false;
 }
 

@@ -34,7 +34,7 @@ class SessionHold {
   /// For the console: the reason, and what to press or type to go on.
   std::string held_by() const;
   /// What to press or type to go on.
-  std::string ways_on() const;
+  std::string how_to_continue() const;
 
   void pause();
   /// Forces are off and nothing goes on until the experimenter says so.
@@ -43,15 +43,15 @@ class SessionHold {
   /// Zero force at once, as somebody asked. \param by  what asked for it: "the key F12"
   /// \param in_trial  the trial under way is cut off first; else nothing goes on from now
   void emergency_zero(const std::string& by, bool in_trial);
-  /// The experimenter says that the fault is mended. True: forces are allowed again, and what is
-  /// left is a pause; false: something stands against it, or there is no fault; it is said.
+  /// The experimenter says that the cause is removed. True: forces are allowed again and the
+  /// session is paused; false: forces stay off, or there is no fault; either is said.
   bool clear_fault();
   void go_on();
   /// The session goes on: the reason was another time's.
   void forget_reason() { reason_.clear(); }
 
  private:
-  bool allow_forces();  ///< false: something stands against it, and is said
+  bool allow_forces();  ///< false: forces stay off; why is said
 
   const LiveStation& station_;
   LiveForces& forces_;

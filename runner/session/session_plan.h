@@ -1,4 +1,5 @@
 #pragma once
+// The schedule of one session as it is worked off.
 
 #include <vector>
 

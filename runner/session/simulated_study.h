@@ -1,6 +1,6 @@
 #pragma once
-// A whole study with simulated participants, several at a time, through the same session, servo,
-// renderers and store as a live one.
+// A whole study with simulated participants, several sessions in parallel, through the same trial
+// loop, servo, renderers and store as a live one.
 
 #include <atomic>
 #include <cstdint>

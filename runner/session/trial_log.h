@@ -1,4 +1,5 @@
 #pragma once
+// The trial loop's way to the database.
 
 #include <cstdint>
 #include <string>

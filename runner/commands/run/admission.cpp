@@ -115,11 +115,11 @@ void confirm_new(const RunSettings& settings, const std::string& code,
   std::string question = codes.empty() ? settings.database + " holds no participants yet.\n"
                                        : settings.database + " does not hold " + code +
                                              ", but others (" + latest(codes) + ").\n";
-  if (!near.empty()) question += alike + " there: a slip of the hand?\n";
+  if (!near.empty()) question += alike + " there: a typing error?\n";
   const auto answer =
       ask(stimuli::printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
   if (answer != "y" && answer != "Y" && answer != "yes")
-    throw UsageError("nobody was enrolled, nothing was begun; the same command asks again");
+    throw UsageError("nobody was enrolled, no session was started; the same command asks again");
 }
 
 void confirm_participant(const RunSettings& settings, const std::string& code, const Known& known) {
@@ -152,7 +152,7 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
       std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
   evidence.newest_record_ns = known.newest_ns;
   evidence.newest_file_ns = std::max(written_ns(settings.protocol), written_ns("/proc/self/exe"));
-  const std::string doubt = clock_doubt(evidence);
+  const std::string doubt = clock_warning(evidence);
   if (doubt.empty()) return;
   say("CLOCK: " + doubt);
   admission.warnings.push_back("CLOCK: " + doubt);
@@ -162,7 +162,7 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
 std::string ask_new_code() {
   const auto code = ask("The new code: ");
   if (!code || !data::is_participant_code(*code))
-    throw UsageError("a pseudonym of 1 to 32 letters and digits was expected");
+    throw UsageError("the code must be a pseudonym of 1 to 32 letters and digits");
   return *code;
 }
 

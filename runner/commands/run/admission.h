@@ -1,5 +1,5 @@
 #pragma once
-// Before a device moves: who is to take part, with which protocol, and is that meant?
+// Before a device is opened: who takes part, with which protocol; what is doubtful is asked.
 
 #include <optional>
 #include <string>
@@ -23,7 +23,8 @@ struct Admission {
 
 /// Looks into the database, if there is one, and lets it go again. Asks at the terminal, where
 /// there is one, before somebody new takes part, and with what somebody goes on whose protocol was
-/// changed. \throws UsageError: not meant, or told otherwise than it is; InputError; StoreError.
+/// changed. \throws UsageError: the answer was no, or the options contradict the database;
+/// InputError; StoreError.
 Admission admit(const RunSettings& settings);
 
 }  // namespace palpate::runner

@@ -45,7 +45,7 @@ void print_outcome(const LiveStation& station, const data::Participant& who,
   if (!outcome.reason.empty())
     std::fprintf(stderr, "%s\n", stimuli::printable_lines(outcome.reason).c_str());
   if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
-    std::fprintf(stderr, "the same command goes on from here\n");
+    std::fprintf(stderr, "the same command resumes from here\n");
   if (station.markers.dropped() > 0)
     std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
                  static_cast<unsigned long long>(station.markers.dropped()));

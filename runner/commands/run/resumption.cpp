@@ -61,10 +61,10 @@ int session_due(data::Store& store, const data::Participant& participant,
     return *settings.session;
   }
   if (session > count)
-    throw UsageError("participant " + participant.code + " has done every session");
+    throw UsageError("participant " + participant.code + " has completed every session");
   const std::string day = data::format_utc(before.clock.utc_ns).substr(0, 10);
   if (session > 1 && day == data::format_utc(utc_now()).substr(0, 10))
-    std::fprintf(stderr, "session %d was today as well\n", session - 1);
+    std::fprintf(stderr, "session %d was also today\n", session - 1);
   return session;
 }
 
@@ -107,7 +107,7 @@ std::string resumption(data::Store& store, const data::Participant& participant,
   std::string text = std::to_string(plan.done()) + " of " + std::to_string(plan.size()) +
                      " trials done, last run " + spoken_time(last->info.clock.utc_ns, utc_now()) +
                      " (" + data::to_string(last->end) + ")";
-  if (!plan.finished()) text += ", goes on with trial " + std::to_string(plan.next().trial);
+  if (!plan.finished()) text += ", continues with trial " + std::to_string(plan.next().trial);
   return text;
 }
 
@@ -119,10 +119,10 @@ std::string withdrawn_when(data::Store& store, const std::string& code) {
 }
 
 void throw_withdrawn(const std::string& code, const std::string& when) {
-  throw UsageError("participant " + code + " has withdrawn" +
-                   (when.empty() ? "" : " (" + when + ")") +
-                   " and is not begun again: add --after-withdrawal where the participant asks to "
-                   "take part again; 'palpate forget' removes what is on record");
+  throw UsageError(
+      "participant " + code + " has withdrawn" + (when.empty() ? "" : " (" + when + ")") +
+      " and is not started again: add --after-withdrawal where the participant asks to "
+      "take part again; 'palpate forget' removes what is on record");
 }
 
 void refuse_withdrawn(data::Store& store, const std::string& code) {

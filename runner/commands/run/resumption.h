@@ -19,7 +19,7 @@ int choose_session(data::Store& store, const data::Participant& participant,
 /// "yesterday 15:02", "today 09:30", "2026-01-31 15:02", in local time.
 std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 
-/// "12 of 24 trials done, last run yesterday 15:02 (paused), goes on with trial 13". Empty where
+/// "12 of 24 trials done, last run yesterday 15:02 (paused), continues with trial 13". Empty where
 /// the session was never begun.
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
                        const SessionPlan& plan);

@@ -78,9 +78,9 @@ LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSe
   LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(), station.plan.size(),
                                end.failed};
   if (end.end == data::RunEnd::withdrawn ||
-      (record.participant().id != 0 && !record.waiting().empty()))
+      (record.participant().id != 0 && !record.pending_notes().empty()))
     record.begin();
-  outcome.unkept = record.waiting();
+  outcome.unkept = record.pending_notes();
   const std::int64_t now = station.clock.now_ns();
   if (record.begun()) record.note(now, "ended: " + outcome.reason);
   record.end(end.end, now);

@@ -14,18 +14,17 @@ namespace po = boost::program_options;
 void check(RunSettings& settings) {
   settings.participant = given_or_asked(settings.participant, "participant code");
   if (!data::is_participant_code(settings.participant))
-    throw UsageError("--participant: a pseudonym of 1 to 32 letters and digits was expected");
-  if (settings.number && *settings.number < 1) throw UsageError("--number: 1 or more was expected");
+    throw UsageError("--participant: must be a pseudonym of 1 to 32 letters and digits");
+  if (settings.number && *settings.number < 1) throw UsageError("--number: must be 1 or more");
   const std::string& changed = settings.changed_protocol;
   if (!changed.empty() && changed != "stored" && changed != "texts")
-    throw UsageError("--changed-protocol: stored or texts was expected");
-  if (settings.session && *settings.session < 1)
-    throw UsageError("--session: 1 or more was expected");
+    throw UsageError("--changed-protocol: must be stored or texts");
+  if (settings.session && *settings.session < 1) throw UsageError("--session: must be 1 or more");
   if (!settings.hand.empty() && settings.hand != "left" && settings.hand != "right")
-    throw UsageError("--hand: left or right was expected");
+    throw UsageError("--hand: must be left or right");
   if (settings.response_latency &&
       !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
-    throw UsageError("--response-latency: seconds, 0 or more, were expected");
+    throw UsageError("--response-latency: must be 0 s or more");
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
@@ -38,8 +37,10 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   line.summary =
       "A live session: resumes an unfinished one, else begins the next. Every trial is on disk "
       "before\nthe next one starts. The participant answers with the protocol's keys; Escape or "
-      "F12 turns the\nforces off. 'palpate devices' lists the devices. Who is new is enrolled when "
-      "the first trial begins;\na code that was never seen before is asked about first.";
+      "F12 turns the\nforces off (emergency). 'palpate devices' lists the devices. A new "
+      "participant is "
+      "enrolled when the first trial begins;\na code that is not in the database yet is asked "
+      "about first.";
   line.example =
       "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
       "--hand right --consent 2024-05\n"
@@ -51,7 +52,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   double latency = 0, scale = 0;
   line.options.add_options()  //
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
-       "database; created, or gone on with")  //
+       "database; created or resumed")  //
       ("participant", po::value(&settings.participant)->required()->value_name("CODE"),
        "pseudonym, 1 to 32 letters and digits; -: asked for, or a line of standard input, so that "
        "no other user of this computer sees it")  //
@@ -62,13 +63,13 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
       ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
-       "where CODE began with another text of the protocol: go on with it as it is stored (the "
+       "where CODE began with another text of the protocol: continue with it as it is stored (the "
        "default), or, where only texts differ, with the new texts; without it a terminal is "
        "asked")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
        "falcon, falcon2, mouse or simulated")  //
       ("session", po::value(&session)->value_name("N"),
-       "default: the first that is not done")  //
+       "default: the first that is not completed")  //
       ("consent", po::value(&settings.consent)->value_name("VERSION"),
        "the consent that was given: version of its text; recorded with the time")           //
       ("hand", po::value(&settings.hand)->value_name("left|right"), "hand used; recorded")  //
@@ -110,7 +111,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   if (values->count("session") > 0) settings.session = session;
   if (values->count("response-latency") > 0) settings.response_latency = latency;
   if (values->count("ui-scale") > 0) {
-    if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: 0.5 to 4 was expected");
+    if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: must be 0.5 to 4");
     settings.ui_scale = scale;
   }
   check(settings);

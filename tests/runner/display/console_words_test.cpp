@@ -29,7 +29,7 @@ TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
   EXPECT_EQ(beside_state(in("end")), "space bar ends it");
   EXPECT_EQ(beside_state(in("trial")), "");
   ConsoleState held = in("rest");
-  held.held_by = "'Go on' goes on";
+  held.held_by = "to continue: 'Go on'";
   EXPECT_EQ(beside_state(held), "") << "the space bar does not";
 }
 
@@ -55,7 +55,7 @@ TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
   state.fault = "zero force was asked for by the key F12";
   EXPECT_EQ(words_of_forces(state),
             "Forces are off: zero force was asked for by the key F12; next: 'Clear the fault'");
-  state.held_by = "the device is unplugged; 'Clear the fault', then 'Go on', goes on";
+  state.held_by = "the device is unplugged; to continue: 'Clear the fault', then 'Go on'";
   EXPECT_EQ(words_of_forces(state), "Forces are off: " + state.held_by);
   state.sample.faults = 0;
   EXPECT_EQ(words_of_forces(state), state.held_by);

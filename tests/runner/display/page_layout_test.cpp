@@ -140,7 +140,7 @@ TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
   Page page;
   page.kind = Page::Kind::checklist;
   page.checklist.steps = {{"Home the device", Checklist::Step::State::done},
-                          {"Feel a feeble push to the right", Checklist::Step::State::now}};
+                          {"Feel a weak push to the right", Checklist::Step::State::now}};
   for (int i = 0; i < 20; ++i) page.checklist.instruction += "Hold the grip and wait. ";
   const Image image = draw_page(page, 389, 728);
   keep(image, "checklist389");

@@ -37,7 +37,7 @@ class SteadyClock final : public Clock {
 Checklist some_checklist() {
   using State = Checklist::Step::State;
   return {{{"Home the device", State::done},
-           {"Feel a feeble push to the right", State::now},
+           {"Feel a weak push to the right", State::now},
            {"Move to every side", State::left_out},
            {"Press the buttons", State::to_do}},
           "limits: forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of "

@@ -288,7 +288,7 @@ TEST(TimeHistogram, QuantilesAreWithinAnEighth) {
     EXPECT_LE(histogram.quantile(p), exact + exact / 8 + 1);
   }
   EXPECT_EQ(histogram.quantile(1), 100'000);
-  EXPECT_NEAR(histogram.share_above(50'000), 0.5, 0.07);
+  EXPECT_NEAR(histogram.fraction_above(50'000), 0.5, 0.07);
   std::uint64_t counted = 0;
   for (const auto& [up_to, count] : histogram.steps()) counted += count;
   EXPECT_EQ(counted, 100'000u);

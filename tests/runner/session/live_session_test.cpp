@@ -458,8 +458,8 @@ TEST_F(LiveSessions, AFaultSaysWhatItIsAndWhatGoesOn) {
   console_.in_fault_sees = &held;
   run(device);
   EXPECT_EQ(held,
-            "the device was lost: the device is unplugged: plug it in again; 'other', then 'on', "
-            "goes on");
+            "the device was lost: the device is unplugged: plug it in again; to continue: 'other', "
+            "then 'on'");
 }
 
 TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
@@ -475,7 +475,7 @@ TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
   console_.clears = false;
   console_.repair = [&] {
     EXPECT_EQ(console_.last.held_by,
-              "the guard process was late: the machine may be busy; 'on' goes on");
+              "the guard process was late: the machine may be busy; to continue: 'on'");
     EXPECT_EQ(device.force, Vec3(0));
     trouble = DeviceTrouble::none;
     screen_.answers = true;

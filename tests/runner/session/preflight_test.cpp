@@ -171,7 +171,7 @@ TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndLetsGo) {
       Servo servo(grip, clock, 1000, limits);
       const ForceDirectionCheck push(limits, both);
       EXPECT_EQ(push.force(), std::min(1.0, limit / 2));
-      EXPECT_EQ(push.give(servo, [] { return false; }), "");
+      EXPECT_EQ(push.push(servo, [] { return false; }), "");
       double most = 0, before = 0;
       for (const auto& [tip, tail] : grip.commands) {
         EXPECT_EQ(Vec3(tip.x, 0, 0), tip);
@@ -226,13 +226,13 @@ TEST(ForceDirectionCheck, TellsWhatIsWrongWithTheCommands) {
        [](Sample& s) { s.faults = s.tick > 9 ? servo_fault::kTripped : 0; }}};
   for (const auto& [what, spoil] : cases) {
     WrongServo servo(spoil);
-    const std::string said = push.give(servo, [] { return false; });
+    const std::string said = push.push(servo, [] { return false; });
     EXPECT_NE(said.find(what), std::string::npos) << said;
     EXPECT_EQ(said.empty(), what.empty()) << said;
     EXPECT_TRUE(servo.stopped);
   }
   WrongServo servo([](Sample&) {});
-  EXPECT_NE(push.give(servo, [] { return true; }), "");
+  EXPECT_NE(push.push(servo, [] { return true; }), "");
   EXPECT_TRUE(servo.stopped);
 }
 

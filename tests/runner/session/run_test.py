@@ -157,11 +157,11 @@ class Whole(Live):
             self.finish(terminal)
             self.assertIn("participant P02 (not enrolled)", terminal.text)
         with self.run_session(**sessions) as terminal:
-            terminal.wait_for("session 1 was today as well", "has number 5; session 2 of 2")
+            terminal.wait_for("session 1 was also today", "has number 5; session 2 of 2")
             self.finish(terminal)
         with self.run_session(**sessions) as terminal:
             self.assertEqual(terminal.finish(), 2)
-            self.assertIn("participant P01 has done every session", terminal.text)
+            self.assertIn("participant P01 has completed every session", terminal.text)
         with self.run_session("--number", "4", **sessions) as terminal:
             self.assertEqual(terminal.finish(), 2)
             self.assertIn("has number 5, not 4", terminal.text)
@@ -308,18 +308,18 @@ class Commands(Live):
 
     def test_a_session_that_goes_on_begins_by_saying_so(self):
         terminal = self.begin()
-        self.assertNotIn("goes on with trial", terminal.text)
+        self.assertNotIn("continues with trial", terminal.text)
         terminal.type(":stop\n1")
         self.finish(terminal)
         with self.run_session() as again:
-            again.wait_for("1 of 4 trials done, last run today ", " (paused), goes on with trial 2")
+            again.wait_for("1 of 4 trials done, last run today ", " (paused), continues with trial 2")
             self.finish(again)
 
     def test_a_stop_can_be_taken_back(self):
         terminal = self.begin()
         terminal.type(":stop\n:stop\n1")
         self.finish(terminal)
-        self.assertIn("the stop is taken back", terminal.text)
+        self.assertIn("the stop is cancelled", terminal.text)
         self.assertEqual(self.ends(), ["done"])
 
     def test_after_an_abort_nobody_reads_that_it_is_over(self):
@@ -402,7 +402,7 @@ class Enrolment(Live):
         self.assertEqual(self.ends(), ["withdrawn"])
         with self.run_session() as refused:
             self.assertEqual(refused.finish(), 2)
-            self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and is not begun again")
+            self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and is not started again")
 
     def test_what_fails_before_the_first_trial_enrols_nobody(self):
         without_display = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
@@ -419,7 +419,7 @@ class Enrolment(Live):
             terminal.type("y\n")
             self.finish(terminal)
         with self.run_session(code="PO1", sure=False) as terminal:
-            terminal.wait_for("P01 is there: a slip of the hand?")
+            terminal.wait_for("P01 is there: a typing error?")
             terminal.wait_for("Is PO1 a new participant? [y/N]")
             terminal.type("\n")
             self.assertEqual(terminal.finish(), 2)
@@ -432,7 +432,7 @@ class Enrolment(Live):
         self.assertEqual(self.codes(self.db), ["P01", "P02"])
         with self.run_session(sure=False) as known:
             self.assertEqual(known.finish(), 2)
-            self.assertIn("has done every session", known.text)
+            self.assertIn("has completed every session", known.text)
             self.assertNotIn("[y/N]", known.text)
 
     def test_a_script_takes_new_codes_but_none_that_looks_like_another(self):
@@ -544,7 +544,7 @@ class Changed(Live):
             terminal.wait_for("which? ")
             terminal.type("s\n")
             self.assertEqual(terminal.finish(), 2)
-            self.assertIn("K1 has done every session", terminal.text)
+            self.assertIn("K1 has completed every session", terminal.text)
 
     def test_new_texts_where_only_texts_differ(self):
         with self.run_session(code="K1", **self.TEXTS) as terminal:

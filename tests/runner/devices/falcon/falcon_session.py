@@ -84,7 +84,7 @@ class FalconSession(unittest.TestCase):
                 if torque and state["torque_is_zero"]:
                     break
                 self.assertLess(time.monotonic(), end, "no push came\n" + terminal.text)
-            came = terminal.wait_for("was a feeble push to the right felt?", "the push was not as it should be")
+            came = terminal.wait_for("was a weak push to the right felt?", "the force direction check failed")
             if came.startswith("was"):
                 return farthest
             terminal.wait_for("(go: push)")
