@@ -7,15 +7,44 @@
 #include "analysis/figures/figures.h"
 #include "analysis/figures/figures_svg.h"
 #include "analysis/input/study_record.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
+#include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_trials.h"
 
 namespace palpate::runner {
+
+namespace {
+
+void check(const std::string& database, const std::string& csv,
+           const analysis::AnalysisSettings& settings, const std::string& usage) {
+  if (database.empty() == csv.empty()) {
+    throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + usage +
+                     "\nMore: add --help");
+  }
+  if (!(settings.too_fast > 0) || !std::isfinite(settings.too_fast)) {
+    throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
+  }
+}
+
+void put(Outputs& outputs, const analysis::Analysis& analysis,
+         const analysis::ReportRecord& record) {
+  if (outputs.wanted("figures")) {
+    for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
+      outputs.put_into_folder(figure.id + ".svg",
+                              analysis::figure_svg(figure, analysis::light_palette()));
+    }
+  }
+  if (outputs.wanted("json")) outputs.put("json", analysis::report_json(analysis));
+  if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
+}
+
+}  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
@@ -23,12 +52,10 @@ int analyze_command(const std::vector<std::string>& args) {
       "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR] "
       "[--force]";
   line.summary =
-      "Is a shape identified faster with the ray than with the point renderer, by how much, how "
-      "sure?\n"
-      "Any renderers of other people's data: each is compared with the first (point where it is "
-      "there).\n"
-      "The answer and its tables go to stdout. Files that are there already are replaced "
-      "with --force alone.";
+      "Are shapes identified faster with the ray than with the point renderer, by how much,\n"
+      "and how certain is it? In data with other renderers each is compared with the first\n"
+      "(point if it is among them). The answer and its tables go to stdout. Existing files\n"
+      "are replaced only with --force.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html   (other "
@@ -41,22 +68,16 @@ int analyze_command(const std::vector<std::string>& args) {
   namespace po = boost::program_options;
   add("db", po::value(&database)->value_name("FILE"), "the study's database");
   add("csv", po::value(&csv)->value_name("FILE"), "trials as CSV, one row a trial");
-  add("json", po::value(&json)->value_name("FILE"), "write every figure as JSON");
-  add("report", po::value(&report)->value_name("FILE.html"), "write a report to look at and print");
+  add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
+  add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
       "write the report's figures as SVG files into this folder");
-  add("force", "replace files that are there");
+  add("force", "replace existing files");
   add("too-fast-s", po::value(&settings.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
-      "leave correct answers before this time out of the times");
+      "exclude correct answers faster than this from the times");
   const auto values = line.parse(args);
   if (!values) return 0;
-  if (database.empty() == csv.empty()) {
-    throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + line.usage +
-                     "\nMore: add --help");
-  }
-  if (!(settings.too_fast > 0) || !std::isfinite(settings.too_fast)) {
-    throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
-  }
+  check(database, csv, settings, line.usage);
   Outputs outputs(*values, {"json", "report"}, {"db", "csv"}, "figures");
 
   const analysis::Analysis analysis =
@@ -65,14 +86,7 @@ int analyze_command(const std::vector<std::string>& args) {
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
     record = analysis::read_report_record(database);
   }
-  if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
-      outputs.put_into_folder(figure.id + ".svg",
-                              analysis::figure_svg(figure, analysis::light_palette()));
-    }
-  }
-  if (outputs.wanted("json")) outputs.put("json", analysis::report_json(analysis));
-  if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
+  put(outputs, analysis, record);
   outputs.write();
   std::cout << analysis::report_text(analysis);
   return 0;

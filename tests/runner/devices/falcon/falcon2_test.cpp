@@ -27,21 +27,21 @@ constexpr double kLength = 0.12;
 struct Bench {
   Emulator tip_emulator, tail_emulator;
   FakeTransport *tip_line = nullptr, *tail_line = nullptr;
-  std::unique_ptr<FalconArm> tip, tail;
+  std::unique_ptr<FalconDriver> tip, tail;
   Pose tail_in_tip{{0.002, -0.003, kLength + 0.001}, glm::normalize(Quat(1, 0.05, -0.03, 0.9))};
 
   Bench() {
-    const auto arm = [](Emulator& emulator, FakeTransport*& line, const char* serial) {
+    const auto driver = [](Emulator& emulator, FakeTransport*& line, const char* serial) {
       emulator.preload(true);
       emulator.plant.hand_stiffness = 5000;
       emulator.plant.hand_damping = 50;
       auto transport = std::make_unique<FakeTransport>(emulator, serial);
       line = transport.get();
       line->control(request::kLatency, 1);
-      return std::make_unique<FalconArm>(std::move(transport), ArmSettings{});
+      return std::make_unique<FalconDriver>(std::move(transport), DriverSettings{});
     };
-    tip = arm(tip_emulator, tip_line, "TIP");
-    tail = arm(tail_emulator, tail_line, "TAIL");
+    tip = driver(tip_emulator, tip_line, "TIP");
+    tail = driver(tail_emulator, tail_line, "TAIL");
   }
 
   /// Both ends, in the tip's world frame, m.
@@ -94,7 +94,7 @@ TEST(Falcon2, SensesTheStylus) {
   }
 }
 
-TEST(Falcon2, PushesEachEndWithItsForce) {
+TEST(Falcon2, CommandsEachEndItsForce) {
   Bench bench;
   Falcon2Device device = bench.device();
   bench.hold_stylus({0, 0, 0}, {0.1, 0, 1});
@@ -104,7 +104,7 @@ TEST(Falcon2, PushesEachEndWithItsForce) {
   EXPECT_LT(glm::length(bench.tail_force() - Vec3(-0.5, 0.4, 1)), 0.03);
 }
 
-TEST(Falcon2, AGripThatSlipsOffTheStylusTakesAllForceAway) {
+TEST(Falcon2, AGripThatSlipsOffTheStylusGivesZeroForce) {
   Bench bench;
   Falcon2Device device = bench.device();
   bench.hold_stylus({0, 0, 0}, {0, 0, 1});
@@ -118,7 +118,7 @@ TEST(Falcon2, AGripThatSlipsOffTheStylusTakesAllForceAway) {
   EXPECT_NEAR(device.stylus().stretch(), 0.012, 1e-3);
 }
 
-TEST(Falcon2, EitherDeviceLostTakesBothForcesAway) {
+TEST(Falcon2, EitherDeviceLostGivesZeroForceAtBoth) {
   for (const bool at_tip : {true, false}) {
     Bench bench;
     Falcon2Device device = bench.device();
@@ -139,7 +139,7 @@ TEST(Falcon2, EitherDeviceLostTakesBothForcesAway) {
   }
 }
 
-TEST(Falcon2, ButtonsOfBoth) {
+TEST(Falcon2, ReadsTheButtonsOfBothGrips) {
   Bench bench;
   bench.tip_emulator.buttons = 4;
   bench.tail_emulator.buttons = 1;
@@ -177,7 +177,7 @@ PairRegistration registration(Bench& bench, const Vec3& offset, const std::funct
   return register_pair(tip, tail, clock, guide, {kLength, offset, points, 0.3});
 }
 
-TEST(FalconRegistration, FindsHowTheDevicesStand) {
+TEST(FalconRegistration, FindsTheRelativePoseOfTheDevices) {
   for (const Vec3& offset : {Vec3(0), Vec3(0, 0, kLength)}) {
     Bench bench;
     if (offset == Vec3(0)) bench.tail_in_tip.position = {0.003, -0.005, 0.004};
@@ -194,7 +194,7 @@ TEST(FalconRegistration, FindsHowTheDevicesStand) {
   }
 }
 
-TEST(FalconRegistration, GripsThatComeApartAreNoticed) {
+TEST(FalconRegistration, GripsThatComeApartAreDetected) {
   Bench bench;
   bench.tail_in_tip.position = {0.003, -0.005, 0.004};
   try {
@@ -204,11 +204,11 @@ TEST(FalconRegistration, GripsThatComeApartAreNoticed) {
     });
     ADD_FAILURE();
   } catch (const GuideError& error) {
-    EXPECT_NE(std::string(error.what()).find("fit only to"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("fit only within"), std::string::npos) << error.what();
   }
 }
 
-TEST(FalconRegistration, TheSamePlaceTwiceIsAskedAgain) {
+TEST(FalconRegistration, APointTakenTwiceIsAskedForAgain) {
   Bench bench;
   bench.tail_in_tip.position = {0.003, -0.005, 0.004};
   ScriptedGuide guide([&bench](int question) {

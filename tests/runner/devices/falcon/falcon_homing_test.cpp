@@ -30,11 +30,11 @@ struct Bench {
     line = transport.get();
     line->control(request::kLatency, 1);
     device = std::make_unique<FalconDevice>(
-        std::make_unique<FalconArm>(std::move(transport), ArmSettings{}));
+        std::make_unique<FalconDriver>(std::move(transport), DriverSettings{}));
   }
 };
 
-TEST(FalconHoming, AsksAndWaits) {
+TEST(FalconHoming, AsksTheExperimenterAndWaits) {
   Bench bench;
   bench.emulator.plant.hand = [](double t) {
     return kCentre + Vec3(0, 0, 0.035 * std::sin(4 * t));

@@ -1,4 +1,4 @@
-#include "runner/display/page_layout.h"
+#include "runner/display/participant_page.h"
 
 #include <gtest/gtest.h>
 
@@ -63,14 +63,14 @@ void keep(const Image& image, const std::string& name) {
   }
 }
 
-TEST(PageLayout, TheSamePageGivesTheSamePixels) {
+TEST(ParticipantPage, TheSamePageGivesTheSamePixels) {
   const Image a = draw_page(trial_page(), 1280, 800), b = draw_page(trial_page(), 1280, 800);
   keep(a, "neutral");
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_GT(inked_rows(a), 30);
 }
 
-TEST(PageLayout, ATrialShowsItsWordAndTheKeyMap) {
+TEST(ParticipantPage, ATrialShowsItsWordAndTheKeyMap) {
   Page page = trial_page();
   const Image without = draw_page(page, 1280, 800);
   page.text = "Go";
@@ -84,12 +84,12 @@ TEST(PageLayout, ATrialShowsItsWordAndTheKeyMap) {
   EXPECT_EQ(inked_rows(draw_page(page, 1280, 800)), 0);
 }
 
-TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
+TEST(ParticipantPage, ALongTextContinuesOnTheNextScreenInTheSameSize) {
   Page page;
   page.kind = Page::Kind::text;
   for (int i = 0; i < 300; ++i) page.text += "Halten Sie den Griffel wie einen Stift. ";
   for (const auto& [width, height] : {std::pair{400, 728}, {1024, 768}, {3840, 2160}}) {
-    const int screens = screens_of(page, width, height);
+    const int screens = screen_count(page, width, height);
     ASSERT_GT(screens, 1);
     std::vector<std::vector<std::uint32_t>> seen;
     for (int i = 0; i < screens; ++i) {
@@ -102,12 +102,12 @@ TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
     EXPECT_EQ(draw_page(page, width, height, {1, screens}).pixels, seen.back());
   }
   page.text = "short";
-  EXPECT_EQ(screens_of(page, 1024, 768), 1);
+  EXPECT_EQ(screen_count(page, 1024, 768), 1);
   page.text = std::string(5000, '\n');
-  EXPECT_EQ(screens_of(page, 1024, 768), 1) << "empty screens are left out";
+  EXPECT_EQ(screen_count(page, 1024, 768), 1) << "empty screens are left out";
 }
 
-TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
+TEST(ParticipantPage, ABreakShowsACountDownAndTheProgress) {
   Page page;
   page.text = "Rest your hand.";
   const Image plain = draw_page(page, 1280, 800);
@@ -122,7 +122,7 @@ TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
   EXPECT_EQ(inked_rows(plain) < inked_rows(counted) && inked_rows(counted) < inked_rows(far), true);
 }
 
-TEST(PageLayout, AReplyInABreakStandsOffTheEdge) {
+TEST(ParticipantPage, AReplyInABreakKeepsItsDistanceFromTheEdge) {
   Page page;
   page.text = "Rest your hand.";
   page.seconds_left = 25;
@@ -136,7 +136,7 @@ TEST(PageLayout, AReplyInABreakStandsOffTheEdge) {
   }
 }
 
-TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
+TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
   Page page;
   page.kind = Page::Kind::checklist;
   page.checklist.steps = {{"Home the device", Checklist::Step::State::done},
@@ -149,7 +149,7 @@ TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
   EXPECT_GT(inked_rows(draw_page(page, 389, 728)), inked_rows(image)) << "more text, more lines";
 }
 
-TEST(PageLayout, EveryScriptFindsItsPlace) {
+TEST(ParticipantPage, EveryScriptFitsTheScreen) {
   Page page;
   page.kind = Page::Kind::text;
   page.keys = trial_page().keys;
@@ -181,7 +181,7 @@ TEST(PageLayout, EveryScriptFindsItsPlace) {
   }
 }
 
-TEST(PageLayout, HostileTextStaysOnTheScreen) {
+TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
   Page page;
   page.kind = Page::Kind::text;
   page.keys = trial_page().keys;
@@ -197,7 +197,7 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
     const Image image = draw_page(page, 1280, 800);
     keep(image, "hostile" + std::to_string(text.size()));
     // Beside the bar of a text with several screens stands the number of the one on show.
-    const bool several = screens_of(page, 1280, 800) > 1;
+    const bool several = screen_count(page, 1280, 800) > 1;
     EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? keys : keys_and_bar)
         << text.substr(0, 20);
     EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);
@@ -209,7 +209,7 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
   }
 }
 
-TEST(PageLayout, OtherKindsOfPages) {
+TEST(ParticipantPage, OtherKindsOfPages) {
   Page page;
   page.kind = Page::Kind::feedback;
   page.text = "\u2713";
@@ -225,10 +225,11 @@ TEST(PageLayout, OtherKindsOfPages) {
   EXPECT_GT(inked_rows(message), 10);
 }
 
-TEST(MissingLetters, NamesWhatNoFontCanShow) {
+TEST(MissingLetters, NamesCharactersThatNoFontHas) {
   EXPECT_EQ(missing_letters({"sphere", "Kugel", "σφαίρα"}), "");
   // A private-use letter: in no font that a test may count on.
-  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 letters"), std::string::npos);
+  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 characters"),
+            std::string::npos);
   EXPECT_NO_THROW(missing_letters({"\xff\xc3"}));
 }
 
