@@ -115,7 +115,7 @@ Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh
         const ExactDepths& exact, bool segment, double seconds) {
   const double ns = runner::nanoseconds_per_count();
   const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
-  const std::unique_ptr<rendering::Method> method = kind.make(mesh, segment);
+  const std::unique_ptr<rendering::ContactMethod> method = kind.make(mesh, segment);
   Row row;
   row.method = kind.name;
   std::vector<std::uint64_t> counts;

@@ -41,7 +41,7 @@ class TrialsCsv : public ::testing::Test {
     const auto found = faults(text);
     ASSERT_EQ(found.size(), 1U) << text.substr(0, 300);
     EXPECT_EQ(found[0].file, path_);
-    EXPECT_EQ(found[0].place, place);
+    EXPECT_EQ(found[0].location, place);
     EXPECT_NE(found[0].expected.find(words), std::string::npos) << found[0].expected;
   }
 
@@ -193,7 +193,7 @@ TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
                             "P1,1,1,1,ray,cone,cone,1,2\n" + "\t,1,1,2,ray,cone,cone,1,nan\n");
   std::vector<std::string> places;
   places.reserve(found.size());
-  for (const protocols::Fault& fault : found) places.push_back(fault.place);
+  for (const protocols::Fault& fault : found) places.push_back(fault.location);
   EXPECT_EQ(places, (std::vector<std::string>{
                         "line 2, column session", "line 2, column block", "line 2, column trial",
                         "line 2, column renderer", "line 2, column shape", "line 2, column correct",

@@ -32,7 +32,7 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
     ASSERT_TRUE(same(target, free.begin(stimuli::Random(5))));
     constexpr int kTouch = 20;
     for (int tick = 0; tick < kTouch + ticks; ++tick) {
-      Felt felt;
+      TouchState felt;
       if (tick >= kTouch) felt = {true, Vec3(0, 0, 1), held_at(target).tip, 0};
       const HandTarget other = free.step({}, held_at(target));
       target = touching.step(felt, held_at(target));
