@@ -82,7 +82,7 @@ class Builder : public nlohmann::json_sax<json> {
     }
     key_ = name;
     if (open_.back().value->contains(name)) {
-      faults_.set_line(open_.back().location.child(name), line());
+      faults_.set_line(open_.back().pointer.child(name), line());
       faults_.add(faults_.full() ? std::string() : child_pointer(here(), name),
                   "each key at most once; this one is given again");
     }
