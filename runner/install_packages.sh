@@ -2,7 +2,7 @@
 # Installs the Debian packages that are missing. Usage: install_packages.sh build|package|tests|quality
 set -euo pipefail
 
-build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libjs-vega libsqlite3-dev
+build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libsqlite3-dev
   libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config zlib1g-dev
   fonts-noto-core libasound2-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev libstb-dev libx11-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
 
 #include "analysis/text.h"
 
@@ -9,55 +11,82 @@ namespace palpate::analysis {
 
 namespace {
 
-/// About a fifth of `span`.
-double tick_step(double span) {
+/// 1, 2 or 5 times a power of ten: about a fifth of `span`.
+double round_step(double span) {
   const double power = std::pow(10.0, std::floor(std::log10(span / 5)));
   const double factor = span / 5 / power;
   return power * (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10);
 }
 
+/// "0.02", "500", "10⁻⁶", "2·10⁻⁶". \param factor 1, 2 or 5, times 10 to the `exponent`
+std::string log_tick_text(int factor, int exponent) {
+  constexpr int kFewDecimals = 3, kFewZeros = 4;
+  if (exponent >= -kFewDecimals && exponent <= kFewZeros) {
+    return fixed(factor * std::pow(10.0, exponent), std::max(0, -exponent));
+  }
+  constexpr const char* kRaised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = factor == 1 ? "" : std::to_string(factor) + "·";
+  text += exponent < 0 ? "10⁻" : "10";
+  for (const char digit : std::to_string(std::abs(exponent))) text += kRaised[digit - '0'];
+  return text;
+}
+
 }  // namespace
 
-double Axes::y(double value) const {
-  return bottom - (std::clamp(value, low, high) - low) / (high - low) * (bottom - top);
+FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title) {
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.high = static_cast<double>(std::max<std::size_t>(shown, 1));
+  axis.grid = false;
+  axis.names = true;
+  for (std::size_t i = 0; i < shown; ++i) {
+    axis.ticks.push_back({static_cast<double>(i) + 0.5, stimuli::printable(names[i], 160)});
+  }
+  return axis;
 }
 
-double Axes::centre(std::size_t shape) const {
-  return left + (static_cast<double>(shape) + 0.5) * slot;
-}
-
-void Axes::round_ends() {
-  step = tick_step(high - low);
-  low = step * std::floor(low / step + 1e-9);
-  high = step * std::ceil(high / step - 1e-9);
-}
-
-void draw_grid(Svg& svg, const Axes& axes) {
-  const double step = axes.step;
+FigureAxis linear_axis(double low, double high, std::string title) {
+  if (!(high > low)) high = low + 1;
+  const double step = round_step(high - low);
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.low = step * std::floor(low / step + 1e-9);
+  axis.high = step * std::ceil(high / step - 1e-9);
   const int decimals = step < 1 ? static_cast<int>(std::ceil(-std::log10(step) - 1e-9)) : 0;
-  const int count = static_cast<int>(std::lround((axes.high - axes.low) / step));
-  for (int i = 0; i <= count; ++i) {
-    const double value = axes.low + i * step, y = axes.y(value);
-    const bool zero = std::fabs(value) < step / 2;
-    svg.line(axes.left, y, axes.left + axes.width, y, zero ? kSoft : kGrid, zero ? 1.2 : 1);
-    svg.text(axes.left - 8, y + 4, fixed(value, decimals), {12, kSoft, Svg::Anchor::end});
+  const auto count = std::lround((axis.high - axis.low) / step);
+  for (long i = 0; i <= count; ++i) {
+    const double at = axis.low + static_cast<double>(i) * step;
+    axis.ticks.push_back({at, fixed(at, decimals)});
   }
+  return axis;
 }
 
-void draw_interval(Svg& svg, const Axes& axes, double x, double low, double high,
-                   std::string_view colour) {
-  const double top = axes.y(high), bottom = axes.y(low);
-  svg.line(x, bottom, x, top, colour, 2);
-  if (high > axes.high) {
-    svg.triangle(x, top + 4, 5, true, colour);
-  } else {
-    svg.line(x - 5, top, x + 5, top, colour, 2);
+FigureAxis log_axis(double low, double high, std::string title) {
+  constexpr double kMostWithParts = 3.5;  // decades
+  if (!(high > low)) {
+    low -= 0.1;
+    high += 0.1;
   }
-  if (low < axes.low) {
-    svg.triangle(x, bottom - 4, 5, false, colour);
-  } else {
-    svg.line(x - 5, bottom, x + 5, bottom, colour, 2);
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.low = low;
+  axis.high = high;
+  const int last = static_cast<int>(std::ceil(high));
+  for (int exponent = static_cast<int>(std::floor(low)); exponent <= last; ++exponent) {
+    for (const int factor : {1, 2, 5}) {
+      const double at = exponent + std::log10(factor);
+      if (factor > 1 && high - low > kMostWithParts) continue;
+      if (at < low - 1e-9 || at > high + 1e-9) continue;
+      axis.ticks.push_back({at, log_tick_text(factor, exponent)});
+    }
   }
+  return axis;
+}
+
+FigureAxis decades_axis(double low, double high, std::string title) {
+  const double first = std::floor(std::log10(low) + 1e-9);
+  const double last = std::ceil(std::log10(high) - 1e-9);
+  return log_axis(first, std::max(last, first + 1), std::move(title));
 }
 
 }  // namespace palpate::analysis

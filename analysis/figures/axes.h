@@ -1,31 +1,22 @@
 #pragma once
+// Axes of panels: their ends, ticks and labels.
 
 #include <cstddef>
-#include <string_view>
+#include <string>
+#include <vector>
 
-#include "analysis/figures/svg.h"
+#include "analysis/figures/figures.h"
 
 namespace palpate::analysis {
 
-constexpr std::string_view kInk = "#1f2328", kSoft = "#59636e", kGrid = "#e3e6ea";
-
-/// The frame of one panel with a slot for each shape; maps values to px, cut to what is shown.
-struct Axes {
-  double left = 0, width = 0, top = 0, bottom = 0;  ///< px
-  double low = 0, high = 1;                         ///< values at bottom and top, low < high
-  double step = 1;                                  ///< between ticks
-  double slot = 0;                                  ///< px for each shape
-
-  double y(double value) const;
-  double centre(std::size_t shape) const;
-  /// Widens low and high to whole ticks of 1, 2 or 5 times a power of ten.
-  void round_ends();
-};
-
-/// Lines and figures of the ticks; the line at 0 is stronger.
-void draw_grid(Svg& svg, const Axes& axes);
-/// An interval with end caps; arrowheads where it leaves the axes.
-void draw_interval(Svg& svg, const Axes& axes, double x, double low, double high,
-                   std::string_view colour);
+/// Slots 0..1, 1..2, ... named in their middles; the first `shown` of the names.
+FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
+/// Round ticks, ends widened to them.
+FigureAxis linear_axis(double low, double high, std::string title);
+/// For log10 of values: ticks at 1, 2 and 5 times powers of ten, where there are many at the powers
+/// alone. \param low, high log10 of values
+FigureAxis log_axis(double low, double high, std::string title);
+/// The same with ends at whole powers of ten. \param low, high values, above 0
+FigureAxis decades_axis(double low, double high, std::string title);
 
 }  // namespace palpate::analysis

@@ -1,10 +1,8 @@
 #pragma once
-// The figures of a report as numbers and words, before anything is drawn. Whoever draws them (a
-// static SVG, Vega in a browser) reads the same panels, so both show the same.
+// Figures as numbers and words in the units of their axes; figure_svg() draws them.
 
 #include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/input/study_record.h"
@@ -12,8 +10,8 @@
 
 namespace palpate::analysis {
 
-/// What a colour stands for; each theme has its own value. Those from `third` on are of further
-/// renderers.
+/// What a colour stands for; each theme has its own value. `third` and on: further renderers or
+/// lines.
 enum class Role {
   page,
   ink,
@@ -27,25 +25,24 @@ enum class Role {
   third,
   fourth,
   fifth,
-  sixth
+  sixth,
+  seventh,
+  eighth
 };
-constexpr std::size_t kRoles = 13, kUsualRoles = 9;
+constexpr std::size_t kRoles = 15;
 const char* to_string(Role role);
 
 /// The diamond is open. Right and left are triangles, the cross stands upright, the saltire not.
 enum class Shape { circle, square, diamond, up, down, dash, right, cross, left, saltire };
 
-/// Corners of the symbols that are told by them alone, right, cross, left and saltire; y down, the
-/// half width 1. Empty: of the others.
-std::vector<std::pair<double, double>> outline_of(Shape shape);
-
 /// One thing in a panel, in the panel's own units.
 struct Mark {
-  enum class Kind { rect, area, line, interval, symbol, text };
+  /// A label is a text beside its point, on the side where it hides least.
+  enum class Kind { rect, area, line, interval, symbol, text, label };
   Kind kind = Kind::symbol;
   Role role = Role::ink;
   /// rect: two opposite corners; area (closed) and line: their corners; interval: one x and two y;
-  /// symbol, text: one of each.
+  /// symbol, text, label: one of each.
   std::vector<double> x, y;
   double opacity = 1;
   double size = 6;  ///< px: half of a symbol, width of a line, height of a text
@@ -54,7 +51,12 @@ struct Mark {
   std::string person;     ///< marks of one participant are made to stand out together
   int anchor = 0;         ///< of a text: -1 starts, 0 is centred, 1 ends at x
   bool bold = false;      ///< of a text
+  bool dashed = false;    ///< of a line
   double dx = 0, dy = 0;  ///< px, of symbols and texts
+  /// Of a text: width that it may take, in units of x (0: any). A wider one gives way to `shorter`,
+  /// then to nothing.
+  double room = 0;
+  std::string shorter;
 };
 
 struct Tick {
@@ -73,7 +75,8 @@ struct FigureAxis {
 struct Panel {
   std::string title;
   FigureAxis x, y;
-  double width = 400, height = 300;  ///< px; in a browser narrower where there is less room
+  double width = 400, height = 300;  ///< px; narrower where there is less room
+  bool starts_row = false;           ///< stands below those before it, not beside them
   std::vector<Mark> marks;
 };
 
@@ -92,10 +95,8 @@ struct Figure {
   std::vector<std::string> notes;
   std::vector<LegendEntry> legend;
   std::vector<Panel> panels;
+  double room = 1000;  ///< px: panels stand side by side within it
 };
-
-/// Roles, from the first on, that a palette needs: the usual ones, and those of further renderers.
-std::size_t roles_in(const Figure& figure);
 
 /// Those that the data allow, in the order of display: figure15, speedup, times, confusion,
 /// speed-accuracy, learning, order, servo (unless all trials' longest periods are alike),

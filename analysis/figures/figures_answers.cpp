@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "analysis/figures/figures_parts.h"
-#include "analysis/figures/svg.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -61,71 +60,6 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
   return panel;
 }
 
-struct Label {
-  double x, y;
-  std::string text;
-};
-
-struct Box {
-  double left, right, top, bottom;  ///< px
-
-  bool meets(const Box& other) const {
-    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
-  }
-};
-
-/// Names beside their points: right or left, above or below, wherever they hide no other. In a
-/// panel that has others at its sides they stay inside.
-void put_labels(Panel& panel, const std::vector<Label>& labels) {
-  constexpr double kSize = 13, kPoint = 7;  // px
-  const auto px = [&](double x) {
-    return (x - panel.x.low) / (panel.x.high - panel.x.low) * panel.width;
-  };
-  const auto py = [&](double y) {
-    return (panel.y.high - y) / (panel.y.high - panel.y.low) * panel.height;
-  };
-  std::vector<Box> taken;  // points, bars, the lines at 0, then labels
-  taken.reserve(2 * labels.size() + panel.marks.size());
-  for (const Mark& mark : panel.marks) {
-    if (mark.kind != Mark::Kind::line && mark.kind != Mark::Kind::interval) continue;
-    const auto [left, right] = std::ranges::minmax(mark.x);
-    const auto [low, high] = std::ranges::minmax(mark.y);
-    taken.push_back({px(left) - 2, px(right) + 2, py(high) - 2, py(low) + 2});
-  }
-  for (const Label& label : labels) {
-    const double x = px(label.x), y = py(label.y);
-    taken.push_back({x - kPoint, x + kPoint, y - kPoint, y + kPoint});
-  }
-  for (const Label& label : labels) {
-    const double wide = text_width(label.text, kSize, true);
-    Mark best;
-    Box place{};
-    std::ptrdiff_t fewest = std::ssize(taken) + 1;
-    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
-      for (const int anchor : {-1, 1}) {
-        Mark mark = text_mark(Role::ink, label.x, label.y, label.text, kSize);
-        mark.anchor = anchor;
-        mark.bold = true;
-        mark.dx = -11 * anchor;
-        mark.dy = dy;
-        const double left = px(label.x) + mark.dx - (anchor > 0 ? wide : 0);
-        const double base = py(label.y) + dy;
-        const Box box{left, left + wide, base - kSize, base + 3};
-        const bool outside = panel.width < kWide && (box.left < 0 || box.right > panel.width);
-        const auto hits =
-            std::ranges::count_if(taken, [&](const Box& other) { return box.meets(other); }) +
-            (outside ? 3 : 0);
-        if (hits >= fewest) continue;
-        fewest = hits;
-        best = std::move(mark);
-        place = box;
-      }
-    }
-    taken.push_back(place);
-    panel.marks.push_back(std::move(best));
-  }
-}
-
 /// Of the time in percent, negative where it is less.
 std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio) {
   if (!log_ratio) return std::nullopt;
@@ -142,7 +76,7 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
                                   "slower and more accurate: a trade-off"));
   panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
   panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
-  std::vector<Label> labels;
+  bool any = false;
   for (std::size_t s = 0; s < shapes; ++s) {
     const SpeedAccuracy& both = comparison.speed_accuracy[s];
     if (!both.percent_change_time || !both.accuracy_change) continue;
@@ -163,11 +97,14 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
       add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
     }
     panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
-    labels.push_back({x, y, name});
+    Mark label = text_mark(Role::ink, x, y, name, 13);
+    label.kind = Mark::Kind::label;
+    label.bold = true;
+    panel.marks.push_back(std::move(label));
+    any = true;
     description += text + ". ";
   }
-  put_labels(panel, labels);
-  return !labels.empty();
+  return any;
 }
 
 }  // namespace

@@ -87,13 +87,6 @@ double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t
   return highest > 0 ? highest : 1;
 }
 
-/// The paper's percent reduction as a number; none where it found no difference or had no shape.
-std::optional<double> paper_number(const RendererPair& pair, const std::string& shape) {
-  const std::string text = paper_reduction(pair, shape);
-  if (text.empty() || text == "n.s.") return std::nullopt;
-  return std::stod(text);
-}
-
 /// The estimate with time-outs as censored times; none where the shape has no time-out, or no
 /// estimate.
 const CensoredEstimate* shown_censored(const Comparison& comparison, std::size_t shape) {
@@ -133,10 +126,12 @@ std::string interval_text(const Interval& percent) {
 }
 
 void add_paper(Panel& panel, const RendererPair& pair, const std::string& shape, double x) {
-  if (const auto value = paper_number(pair, shape)) {
+  const PaperEffect* effect = paper_effect(pair, shape);
+  if (!effect) return;
+  if (const auto& value = effect->percent_reduction) {
     panel.marks.push_back(symbol(Role::paper, Shape::diamond, x, *value, 7,
                                  shape + ", Ho et al. 2000: " + fixed(*value, 0) + " %"));
-  } else if (!paper_reduction(pair, shape).empty()) {
+  } else {
     Mark mark = text_mark(Role::paper, x, 0, "n.s.", 12);
     mark.bold = true;
     mark.dy = -6;
@@ -276,7 +271,7 @@ Figure speedup_of(const Analysis& analysis) {
     return false;
   };
   const bool with_paper = shown([&](const Comparison& comparison, std::size_t s) {
-    return !paper_reduction(comparison.pair, analysis.table.shapes[s]).empty();
+    return paper_effect(comparison.pair, analysis.table.shapes[s]) != nullptr;
   });
   const bool with_censored = shown([](const Comparison& comparison, std::size_t s) {
     return shown_censored(comparison, s) != nullptr;

@@ -6,7 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/figures/axes.h"
 #include "analysis/figures/figures.h"
+#include "analysis/figures/marks.h"
 
 namespace palpate::analysis {
 
@@ -38,26 +40,6 @@ Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::
                        double slot);
 /// Title of an axis for what a comparison gains or changes: "less time with the ray (%)".
 std::string gain_title(const Analysis& analysis, const std::string& what, const std::string& joint);
-
-/// Slots 0..1, 1..2, ... named in their middles.
-FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
-/// Round ticks, ends widened to them.
-FigureAxis linear_axis(double low, double high, std::string title);
-/// For log10 of seconds: ticks at 1, 2 and 5 times powers of ten.
-FigureAxis seconds_axis(double low, double high, std::string title);
-
-Mark symbol(Role role, Shape shape, double x, double y, double size, std::string text = {});
-Mark text_mark(Role role, double x, double y, std::string text, double size = 12);
-Mark line_mark(Role role, std::vector<double> x, std::vector<double> y, double width = 2);
-Mark rect_mark(Role role, double x0, double y0, double x1, double y1, double opacity,
-               std::string text);
-
-/// An interval, cut to the axis, with arrowheads where it leaves it.
-void add_interval(Panel& panel, Role role, double x, double low, double high, std::string text);
-
-/// The same from left to right.
-void add_interval_across(Panel& panel, Role role, double y, double low, double high,
-                         const std::string& text);
 
 /// "1.25 s"
 std::string seconds_text(double seconds);

@@ -84,8 +84,8 @@ Figure learning_of(const Analysis& analysis) {
   parts.reserve(kLearningBins);
   for (std::size_t b = 0; b < kLearningBins; ++b) parts.push_back(std::to_string(b + 1));
   panel.x = names_axis(parts, kLearningBins, "part of the trials with a renderer, first to last");
-  panel.y = seconds_axis(low / per_decade - 0.05, high / per_decade + 0.05,
-                         "geometric mean time (s, logarithmic)");
+  panel.y = log_axis(low / per_decade - 0.05, high / per_decade + 0.05,
+                     "geometric mean time (s, logarithmic)");
   if (panel.y.ticks.size() < 3) {
     const FigureAxis seconds =
         linear_axis(std::pow(10, panel.y.low), std::pow(10, panel.y.high), "");

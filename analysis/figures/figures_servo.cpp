@@ -45,7 +45,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
   for (const ServoQuality& servo : record.servo) {
     Panel panel;
     panel.title = stimuli::printable(servo.renderer, 40);
-    panel.x = seconds_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
+    panel.x = log_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
     panel.x.grid = false;
     panel.y = linear_axis(0, room, "trials (%)");
     panel.width = 380;

@@ -1,29 +1,20 @@
 #pragma once
-// Figures as SVG, without a browser.
+// Figures as SVG: files, and the same drawings in a page.
 
-#include <array>
 #include <string>
 
 #include "analysis/figures/figures.h"
+#include "analysis/figures/palette.h"
 
 namespace palpate::analysis {
 
-/// Colours by role: what SVG and CSS read.
-using Palette = std::array<std::string, kRoles>;
-
-/// For paper. Okabe & Ito's (2008) colours, some darker: told apart with every common colour
-/// vision.
-Palette light_palette();
-Palette dark_palette();
-/// "var(--point)" and so on: a page's style says which.
-Palette page_palette();
-
-/// Where a figure stands: in a file of its own, or in a page that has its title above and its notes
-/// below.
-enum class Stands { alone, in_page };
+/// Where a figure stands: in a file of its own; in a page that has its title above and its notes
+/// below; or there for a narrow screen, with panels narrower and below each other.
+enum class Stands { alone, in_page, in_narrow_page };
 
 /// A document with title, label, legend and notes; in a page, title and notes are there for whoever
-/// saves the drawing, but not shown.
+/// saves the drawing, but not shown. Marks have their exact numbers as titles; those of one
+/// participant are groups with the attribute data-person.
 std::string figure_svg(const Figure& figure, const Palette& palette, Stands stands = Stands::alone);
 
 }  // namespace palpate::analysis

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "analysis/figures/figures_parts.h"
-#include "analysis/figures/svg.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -140,21 +139,20 @@ Stand stand_of(const Analysis& analysis, std::size_t renderer, std::size_t rende
   return {slot - 0.45 + 0.9 * (static_cast<double>(renderer) + 0.5) / n, 0, scale / n};
 }
 
-/// A cell's time-outs above the middle of its violin, or of its half. \param room px for a text
+/// A cell's time-outs above the middle of its violin, or of its half. \param room for the text,
+/// in slots
 void add_time_outs(Panel& panel, const TimeOutCell& cell, const Look& look, const Stand& stand,
                    double room, const std::string& name) {
   if (cell.n_timeouts == 0) return;
   const std::string share = fixed(100 * cell.share(), cell.share() < 0.0995 ? 1 : 0) + " %";
   const double x = stand.x + 0.25 * stand.side;
-  constexpr double kSize = 11.5;
-  for (const std::string& text : {std::to_string(cell.n_timeouts) + " (" + share + ")", share}) {
-    if (text_width(text, kSize, true) > room) continue;
-    Mark mark = text_mark(look.role, x, panel.y.high, text, kSize);
-    mark.bold = true;
-    mark.dy = 16;
-    panel.marks.push_back(std::move(mark));
-    break;
-  }
+  Mark mark = text_mark(look.role, x, panel.y.high,
+                        std::to_string(cell.n_timeouts) + " (" + share + ")", 11.5);
+  mark.bold = true;
+  mark.dy = 16;
+  mark.room = room;
+  mark.shorter = share;
+  panel.marks.push_back(std::move(mark));
   panel.marks.push_back(symbol(look.role, Shape::up, x, std::log10(*cell.highest_limit), 4,
                                name + ": " + counted(cell.n_timeouts, "time-out", "time-outs") +
                                    " of " + counted(cell.n_trials, "trial", "trials") + " (" +
@@ -218,7 +216,7 @@ Figure times_of(const Analysis& analysis) {
   const double top = limits.empty() ? high + 0.08 : std::max(high, limits.back()) + 0.17;
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
-  panel.y = seconds_axis(low - 0.08, top, "time (s, logarithmic)");
+  panel.y = log_axis(low - 0.08, top, "time (s, logarithmic)");
   panel.width = std::max(
       kWide, std::max(70.0, 35.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
   panel.height = 360;
@@ -231,7 +229,7 @@ Figure times_of(const Analysis& analysis) {
       widest = std::max(widest, *std::ranges::max_element(shares[r][s]));
     }
   }
-  const double room = 0.85 * panel.width / static_cast<double>(shapes * renderers);
+  const double room = 0.85 / static_cast<double>(renderers);
   for (std::size_t s = 0; s < shapes; ++s) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       const TimeOutCell& outs = analysis.time_outs.cells[r][s];

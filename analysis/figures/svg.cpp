@@ -12,7 +12,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr std::string_view kFonts =
+constexpr std::string_view kFont =
     "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
 /// Two decimals, never an exponent, a plain minus: what SVG reads.
@@ -99,9 +99,10 @@ void Svg::area(const std::vector<double>& x, const std::vector<double>& y, std::
 }
 
 void Svg::path(const std::vector<double>& x, const std::vector<double>& y, std::string_view stroke,
-               double width, double opacity) {
+               double width, double opacity, bool dashed) {
   body_ += "<polyline" + points(x, y) + " fill=\"none\"" + attribute("stroke", stroke) +
-           attribute("stroke-width", width) + attribute("stroke-opacity", opacity) + "/>\n";
+           attribute("stroke-width", width) + attribute("stroke-opacity", opacity) +
+           (dashed ? " stroke-dasharray=\"5 5\"" : "") + "/>\n";
 }
 
 void Svg::triangle(double x, double y, double half, bool up, std::string_view fill) {
@@ -124,8 +125,12 @@ void Svg::text(double x, double y, std::string_view text, const TextStyle& style
   body_ += ">" + escaped(text) + "</text>\n";
 }
 
-void Svg::begin_group(std::string_view title) {
-  body_ += "<g><title>" + escaped(title) + "</title>\n";
+void Svg::begin_group(std::string_view title, std::string_view person) {
+  body_ += "<g";
+  if (!person.empty()) body_ += attribute("data-person", person);
+  body_ += '>';
+  if (!title.empty()) body_ += "<title>" + escaped(title) + "</title>";
+  body_ += '\n';
 }
 
 void Svg::begin_alone() { body_ += "<g class=\"alone\">\n"; }
@@ -136,15 +141,19 @@ std::string Svg::document(double width, double height, std::string_view title,
                           std::string_view description, std::string_view id,
                           const std::optional<Part>& shown) const {
   const auto whole_px = [](double length) { return std::to_string(static_cast<int>(length)); };
-  const Part part = shown.value_or(Part{0, height});
-  const std::string w = whole_px(width), h = whole_px(part.bottom - part.top), name = escaped(id);
-  std::string size = attribute("width", w) + attribute("height", h) +
-                     attribute("viewBox", "0 " + whole_px(part.top) + " " + w + " " + h);
-  if (shown) size += attribute("data-whole", "0 0 " + w + " " + whole_px(height));
+  const Part part = shown.value_or(Part{0, width, 0, height});
+  const std::string w = whole_px(part.right - part.left), h = whole_px(part.bottom - part.top);
+  const std::string name = escaped(id);
+  std::string size =
+      attribute("width", w) + attribute("height", h) +
+      attribute("viewBox", whole_px(part.left) + " " + whole_px(part.top) + " " + w + " " + h);
+  if (shown) {
+    size += attribute("data-whole", "0 0 " + whole_px(width) + " " + whole_px(height));
+  }
   return "<svg xmlns=\"http://www.w3.org/2000/svg\"" + size +
-         " style=\"min-width:" + std::to_string(static_cast<int>(0.65 * width)) +
+         " style=\"min-width:" + whole_px(0.65 * (part.right - part.left)) + "px;max-width:" + w +
          "px\" role=\"img\" aria-labelledby=\"" + name + "-title " + name +
-         "-description\" font-family=\"" + std::string(kFonts) + "\">\n<title id=\"" + name +
+         "-description\" font-family=\"" + std::string(kFont) + "\">\n<title id=\"" + name +
          "-title\">" + escaped(title) + "</title>\n<desc id=\"" + name + "-description\">" +
          escaped(description) + "</desc>\n" + body_ + "</svg>\n";
 }

@@ -33,10 +33,11 @@ class Svg {
   void area(const std::vector<double>& x, const std::vector<double>& y, std::string_view fill,
             double opacity, std::string_view stroke, double width);
   void path(const std::vector<double>& x, const std::vector<double>& y, std::string_view stroke,
-            double width, double opacity);
+            double width, double opacity, bool dashed = false);
   void text(double x, double y, std::string_view text, const TextStyle& style);
-  /// What follows until end_group() shows `title` when pointed at.
-  void begin_group(std::string_view title);
+  /// What follows until end_group() shows `title` when pointed at, and belongs to `person`; either
+  /// may be empty.
+  void begin_group(std::string_view title, std::string_view person = {});
   /// What follows until end_group() is for a file of its own: a page says it beside the drawing.
   void begin_alone();
   void end_group();
@@ -44,12 +45,12 @@ class Svg {
   /// Puts the elements of another on top.
   void append(const Svg& other) { body_ += other.body_; }
 
-  /// From top to bottom, px.
   struct Part {
-    double top = 0, bottom = 0;
+    double left = 0, right = 0, top = 0, bottom = 0;  ///< px
   };
 
-  /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small.
+  /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small,
+  /// nor above its own width.
   /// \param id starts the ids of title and description: unique within a page
   /// \param shown the part that a page shows; the whole is in an attribute for whoever saves it
   std::string document(double width, double height, std::string_view title,

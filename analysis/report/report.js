@@ -1,82 +1,94 @@
-// Draws the report's figures with Vega where it is there, and saves them.
+// Tooltips, highlighting of one participant, and saving of the page's figures.
 (() => {
   'use strict';
-  const content = JSON.parse(document.getElementById('report-data').textContent);
-  const views = new Map();
+  const colours = JSON.parse(document.getElementById('saved-colours').textContent);
+  const drawings = [...document.querySelectorAll('.drawing svg')];
+
+  // What is saved: the figures as they came, before tooltips replace their titles.
+  const saved = new Map();
+  for (const tools of document.querySelectorAll('.tools[data-figure]')) {
+    const drawing = tools.previousElementSibling.querySelector('.wide-screen svg');
+    saved.set(tools.dataset.figure, drawing.cloneNode(true));
+  }
+
+  // A title would show as the browser's own tooltip as well, late and never on a touch screen.
+  for (const drawing of drawings) {
+    for (const title of drawing.querySelectorAll('g > title')) {
+      title.parentNode.dataset.tip = title.textContent;
+      title.remove();
+    }
+    const title = drawing.querySelector('title');
+    drawing.setAttribute('aria-label', title.textContent);
+    drawing.setAttribute('aria-describedby', drawing.querySelector('desc').id);
+    drawing.removeAttribute('aria-labelledby');
+    title.remove();
+  }
+
+  const marks = new Map(); // by participant
+  for (const mark of document.querySelectorAll('.drawing [data-person]')) {
+    const person = mark.dataset.person;
+    if (!marks.has(person)) marks.set(person, []);
+    marks.get(person).push(mark);
+  }
+  let picked = '';
+  let chosen = '';
+  function pick(person) {
+    if (person === picked) return;
+    for (const mark of marks.get(picked) || []) mark.classList.remove('picked');
+    for (const mark of marks.get(person) || []) mark.classList.add('picked');
+    document.documentElement.classList.toggle('picking', marks.has(person));
+    picked = person;
+  }
+
   const tip = document.createElement('div');
   tip.id = 'tip';
   tip.setAttribute('aria-hidden', 'true');
   tip.hidden = true;
   document.body.append(tip);
 
+  // The mark at the pointer or, for thin lines, a few px beside it.
+  function markAt(event) {
+    for (const reach of [0, 3, 6]) {
+      for (const [dx, dy] of [[0, -reach], [0, reach], [-reach, 0], [reach, 0]]) {
+        const found = document.elementFromPoint(event.clientX + dx, event.clientY + dy);
+        const mark = found && found.closest('.drawing [data-tip]');
+        if (mark) return mark;
+        if (reach === 0) break;
+      }
+    }
+    return null;
+  }
+
   // Text only: what comes from the data is never markup.
-  function showTip(handler, event, item, text) {
-    tip.hidden = text === null || text === undefined || text === '';
-    if (tip.hidden) return;
-    tip.textContent = String(text);
+  function showTip(event) {
+    const mark = event.type === 'pointerleave' ? null : markAt(event);
+    pick((mark && mark.dataset.person) || chosen);
+    tip.hidden = !mark;
+    if (!mark) return;
+    tip.textContent = mark.dataset.tip;
     const room = document.documentElement.clientWidth;
     tip.style.left = Math.max(8, Math.min(event.clientX + 14, room - tip.offsetWidth - 8)) + 'px';
     const above = event.clientY - tip.offsetHeight - 12;
     tip.style.top = (above > 4 ? above : event.clientY + 18) + 'px';
   }
-
-  function roomIn(box) {
-    return Math.max(280, Math.floor(box.clientWidth));
-  }
-
-  // The second run takes up the size that the first found.
-  function fit(view, room) {
-    view.signal('room', room).resize().run();
-    view.run();
-  }
-
-  function draw(id, spec) {
-    const box = document.querySelector(`#${id} .drawing`);
-    if (!box) return;
-    const target = document.createElement('div');
-    target.className = 'vega';
-    const fixed = box.querySelector('.fixed');
-    fixed.hidden = true;
-    box.append(target);
-    try {
-      const view = new palpateVega.View(palpateVega.parse(spec, null, {ast: true}), {
-        expr: palpateVega.expressionInterpreter,
-        renderer: 'svg',
-        container: target,
-        hover: true,
-        logLevel: 1,
-      });
-      view.tooltip(showTip);
-      fit(view, roomIn(box));
-      views.set(id, {view, box});
-    } catch (error) {
-      target.remove();
-      fixed.hidden = false;
-      throw error;
+  for (const drawing of drawings) {
+    for (const event of ['pointermove', 'pointerdown', 'pointerleave']) {
+      drawing.addEventListener(event, showTip);
     }
   }
 
-  if (window.palpateVega) {
-    for (const [id, spec] of Object.entries(content.figures)) draw(id, spec);
-    let waiting = 0;
-    window.addEventListener('resize', () => {
-      cancelAnimationFrame(waiting);
-      waiting = requestAnimationFrame(() => {
-        for (const {view, box} of views.values()) fit(view, roomIn(box));
-      });
+  const chooser = document.getElementById('person');
+  if (chooser && marks.size > 0) {
+    chooser.closest('label').hidden = false;
+    chooser.addEventListener('change', () => {
+      chosen = chooser.value;
+      pick(chosen);
     });
-    const chooser = document.getElementById('person');
-    if (chooser && views.has('figure15')) {
-      chooser.closest('label').hidden = false;
-      chooser.addEventListener('change', () => {
-        views.get('figure15').view.signal('chosen', chooser.value).run();
-      });
-    }
   }
 
-  // What is saved is the figure with title, label and notes, in colours for paper.
+  // With title, label and notes, in colours for paper.
   function fileText(id) {
-    const source = document.querySelector(`#${id} .fixed svg`).cloneNode(true);
+    const source = saved.get(id).cloneNode(true);
     source.removeAttribute('style');
     const whole = source.dataset.whole;
     source.setAttribute('viewBox', whole);
@@ -84,7 +96,7 @@
     source.setAttribute('height', whole.split(' ')[3]);
     source.removeAttribute('data-whole');
     const text = new XMLSerializer().serializeToString(source);
-    return text.replace(/var\(--([a-z]+)\)/g, (all, role) => content.palette[role] || all);
+    return text.replace(/var\(--([a-z]+)\)/g, (all, role) => colours[role] || all);
   }
 
   function offer(blob, name) {
@@ -116,7 +128,7 @@
   }
 
   for (const button of document.querySelectorAll('button[data-save]')) {
-    const id = button.closest('section').id;
+    const id = button.closest('.tools').dataset.figure;
     button.hidden = false;
     button.addEventListener('click', () => (button.dataset.save === 'svg' ? saveSvg : savePng)(id));
   }
@@ -126,11 +138,8 @@
   window.addEventListener('beforeprint', () => {
     opened = [...document.querySelectorAll('details:not([open]):not(.long)')];
     for (const part of opened) part.open = true;
-    for (const {view} of views.values()) fit(view, 900);
   });
   window.addEventListener('afterprint', () => {
     for (const part of opened) part.open = false;
-    for (const {view, box} of views.values()) fit(view, roomIn(box));
   });
-  document.documentElement.dataset.ready = String(views.size);
 })();

@@ -7,9 +7,7 @@
 
 namespace palpate::analysis {
 
-/// The analysis as one HTML page that is complete in itself: its content security policy allows no
-/// network and no script but its own, every text is escaped. Figures are drawn by Vega where the
-/// program was built with it, and are there as SVG for where scripts do not run and for saving.
+/// The analysis as one HTML page (HtmlPage): the answer, figures, tables, and where all comes from.
 std::string report_html(const Analysis& analysis, const ReportRecord& record);
 
 }  // namespace palpate::analysis

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "analysis/report/report_assets.h"
 #include "analysis/text.h"
 #include "protocols/sha256.h"
 
@@ -38,22 +37,6 @@ void put_row(std::string& out, const std::vector<std::string>& cells, std::size_
 }
 
 int digit_of(char hex) { return hex <= '9' ? hex - '0' : hex - 'a' + 10; }
-
-constexpr std::string_view kBefore = R"js((() => {
-'use strict';
-const known = {};
-const require = (name) => known[name === 'vega-selections' ? 'vega-selection' : name] || {};
-const define = undefined;
-const add = (name, body) => { const module = {exports: {}}; body(module.exports, module, require);
-  known[name] = module.exports; };
-)js";
-constexpr std::string_view kAfter = R"js(
-Object.assign(known['vega-dataflow'].transforms, known['vega-encode'],
-  known['vega-view-transforms'], known['vega-transforms']);
-globalThis.palpateVega = {parse: known['vega-parser'].parse, View: known['vega-view'].View,
-  expressionInterpreter: known['vega-interpreter'].expressionInterpreter};
-})();
-)js";
 
 }  // namespace
 
@@ -104,37 +87,6 @@ std::string script_hash(std::string_view script) {
       out += i <= n / 2 ? kDigits[(bits >> (18 - 6 * i)) & 63] : '=';
     }
   }
-  return out;
-}
-
-std::string inside_script(std::string_view json) {
-  std::string out;
-  out.reserve(json.size());
-  for (const char c : json) {
-    if (c == '<' || c == '>' || c == '&') {
-      out += c == '<' ? "\\u003c" : c == '>' ? "\\u003e" : "\\u0026";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
-std::string vega_script() {
-  const auto modules = vega_modules();
-  if (modules.empty()) return {};
-  std::string out = "/*\n";
-  out += vega_notice();
-  out += "*/\n";
-  out += kBefore;
-  for (const ScriptModule& module : modules) {
-    out += "add('";
-    out += module.name;
-    out += "', function (exports, module, require) {";
-    out += module.text;
-    out += "\n});\n";
-  }
-  out += kAfter;
   return out;
 }
 

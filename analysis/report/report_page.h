@@ -22,11 +22,4 @@ void put_folded(std::string& out, std::string_view summary, const std::vector<Ta
 /// `sha256-...` of a script for a content security policy.
 std::string script_hash(std::string_view script);
 
-/// JSON as the content of a script element: nothing in it ends the element.
-std::string inside_script(std::string_view json);
-
-/// Vega as one script that needs no eval and leaves one global, palpateVega; empty where the
-/// program was built without.
-std::string vega_script();
-
 }  // namespace palpate::analysis

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/statistics/paired.h"
+#include "analysis/text.h"
+
 namespace palpate::analysis {
 
 namespace {
@@ -23,7 +26,33 @@ std::vector<std::size_t> grid(std::size_t least, std::size_t most) {
   return out;
 }
 
+/// "cone (22.0 %) and cube (11.0 %)".
+std::string effects(const StudyModel& model) {
+  std::vector<std::string> parts;
+  for (std::size_t s = 0; s < model.shapes.size(); ++s) {
+    if (model.log_ratios[s] == 0) continue;
+    parts.push_back(model.shapes[s] + " (" + fixed(percent_reduction(model.log_ratios[s]), 1) +
+                    " %)");
+  }
+  return joined(parts);
+}
+
+std::size_t n_effects(const StudyModel& model) {
+  return model.shapes.size() - static_cast<std::size_t>(std::ranges::count(model.log_ratios, 0.0));
+}
+
 }  // namespace
+
+std::string goal_text(const Plan& plan) {
+  std::string text = "find the gain for " + effects(plan.model);
+  if (n_effects(plan.model) > 1)
+    text += plan.settings.goal == Goal::all ? ", all of them" : ", any of them";
+  return text;
+}
+
+std::size_t trials_per_participant(const Plan& plan, std::size_t trials) {
+  return 2 * plan.model.shapes.size() * trials;
+}
 
 double goal_power(const Plan& plan, const Power& power) {
   return power.share(plan.settings.goal == Goal::all ? power.all : power.any);

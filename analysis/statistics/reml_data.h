@@ -16,8 +16,6 @@ struct ModelCells {
   /// [renderer][shape] of these: column of X, -1 for an empty cell. Those of a renderer adjoin.
   std::vector<std::vector<Eigen::Index>> column;
   Eigen::Index n = 0;
-
-  bool all() const { return n == static_cast<Eigen::Index>(renderers.size() * shapes.size()); }
 };
 
 ModelCells model_cells(const People& people);

@@ -97,18 +97,20 @@ std::string with_renderer(const Analysis& analysis, const std::string& joint) {
   return pair.is_ray_minus_point() ? with : with + " " + joint + " " + reference;
 }
 
+const PaperEffect* paper_effect(const RendererPair& pair, std::string_view shape) {
+  return pair.is_ray_minus_point() && pair.in_data() ? find_paper_effect(shape) : nullptr;
+}
+
 std::string paper_reduction(const RendererPair& pair, const std::string& shape) {
-  if (!pair.is_ray_minus_point() || !pair.in_data()) return {};
-  if (shape == "cone") return "22 %";
-  if (shape == "cube") return "11 %";
-  if (shape == "sphere" || shape == "cylinder") return "n.s.";
-  return {};
+  const PaperEffect* effect = paper_effect(pair, shape);
+  if (!effect) return {};
+  return effect->percent_reduction ? fixed(*effect->percent_reduction, 0) + " %" : "n.s.";
 }
 
 bool compares_as_paper(const Analysis& analysis) {
   return std::ranges::any_of(analysis.comparisons, [&](const Comparison& comparison) {
     return std::ranges::any_of(analysis.table.shapes, [&](const std::string& shape) {
-      return !paper_reduction(comparison.pair, shape).empty();
+      return paper_effect(comparison.pair, shape) != nullptr;
     });
   });
 }

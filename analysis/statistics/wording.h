@@ -2,8 +2,10 @@
 // What an analysis is called and what it answers, in words.
 
 #include <string>
+#include <string_view>
 
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/paper_effects.h"
 
 namespace palpate::analysis {
 
@@ -17,8 +19,10 @@ std::string answer(const Analysis& analysis);
 /// \param joint "than with" or "against"
 std::string with_renderer(const Analysis& analysis, const std::string& joint);
 
-/// The paper's percent reduction for a shape (fig. 15): "22 %", "n.s.", or empty where it has none,
-/// as for any comparison but ray against point with trials of both.
+/// What the paper found for a shape; null where it has none, as for any comparison but ray against
+/// point with trials of both.
+const PaperEffect* paper_effect(const RendererPair& pair, std::string_view shape);
+/// The same in words: "22 %", "n.s.", or empty.
 std::string paper_reduction(const RendererPair& pair, const std::string& shape);
 /// Whether the paper compared what one of the study's comparisons does, with one of its shapes.
 bool compares_as_paper(const Analysis& analysis);

@@ -7,29 +7,15 @@
 #include "analysis/figures/figures.h"
 #include "analysis/figures/figures_svg.h"
 #include "analysis/input/study_record.h"
-#include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
-#include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/study_trials.h"
 
 namespace palpate::runner {
-
-namespace {
-
-analysis::TrialTable read_trials(const std::string& database, const std::string& csv) {
-  if (!csv.empty()) return analysis::read_trials_csv(csv);
-  try {
-    return analysis::read_trials_store(database);
-  } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());  // the file named is bad input: status 2
-  }
-}
-
-}  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
@@ -74,7 +60,7 @@ int analyze_command(const std::vector<std::string>& args) {
   Outputs outputs(*values, {"json", "report"}, {"db", "csv"}, "figures");
 
   const analysis::Analysis analysis =
-      analysis::analyze(read_trials(database, csv), settings, PALPATE_VERSION);
+      analysis::analyze(read_study_trials(database, csv), settings, PALPATE_VERSION);
   analysis::ReportRecord record;
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
     record = analysis::read_report_record(database);

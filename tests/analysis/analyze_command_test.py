@@ -84,7 +84,7 @@ class Analyze(unittest.TestCase):
         self.assertTrue([e.text for e in root.iter(SVG + "title") if e.text.startswith(who[0] + ", ")])
         markup, scripts = without_scripts(page)
         xml.fromstring(markup)
-        self.assertLessEqual(len(scripts), 3)
+        self.assertEqual(len(scripts), 2)
         tags = Tags(markup)
         self.assertFalse({"script", "img", "iframe", "object"} & tags.tags)
         self.assertFalse([name for name in tags.attributes if name.startswith("on")])

@@ -4,6 +4,7 @@
 #include <thread>
 #include <vector>
 
+#include "analysis/figures/figures_svg.h"
 #include "runner/commands/accuracy/measure.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
@@ -99,7 +100,8 @@ int accuracy_command(const std::vector<std::string>& args) {
     measure_accuracy(report, values->count("quick") > 0, jobs, seed);
   }
   if (outputs.wanted("json")) outputs.put("json", accuracy_json(report).dump(1) + "\n");
-  if (outputs.wanted("figure")) outputs.put("figure", accuracy_figure(report));
+  if (outputs.wanted("figure"))
+    outputs.put("figure", analysis::figure_svg(accuracy_figure(report), analysis::light_palette()));
   if (outputs.wanted("report")) outputs.put("report", accuracy_page(report));
   outputs.write();
   std::cout << accuracy_text(report);

@@ -7,24 +7,29 @@
 #include <vector>
 
 #include "analysis/figures/axes.h"
-#include "analysis/figures/svg.h"
+#include "analysis/figures/figures.h"
+#include "analysis/figures/marks.h"
 #include "runner/commands/accuracy/report.h"
-#include "runner/commands/shared/log_panel.h"
 
 namespace palpate::runner {
 namespace {
 
-// m; a logarithm must have something for an error of 0, and nobody needs to tell such errors apart.
+// m: an error of 0 has no logarithm, and nobody needs to tell such errors apart.
 constexpr double kLeastOfShape = 1e-10, kLeastOfPolyhedron = 1e-18;
 
-struct Colour {
-  std::string_view method, colour;
+struct MethodLook {
+  std::string_view method;
+  analysis::Role role;
 };
-// Okabe & Ito's colours, to be told apart by everyone; the product is dark.
-constexpr std::array kColours = {Colour{"tick", analysis::kInk},  Colour{"walk", "#0072B2"},
-                                 Colour{"walk-float", "#56B4E9"}, Colour{"walk-cold", "#8C8C8C"},
-                                 Colour{"scan", "#009E73"},       Colour{"brute-force", "#E69F00"},
-                                 Colour{"bullet", "#D55E00"},     Colour{"fcl", "#CC79A7"}};
+// The program's own tick is dark, wide and on top.
+constexpr std::array kLooks = {MethodLook{"tick", analysis::Role::ink},
+                               MethodLook{"walk", analysis::Role::point},
+                               MethodLook{"walk-float", analysis::Role::eighth},
+                               MethodLook{"walk-cold", analysis::Role::soft},
+                               MethodLook{"scan", analysis::Role::fourth},
+                               MethodLook{"brute-force", analysis::Role::seventh},
+                               MethodLook{"bullet", analysis::Role::ray},
+                               MethodLook{"fcl", analysis::Role::third}};
 
 double of_shape(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfShape, row.shape_errors.depth.rms);
@@ -32,93 +37,98 @@ double of_shape(const rendering::AccuracyRow& row) {
 double of_polyhedron(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfPolyhedron, row.polyhedron_errors.depth.worst);
 }
+using ErrorOf = double (*)(const rendering::AccuracyRow&);
 
-/// One shape's panel: a line for each method from its coarsest tessellation to its finest.
-void draw_methods(analysis::Svg& svg, const LogPanel& panel, const AccuracyReport& report,
-                  std::string_view shape, double (*error)(const rendering::AccuracyRow&)) {
-  for (auto c = kColours.rbegin(); c != kColours.rend(); ++c) {  // the product is on top
-    std::vector<std::pair<double, double>> points;
+/// Lines from the coarsest tessellation to the finest, one for each method.
+void add_methods(analysis::Panel& panel, const AccuracyReport& report, std::string_view shape,
+                 ErrorOf error) {
+  for (auto look = kLooks.rbegin(); look != kLooks.rend(); ++look) {
+    const bool ours = look->method == "tick";
+    analysis::Mark line = analysis::line_mark(look->role, {}, {}, ours ? 2.5 : 1.2);
     for (const rendering::AccuracyRow& row : report.rows) {
-      if (row.probe == "ray" && row.shape == shape && row.method == c->method) {
-        points.emplace_back(row.ns_per_tick, error(row));
-      }
+      if (row.probe != "ray" || row.shape != shape || row.method != look->method) continue;
+      line.x.push_back(std::log10(row.ns_per_tick));
+      line.y.push_back(std::log10(error(row)));
+      panel.marks.push_back(analysis::symbol(
+          look->role, analysis::Shape::circle, line.x.back(), line.y.back(), ours ? 3.5 : 2.5,
+          row.method + ", " + thousands(row.triangles) +
+              " triangles: " + significant(row.ns_per_tick) + " ns a tick, error " +
+              significant(error(row)) + " m"));
     }
-    const bool ours = c->method == "tick";
-    draw_path(svg, panel, points, c->colour, ours ? 2.5 : 1.2);
-    for (const auto& [ns, e] : points) {
-      svg.circle(panel.x(ns), panel.y(e), ours ? 3.5 : 2.5, c->colour);
-    }
+    if (line.x.size() > 1) panel.marks.push_back(std::move(line));
   }
 }
 
-void draw_legend(analysis::Svg& svg, const AccuracyReport& report, double x, double y) {
-  for (const Colour& colour : kColours) {
-    const bool there =
-        std::any_of(report.rows.begin(), report.rows.end(),
-                    [&](const rendering::AccuracyRow& r) { return r.method == colour.method; });
-    if (!there) continue;
-    svg.line(x, y - 4, x + 18, y - 4, colour.colour, colour.method == "tick" ? 2.5 : 1.5);
-    svg.circle(x + 9, y - 4, 3, colour.colour);
-    svg.text(x + 24, y, colour.method,
-             {12, analysis::kInk, analysis::Svg::Anchor::start, false, 0});
-    x += 24 + analysis::text_width(colour.method, 12) + 22;
+/// A dashed line across the panel. \param name above it at the right; empty: none
+void add_level(analysis::Panel& panel, double metres, const std::string& name) {
+  const double level = std::log10(metres);
+  analysis::Mark line =
+      analysis::line_mark(analysis::Role::soft, {panel.x.low, panel.x.high}, {level, level}, 1);
+  line.dashed = true;
+  panel.marks.push_back(std::move(line));
+  if (name.empty()) return;
+  analysis::Mark text = analysis::text_mark(analysis::Role::soft, panel.x.high, level, name, 11);
+  text.anchor = 1;
+  text.dx = -4;
+  text.dy = -5;
+  panel.marks.push_back(std::move(text));
+}
+
+/// Panels of one kind of error, with the same axes.
+void add_row(analysis::Figure& figure, const AccuracyReport& report, ErrorOf error,
+             double least_high, const std::string& title) {
+  double fastest = 1e9, slowest = 1, low = 1e9, high = least_high;
+  for (const rendering::AccuracyRow& row : report.rows) {
+    if (row.probe != "ray") continue;
+    fastest = std::min(fastest, row.ns_per_tick);
+    slowest = std::max(slowest, row.ns_per_tick);
+    low = std::min(low, error(row));
+    high = std::max(high, error(row));
+  }
+  const std::vector<std::string> shapes = measured_shapes(report);
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    analysis::Panel panel;
+    panel.title = shapes[s];
+    panel.x = analysis::decades_axis(fastest, slowest, "ns a tick");
+    panel.y = analysis::decades_axis(low, high, s == 0 ? title : "");
+    panel.width = panel.height = 230;
+    panel.starts_row = s == 0;
+    add_methods(panel, report, shapes[s], error);
+    figure.panels.push_back(std::move(panel));
   }
 }
 
 }  // namespace
 
-std::string accuracy_figure(const AccuracyReport& report) {
-  constexpr double kPanel = 230, kHeight = 230, kLeft = 62, kGap = 58, kTop = 112, kRight = 20;
-  constexpr double kBetween = 84;
-  const std::vector<std::string> shapes = measured_shapes(report);
-  // The legend needs the width of four panels.
-  const auto columns = static_cast<double>(std::max<std::size_t>(shapes.size(), 4));
-  const double width = kLeft + columns * (kPanel + kGap) - kGap + kRight;
-  analysis::Svg svg;
-  svg.rect(0, 0, width, kTop + 2 * kHeight + kBetween + 52, "#ffffff");
-  svg.text(16, 30, "Tessellation decides the error, the method decides the time",
-           {18, analysis::kInk, analysis::Svg::Anchor::start, true, 0});
-  svg.text(16, 52,
-           "Each line runs from the coarsest to the finest tessellation; a stylus felt as a ray, "
-           "a hand at 0.1 m/s, 1 to 2 mm deep.",
-           {13, analysis::kSoft, analysis::Svg::Anchor::start, false, 0});
-  draw_legend(svg, report, 16, 78);
-  LogPanel shape_errors{0, kTop, kPanel, kHeight, 1e9, 1, 1e9, kLeastOfShape};
-  LogPanel exact_errors{0,   kTop + kHeight + kBetween, kPanel, kHeight, 1e9, 1,
-                        1e9, kLeastOfPolyhedron};
-  for (const rendering::AccuracyRow& row : report.rows) {
-    if (row.probe != "ray") continue;
-    for (auto [panel, error] :
-         {std::pair{&shape_errors, of_shape(row)}, std::pair{&exact_errors, of_polyhedron(row)}}) {
-      panel->x_low = std::min(panel->x_low, row.ns_per_tick);
-      panel->x_high = std::max(panel->x_high, row.ns_per_tick);
-      panel->y_low = std::min(panel->y_low, error);
-      panel->y_high = std::max(panel->y_high, error);
+analysis::Figure accuracy_figure(const AccuracyReport& report) {
+  analysis::Figure figure;
+  figure.id = "accuracy";
+  figure.title = "Tessellation decides the error, the method decides the time";
+  figure.subtitle =
+      "Each line runs from the coarsest to the finest tessellation; a stylus felt as a ray, a hand "
+      "at 0.1 m/s, 1 to 2 mm deep.";
+  figure.description =
+      "Error over time for each method of finding contact. One panel for each shape, both axes "
+      "logarithmic. Top: error of depth against the analytic shape. Bottom: against the exact "
+      "polyhedron.";
+  figure.room = 1e6;  // all shapes side by side
+  for (const MethodLook& look : kLooks) {
+    if (std::ranges::find(report.rows, look.method, &rendering::AccuracyRow::method) !=
+        report.rows.end()) {
+      figure.legend.push_back({std::string(look.method), look.role, analysis::Shape::circle});
     }
   }
-  shape_errors.y_high = std::max(shape_errors.y_high, kHand.position);
-  shape_errors.round_ends();
-  exact_errors.round_ends();
+  add_row(figure, report, of_shape, kHand.position, "rms depth error against the shape (m)");
   // Levels are named where no line is in the way: a shape of flats has one tessellation.
-  const auto flat = std::find_if(shapes.begin(), shapes.end(), is_flat_sided);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const double left = kLeft + static_cast<double>(i) * (kPanel + kGap);
-    shape_errors.left = exact_errors.left = left;
-    const std::string& name = shapes[i];
-    draw_panel(svg, shape_errors,
-               {name, "ns a tick", i == 0 ? "rms depth error against the shape, m" : ""});
-    const bool named = flat != shapes.end() && name == *flat;
-    draw_level(svg, shape_errors, kHand.position, named ? "a hand feels 1 mm" : "");
-    draw_level(svg, shape_errors, kDevice.position, named ? "a device resolves 0.03 mm" : "");
-    draw_methods(svg, shape_errors, report, name, of_shape);
-    draw_panel(svg, exact_errors,
-               {name, "ns a tick", i == 0 ? "worst against the polyhedron, m" : ""});
-    draw_methods(svg, exact_errors, report, name, of_polyhedron);
+  const auto flat = std::ranges::find_if(
+      figure.panels, [](const analysis::Panel& panel) { return is_flat_sided(panel.title); });
+  for (auto panel = figure.panels.begin(); panel != figure.panels.end(); ++panel) {
+    add_level(*panel, kHand.position, panel == flat ? "a hand feels 1 mm" : "");
+    add_level(*panel, kDevice.position, panel == flat ? "a device resolves 0.03 mm" : "");
   }
-  return svg.document(width, kTop + 2 * kHeight + kBetween + 52,
-                      "Error over time for each method of finding contact",
-                      "One panel for each shape, both axes logarithmic. Top: error of depth "
-                      "against the analytic shape. Bottom: against the exact polyhedron.");
+  add_row(figure, report, of_polyhedron, kLeastOfPolyhedron,
+          "worst depth error against the polyhedron (m)");
+  return figure;
 }
 
 }  // namespace palpate::runner

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <sstream>
 
+#include "analysis/report/html_page.h"
+#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 #include "rendering/accuracy/peers.h"
-#include "runner/commands/shared/page.h"
 
 namespace palpate::runner {
 namespace {
@@ -111,19 +112,25 @@ std::string accuracy_text(const AccuracyReport& report) {
 }
 
 std::string accuracy_page(const AccuracyReport& report) {
-  ReportPage page;
-  page.title = report.rows.empty() ? "How many random ticks are wrong"
-                                   : "How far the forces are from the exact ones, and at what cost";
-  if (!report.rows.empty()) {
-    page.sentences = {kQuestion};
-    for (std::string& sentence : recommendations(report)) {
-      page.sentences.push_back(std::move(sentence));
-    }
-    page.figures.push_back({accuracy_figure(report), ""});
-    page.notes = how_to_read(report);
+  const bool measured = !report.rows.empty();
+  analysis::HtmlPage page(measured ? "How far the forces are from the exact ones, and at what cost"
+                                   : "How many random ticks are wrong");
+  if (measured) {
+    std::vector<std::string> sentences = recommendations(report);
+    sentences.insert(sentences.begin(), kQuestion);
+    analysis::put_list(page.below_title(), sentences);
+    page.put_figure_section(accuracy_figure(report), "Error over time");
   }
-  page.tables = accuracy_tables(report);
-  return page_html(page);
+  page.begin_section("tables", "The numbers", "Numbers");
+  for (const analysis::Table& table : accuracy_tables(report))
+    analysis::put_table(page.body(), table);
+  page.end_section();
+  if (measured) {
+    page.begin_section("reading", "How to read it", "How to read it");
+    analysis::put_list(page.body(), how_to_read(report));
+    page.end_section();
+  }
+  return page.html("palpate " PALPATE_VERSION ".");
 }
 
 }  // namespace palpate::runner

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/figures/figures.h"
 #include "analysis/report/tables.h"
 #include "rendering/accuracy/paper_first_contact.h"
 #include "rendering/accuracy/study.h"
@@ -64,9 +65,9 @@ std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 
 std::string accuracy_text(const AccuracyReport& report);
 nlohmann::ordered_json accuracy_json(const AccuracyReport& report);
-/// The work-precision figure as SVG: error over nanoseconds a tick, two panels for each shape.
-std::string accuracy_figure(const AccuracyReport& report);
-/// All of it as one HTML page without scripts.
+/// The work-precision figure: error over nanoseconds a tick, two panels for each shape.
+analysis::Figure accuracy_figure(const AccuracyReport& report);
+/// All of it as one page.
 std::string accuracy_page(const AccuracyReport& report);
 
 }  // namespace palpate::runner

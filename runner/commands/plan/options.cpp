@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/paper_effects.h"
 #include "analysis/text.h"
-#include "data/store/store.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/study_trials.h"
 
 namespace palpate::runner {
 
@@ -108,31 +108,26 @@ void put_effects(const std::string& text, analysis::StudyModel& model) {
 /// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
 /// paper's effects. \return what was taken
 std::string put_default_effects(analysis::StudyModel& model) {
-  constexpr double kCone = 22, kCube = 11;
+  double smallest = 100;
+  for (const analysis::PaperEffect& effect : analysis::kPaperEffects) {
+    smallest = std::min(smallest, effect.percent_reduction.value_or(smallest));
+  }
   bool known = false;
   for (std::size_t s = 0; s < model.shapes.size(); ++s) {
-    const bool cone = model.shapes[s] == "cone", cube = model.shapes[s] == "cube";
-    model.log_ratios[s] = std::log1p(-(cone ? kCone : cube ? kCube : 0) / 100);
-    known = known || cone || cube;
+    const analysis::PaperEffect* effect = analysis::find_paper_effect(model.shapes[s]);
+    const double percent = effect ? effect->percent_reduction.value_or(0) : 0;
+    model.log_ratios[s] = std::log1p(-percent / 100);
+    known = known || percent > 0;
   }
   std::string taken = "the paper's";
   if (!known) {
-    std::ranges::fill(model.log_ratios, std::log1p(-kCube / 100));
-    taken = analysis::fixed(kCube, 0) +
+    std::ranges::fill(model.log_ratios, std::log1p(-smallest / 100));
+    taken = analysis::fixed(smallest, 0) +
             " % for every shape, the smaller of the paper's, whose shapes are "
             "not among these";
   }
   return "No wanted effects were given (--effect SHAPE=PERCENT,...): taken were " + taken +
          ". The shapes: " + shapes_of(model) + ".";
-}
-
-analysis::TrialTable read_trials(const std::string& database, const std::string& csv) {
-  if (!csv.empty()) return analysis::read_trials_csv(csv);
-  try {
-    return analysis::read_trials_store(database);
-  } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());
-  }
 }
 
 }  // namespace
@@ -147,14 +142,15 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
       }
     }
     pilot.pair = {"point", "ray", std::nullopt, std::nullopt};
-    pilot.model.shapes = {"sphere", "cone", "cylinder", "cube"};
-    pilot.model.log_ratios.assign(4, 0.0);
+    for (const analysis::PaperEffect& effect : analysis::kPaperEffects)
+      pilot.model.shapes.emplace_back(effect.shape);
+    pilot.model.log_ratios.assign(pilot.model.shapes.size(), 0.0);
     pilot.model.intercept_sd = options.intercept_sd;
     return pilot;
   }
   const std::string& source = options.csv.empty() ? options.database : options.csv;
   pilot = analysis::read_pilot(
-      analysis::analyze(read_trials(options.database, options.csv), {}, PALPATE_VERSION));
+      analysis::analyze(read_study_trials(options.database, options.csv), {}, PALPATE_VERSION));
   if (!pilot.undefined.empty()) {
     throw UsageError(
         source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);

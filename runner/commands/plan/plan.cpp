@@ -1,10 +1,10 @@
-#include "analysis/statistics/plan.h"
-
 #include <iostream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "analysis/figures/figures_svg.h"
+#include "analysis/report/plan_report.h"
 #include "runner/commands/plan/options.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -92,7 +92,9 @@ int plan_command(const std::vector<std::string>& args) {
   progress.clear();
   plan.label = std::move(pilot.label);
   if (outputs.wanted("json")) outputs.put("json", analysis::plan_json(plan));
-  if (outputs.wanted("figure")) outputs.put("figure", analysis::plan_svg(plan));
+  if (outputs.wanted("figure"))
+    outputs.put("figure",
+                analysis::figure_svg(analysis::plan_figure(plan), analysis::light_palette()));
   outputs.write();
   std::cout << analysis::plan_text(plan);
   return 0;

@@ -4,9 +4,10 @@
 #include <cmath>
 #include <sstream>
 
+#include "analysis/report/html_page.h"
+#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
-#include "runner/commands/shared/page.h"
 
 namespace palpate::runner {
 namespace {
@@ -259,14 +260,20 @@ Json stability_json(const StabilityReport& report) {
 }
 
 std::string stability_page(const StabilityReport& report) {
-  ReportPage page;
-  page.title = "At what stiffness does it buzz?";
-  page.sentences = stability_sentences(report);
-  page.figures.push_back({stability_figure(report), ""});
-  if (!report.integrators.empty()) page.figures.push_back({integrator_figure(report), ""});
-  page.tables = stability_tables(report);
-  page.notes = how_to_read();
-  return page_html(page);
+  analysis::HtmlPage page("At what stiffness does it buzz?");
+  analysis::put_list(page.below_title(), stability_sentences(report));
+  page.put_figure_section(stability_figure(report), "Boundaries");
+  if (!report.integrators.empty()) {
+    page.put_figure_section(integrator_figure(report), "Integrators");
+  }
+  page.begin_section("tables", "The numbers", "Numbers");
+  for (const analysis::Table& table : stability_tables(report))
+    analysis::put_table(page.body(), table);
+  page.end_section();
+  page.begin_section("reading", "How to read it", "How to read it");
+  analysis::put_list(page.body(), how_to_read());
+  page.end_section();
+  return page.html("palpate " PALPATE_VERSION ".");
 }
 
 }  // namespace palpate::runner

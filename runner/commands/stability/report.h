@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/figures/figures.h"
 #include "analysis/report/tables.h"
 #include "runner/stability/boundary.h"
 #include "runner/stability/integrators.h"
@@ -43,10 +44,10 @@ std::vector<std::string> stability_sentences(const StabilityReport& report);
 std::vector<analysis::Table> stability_tables(const StabilityReport& report);
 std::string stability_text(const StabilityReport& report);
 nlohmann::ordered_json stability_json(const StabilityReport& report);
-/// Damping over stiffness, measured beside theory, a panel for each question; SVG.
-std::string stability_figure(const StabilityReport& report);
-/// Error over run time of the integrators; SVG.
-std::string integrator_figure(const StabilityReport& report);
+/// Damping over stiffness, measured beside theory, a panel for each question.
+analysis::Figure stability_figure(const StabilityReport& report);
+/// Error over run time of the integrators.
+analysis::Figure integrator_figure(const StabilityReport& report);
 std::string stability_page(const StabilityReport& report);
 
 }  // namespace palpate::runner

@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "analysis/figures/figures_svg.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -208,7 +209,9 @@ int stability_command(const std::vector<std::string>& args) {
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const StabilityReport report = study(values->count("full") > 0, jobs);
   if (outputs.wanted("json")) outputs.put("json", stability_json(report).dump(1) + "\n");
-  if (outputs.wanted("figure")) outputs.put("figure", stability_figure(report));
+  if (outputs.wanted("figure"))
+    outputs.put("figure",
+                analysis::figure_svg(stability_figure(report), analysis::light_palette()));
   if (outputs.wanted("report")) outputs.put("report", stability_page(report));
   outputs.write();
   std::cout << stability_text(report);

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "analysis/figures/figures_svg.h"
 #include "analysis/input/trial_table_builder.h"
+#include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/pilot.h"
 #include "analysis/statistics/power.h"
@@ -128,7 +130,7 @@ TEST(Plan, FindsTheFewestParticipants) {
   EXPECT_EQ(json["needed"][1]["participants"], plan.curves[1].smallest->design.participants);
   EXPECT_EQ(json["needed"][1]["trials_per_participant"], 160);
   EXPECT_NE(plan_text(plan).find("<- enough"), std::string::npos);
-  EXPECT_NE(plan_svg(plan).find("</svg>"), std::string::npos);
+  EXPECT_NE(figure_svg(plan_figure(plan), light_palette()).find("</svg>"), std::string::npos);
 }
 
 TEST(Plan, SaysWhereTheRangeIsTooSmall) {
@@ -142,7 +144,7 @@ TEST(Plan, SaysWhereTheRangeIsTooSmall) {
   const auto json = nlohmann::json::parse(plan_json(plan));
   EXPECT_TRUE(json["needed"][0]["participants"].is_null());
   EXPECT_EQ(json["needed"][0]["status"], "undefined");
-  EXPECT_EQ(plan_svg(plan).find("nan"), std::string::npos);
+  EXPECT_EQ(figure_svg(plan_figure(plan), light_palette()).find("nan"), std::string::npos);
 }
 
 /// A study of 60 people with the sds given.

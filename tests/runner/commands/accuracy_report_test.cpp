@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
+#include "analysis/figures/figures_svg.h"
 #include "runner/commands/accuracy/report.h"
 
 namespace palpate::runner {
@@ -27,7 +29,9 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
       report.rows.push_back(row_of(added, 8, probe));
     }
   }
-  const std::string text = accuracy_text(report), figure = accuracy_figure(report);
+  const std::string text = accuracy_text(report),
+                    figure =
+                        analysis::figure_svg(accuracy_figure(report), analysis::light_palette());
   const auto json = accuracy_json(report);
   ASSERT_EQ(json["recommended"].size(), 5U);
   EXPECT_EQ(json["recommended"][0]["shape"], "sphere");
@@ -38,8 +42,14 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
   for (const char* shape : {"sphere", "octahedron", "wedge", "prism", "pyramid"}) {
     EXPECT_NE(figure.find(std::string(">") + shape + "<"), std::string::npos) << shape;
   }
-  // Five panels of 230, four gaps of 58, and the margins.
-  EXPECT_NE(figure.find("width=\"1464\""), std::string::npos) << figure.substr(0, 300);
+  // Two rows of five panels with the same axes.
+  const std::vector<analysis::Panel> panels = accuracy_figure(report).panels;
+  ASSERT_EQ(panels.size(), 10U);
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    EXPECT_EQ(panels[p].starts_row, p % 5 == 0);
+    EXPECT_EQ(panels[p].x.high, panels[0].x.high);
+    EXPECT_EQ(panels[p].y.low, panels[p < 5 ? 0 : 5].y.low);
+  }
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ class Stability(unittest.TestCase):
         root = xml.etree.ElementTree.parse(figure).getroot()
         svg = "{http://www.w3.org/2000/svg}"
         points = sum(len(curve["points"]) for curve in result["curves"])
-        self.assertEqual(len(root.findall(svg + "circle")) + len(root.findall(svg + "polygon")), points + len(result["curves"]))
+        self.assertEqual(len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon"))), points + len(result["curves"]))
         xml.etree.ElementTree.fromstring(page.read_text().replace("<!DOCTYPE html>", ""))
 
     def test_refuses_what_it_should(self):
