@@ -1,4 +1,3 @@
-#include "rendering/accuracy/methods.h"
 #include "rendering/accuracy/peers.h"
 #include "runner/commands/accuracy/report.h"
 

@@ -173,7 +173,7 @@ class Report(unittest.TestCase):
         self.open()
         for name in FIGURES:
             tip, x, y = self.browser.run(
-                f"(() => {{ const m = document.querySelector('#{name} .wide-screen [data-tip]:last-of-type > *'); "
+                f"(() => {{ const m = [...document.querySelectorAll('#{name} .wide-screen [data-tip] > *')].pop(); "
                 "m.scrollIntoView({block: 'center', behavior: 'instant'}); const b = m.getBoundingClientRect(); "
                 "return [m.parentNode.dataset.tip, b.x + b.width / 2, b.y + b.height / 2]; })()")
             self.browser.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
