@@ -44,7 +44,7 @@ stimuli::Material of(double stiffness, double damping = 0) {
 
 double share(const stimuli::Material& material, const DeviceCapabilities& device,
              double rate = 1000, double scale = 1, bool controlled = false) {
-  return showable(material, device, rate, scale, controlled).share;
+  return showable(material, device, rate, scale, controlled).fraction;
 }
 
 TEST(DeviceCheck, TheBoundsOfAMaterial) {
