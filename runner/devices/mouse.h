@@ -1,18 +1,18 @@
 #pragma once
-// A stylus for anyone without hardware: pointer, wheel and modifiers move and turn it in the
-// console's view, and contact is seen, not felt. Five degrees of freedom.
+// A virtual stylus moved with the mouse, for trying sessions without hardware: five degrees of
+// freedom sensed, none actuated, so contact is seen but not felt.
 
 #include "runner/servo/device.h"
 #include "runner/servo/triple_buffer.h"
 
 namespace palpate::runner {
 
-/// Where the pointer wants the stylus. Belongs to the thread of the window. Frame: the view's, x to
-/// the right, y up, z towards the viewer.
-struct MouseHand {
+/// Target pose of the stylus, set by pointer, wheel and modifiers. Belongs to the window's thread.
+/// Device frame, which is the view's at first: x to the right, y up, z towards the viewer.
+struct StylusTarget {
   Vec3 tip;           ///< m
   double length = 0;  ///< m
-  double yaw = 0;     ///< rad, about y: of the axis from tip to tail
+  double yaw = 0;     ///< rad, about y, of the axis from tip to tail
   double pitch = 0;   ///< rad, up
 
   /// \param across, up, towards  m
@@ -23,19 +23,20 @@ struct MouseHand {
   rendering::LineProbe stylus() const { return {tip, tip + length * axis()}; }
 };
 
-/// The device. aim() by the window's thread, the rest by the servo's; neither waits for the other.
+/// The device. set_target() is called by the window's thread, the rest by the servo's; neither
+/// waits for the other.
 class MouseStylus final : public Device {
  public:
   /// \param length  m, of the stylus; \param rate  Hz, of the servo
   MouseStylus(double length, double rate);
 
-  /// Where the stylus starts: above and before the workspace, outside of any home zone's radius.
-  MouseHand resting_hand() const;
-  void aim(const rendering::LineProbe& target) noexcept { target_.write(target); }
+  /// Start pose: above and in front of the workspace, outside of any home zone.
+  StylusTarget initial_target() const;
+  void set_target(const rendering::LineProbe& target) noexcept { target_.write(target); }
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override;
-  void write(const Vec3&, const Vec3&) noexcept override {}  // nothing to push with
+  void write(const Vec3&, const Vec3&) noexcept override {}  // no motors
 
  private:
   double length_, follow_, longest_step_;

@@ -23,14 +23,14 @@ std::unique_ptr<Device> open_mouse(const DeviceConfig& config) {
 }
 
 constexpr DeviceKind kKinds[] = {
-    {"falcon", "a Novint Falcon: feels with one point, no direction", true, falcon::check_falcon,
-     falcon::connected_falcons, falcon::open_falcon},
+    {"falcon", "a Novint Falcon: position and force of one point, no orientation", true,
+     falcon::check_falcon, falcon::connected_falcons, falcon::open_falcon},
     {"falcon2", "two Novint Falcons that hold the ends of a stylus", true, falcon::check_falcon2,
      falcon::connected_falcons, falcon::open_falcon2},
-    {"mouse", "the pointer moves a stylus in the window; contact is seen, nothing is felt", false,
+    {"mouse", "the pointer moves a stylus in the window; contact is seen, not felt", false,
      nothing_to_check, always_there, open_mouse},
     {"simulated",
-     "a stylus held by two simulated devices and a simulated hand that strokes to and fro", false,
+     "a stylus held by two simulated devices and a simulated hand that moves to and fro", false,
      nothing_to_check, always_there, open_simulated},
 };
 

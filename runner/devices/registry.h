@@ -1,5 +1,5 @@
 #pragma once
-// The devices that this program knows by name: what `run --device` and `devices` offer.
+// The kinds of device that `run --device` and `devices` offer, by name.
 
 #include <memory>
 #include <span>
@@ -21,7 +21,7 @@ struct DeviceKind {
   void (*check)(const DeviceConfig& config);
   /// \throws std::runtime_error where this computer cannot list such devices
   std::vector<ConnectedDevice> (*connected)();
-  /// Ready to be read and written. \throws std::runtime_error saying why not and what would help
+  /// Ready to be read and written. \throws std::runtime_error saying why not and what to do
   std::unique_ptr<Device> (*open)(const DeviceConfig& config);
 };
 

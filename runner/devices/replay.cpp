@@ -14,7 +14,7 @@ ReplayDevice::ReplayDevice(std::span<const data::SampleRecord> samples, double r
     : samples_(samples), nominal_ns_(std::llround(1e9 / rate)), now_ns_(nominal_ns_) {
   capabilities_.name = "replay";
   capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
-  // Limits were the recorded device's: what was rendered comes before them.
+  // The rendered force is compared, before the limits of the recorded device.
   capabilities_.max_force = capabilities_.max_stiffness = std::numeric_limits<double>::max();
   capabilities_.max_rate = rate;
 }
@@ -33,7 +33,7 @@ DeviceReading ReplayDevice::read() noexcept {
 
 void ReplayDevice::wait_until(std::int64_t when_ns) noexcept {
   const bool known = next_ < samples_.size() && samples_[next_].period_ns > 0;
-  // The first tick of a trial follows on nothing that is on record.
+  // The period before the first tick of a trial is not on record.
   if (known && next_ > 0) {
     now_ns_ += samples_[next_].period_ns;
   } else {

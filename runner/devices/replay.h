@@ -1,5 +1,5 @@
 #pragma once
-// A recorded trial before the servo again: the stylus as it was, at the times that it was.
+// A device that plays a recorded trial back to the servo: recorded poses at the recorded times.
 
 #include <span>
 
@@ -8,9 +8,9 @@
 
 namespace palpate::runner {
 
-/// The device and the clock of a recording in one: each tick comes a recorded period after the last
-/// and finds the stylus where it then was. With its readings in the virtual frame: the servo needs
-/// no workspace. `samples` must outlive it. After the last one the device is lost.
+/// Device and clock in one: each tick comes one recorded period after the last. Its readings are in
+/// the virtual frame, so the servo needs no workspace map. `samples` must outlive it. After the
+/// last sample the device is lost.
 class ReplayDevice final : public Device, public Clock {
  public:
   /// \param rate  Hz, for samples whose period is not on record
@@ -18,7 +18,7 @@ class ReplayDevice final : public Device, public Clock {
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override;
-  void write(const Vec3&, const Vec3&) noexcept override {}  // nobody holds it
+  void write(const Vec3&, const Vec3&) noexcept override {}  // forces go nowhere
 
   std::int64_t now_ns() noexcept override { return now_ns_; }
   void wait_until(std::int64_t when_ns) noexcept override;

@@ -11,7 +11,7 @@
 namespace palpate::runner {
 namespace {
 
-/// What a second of readings was like.
+/// Statistics over a second of readings.
 struct Readings {
   int ticks = 0, lost = 0, late = 0, not_finite = 0;
   DeviceTrouble trouble = DeviceTrouble::none;

@@ -13,9 +13,9 @@ struct SelfTestResult {
   std::string found;
 };
 
-/// Reads a device for a second at its rate, pushing nothing: do readings come, in time, finite,
-/// within reach and as still as a device that nobody pushes? \param rate  Hz, of the servo; never
-/// above the device's own
+/// Reads a device for a second with zero force and checks that readings come, in time, finite,
+/// within reach and without jumps. \param rate  Hz, of the servo; limited
+/// to the device's own
 std::vector<SelfTestResult> self_test(Device& device, double rate);
 
 }  // namespace palpate::runner

@@ -11,7 +11,7 @@ Vec3 round_to(const Vec3& v, double step) {
           std::nearbyint(v.z / step) * step};
 }
 
-/// The rotation vector (rad) that turns unit `from` into unit `to` by the shortest way.
+/// The rotation vector (rad) of the smallest rotation from unit `from` to unit `to`.
 Vec3 rotation_between(const Vec3& from, const Vec3& to) {
   const Vec3 c = glm::cross(from, to);
   const double sine = glm::length(c);
@@ -86,8 +86,8 @@ void SimulatedStylus::reset(const HandTarget& target) {
 }
 
 DeviceReading SimulatedStylus::read() noexcept {
-  // Translation: about the point where the hand's spring, its damper's pull along with the target,
-  // and the force held since the last tick are in balance.
+  // Translation, about the equilibrium of the hand's spring, its damper (relative to the moving
+  // target) and the force held since the last tick.
   const Vec3 balance = target_.grip + (force_ + hand_.damping * target_.velocity) / hand_.stiffness;
   Vec3 offset = position_ - balance, velocity = velocity_;
   shift_.advance(offset, velocity);
@@ -96,15 +96,15 @@ DeviceReading SimulatedStylus::read() noexcept {
     position_ = balance + offset;
     velocity_ = (1 - friction_step_ / speed) * velocity;
   } else {
-    velocity_ = Vec3(0);  // friction holds it
+    velocity_ = Vec3(0);  // sticks
   }
   const double distance = glm::length(position_);
   if (distance > settings_.workspace_radius) {
     position_ *= settings_.workspace_radius / distance;
     velocity_ = Vec3(0);
   }
-  // Rotation: the same about the target's axis. Torsion about the stylus is neither sensed nor
-  // driven.
+  // Rotation likewise, about the target's axis. Roll about the stylus is neither sensed nor
+  // actuated.
   const Vec3 turned_balance = torque_ / hand_.turn_stiffness;
   Vec3 turned = rotation_between(target_.axis, axis_) - turned_balance;
   turn_.advance(turned, spin_);

@@ -1,5 +1,5 @@
 #pragma once
-// A stylus held at both ends by two simulated devices and, at the grip, by a simulated hand.
+// A simulated stylus: held at both ends by simulated devices and at the grip by a simulated hand.
 
 #include <cstdint>
 
@@ -18,24 +18,24 @@ struct SimulatedDeviceSettings {
   double workspace_radius = 0.25;  ///< m; the grip stops there
 };
 
-/// The hand as an impedance about a target: it never sees the object.
+/// The hand as a mechanical impedance about a target pose; it knows nothing of the object.
 struct HandImpedance {
   double stiffness = 400;       ///< N/m
   double damping = 10;          ///< N s/m
-  double mass = 0.1;            ///< kg, that moves with the stylus
+  double mass = 0.1;            ///< kg, moving with the stylus
   double turn_stiffness = 1;    ///< N m/rad
   double turn_damping = 0.035;  ///< N m s/rad
 };
 
-/// Where the hand wants the stylus.
+/// Target pose of the hand.
 struct HandTarget {
   Vec3 grip;           ///< m
   Vec3 velocity;       ///< m/s, of grip
   Vec3 axis{0, 0, 1};  ///< unit, tip to tail
 };
 
-/// The free motion of m x'' = -k x - b x' over one tick, exactly (matrix exponential), so that a
-/// stiff hand cannot blow up the simulation.
+/// m x'' = -k x - b x' integrated exactly over one tick (matrix exponential), so that the
+/// simulation is stable for any stiffness.
 class SpringDamper {
  public:
   SpringDamper(double mass, double damping, double stiffness, double tick);
@@ -49,17 +49,17 @@ class SpringDamper {
   double xx_, xv_, vx_, vv_;
 };
 
-/// Five degrees of freedom sensed and driven. Deterministic. read() moves time on by one tick.
+/// Five degrees of freedom, sensed and actuated. Deterministic. read() advances time by one tick.
 class SimulatedStylus final : public Device {
  public:
-  /// \param length, grip  m; grip measured from the tip, taken as the centre of the moving mass
+  /// \param length, grip  m; grip measured from the tip, taken as the centre of mass
   SimulatedStylus(const SimulatedDeviceSettings& device, const HandImpedance& hand, double length,
                   double grip, double tick);
 
-  /// At rest on its target, no force.
+  /// Puts it at rest at the target, without force.
   void reset(const HandTarget& target);
   void set_target(const HandTarget& target) { target_ = target; }
-  /// Grip of the stylus as it is, m (not quantised): for a hand that feels where it is.
+  /// True position of the grip, m, not quantised.
   const Vec3& grip() const { return position_; }
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }

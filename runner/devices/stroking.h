@@ -1,6 +1,6 @@
 #pragma once
-// The simulated device for a session that nobody feels: its hand rests outside of the workspace,
-// strokes through it and back, and rests again, whatever happens.
+// The simulated device of `run --device simulated`: its hand rests outside of the workspace,
+// strokes through it and back, and repeats this open-loop.
 
 #include "runner/devices/simulated.h"
 
@@ -8,8 +8,8 @@ namespace palpate::runner {
 
 struct StrokeSettings {
   double distance = 0.1;  ///< m, from the centre of the workspace, at rest
-  double rest = 1.0;      ///< s, between strokes: a trial can begin
-  double stroke = 1.5;    ///< s, there and back
+  double rest = 1.0;      ///< s, between strokes, so that a trial can begin
+  double stroke = 1.5;    ///< s, forth and back
 };
 
 class StrokingStylus final : public Device {

@@ -19,11 +19,11 @@ constexpr double kTurnPerPixel = 0.006;               // rad
 PointerHand::PointerHand(MouseStylus& device, const WorkspaceMap& workspace)
     : device_(device),
       workspace_(workspace),
-      hand_(device.resting_hand()),
+      hand_(device.initial_target()),
       press_(kFirstPress),
       off_(kBeside) {
   hand_.tip += workspace_.centre;
-  device_.aim(hand_.stylus());
+  device_.set_target(hand_.stylus());
 }
 
 Vec3 PointerHand::wanted(const glm::vec2& pixel, const Camera& camera, const LineOfSight& object) {
@@ -66,7 +66,7 @@ void PointerHand::step(const PointerMotion& pointer, const Camera& camera,
   } else if (entered || notches != 0 || (!pointer.reach && pointer.moved != glm::vec2(0, 0))) {
     follow();
   }
-  device_.aim(hand_.stylus());
+  device_.set_target(hand_.stylus());
 }
 
 }  // namespace palpate::runner

@@ -23,9 +23,9 @@ struct PointerMotion {
 using LineOfSight =
     std::function<std::optional<glm::vec3>(const glm::vec3& from, const glm::vec3& along)>;
 
-/// Moves a MouseHand as the pointer says: the tip is under the pointer, pressed a little into the
-/// surface that is seen there. Beside the object it floats before it, as far off as a trial asks
-/// for to begin. The wheel presses harder, and beside the object goes to and fro.
+/// Moves a StylusTarget as the pointer says: the tip is under the pointer, pressed a little into
+/// the surface that is seen there. Beside the object it floats before it, as far off as a trial
+/// asks for to begin. The wheel presses harder, and beside the object goes to and fro.
 class PointerHand {
  public:
   PointerHand(MouseStylus& device, const WorkspaceMap& workspace);
@@ -36,7 +36,7 @@ class PointerHand {
 
   MouseStylus& device_;
   WorkspaceMap workspace_;
-  MouseHand hand_;
+  StylusTarget hand_;
   glm::vec2 held_{0, 0};  ///< px, from the tip to the pointer: after a turn the tip must not jump
   bool was_over_ = false, touches_ = false;
   double press_ = 0;  ///< m, into the surface, along the line of sight

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "protocols/parse.h"
-#include "runner/devices/falcon/arm.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/serial.h"
@@ -52,15 +52,15 @@ void move_an_arm(const std::uint8_t* data, std::size_t size) {
   using namespace palpate::runner::falcon;
   auto line = std::make_unique<Wire>(data, size);
   Wire& wire = *line;
-  FalconArm arm(std::move(line), {});
+  FalconDriver driver(std::move(line), {});
   while (!wire.empty()) {
     wire.tick();
-    const ArmReading& reading = arm.update();
+    const DriverReading& reading = driver.update();
     const double size_m = std::max(
         {std::abs(reading.position.x), std::abs(reading.position.y), std::abs(reading.position.z)});
     if (!(size_m < 0.5)) std::abort();
-    arm.push({1, -2, 3});
-    for (const int motor : arm.motors()) {
+    driver.push({1, -2, 3});
+    for (const int motor : driver.motors()) {
       if (std::abs(motor) > kMaxCount) std::abort();
     }
   }

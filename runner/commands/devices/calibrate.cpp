@@ -61,7 +61,7 @@ class TerminalGuide final : public Guide {
   std::string line_;
 };
 
-std::vector<double> numbers(const std::string& text, const std::string& option) {
+std::vector<double> parse_numbers(const std::string& text, const std::string& option) {
   std::vector<double> values;
   std::string_view rest = text;
   while (true) {
@@ -83,7 +83,7 @@ void check(bool good, const std::string& expectation) {
 
 WeighingSettings weighing_settings(const po::variables_map& values) {
   WeighingSettings settings;
-  settings.weights = numbers(values["weights"].as<std::string>(), "weights");
+  settings.weights = parse_numbers(values["weights"].as<std::string>(), "weights");
   settings.gravity = values["gravity"].as<double>();
   settings.cycle = values["sweep-seconds"].as<double>();
   settings.settle = 0.75 * settings.cycle;
@@ -100,7 +100,7 @@ RegistrationSettings registration_settings(const po::variables_map& values) {
   RegistrationSettings settings;
   settings.stylus_length = values["stylus-length"].as<double>();
   settings.points = values["points"].as<int>();
-  const auto offset = numbers(values["offset"].as<std::string>(), "offset");
+  const auto offset = parse_numbers(values["offset"].as<std::string>(), "offset");
   check(offset.size() == 3, "--offset takes three numbers: x,y,z in m");
   settings.offset = {offset[0], offset[1], offset[2]};
   for (const double part : offset) {
@@ -117,8 +117,8 @@ std::string now_utc() {
                           std::chrono::nanoseconds(1));
 }
 
-/// The nominal scale: what is stored must not enter what is measured.
-DeviceConfig one_of(const DeviceConfig& config, const std::string& serial) {
+/// One device with the nominal scale: a stored calibration must not affect the measurement.
+DeviceConfig uncalibrated(const DeviceConfig& config, const std::string& serial) {
   DeviceConfig one = config;
   one.serials.clear();
   if (!serial.empty()) one.serials = {serial};
@@ -126,14 +126,14 @@ DeviceConfig one_of(const DeviceConfig& config, const std::string& serial) {
   return one;
 }
 
-/// Owned by a guard process: the motors are at work here, too. It has more patience than in a
-/// session, where the hand is closer and a late tick spoils a trial. \param rate  Hz
+/// In a guard process, because forces are commanded. \param rate  Hz that the guard expects: lower
+/// than the ticks' 1 kHz, so that a late tick does not interrupt the procedure
 std::unique_ptr<GuardedDevice> guarded(const DeviceConfig& config, double rate) {
   GuardSettings settings;
   settings.rate = rate;
   return std::make_unique<GuardedDevice>([config] { return open_falcon(config); }, settings);
 }
-constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // without force there is no hurry
+constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // Hz; registration uses no force
 
 void store(const std::string& path, const Calibration& calibration) {
   write_whole(path, to_json(calibration));
@@ -142,10 +142,10 @@ void store(const std::string& path, const Calibration& calibration) {
 
 int calibrate_force(const DeviceConfig& config, const po::variables_map& values) {
   const WeighingSettings settings = weighing_settings(values);
-  Calibration calibration = read_calibration(config.calibration);  // faults are found before work
+  Calibration calibration = read_calibration(config.calibration);  // reports its faults first
   FaultSignals signals;
   const auto device =
-      guarded(one_of(config, config.serials.empty() ? "" : config.serials[0]), kWeighingRate);
+      guarded(uncalibrated(config, config.serials.empty() ? "" : config.serials[0]), kWeighingRate);
   signals.watch(device.get());
   request_realtime({});
   RealClock clock;
@@ -162,9 +162,9 @@ int calibrate_force(const DeviceConfig& config, const po::variables_map& values)
             << "residual                 " << force.residual << " N\n"
             << "sideways                 " << force.sideways << " N for each N\n"
             << "weight of the arms       " << force.arm_weight << " N\n"
-            << "force in every direction " << sure_force(force.counts_per_torque) << " N\n";
-  if (!believable(force)) {
-    std::cerr << "This scale is more than " << kBelievableFactor
+            << "force in every direction " << guaranteed_force(force.counts_per_torque) << " N\n";
+  if (!plausible(force)) {
+    std::cerr << "This scale is more than " << kPlausibleFactor
               << " times off the nominal one and will not be used: were the weights right, and did "
                  "they hang freely?\n";
   }
@@ -177,8 +177,8 @@ int calibrate_pair(const DeviceConfig& config, const po::variables_map& values) 
         "falcon2 needs two --serial: first that of the Falcon at the stylus' tip");
   Calibration calibration = read_calibration(config.calibration);
   FaultSignals signals;
-  const auto tip = guarded(one_of(config, config.serials[0]), kRegistrationRate);
-  const auto tail = guarded(one_of(config, config.serials[1]), kRegistrationRate);
+  const auto tip = guarded(uncalibrated(config, config.serials[0]), kRegistrationRate);
+  const auto tail = guarded(uncalibrated(config, config.serials[1]), kRegistrationRate);
   request_realtime({});
   RealClock clock;
   TerminalGuide guide(signals);
@@ -193,7 +193,7 @@ int calibrate_pair(const DeviceConfig& config, const po::variables_map& values) 
             << stimuli::printable(pair.tail_serial) << "\n"
             << "tail's centre  " << p.x << ", " << p.y << ", " << p.z << " m from the tip's\n"
             << "residual       " << pair.residual * 1e3 << " mm over " << pair.points
-            << " places\n";
+            << " points\n";
   return 0;
 }
 
@@ -205,13 +205,13 @@ void add_calibrate_options(po::options_description& options) {
       "gravity", po::value<double>()->default_value(9.80665),
       "--calibrate falcon: at this place, m/s^2")(
       "sweep-seconds", po::value<double>()->default_value(4),
-      "--calibrate falcon: the grip goes up and down twice while it is weighed, so long each time, "
+      "--calibrate falcon: time of each of the two slow movements up and down while weighing, "
       "s")("stylus-length", po::value<double>()->default_value(0.12),
            "--calibrate falcon2: between the centres of the grips on the stylus, m")(
       "offset", po::value<std::string>()->default_value("0,0,0"),
-      "--calibrate falcon2: from the tip's grip to the tail's while places are taken, x,y,z in m; "
-      "0,0,0: they are pinned together")("points", po::value<int>()->default_value(8),
-                                         "--calibrate falcon2: places to take");
+      "--calibrate falcon2: from the tip's grip to the tail's while points are taken, x,y,z in m; "
+      "0,0,0: pinned together")("points", po::value<int>()->default_value(8),
+                                "--calibrate falcon2: number of points to take");
 }
 
 int calibrate_devices(const std::string& device, const DeviceConfig& config,

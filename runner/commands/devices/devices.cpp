@@ -1,4 +1,5 @@
-// palpate devices: what is connected, what it can do, and whether this machine keeps time.
+// palpate devices: connected devices, their limits and self-tests; the servo's timing on this
+// computer; calibration.
 
 #include <unistd.h>
 
@@ -24,14 +25,15 @@ namespace po = boost::program_options;
 using Json = nlohmann::ordered_json;
 
 Json to_json(const DeviceCapabilities& c) {
-  // What pushes nothing has no limits of pushing; what stands there keeps scenes from being cut.
-  const auto of_pushing = [&c](double limit) {
+  // Without motors there are no limits of force; the stored ones only keep scenes from being
+  // limited.
+  const auto limit_of_force = [&c](double limit) {
     return c.actuated_freedom > 0 ? Json(limit) : Json();
   };
   return {{"sensed_freedom", c.sensed_freedom},
           {"actuated_freedom", c.actuated_freedom},
-          {"max_force_n", of_pushing(c.max_force)},
-          {"max_stiffness_n_per_m", of_pushing(c.max_stiffness)},
+          {"max_force_n", limit_of_force(c.max_force)},
+          {"max_stiffness_n_per_m", limit_of_force(c.max_stiffness)},
           {"max_rate_hz", c.any_rate ? Json() : Json(c.max_rate)},
           {"workspace_radius_m", c.workspace_radius},
           {"resolution_m", c.resolution},
@@ -60,7 +62,7 @@ void print_limits(const DeviceCapabilities& c) {
     std::printf("    calibration: %s\n", stimuli::printable(c.calibration).c_str());
 }
 
-/// Opened, its limits, its self-test. \return whether the test was passed
+/// Opens a device, prints its limits and self-test. \return whether the test was passed
 bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row) {
   const auto factory = [&kind, config] { return kind.open(config); };
   GuardSettings settings;
@@ -81,8 +83,8 @@ bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row
   return passed;
 }
 
-/// What is there of a kind; \return false where a device that is there does not work.
-bool list(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
+/// Prints the connected devices of a kind. \return false if one that is connected does not work
+bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
   Json row = {{"name", kind.name}, {"description", kind.description}};
   std::printf("%s: %s\n", kind.name, kind.description);
   bool good = true, usable = false;
@@ -169,7 +171,7 @@ int timing(const po::variables_map& values, const DeviceConfig& config, Json& re
   settings.rate = config.rate;
   settings.seconds = values["seconds"].as<double>();
   if (!(settings.seconds >= 0.1 && settings.seconds <= 86'400))
-    throw UsageError("--seconds: 0.1 to 86400 was expected");
+    throw UsageError("--seconds: must be 0.1 to 86400");
   settings.guarded = values.count("guarded") > 0;
   settings.realtime.core = values["core"].as<int>();
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
@@ -190,7 +192,7 @@ DeviceConfig config_of(const po::variables_map& values) {
   DeviceConfig config;
   config.rate = values["rate"].as<double>();
   if (!(config.rate >= 10 && config.rate <= 10'000))
-    throw UsageError("--rate: 10 to 10000 Hz was expected");
+    throw UsageError("--rate: must be 10 to 10000 Hz");
   if (values.count("serial") > 0) config.serials = values["serial"].as<std::vector<std::string>>();
   if (values.count("firmware") > 0) config.firmware = values["firmware"].as<std::string>();
   if (values.count("calibration") > 0) config.calibration = values["calibration"].as<std::string>();
@@ -203,9 +205,9 @@ int devices_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate devices [--device NAME] [--timing] [--calibrate] [--json FILE]";
   line.summary =
-      "Lists the devices that are connected, their limits and what their self-tests found; "
-      "measures "
-      "whether this machine keeps a servo's time; calibrates forces. No self-test pushes.";
+      "Lists the connected devices with their limits and self-tests; measures whether this "
+      "machine\n"
+      "keeps the servo's timing; calibrates forces. Self-tests command zero force.";
   line.example =
       "  palpate devices                                       what is there\n"
       "  palpate devices --device falcon --firmware nvent.bin  opens one and tests it\n"
@@ -213,20 +215,20 @@ int devices_command(const std::vector<std::string>& args) {
       "  palpate devices --calibrate --device falcon --calibration lab.json --weights "
       "0.1,0.2,0.4\n";
   line.options.add_options()                                                                //
-      ("device", po::value<std::string>()->value_name("NAME"), "this kind of device only")  //
+      ("device", po::value<std::string>()->value_name("NAME"), "only this kind of device")  //
       ("serial", po::value<std::vector<std::string>>()->value_name("S"),
        "which one of several; falcon2: twice, the tip's first")  //
       ("firmware", po::value<std::string>()->value_name("FILE"),
-       "to upload where the device asks for it")                                                 //
-      ("calibration", po::value<std::string>()->value_name("FILE"), "file of calibrations")      //
-      ("rate", po::value<double>()->default_value(1000)->value_name("HZ"), "of the servo")       //
-      ("timing", "measure this machine; exit status 1 when it is not fit")                       //
-      ("seconds", po::value<double>()->default_value(10)->value_name("S"), "--timing: so long")  //
-      ("guarded", "--timing: with the device in a guard process, as a Falcon is")                //
-      ("no-fifo", "--timing: without real-time priority")                                        //
-      ("no-realtime", "--timing: with no right that an ordinary program has not")                //
+       "to upload where the device needs it")                                                     //
+      ("calibration", po::value<std::string>()->value_name("FILE"), "file of calibrations")       //
+      ("rate", po::value<double>()->default_value(1000)->value_name("HZ"), "of the servo")        //
+      ("timing", "measure this machine; exit status 1 when it is not fit")                        //
+      ("seconds", po::value<double>()->default_value(10)->value_name("S"), "--timing: duration")  //
+      ("guarded", "--timing: with the device in a guard process, as a Falcon is")                 //
+      ("no-fifo", "--timing: without real-time priority")                                         //
+      ("no-realtime", "--timing: without any real-time right")                                    //
       ("core", po::value<int>()->default_value(-1)->value_name("N"),
-       "--timing: on this processor alone")                                                 //
+       "--timing: on this processor only")                                                  //
       ("calibrate", "guided calibration of a device")                                       //
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
       ("force", "replace a file that is there");
@@ -242,7 +244,7 @@ int devices_command(const std::vector<std::string>& args) {
   try {
     const DeviceKind* const only = named ? &device_kind(name) : nullptr;
     if (values->count("calibrate") > 0) {
-      if (!named) throw UsageError("--calibrate: --device says which");
+      if (!named) throw UsageError("--calibrate: name the device with --device");
       return calibrate_devices(name, config, *values);
     }
     if (values->count("timing") > 0) {
@@ -252,7 +254,7 @@ int devices_command(const std::vector<std::string>& args) {
       report["devices"] = Json::array();
       for (const DeviceKind& kind : device_kinds()) {
         if (only != nullptr && only != &kind) continue;
-        if (!list(kind, config, named, report["devices"])) status = 1;
+        if (!list_kind(kind, config, named, report["devices"])) status = 1;
       }
     }
   } catch (const std::invalid_argument& error) {

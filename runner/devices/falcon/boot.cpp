@@ -15,11 +15,11 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 3> kMonitorProbe = {0x0A, 0x43, 0x0D};
 constexpr std::array<std::uint8_t, 4> kMonitorReply = {0x0A, 0x44, 0x2C, 0x0D};
-constexpr std::array<std::uint8_t, 1> kLock = {0x41};  // the boot ROM finds its speed by it
+constexpr std::array<std::uint8_t, 1> kLock = {0x41};  // the boot ROM measures its bit rate by it
 // A full IN packet for each echo, so that the chip's 16 ms timer does not hold it back.
 constexpr std::size_t kChunk = 62;
 
-/// One upload has failed; the next may not.
+/// One upload failed; it is worth trying again.
 class AttemptFailed : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -40,7 +40,7 @@ void send(Transport& transport, Bytes bytes) {
   throw AttemptFailed("bytes could not be sent");
 }
 
-/// Up to `count` bytes, fewer when the time is over.
+/// Up to `count` bytes; fewer on time-out.
 std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::int64_t wait_ns) {
   std::vector<std::uint8_t> bytes(count);
   std::size_t have = 0;
@@ -54,7 +54,7 @@ std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::
   return bytes;
 }
 
-/// The monitor's answer may follow litter: it is looked for in all that comes.
+/// Other bytes may precede the monitor's answer: it is searched for in all that arrives.
 void wake_monitor(Transport& transport, const BootSettings& settings) {
   for (int probe = 0; probe < settings.monitor_probes; ++probe) {
     send(transport, kMonitorProbe);
@@ -90,7 +90,7 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
   const auto tell = [&progress, &report] {
     if (report) report(progress);
   };
-  progress.stage = BootProgress::Stage::monitor;
+  progress.step = BootProgress::Step::monitor;
   tell();
   purge(transport);
   transport.control(request::kEvent, kEventNone);
@@ -105,16 +105,16 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
 
   transport.control(request::kModem, kDtrLow);
   transport.control(request::kBaud, kBaudBoot);
-  purge(transport);  // answers to probes that were sent once too often
+  purge(transport);  // late answers to further probes
   send(transport, kLock);
   expect_echo(transport, kLock, 0, settings.echo_wait_ns);
 
-  progress.stage = BootProgress::Stage::uploading;
+  progress.step = BootProgress::Step::uploading;
   progress.size = image.bytes.size();
   for (std::size_t at = 0; at < image.bytes.size(); at += kChunk) {
     const Bytes chunk = Bytes(image.bytes).subspan(at, std::min(kChunk, image.bytes.size() - at));
     send(transport, chunk);
-    // The echo is the only check there is: the stream carries no sum.
+    // The echo is the only check: the stream has no checksum.
     expect_echo(transport, chunk, at, settings.echo_wait_ns);
     progress.sent = at + chunk.size();
     tell();
@@ -153,9 +153,10 @@ void boot(Transport& transport, const FirmwareImage* image, const BootSettings& 
   if (report) report(progress);
   if (!firmware_runs(transport, settings)) {
     if (image == nullptr) {
-      throw TransportError("the Falcon " + transport.serial() +
-                           " has no firmware (it forgets it when its power goes): name a file with "
-                           "--firmware, from its own driver or a libnifalcon checkout");
+      throw TransportError(
+          "the Falcon " + transport.serial() +
+          " has no firmware (it is lost when the device is switched off): name a file with "
+          "--firmware, from its own driver or a libnifalcon checkout");
     }
     std::string troubles;
     bool runs = false;
@@ -176,7 +177,7 @@ void boot(Transport& transport, const FirmwareImage* image, const BootSettings& 
                            std::to_string(settings.uploads) + " attempts:" + troubles);
     }
   }
-  progress.stage = BootProgress::Stage::running;
+  progress.step = BootProgress::Step::running;
   if (report) report(progress);
 }
 

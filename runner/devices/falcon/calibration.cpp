@@ -115,7 +115,7 @@ CalibrationVerdict judge(const std::string& what, const std::string& made_utc, b
   const double days = made ? static_cast<double>(unix_ns - *made) / kNsPerDay : NAN;
   std::ostringstream age;
   age << static_cast<long long>(std::floor(std::max(0.0, days)));
-  if (days <= kCalibrationDays && days > -1) {  // a day's leeway for a clock that was set
+  if (days <= kCalibrationDays && days > -1) {  // one day of tolerance for clocks that were set
     return {CalibrationState::good, what + ": made " + made_utc + ", " + age.str() + " days ago"};
   }
   return {CalibrationState::stale,
@@ -129,15 +129,15 @@ CalibrationVerdict implausible(const std::string& what, const ForceCalibration& 
   std::ostringstream text;
   text << std::setprecision(2) << what << ": its motors would be "
        << (times > 1 ? times : 1 / times) << " times " << (times > 1 ? "weaker" : "stronger")
-       << " than a Falcon's (up to " << kBelievableFactor
-       << " is believed), and is not used; run palpate devices --calibrate again";
+       << " than a Falcon's (up to " << kPlausibleFactor
+       << " is plausible), so it is not used; run palpate devices --calibrate again";
   return {CalibrationState::implausible, text.str()};
 }
 
-/// The scale of force is trusted with a hand: nobody else may have put it there.
+/// The force scale is safety-critical: nobody else may be able to write the file.
 void require_own(const std::string& path) {
   struct stat found {};
-  if (::stat(path.c_str(), &found) != 0) return;  // reading it will tell
+  if (::stat(path.c_str(), &found) != 0) return;  // reading it reports why
   const bool ours = found.st_uid == ::geteuid() || found.st_uid == 0;
   if (ours && (found.st_mode & (S_IWGRP | S_IWOTH)) == 0) return;
   throw protocols::InputError(
@@ -150,9 +150,9 @@ void require_own(const std::string& path) {
 
 }  // namespace
 
-bool believable(const ForceCalibration& force) {
+bool plausible(const ForceCalibration& force) {
   const double times = force.counts_per_torque / kCountsPerTorque;
-  return times >= 1 / kBelievableFactor && times <= kBelievableFactor;
+  return times >= 1 / kPlausibleFactor && times <= kPlausibleFactor;
 }
 
 const ForceCalibration* Calibration::force_of(const std::string& serial) const {
@@ -240,7 +240,7 @@ CalibrationVerdict judge_forces(const Calibration& calibration,
   for (const std::string& serial : serials) {
     const ForceCalibration* force = calibration.force_of(serial);
     const std::string what = "force of the Falcon " + serial;
-    verdict = both(verdict, force != nullptr && !believable(*force)
+    verdict = both(verdict, force != nullptr && !plausible(*force)
                                 ? implausible(what, *force)
                                 : judge(what, force != nullptr ? force->made_utc : "",
                                         force != nullptr, unix_ns));

@@ -5,26 +5,26 @@
 
 namespace palpate::runner::falcon {
 
-Falcon2Device::Falcon2Device(std::unique_ptr<FalconArm> tip, std::unique_ptr<FalconArm> tail,
+Falcon2Device::Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,
                              const StylusFromEnds& stylus, const std::string& calibration)
     : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
-  capabilities_ = {
-      "falcon2",
-      5,
-      5,
-      std::min(sure_force(tip_->counts_per_torque()), sure_force(tail_->counts_per_torque())),
-      kMaxStiffness,
-      kMaxRate,
-      kWorkspaceRadius,
-      kResolution,
-      false,
-      tip_->serial() + ", " + tail_->serial(),
-      calibration};
+  capabilities_ = {"falcon2",
+                   5,
+                   5,
+                   std::min(guaranteed_force(tip_->counts_per_torque()),
+                            guaranteed_force(tail_->counts_per_torque())),
+                   kMaxStiffness,
+                   kMaxRate,
+                   kWorkspaceRadius,
+                   kResolution,
+                   false,
+                   tip_->serial() + ", " + tail_->serial(),
+                   calibration};
 }
 
 DeviceReading Falcon2Device::read() noexcept {
-  const ArmReading& tip = tip_->update();
-  const ArmReading& tail = tail_->update();
+  const DriverReading& tip = tip_->update();
+  const DriverReading& tail = tail_->update();
   DeviceTrouble trouble = tip.trouble;
   if (tip.usable() && tail.trouble != DeviceTrouble::none) trouble = tail.trouble;
   lost_ = !tip.usable() || !tail.usable();
@@ -37,7 +37,7 @@ DeviceReading Falcon2Device::read() noexcept {
 }
 
 void Falcon2Device::reopen() {
-  // The other one holds its last command while nobody speaks to it.
+  // A device keeps its last command while no packets reach it.
   tip_->halt();
   tail_->halt();
   tip_->reopen();
@@ -45,7 +45,7 @@ void Falcon2Device::reopen() {
 }
 
 void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
-  // One device alone would turn the stylus: both push or neither.
+  // A force from one device alone would turn the stylus: both or none.
   tip_->push(lost_ ? Vec3(0) : device1);
   tail_->push(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2));
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Talking with the experimenter while the devices stay under control: a question may stand for
-// minutes, and every millisecond of it is a tick.
+// Dialog with the experimenter during a guided procedure. It never blocks: the devices need a tick
+// every millisecond while a question waits for its answer.
 
 #include <cstdint>
 #include <stdexcept>
@@ -8,18 +8,19 @@
 
 namespace palpate::runner::falcon {
 
+/// Shows texts and questions, and polls for answers.
 class Guide {
  public:
   virtual ~Guide() = default;
   virtual void say(const std::string& text) = 0;
-  /// Puts a question that is answered by going on (ENTER).
+  /// Shows a request, to be confirmed with ENTER.
   virtual void ask(const std::string& text) = 0;
   enum class Answer : std::uint8_t { none, go_on, stop };
-  /// Never waits.
+  /// The answer to the last request, if there is one yet; never blocks.
   virtual Answer answer() = 0;
 };
 
-/// A guided procedure came to no result; what() says why and what to do.
+/// A guided procedure gave no result; what() says why and what to do.
 class GuideError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

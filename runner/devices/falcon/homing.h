@@ -5,8 +5,8 @@
 
 namespace palpate::runner::falcon {
 
-/// Asks for the grip to be pulled out and pushed in, until the device knows where it is. Shows no
-/// force. \throws GuideError when it is stopped or the device is unplugged.
+/// Asks the experimenter to pull the grip out and push it in until the device is homed. Zero force.
+/// \throws GuideError when stopped or when the device is unplugged.
 void wait_until_homed(Device& device, Clock& clock, Guide& guide);
 
 }  // namespace palpate::runner::falcon

@@ -6,7 +6,7 @@
 
 namespace palpate::runner::falcon {
 
-/// Firmware that a user has pointed to; we ship none. A stream for the boot ROM of TI's C28x
+/// A firmware file named by the user; none is shipped. A stream for the boot ROM of TI's C28x
 /// processors: 16-bit little-endian words; key 0x08AA, 8 reserved words, entry point; blocks of a
 /// count, a destination and so many words; a count of 0 ends it.
 struct FirmwareImage {
@@ -15,7 +15,7 @@ struct FirmwareImage {
   int blocks = 0;
 };
 
-/// Checks the structure, all there is to check. \throws InputError naming `file` and the byte.
+/// Checks the structure; the format has no checksum. \throws InputError naming `file` and the byte.
 FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& file);
 /// \throws InputError.
 FirmwareImage read_image(const std::string& file);

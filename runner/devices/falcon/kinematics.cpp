@@ -9,17 +9,17 @@
 namespace palpate::runner::falcon {
 namespace {
 
-constexpr double kMaxStep = 0.02;     // m; farther, the linear model misleads
+constexpr double kMaxStep = 0.02;     // m; beyond it the linear model is too far off
 constexpr double kConverged = 1e-11;  // rad, 1e-8 of a count
 constexpr int kMaxIterations = 40;    // a warm start takes 4
-constexpr int kMaxHalvings = 25;      // then the step is below what a double resolves
+constexpr int kMaxHalvings = 25;      // the step is then below the resolution of a double
 constexpr double kSingular = 1e-6;    // volume of the unit rows
 
 Vec3 residual_of(const Vec3& thighs, const Legs& legs) {
   return {thighs.x - legs[0].thigh, thighs.y - legs[1].thigh, thighs.z - legs[2].thigh};
 }
 
-/// The inverse of a matrix of three rows has their cross products as columns.
+/// Inverse of a matrix of three rows: its columns are their cross products over the determinant.
 struct Inverse {
   std::array<Vec3, 3> columns;
   bool regular = false;
@@ -34,7 +34,7 @@ struct Inverse {
   }
 };
 
-bool believable(const Vec3& p) {
+bool within_reach(const Vec3& p) {
   return p.z >= kNearest && p.z <= kFarthest && std::hypot(p.x, p.y) <= kWidest;
 }
 
@@ -108,7 +108,7 @@ std::optional<ForwardResult> forward(const Vec3& thighs, const Vec3& start) noex
     }
     if (!better) return std::nullopt;
   }
-  if (!believable(at.position)) return std::nullopt;
+  if (!within_reach(at.position)) return std::nullopt;
   return at;
 }
 
@@ -128,7 +128,7 @@ double force_in_every_direction(const Vec3& position, double max_torque) noexcep
   if (!legs) return 0;
   const Inverse j(jacobian(*legs));
   if (!j.regular) return 0;
-  // A unit force along a column asks most of that motor.
+  // The direction that loads a motor most is its column of the inverse.
   return max_torque / std::max({glm::length(j.columns[0]), glm::length(j.columns[1]),
                                 glm::length(j.columns[2])});
 }

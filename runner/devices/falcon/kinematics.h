@@ -1,7 +1,7 @@
 #pragma once
-// Where the Falcon's grip is, and which torques push it how. Lengths in m, angles in rad, all in
-// the Falcon's own frame: x right, y up, z out of the device towards the user, z = 0 at its base.
-// Pure functions.
+// Kinematics and statics of the Falcon: encoder counts to position, force to motor torques. Lengths
+// in m, angles in rad, in the Falcon's own frame: x right, y up, z out of the device towards the
+// user, z = 0 at its base. Pure functions.
 //
 // A leg is a two-link arm in its plane (Clavel 1991; Stamper 1997). The Jacobian departs from
 // libnifalcon's, whose third column is wrong (up to 66 %); ours is held against differences.
@@ -13,7 +13,7 @@
 
 namespace palpate::runner::falcon {
 
-/// What the joints of a leg stand at, rad.
+/// Joint angles of a leg, rad.
 struct LegAngles {
   double thigh = 0;  ///< theta 1, the one with motor and encoder
   double shin = 0;   ///< theta 2, of the shin in the leg's plane
@@ -28,7 +28,7 @@ using Jacobian = std::array<Vec3, 3>;
 Vec3 thigh_angles(const Vec3& counts);
 Vec3 encoder_counts(const Vec3& thighs);
 
-/// The joints that put the grip there; nullopt where no leg reaches.
+/// Inverse kinematics; nullopt where a leg cannot reach.
 std::optional<Legs> inverse(const Vec3& position) noexcept;
 
 Jacobian jacobian(const Legs& legs) noexcept;
@@ -38,18 +38,18 @@ struct ForwardResult {
   int iterations = 0;
 };
 
-/// Where the grip is when the thighs stand at these angles: Newton's method with its step limited
-/// to 20 mm and halved while the residual does not fall. A warm start takes at most 4 steps.
-/// Nothing where it does not converge or converges outside of what the device can reach.
+/// Forward kinematics: Newton's method with its step limited to 20 mm and halved while the residual
+/// does not fall. From the last tick's position it takes at most 4 steps. nullopt where it does not
+/// converge, or converges out of the device's reach.
 std::optional<ForwardResult> forward(const Vec3& thighs, const Vec3& start) noexcept;
 
-/// Torques at the thighs, N m, that push the hand with `force` (N); nothing at a singularity.
+/// Torques at the thighs, N m, that give `force` (N) on the hand; nullopt at a singularity.
 std::optional<Vec3> torque_for(const Jacobian& j, const Vec3& force) noexcept;
-/// The force (N) of torques (N m).
+/// The force (N) on the hand that torques (N m) give.
 Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
 
-/// The force (N) that can be shown in every direction there when no torque exceeds `max_torque`
-/// (N m); 0 out of reach.
+/// The largest force (N) that can be shown in every direction at a position while no torque exceeds
+/// `max_torque` (N m); 0 out of reach.
 double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
 
 }  // namespace palpate::runner::falcon

@@ -32,7 +32,7 @@ std::optional<FirmwareImage> image_in(const std::string& path) {
   return read_image(path);
 }
 
-/// \throws InputError: the calibration has none of these two.
+/// \throws InputError if the calibration has no registration of these two.
 const PairRegistration& registration_in(const Calibration& calibration,
                                         const DeviceConfig& config) {
   const std::string &tip = config.serials[0], &tail = config.serials[1];
@@ -40,7 +40,7 @@ const PairRegistration& registration_in(const Calibration& calibration,
   throw protocols::InputError(
       {{config.calibration.empty() ? "(no calibration file)" : config.calibration, "/pairs",
         "expected a registration of the Falcons " + tip + " (tip) and " + tail +
-            " (tail), without which nobody knows how they stand to each other: run "
+            " (tail), which gives their relative pose: run "
             "palpate devices --calibrate --device falcon2"}});
 }
 
@@ -52,8 +52,8 @@ CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::
   return verdict;
 }
 
-/// As DeviceCapabilities tells it: nothing when it is missing.
-std::string in_short(const CalibrationVerdict& verdict) {
+/// As DeviceCapabilities has it: empty when missing.
+std::string summary_of(const CalibrationVerdict& verdict) {
   switch (verdict.state) {
     case CalibrationState::good:
       return verdict.text;
@@ -67,14 +67,14 @@ std::string in_short(const CalibrationVerdict& verdict) {
   return "";
 }
 
-void tell(const std::string& serial, const BootProgress& progress) {
+void show_progress(const std::string& serial, const BootProgress& progress) {
   if (isatty(STDERR_FILENO) == 0) return;
-  using Stage = BootProgress::Stage;
-  if (progress.stage == Stage::monitor && progress.attempt > 1) {
+  using Step = BootProgress::Step;
+  if (progress.step == Step::monitor && progress.attempt > 1) {
     std::cerr << "\n  " << stimuli::printable(progress.trouble) << "; attempt " << progress.attempt
               << "\n";
   }
-  if (progress.stage != Stage::uploading) return;
+  if (progress.step != Step::uploading) return;
   std::cerr << "\rFalcon " << stimuli::printable(serial) << ": firmware "
             << 100 * progress.sent / progress.size << " %"
             << (progress.sent == progress.size ? "\n" : "") << std::flush;
@@ -95,22 +95,22 @@ CalibrationVerdict judge_calibration(const std::string& path,
   return judge(calibration_in(path), serials);
 }
 
-std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
-                                    const Calibration& calibration) {
-  const auto image = image_in(firmware);  // a bad file is found before the device is touched
+std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
+                                          const Calibration& calibration) {
+  const auto image = image_in(firmware);  // first: a bad file is reported before the device opens
   auto line = open_usb(serial);
   const std::string name = line->serial();
-  ArmSettings settings;
+  DriverSettings settings;
   settings.boot = [image, name](Transport& transport) {
     boot(transport, image ? &*image : nullptr, {},
-         [&name](const BootProgress& progress) { tell(name, progress); });
+         [&name](const BootProgress& progress) { show_progress(name, progress); });
   };
   settings.boot(*line);
   const ForceCalibration* force = calibration.force_of(name);
-  if (force != nullptr && believable(*force)) {
+  if (force != nullptr && plausible(*force)) {
     settings.counts_per_torque = force->counts_per_torque;
   }
-  return std::make_unique<FalconArm>(std::move(line), settings);
+  return std::make_unique<FalconDriver>(std::move(line), settings);
 }
 
 void check_falcon(const DeviceConfig& config) {
@@ -134,18 +134,18 @@ void check_falcon2(const DeviceConfig& config) {
 
 std::unique_ptr<Device> open_falcon(const DeviceConfig& config) {
   const Calibration calibration = calibration_in(config.calibration);
-  auto arm =
-      open_arm(config.serials.empty() ? "" : config.serials[0], config.firmware, calibration);
-  const std::string known = in_short(judge(calibration, {arm->serial()}));
-  return std::make_unique<FalconDevice>(std::move(arm), known);
+  auto driver =
+      open_driver(config.serials.empty() ? "" : config.serials[0], config.firmware, calibration);
+  const std::string known = summary_of(judge(calibration, {driver->serial()}));
+  return std::make_unique<FalconDevice>(std::move(driver), known);
 }
 
 std::unique_ptr<Device> open_falcon2(const DeviceConfig& config) {
   const Calibration calibration = calibration_in(config.calibration);
   const PairRegistration& pair = registration_in(calibration, config);
-  auto tip = open_arm(config.serials[0], config.firmware, calibration);
-  auto tail = open_arm(config.serials[1], config.firmware, calibration);
-  const std::string known = in_short(judge(calibration, config.serials));
+  auto tip = open_driver(config.serials[0], config.firmware, calibration);
+  auto tail = open_driver(config.serials[1], config.firmware, calibration);
+  const std::string known = summary_of(judge(calibration, config.serials));
   return std::make_unique<Falcon2Device>(
       std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
 }

@@ -1,20 +1,20 @@
 #pragma once
-// From what a user names to a device that is ready but for its homing: the Falcon's rows in the
-// registry.
+// Opens Falcons from a DeviceConfig, ready but for homing: the functions behind the Falcon's rows
+// in the registry of devices.
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "runner/devices/falcon/arm.h"
 #include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/calibration.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/servo/device.h"
 #include "runner/servo/device_config.h"
 
 namespace palpate::runner::falcon {
 
-/// Falcons that are plugged in. \throws TransportError where this computer cannot look.
+/// Falcons that are plugged in. \throws TransportError where USB cannot be used.
 std::vector<ConnectedDevice> connected_falcons();
 
 /// See DeviceKind::check.
@@ -26,18 +26,18 @@ void check_falcon2(const DeviceConfig& config);
 /// TransportError, InputError.
 std::unique_ptr<Device> open_falcon(const DeviceConfig& config);
 
-/// Two, which config.serials names: first the one at the stylus' tip. Their registration must be in
-/// config.calibration. \throws TransportError, InputError.
+/// The two that config.serials names, the one at the stylus' tip first. Their registration must be
+/// in config.calibration. \throws TransportError, InputError.
 std::unique_ptr<Device> open_falcon2(const DeviceConfig& config);
 
-/// For a pre-flight that has the serial numbers: is all calibrated that these need, and not too
-/// long ago? Two are a pair, tip and tail. \param path  empty: none. \throws InputError.
+/// State of all calibrations that these devices need. Two serial numbers are a pair, tip and tail.
+/// \param path  empty: none. \throws InputError.
 CalibrationVerdict judge_calibration(const std::string& path,
                                      const std::vector<std::string>& serials);
 
-/// One arm, with the scale of force of the calibration when it has one. Tells the progress of an
-/// upload to a terminal. \throws TransportError, InputError.
-std::unique_ptr<FalconArm> open_arm(const std::string& serial, const std::string& firmware,
-                                    const Calibration& calibration);
+/// The driver of one Falcon, with the calibrated scale of force if there is a plausible one. Shows
+/// the progress of an upload on a terminal. \throws TransportError, InputError.
+std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
+                                          const Calibration& calibration);
 
 }  // namespace palpate::runner::falcon

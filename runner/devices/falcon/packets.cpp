@@ -79,12 +79,12 @@ std::optional<Reply> decode_reply(const Packet& packet) noexcept {
 }
 
 std::optional<Packet> PacketStream::take(std::uint8_t byte) noexcept {
-  // '<' is reserved for framing: inside of a packet it says that the one before was cut short.
+  // '<' is used for framing only: inside a packet it means that the packet was truncated.
   if (byte == kBegin) {
     if (size_ > 0) ++dropped_;
     size_ = 0;
   } else if (size_ == 0) {
-    return std::nullopt;  // litter between packets
+    return std::nullopt;  // not part of a packet
   }
   packet_[size_++] = byte;
   if (size_ < packet_.size()) return std::nullopt;

@@ -1,7 +1,7 @@
 #pragma once
 // The 16-byte packets of the Falcon's normal mode, both ways: '<', three signed 16-bit numbers of
 // four nibbles each (least significant first), a byte of bits, an unknown byte, '>'. No checksum.
-// Pure functions over bytes: whatever comes in, nothing but a count of bad packets happens.
+// Pure functions over bytes: malformed input only increases a count.
 
 #include <array>
 #include <cstdint>
@@ -13,8 +13,8 @@ using Packet = std::array<std::uint8_t, 16>;
 
 /// Host to device. LED colours as libnifalcon's code uses them.
 struct Command {
-  std::array<int, 3> motors{};  ///< -4095 to 4095; what is beyond is cut
-  bool homing = true;           ///< must be asked for in every packet to get and keep it
+  std::array<int, 3> motors{};  ///< -4095 to 4095; clamped
+  bool homing = true;           ///< must be set in every packet to start and keep it
   bool green = false, blue = false, red = false;
 };
 
@@ -32,15 +32,15 @@ std::optional<Command> decode_command(const Packet& packet) noexcept;
 Packet encode(const Reply& reply) noexcept;
 std::optional<Reply> decode_reply(const Packet& packet) noexcept;
 
-/// Finds packets in a stream that may be split, joined, cut short or littered.
+/// Finds packets in a byte stream in which they may be split, joined, truncated or garbled.
 class PacketStream {
  public:
-  /// Takes one byte; a whole packet with its brackets in place when this byte ends it.
+  /// Takes one byte; returns the packet that this byte completes, if any.
   std::optional<Packet> take(std::uint8_t byte) noexcept;
-  /// Packets begun and thrown away.
+  /// Packets begun and discarded.
   std::uint64_t dropped() const noexcept { return dropped_; }
   void count_bad() noexcept { ++dropped_; }
-  /// Throws away what was begun: its end will not come.
+  /// Discards an incomplete packet.
   void reset() noexcept {
     if (size_ > 0) ++dropped_;
     size_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
-// Every number of the Novint Falcon in one table. Sources: the sizes and the scale are those that
-// libnifalcon (commit f7c727a, BSD-3) works with; what differs is said beside it.
+// Every constant of the Novint Falcon. Source of sizes and scale: libnifalcon (commit f7c727a,
+// BSD-3); differences are stated beside the constant.
 
 #include <array>
 #include <cstdint>
@@ -28,25 +28,26 @@ inline constexpr std::array<double, 3> kLegSin = {0.96592582628906831, -0.258819
 inline constexpr double kCountAngle = 14.25 / 110 * 2 * 3.14159265358979323846 / 1280;  ///< rad
 inline constexpr double kZeroAngle = 35 * 3.14159265358979323846 / 180;  ///< rad; approximate
 
-// Motors. A positive count turns the thigh down and draws the grip in. The scale of force is
-// uncertain by a factor of 2 to 4 until the device has been calibrated with weights.
+// Motors. A positive count turns the thigh down and pulls the grip in. The scale of force is
+// uncertain by a factor of 2 to 4 until the device is calibrated with weights.
 inline constexpr double kCountsPerTorque = -1e4;  ///< 1/(N m) at the thigh
-inline constexpr int kMaxCount = 4095;            ///< larger ones would wrap or saturate singly
-/// Nominal newtons that are told for each newton of a known weight. Weighing refuses what lies
-/// outside; a scale beyond the believable is never used for forces on a hand.
+inline constexpr int kMaxCount = 4095;            ///< larger values would wrap or saturate
+/// Nominal newtons commanded for each newton of a known weight. Weighing refuses slopes outside; a
+/// scale that is not plausible is never used for forces on a hand.
 inline constexpr double kLeastSlope = 0.05, kMostSlope = 20;
-inline constexpr double kBelievableFactor = 4;  ///< off the nominal scale, either way
+inline constexpr double kPlausibleFactor = 4;  ///< of the nominal scale, up or down
 
 // Workspace, m.
-inline constexpr Vec3 kCentre{0, 0, 0.125};       ///< Falcon frame
-inline constexpr double kWorkspaceRadius = 0.04;  ///< about the centre, free in every direction
-inline constexpr double kNearest = 0.06, kFarthest = 0.20;  ///< z of a grip that can be believed
-inline constexpr double kWidest = 0.09;                     ///< distance from the axis, the same
+inline constexpr Vec3 kCentre{0, 0, 0.125};  ///< Falcon frame
+inline constexpr double kWorkspaceRadius =
+    0.04;  ///< about the centre, reachable in every direction
+inline constexpr double kNearest = 0.06, kFarthest = 0.20;  ///< range of plausible z
+inline constexpr double kWidest = 0.09;                     ///< plausible distance from the axis
 
 inline constexpr double kMaxStiffness = 3000;  ///< N/m at 1 kHz, as CHAI3D lists
 inline constexpr double kResolution = 5e-5;    ///< m, about one count near the centre
 inline constexpr double kMaxRate = 1000;       ///< Hz: the latency timer's 1 ms
-inline constexpr double kMaxSpeed = 5;         ///< m/s; no hand moves the grip faster
+inline constexpr double kMaxSpeed = 5;         ///< m/s; hands move the grip more slowly
 
 // USB.
 inline constexpr std::uint16_t kVendor = 0x0403, kProduct = 0xCB48;

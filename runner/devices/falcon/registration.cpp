@@ -12,15 +12,15 @@ namespace {
 
 constexpr std::int64_t kTickNs = 1'000'000;
 constexpr double kStillness = 0.001;     // m
-constexpr double kApart = 0.015;         // m, from each earlier point
-constexpr double kMostResidual = 0.003;  // m; more, and a point was wrong
+constexpr double kApart = 0.015;         // m, from every earlier point
+constexpr double kMostResidual = 0.003;  // m; more: a point was wrong
 
 class Procedure {
  public:
   Procedure(Device& tip, Device& tail, Clock& clock, Guide& guide)
       : tip_(tip), tail_(tail), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
 
-  /// Asks until a point was taken that counts.
+  /// Asks until a valid point was taken.
   PairedPoint take(const std::string& question, const std::vector<PairedPoint>& earlier,
                    const RegistrationSettings& settings) {
     for (;;) {
@@ -35,13 +35,13 @@ class Procedure {
         return glm::length(old.tip_frame - settings.offset - point->tip_frame) >= kApart;
       });
       if (apart) return {point->tip_frame + settings.offset, point->tail_frame};
-      guide_.say("  that is too near to an earlier place; go farther");
+      guide_.say("  that is too near to an earlier point; move farther away");
     }
   }
 
  private:
   PairedPoint tick() {
-    // A stall is not made up for by a burst.
+    // Missed ticks are not made up for.
     due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
     return {free_position(tip_), free_position(tail_)};
@@ -50,14 +50,14 @@ class Procedure {
   static Vec3 free_position(Device& device) {
     const DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
-    // Where there is no force a guard has nothing to cut off.
+    // The guard has commanded zero force: harmless, as no force is used here.
     if (reading.lost && reading.trouble != DeviceTrouble::guarded) {
       throw GuideError(device.capabilities().serial + ": " + advice(reading.trouble));
     }
     return reading.stylus.tip;
   }
 
-  /// The mean over a while; nothing where either grip moved.
+  /// The mean position during a rest; nullopt where either grip moved.
   std::optional<PairedPoint> rest(double seconds) {
     const PairedPoint first = tick();
     PairedPoint mean;
@@ -98,16 +98,17 @@ PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& g
   points.reserve(static_cast<std::size_t>(settings.points));
   for (int i = 1; i <= settings.points; ++i) {
     std::ostringstream question;
-    question << "Place " << i << " of " << settings.points
-             << ": take both to a new place (right, left, near, far, up, down), hold them still, "
-                "and press ENTER.";
+    question
+        << "Point " << i << " of " << settings.points
+        << ": move both to a new position (right, left, near, far, up, down), hold them still, "
+           "and press ENTER.";
     points.push_back(procedure.take(question.str(), points, settings));
   }
   const RigidFit fit = fit_rigid(points);
   if (fit.residual > kMostResidual) {
     std::ostringstream text;
-    text << "the places fit only to " << std::round(fit.residual * 1e4) / 10 << " mm ("
-         << kMostResidual * 1e3 << " mm are borne; the worst is "
+    text << "the points fit only within " << std::round(fit.residual * 1e4) / 10 << " mm ("
+         << kMostResidual * 1e3 << " mm are allowed; the worst is "
          << std::round(fit.worst * 1e4) / 10
          << " mm off): are the grips firmly together, and both devices homed?";
     throw GuideError(text.str());

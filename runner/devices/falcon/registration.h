@@ -1,5 +1,5 @@
 #pragma once
-// Where the two Falcons of a stylus stand to each other, from places that both have seen.
+// Registration: the relative pose of two Falcons that hold a stylus, from points that both reach.
 
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/guide.h"
@@ -10,14 +10,14 @@ namespace palpate::runner::falcon {
 
 struct RegistrationSettings {
   double stylus_length = 0.12;  ///< m, between the centres of the grips on the stylus
-  /// From the tip's grip to the tail's, m, tip's frame, while points are taken: zero where the
-  /// grips are pinned together, else how the jig holds the stylus (its direction must not change).
+  /// From the tip's grip to the tail's, m, tip's frame, while points are taken: zero with the grips
+  /// pinned together, else the stylus in its jig (its direction must not change).
   Vec3 offset;
   int points = 8;
-  double still = 0.5;  ///< s that the grips rest at each
+  double still = 0.5;  ///< s of rest at each point
 };
 
-/// The whole procedure; no force is shown. \throws GuideError, RegistrationError.
+/// The whole guided procedure; zero force. \throws GuideError, RegistrationError.
 /// \param tip, tail  one Falcon each
 PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
                                const RegistrationSettings& settings);

@@ -1,6 +1,6 @@
 #pragma once
-// What a device calls itself. It is printed, stored and compared with files, and whoever makes a
-// device chooses it.
+// Serial numbers come from the device, so they are untrusted text: they are printed, stored and
+// compared with files.
 
 #include <algorithm>
 #include <cstddef>
@@ -12,8 +12,8 @@ namespace palpate::runner::falcon {
 
 inline constexpr std::size_t kMaxSerial = 32;  ///< characters
 
-/// Letters, digits, '.', '_' and '-' stay, anything else becomes '_'; the rest is cut off.
-/// \return "" for nothing but blanks and zeros
+/// Keeps letters, digits, '.', '_' and '-', replaces others by '_', truncates to kMaxSerial.
+/// \return "" if there is nothing but blanks and zeros
 inline std::string clean_serial(std::span<const std::uint8_t> text) {
   std::string clean;
   bool any = false;

@@ -44,7 +44,8 @@ RigidFit fit_rigid(std::span<const PairedPoint> points) {
                             " mm across): spread them over the workspace");
   }
   Eigen::Vector3d sign(1, 1, 1);
-  // A reflection would fit flat or noisy points as well; a device is not mirrored.
+  // The best orthogonal matrix may be a reflection where points are coplanar or noisy: take the
+  // best rotation.
   sign[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
   const Eigen::Vector3d shift = tip_mean - rotation * tail_mean;

@@ -1,6 +1,6 @@
 #pragma once
-// A stylus whose ends two devices hold: its pose from both, and where the devices stand to each
-// other. Pure functions and a little state.
+// The pose of a stylus whose ends are held by two devices, and the rigid transformation between the
+// devices' frames.
 
 #include <span>
 #include <stdexcept>
@@ -10,7 +10,7 @@
 
 namespace palpate::runner {
 
-/// The same place seen by two devices, each in its own frame, m.
+/// One point in the frames of both devices, m.
 struct PairedPoint {
   Vec3 tip_frame, tail_frame;
 };
@@ -21,34 +21,36 @@ struct RigidFit {
   double worst = 0;     ///< m
 };
 
-/// The points do not fix a placement; what() says why.
+/// The points do not determine a transformation; what() says why.
 class RegistrationError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The placement with least squares, in closed form: Horn 1987, with the rotation from the singular
-/// value decomposition of the covariance (Arun, Huang & Blostein 1987) and its sign as Umeyama
-/// 1991. At least 4 points, spread by 10 mm or more in at least two directions. \throws
-/// RegistrationError.
+/// The rigid transformation with least squared error, in closed form: Horn 1987, with the rotation
+/// from the singular value decomposition of the covariance (Arun, Huang & Blostein 1987) and its
+/// sign as Umeyama 1991. At least 4 points, spread by 10 mm or more in at least two directions.
+/// \throws RegistrationError.
 RigidFit fit_rigid(std::span<const PairedPoint> points);
 
-/// The segment between the ends; watches that it stays as long as the stylus is.
+/// The segment between the ends; checks that its length stays that of the stylus.
 class StylusFromEnds {
  public:
   /// \param length     m, between the centres of the grips
-  /// \param tolerance  m; both devices' errors and one tick's motion are below it
+  /// \param tolerance  m; larger than both devices' errors and the motion in a tick
   StylusFromEnds(const Pose& tail_in_tip, double length, double tolerance = 0.004)
       : tail_in_tip_(tail_in_tip), length_(length), tolerance_(tolerance) {}
 
-  /// \param tip, tail  m, each in its own device's frame. False when the ends have been farther
-  ///                   apart or nearer than the stylus allows for kMaxWrong ticks in a row: a hand
-  ///                   has let go, a joint has slipped, or a device has lost its place.
+  /// \param tip, tail  m, each in its own device's frame. False when the distance
+  ///                   of the ends has been wrong for kMaxWrong ticks in a row: a grip has come
+  ///                   off, a joint has slipped, or a device has lost its reference.
   bool update(const Vec3& tip, const Vec3& tail) noexcept;
-  /// The last one whose length was right, in the tip device's frame.
+  /// The last one of the right length, in the tip device's frame.
   const rendering::LineProbe& stylus() const { return stylus_; }
   double length() const { return length_; }
-  double stretch() const { return stretch_; }  ///< m, of the last update; longer: positive
-  /// A force on the tail, in the tip's frame, as the tail's device must show it.
+  double stretch() const {
+    return stretch_;
+  }  ///< m, measured minus nominal length, of the last update
+  /// Rotates a force on the tail from the tip device's frame into the tail device's.
   Vec3 to_tail_frame(const Vec3& force) const;
 
   static constexpr int kMaxWrong = 5;
@@ -58,7 +60,7 @@ class StylusFromEnds {
   double length_, tolerance_;
   rendering::LineProbe stylus_;
   double stretch_ = 0;
-  int wrong_ = kMaxWrong;  // nothing right has been seen yet
+  int wrong_ = kMaxWrong;  // no valid reading yet
 };
 
 }  // namespace palpate::runner

@@ -17,7 +17,7 @@ constexpr std::size_t kStatus = 2;          // bytes of line status that head ev
 constexpr unsigned kControlTimeout = 1000;  // ms
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// Bytes that came in and were not asked for yet. The oldest go when nobody asks.
+/// Bytes received and not read yet; when full, the oldest are overwritten.
 class ByteRing {
  public:
   void put(std::uint8_t byte) {
@@ -33,7 +33,7 @@ class ByteRing {
 
  private:
   std::array<std::uint8_t, 4096> bytes_{};
-  std::size_t begin_ = 0, end_ = 0;  // run on; a size_t does not wrap in a lifetime
+  std::size_t begin_ = 0, end_ = 0;  // count all bytes ever; a size_t does not overflow
 };
 
 class UsbTransport final : public Transport {
@@ -111,7 +111,7 @@ class UsbTransport final : public Transport {
       if (transfer == nullptr) throw std::bad_alloc();
     }
     ~Slot() {
-      if (!busy) libusb_free_transfer(transfer);  // else the kernel may still write into it
+      if (!busy) libusb_free_transfer(transfer);  // else leaked: the kernel may still write into it
     }
     Slot(const Slot&) = delete;
     Slot& operator=(const Slot&) = delete;
@@ -169,7 +169,7 @@ class UsbTransport final : public Transport {
     throw TransportError("the Falcon " + serial_ + " takes no reads");
   }
 
-  /// Takes back all transfers first: they point into this object.
+  /// Cancels all transfers first: they point into this object.
   void close() noexcept {
     closing_ = true;
     const auto busy = [this] {

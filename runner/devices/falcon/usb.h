@@ -1,6 +1,6 @@
 #pragma once
-// The real line to a Falcon: libusb-1.0, asynchronous transfers with two reads always queued, all
-// in the calling thread. Where the program is built without libusb, these throw and say so.
+// The USB line to a Falcon: libusb-1.0, asynchronous transfers with two reads always queued, all in
+// the calling thread. In a build without libusb these functions throw.
 
 #include <cstdint>
 #include <memory>
@@ -18,31 +18,31 @@ struct UsbListing {
   std::string trouble;  ///< why it cannot be opened; empty: it can
 };
 
-/// Is USB compiled in?
+/// Whether USB was built in.
 bool usb_available() noexcept;
 
 /// \throws TransportError where USB cannot be used at all.
 std::vector<UsbListing> list_usb();
 
-/// Opens and claims a Falcon. \param serial empty: the only one. \throws TransportError.
+/// Opens and claims a Falcon. \param serial  empty: the only one. \throws TransportError.
 std::unique_ptr<Transport> open_usb(const std::string& serial);
 
-/// Falcons that come and go.
-class HotplugWatch {
+/// Counts Falcons that are plugged in and unplugged.
+class HotplugListener {
  public:
-  virtual ~HotplugWatch() = default;
-  /// Looks what has happened since, for at most so long.
+  virtual ~HotplugListener() = default;
+  /// Handles events for up to `wait_ns`.
   virtual void poll(std::int64_t wait_ns) = 0;
-  int arrived() const { return arrived_; }  ///< in all, with those plugged in at first
+  int arrived() const { return arrived_; }  ///< in all, including those that were there at first
   int left() const { return left_; }
 
  protected:
   int arrived_ = 0, left_ = 0;
 };
 /// \throws TransportError.
-std::unique_ptr<HotplugWatch> watch_usb();
+std::unique_ptr<HotplugListener> listen_for_hotplug();
 
-/// A libusb error code in words, with what would help. \param what e.g. "cannot open the Falcon"
+/// The message for a libusb error code, with what to do. \param what  e.g. "cannot open the Falcon"
 std::string usb_error(const std::string& what, int code);
 
 }  // namespace palpate::runner::falcon

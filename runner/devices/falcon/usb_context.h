@@ -1,5 +1,5 @@
 #pragma once
-// Owners of what libusb hands out, for falcon_usb*.cpp.
+// Owning pointers to libusb's objects, for usb*.cpp.
 
 #include <libusb-1.0/libusb.h>
 

@@ -9,7 +9,7 @@
 namespace palpate::runner::falcon {
 namespace {
 
-/// Where it is plugged in: stays the same over re-plugging, for a device without a serial number.
+/// The USB port, which identifies a device without a serial number across re-plugging.
 std::string port_of(libusb_device* device) {
   std::array<std::uint8_t, 8> ports{};
   const int depth = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
@@ -26,18 +26,18 @@ std::string place_of(const UsbListing& listing) {
          std::to_string(listing.address);
 }
 
-class LibusbWatch final : public HotplugWatch {
+class LibusbHotplugListener final : public HotplugListener {
  public:
-  LibusbWatch() : context_(make_usb_context()) {
+  LibusbHotplugListener() : context_(make_usb_context()) {
     const int code = libusb_hotplug_register_callback(
         context_.get(), LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT,
         LIBUSB_HOTPLUG_ENUMERATE, kVendor, kProduct, LIBUSB_HOTPLUG_MATCH_ANY,
-        &LibusbWatch::changed, this, &handle_);
+        &LibusbHotplugListener::changed, this, &handle_);
     if (code != LIBUSB_SUCCESS) throw TransportError(usb_error("cannot watch the bus", code));
   }
-  ~LibusbWatch() override { libusb_hotplug_deregister_callback(context_.get(), handle_); }
-  LibusbWatch(const LibusbWatch&) = delete;
-  LibusbWatch& operator=(const LibusbWatch&) = delete;
+  ~LibusbHotplugListener() override { libusb_hotplug_deregister_callback(context_.get(), handle_); }
+  LibusbHotplugListener(const LibusbHotplugListener&) = delete;
+  LibusbHotplugListener& operator=(const LibusbHotplugListener&) = delete;
 
   void poll(std::int64_t wait_ns) override {
     timeval wait{wait_ns / 1'000'000'000, (wait_ns % 1'000'000'000) / 1000};
@@ -47,8 +47,8 @@ class LibusbWatch final : public HotplugWatch {
  private:
   static int LIBUSB_CALL changed(libusb_context* /*context*/, libusb_device* /*device*/,
                                  libusb_hotplug_event event, void* self) {
-    auto* watch = static_cast<LibusbWatch*>(self);
-    ++(event == LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED ? watch->arrived_ : watch->left_);
+    auto* listener = static_cast<LibusbHotplugListener*>(self);
+    ++(event == LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED ? listener->arrived_ : listener->left_);
     return 0;
   }
 
@@ -139,6 +139,8 @@ std::vector<UsbListing> list_usb() {
   return listings;
 }
 
-std::unique_ptr<HotplugWatch> watch_usb() { return std::make_unique<LibusbWatch>(); }
+std::unique_ptr<HotplugListener> listen_for_hotplug() {
+  return std::make_unique<LibusbHotplugListener>();
+}
 
 }  // namespace palpate::runner::falcon

@@ -1,4 +1,4 @@
-// Built without libusb: every use of a Falcon says so.
+// For builds without libusb.
 
 #include "runner/devices/falcon/usb.h"
 
@@ -13,7 +13,7 @@ namespace {
 bool usb_available() noexcept { return false; }
 std::vector<UsbListing> list_usb() { refuse(); }
 std::unique_ptr<Transport> open_usb(const std::string& /*serial*/) { refuse(); }
-std::unique_ptr<HotplugWatch> watch_usb() { refuse(); }
+std::unique_ptr<HotplugListener> listen_for_hotplug() { refuse(); }
 std::string usb_error(const std::string& what, int /*code*/) { return what; }
 
 }  // namespace palpate::runner::falcon

@@ -17,17 +17,18 @@ constexpr double kNearCentre = 0.01;  // m, to begin with
 constexpr int kLastTicks = 20;
 constexpr int kMaxAttempts = 5;
 constexpr long kMaxInterrupted = 20;  // ticks of a measurement
-constexpr double kMaxDrift = 0.035;   // m; beyond, the weight has won
-constexpr double kRamp = 0.5;         // s, from nothing to full force
-// By the nominal scale; the true one may be 4 times stronger, and the loop must bear that.
+constexpr double kMaxDrift = 0.035;   // m, from the target; beyond it the motors are too weak
+constexpr double kRamp = 0.5;         // s, from zero to full force
+// By the nominal scale; with motors 4 times as strong the loop must still be stable.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
 constexpr double kMostResidual = 0.1;                              // of the heaviest weight
 
-/// Holds the grip at a target.
-class Holder {
+/// PID control of the grip's position.
+class PositionController {
  public:
-  Holder(const Vec3& position, double max_force) : last_(position), max_force_(max_force) {}
+  PositionController(const Vec3& position, double max_force)
+      : last_(position), max_force_(max_force) {}
 
   Vec3 force(const Vec3& position, const Vec3& target) {
     const double blend = kTick / (kVelocityTime + kTick);
@@ -57,7 +58,8 @@ class Procedure {
   Procedure(Device& device, Clock& clock, Guide& guide)
       : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
   ~Procedure() {
-    for (int i = 0; i < kLastTicks; ++i) {  // one may come while a reply is still awaited
+    // A single zero command could be skipped while a reply is pending.
+    for (int i = 0; i < kLastTicks; ++i) {
       next_reading();
       device_.write(Vec3(0), Vec3(0));
     }
@@ -65,19 +67,19 @@ class Procedure {
   Procedure(const Procedure&) = delete;
   Procedure& operator=(const Procedure&) = delete;
 
-  void find_centre() {
-    guide_.ask("Take the grip to the middle of its space, hold it there, and press ENTER.");
+  void start_at_centre() {
+    guide_.ask("Move the grip to the centre of its workspace, hold it there, and press ENTER.");
     for (;;) {
       const Vec3 position = tick_free();
       if (!answered()) continue;
       if (glm::length(position) <= kNearCentre) break;
       std::ostringstream where;
-      where << "That is not the middle yet: move it " << centimetres(-position.x) << " cm right, "
+      where << "That is not the centre yet: move it " << centimetres(-position.x) << " cm right, "
             << centimetres(-position.y) << " cm away from you, " << centimetres(-position.z)
-            << " cm up (less than 1 cm off is enough), and press ENTER.";
+            << " cm up (to within 1 cm), and press ENTER.";
       guide_.ask(where.str());
     }
-    holder_.emplace(device_.read().stylus.tip, device_.capabilities().max_force);
+    controller_.emplace(device_.read().stylus.tip, device_.capabilities().max_force);
   }
 
   Weighing measure(double weight, const std::string& question, const WeighingSettings& settings) {
@@ -87,9 +89,9 @@ class Procedure {
     } while (!answered());
     guide_.say("  measuring; do not touch it");
     for (int attempt = 0; attempt < kMaxAttempts; ++attempt) {
-      const long interrupted = interrupted_, saturated = holder_->saturated();
+      const long interrupted = interrupted_, saturated = controller_->saturated();
       Weighing weighing{weight, mean_force(settings)};
-      if (holder_->saturated() > saturated) {
+      if (controller_->saturated() > saturated) {
         throw GuideError("the motors were at their limit: take lighter weights");
       }
       if (interrupted_ - interrupted <= kMaxInterrupted) return weighing;
@@ -99,7 +101,7 @@ class Procedure {
   }
 
  private:
-  /// Told over whole cycles of slow motion up and down.
+  /// Mean commanded force over whole cycles of slow motion up and down.
   Vec3 mean_force(const WeighingSettings& settings) {
     const auto ticks = [](double seconds) { return std::lround(seconds / kTick); };
     for (long i = 0; i < ticks(settings.settle); ++i) tick_held(Vec3(0));
@@ -107,8 +109,10 @@ class Procedure {
     const long count = ticks(settings.cycle * settings.cycles);
     for (long i = 0; i < count; ++i) {
       const double phase = static_cast<double>(i) * kTick / settings.cycle;
-      const double part = phase - std::floor(phase);
-      const double triangle = part < 0.25 ? 4 * part : part < 0.75 ? 2 - 4 * part : 4 * part - 4;
+      const double fraction = phase - std::floor(phase);
+      const double triangle = fraction < 0.25   ? 4 * fraction
+                              : fraction < 0.75 ? 2 - 4 * fraction
+                                                : 4 * fraction - 4;
       mean += tick_held({0, 0, settings.sweep * triangle}) / static_cast<double>(count);
     }
     return mean;
@@ -117,13 +121,13 @@ class Procedure {
   static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
 
   DeviceReading next_reading() {
-    // A stall is not made up for by a burst.
+    // Missed ticks are not made up for.
     due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
     return device_.read();
   }
 
-  /// Nothing where a guard process has just cut the force off; a zero command takes it on again.
+  /// nullopt where a guard process has just cut the force off; a zero command re-enables it.
   std::optional<Vec3> position() {
     const DeviceReading reading = next_reading();
     if (reading.trouble == DeviceTrouble::guarded) {
@@ -144,17 +148,17 @@ class Procedure {
     }
   }
 
-  /// The force that was told.
+  /// \return the force commanded
   Vec3 tick_held(const Vec3& target) {
     const auto at = position();
-    if (!at) return told_;
+    if (!at) return commanded_;
     if (glm::length(*at - target) > kMaxDrift) {
       throw GuideError(
-          "the grip got away from the middle: take lighter weights, and let them down slowly");
+          "the grip drifted away from the centre: take lighter weights, and lower them slowly");
     }
-    told_ = holder_->force(*at, target);
-    device_.write(told_, Vec3(0));
-    return told_;
+    commanded_ = controller_->force(*at, target);
+    device_.write(commanded_, Vec3(0));
+    return commanded_;
   }
 
   bool answered() {
@@ -167,8 +171,8 @@ class Procedure {
   Clock& clock_;
   Guide& guide_;
   std::int64_t due_ns_;
-  std::optional<Holder> holder_;
-  Vec3 told_;
+  std::optional<PositionController> controller_;
+  Vec3 commanded_;
   long interrupted_ = 0;  // ticks
 };
 
@@ -193,25 +197,26 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   slope /= spread;
   if (!(slope.z > kLeastSlope && slope.z < kMostSlope)) {
     std::ostringstream text;
-    text << "the motors were told " << slope.z << " N more for each N of weight, which cannot be: "
-         << "did every weight hang at the grip, and hang freely?";
+    text << "the commanded force rose by " << slope.z
+         << " N for each N of weight, which cannot be: "
+         << "did every weight hang freely from the grip?";
     throw GuideError(text.str());
   }
   double square = 0;
   for (const Weighing& w : weighings) {
-    const double off = w.force.z - mean_force.z - slope.z * (w.weight - mean_weight);
-    square += off * off / n;
+    const double deviation = w.force.z - mean_force.z - slope.z * (w.weight - mean_weight);
+    square += deviation * deviation / n;
   }
   ForceCalibration force;
-  // More told than weighed: a count is weaker than thought, so more of them make a newton metre.
+  // Slope above 1: the motors are weaker than nominal, so a newton metre takes more counts.
   force.counts_per_torque = kCountsPerTorque * slope.z;
   force.residual = std::sqrt(square) / slope.z;
   force.sideways = std::hypot(slope.x, slope.y) / slope.z;
   force.arm_weight = (mean_force.z - slope.z * mean_weight) / slope.z;
   if (force.residual > kMostResidual * heaviest) {
     std::ostringstream text;
-    text << "the weights lie " << force.residual << " N off a line (" << kMostResidual * heaviest
-         << " N are borne): was a weight wrong or touched?";
+    text << "the weights lie " << force.residual << " N off a straight line ("
+         << kMostResidual * heaviest << " N are allowed): was a weight wrong or touched?";
     throw GuideError(text.str());
   }
   return force;
@@ -220,13 +225,13 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
 ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings) {
   Procedure procedure(device, clock, guide);
-  procedure.find_centre();
+  procedure.start_at_centre();
   std::vector<Weighing> weighings = {
-      procedure.measure(0, "Let go of the grip: it holds itself. Press ENTER.", settings)};
+      procedure.measure(0, "Let go of the grip: the motors hold it. Press ENTER.", settings)};
   for (const double mass : settings.weights) {
     std::ostringstream question;
     question << "Hang " << mass
-             << " kg at the grip, let it down slowly, still it, and press ENTER.";
+             << " kg from the grip, lower it slowly, stop it from swinging, and press ENTER.";
     weighings.push_back(procedure.measure(mass * settings.gravity, question.str(), settings));
   }
   ForceCalibration force = fit_scale(weighings);

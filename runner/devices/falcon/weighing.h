@@ -1,8 +1,8 @@
 #pragma once
-// Calibration of a Falcon's force with known weights. The device has no sensor of force, but it can
-// hold its grip still: what the motors are told while it carries a weight, less what they are told
-// without, is that weight. The grip moves slowly up and down meanwhile, so that friction, which
-// helps on the way down and hinders on the way up, cancels.
+// Calibration of a Falcon's force with known weights. The device has no force sensor, but a
+// position controller can hold its grip: the force commanded while it carries a weight, minus that
+// commanded without, is the weight. The grip moves slowly up and down meanwhile, so that friction
+// cancels.
 
 #include <vector>
 
@@ -24,16 +24,16 @@ struct WeighingSettings {
 /// One weight's measurement.
 struct Weighing {
   double weight = 0;  ///< N
-  Vec3 force;         ///< N, world frame, that the motors were told, by the nominal scale
+  Vec3 force;         ///< N, world frame, mean force commanded, by the nominal scale
 };
 
-/// The scale from weighings (the first without a weight). \throws GuideError where they make no
-/// sense: no more force for more weight, or far off a line.
+/// The scale from weighings (the first without a weight). \throws GuideError where they are
+/// inconsistent: force does not rise with weight, or is far from linear.
 ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
 
-/// The whole procedure, at 1 kHz of the clock. Zero force before and after.
-/// \param device  one Falcon, opened with its nominal scale; through a guard process, best
-/// \throws GuideError when it is stopped, the device is lost, or the grip gets away.
+/// The whole guided procedure, at 1 kHz. Zero force before and after.
+/// \param device  one Falcon, opened with its nominal scale; should be owned by a guard process
+/// \throws GuideError when stopped, the device is lost, or the grip drifts away.
 ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings);
 

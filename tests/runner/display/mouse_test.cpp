@@ -33,11 +33,11 @@ TEST(MouseStylus, RestsOutsideOfTheHomeZoneUntilItIsMoved) {
 TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
   for (const double rate : {1000.0, 4000.0}) {
     MouseStylus device(kLength, rate);
-    MouseHand hand = device.resting_hand();
+    StylusTarget hand = device.initial_target();
     rendering::LineProbe before = device.read().stylus;
     hand.move(-0.12, -0.08, -0.04);
     hand.turn(M_PI - 0.1, -1.4);
-    device.aim(hand.stylus());
+    device.set_target(hand.stylus());
     for (int i = 0; i < static_cast<int>(rate); ++i) {
       const rendering::LineProbe now = device.read().stylus;
       ASSERT_LE(glm::length(now.tip - before.tip), 1.0001 / rate);
@@ -54,38 +54,38 @@ TEST(MouseStylus, NoAimMakesAPoseThatIsNotFinite) {
   MouseStylus device(kLength, 1000);
   std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<double> far(-10, 10);
-  MouseHand hand = device.resting_hand();
+  StylusTarget hand = device.initial_target();
   for (int i = 0; i < 20000; ++i) {
     hand.move(far(random), far(random), far(random));
     hand.turn(far(random), far(random));
-    device.aim(hand.stylus());
+    device.set_target(hand.stylus());
     const rendering::LineProbe now = device.read().stylus;
     ASSERT_NEAR(length_of(now), kLength, 1e-9);
     ASSERT_LT(glm::length(now.tip), 1);
   }
   // The tail straight through the tip: the axis has nowhere to go but must not be lost.
   const rendering::LineProbe at = device.read().stylus;
-  device.aim({at.tail, at.tip});
+  device.set_target({at.tail, at.tip});
   for (int i = 0; i < 2000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
 }
 
 TEST(MouseStylus, AimedFromAnotherThread) {
   MouseStylus device(kLength, 1000);
   std::thread window([&device] {
-    MouseHand hand = device.resting_hand();
+    StylusTarget hand = device.initial_target();
     for (int i = 0; i < 20000; ++i) {
       hand.move(-1e-5, 0, 0);
-      device.aim(hand.stylus());
+      device.set_target(hand.stylus());
     }
   });
   for (int i = 0; i < 20000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
   window.join();
   for (int i = 0; i < 2000; ++i) device.read();
-  EXPECT_NEAR(device.read().stylus.tip.x, device.resting_hand().tip.x - 0.2, 1e-6);
+  EXPECT_NEAR(device.read().stylus.tip.x, device.initial_target().tip.x - 0.2, 1e-6);
 }
 
-TEST(MouseHand, StaysInReachAndTurnsFiveDegreesOfFreedom) {
-  MouseHand hand{{}, kLength, 0, 0};
+TEST(StylusTarget, StaysInReachAndTurnsFiveDegreesOfFreedom) {
+  StylusTarget hand{{}, kLength, 0, 0};
   EXPECT_NEAR(glm::length(hand.axis() - Vec3(0, 0, 1)), 0, 1e-12);
   hand.turn(M_PI / 2, 0);
   EXPECT_NEAR(glm::length(hand.axis() - Vec3(1, 0, 0)), 0, 1e-12);

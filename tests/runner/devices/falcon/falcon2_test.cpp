@@ -27,21 +27,21 @@ constexpr double kLength = 0.12;
 struct Bench {
   Emulator tip_emulator, tail_emulator;
   FakeTransport *tip_line = nullptr, *tail_line = nullptr;
-  std::unique_ptr<FalconArm> tip, tail;
+  std::unique_ptr<FalconDriver> tip, tail;
   Pose tail_in_tip{{0.002, -0.003, kLength + 0.001}, glm::normalize(Quat(1, 0.05, -0.03, 0.9))};
 
   Bench() {
-    const auto arm = [](Emulator& emulator, FakeTransport*& line, const char* serial) {
+    const auto driver = [](Emulator& emulator, FakeTransport*& line, const char* serial) {
       emulator.preload(true);
       emulator.plant.hand_stiffness = 5000;
       emulator.plant.hand_damping = 50;
       auto transport = std::make_unique<FakeTransport>(emulator, serial);
       line = transport.get();
       line->control(request::kLatency, 1);
-      return std::make_unique<FalconArm>(std::move(transport), ArmSettings{});
+      return std::make_unique<FalconDriver>(std::move(transport), DriverSettings{});
     };
-    tip = arm(tip_emulator, tip_line, "TIP");
-    tail = arm(tail_emulator, tail_line, "TAIL");
+    tip = driver(tip_emulator, tip_line, "TIP");
+    tail = driver(tail_emulator, tail_line, "TAIL");
   }
 
   /// Both ends, in the tip's world frame, m.

@@ -96,7 +96,7 @@ TEST(FalconCalibration, AScaleFarFromAFalconsIsImplausible) {
         std::pair(-4.1e4, CalibrationState::implausible)}) {
     Calibration calibration;
     calibration.put({"A1", counts, 0.01, 0.02, 0.3, {0.1, 0.2}, "2026-10-31T11:00:00Z"});
-    EXPECT_EQ(believable(calibration.forces[0]), state == CalibrationState::good) << counts;
+    EXPECT_EQ(plausible(calibration.forces[0]), state == CalibrationState::good) << counts;
     const CalibrationVerdict verdict = judge_forces(calibration, {"A1"}, kNow);
     EXPECT_EQ(verdict.state, state) << counts;
     if (state == CalibrationState::good) continue;

@@ -30,7 +30,7 @@ struct Bench {
     line = transport.get();
     line->control(request::kLatency, 1);
     device = std::make_unique<FalconDevice>(
-        std::make_unique<FalconArm>(std::move(transport), ArmSettings{}));
+        std::make_unique<FalconDriver>(std::move(transport), DriverSettings{}));
   }
 };
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <thread>
 
-#include "runner/devices/falcon/arm.h"
 #include "runner/devices/falcon/boot.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/usb.h"
 #include "tests/runner/devices/falcon/emulated_bus.h"
@@ -34,13 +34,13 @@ std::string open_failure(const std::string& serial) {
 
 /// Ticks of a millisecond and somewhat, as the machine allows; until `done` or so many.
 template <class Force, class Done>
-int run(FalconArm& arm, int ticks, Force force, Done done) {
+int run(FalconDriver& driver, int ticks, Force force, Done done) {
   auto due = std::chrono::steady_clock::now();
   for (int i = 0; i < ticks; ++i) {
     due += std::chrono::milliseconds(1);
     std::this_thread::sleep_until(due);
-    const ArmReading& reading = arm.update();
-    arm.push(force(reading.position));
+    const DriverReading& reading = driver.update();
+    driver.push(force(reading.position));
     if (done()) return i;
   }
   return ticks;
@@ -50,15 +50,15 @@ constexpr auto kNever = [] { return false; };
 
 struct ReadyArm {
   EmulatedBus bus;
-  std::unique_ptr<FalconArm> arm;
+  std::unique_ptr<FalconDriver> driver;
   explicit ReadyArm(bool homed = true) {
     bus.add("FALCON01");
     bus.with(0, [homed](Emulator& emulator) { emulator.preload(homed); });
     auto line = open_usb("");
     boot(*line, nullptr);
-    ArmSettings settings;
+    DriverSettings settings;
     settings.silence_ns = 500'000'000;  // a busy machine and the mocked node are slow
-    arm = std::make_unique<FalconArm>(std::move(line), settings);
+    driver = std::make_unique<FalconDriver>(std::move(line), settings);
   }
 };
 
@@ -130,35 +130,36 @@ TEST(FalconUsb, UploadsFirmwareInSpiteOfLostAndWrongEchoes) {
 
 TEST(FalconUsb, HomesAndHoldsAWall) {
   ReadyArm bench(false);
-  FalconArm& arm = *bench.arm;
-  EXPECT_EQ(arm.reading().trouble, DeviceTrouble::not_homed);
+  FalconDriver& driver = *bench.driver;
+  EXPECT_EQ(driver.reading().trouble, DeviceTrouble::not_homed);
   bench.bus.with(0, [](Emulator& emulator) {
     emulator.plant.hand_stiffness = 400;
     emulator.plant.hand_damping = 20;
     emulator.plant.hand = [](double t) { return kCentre + Vec3(0, 0, 0.035 * std::sin(6 * t)); };
   });
   const auto push = [](const Vec3&) { return Vec3(1, 1, 1); };
-  EXPECT_LT(run(arm, 5000, push, [&] { return arm.reading().trouble == DeviceTrouble::none; }),
-            5000);
+  EXPECT_LT(
+      run(driver, 5000, push, [&] { return driver.reading().trouble == DeviceTrouble::none; }),
+      5000);
   bench.bus.with(0, [](Emulator& emulator) {
     EXPECT_FALSE(emulator.torque_before_homing());
     emulator.plant.hand_stiffness = 80;
     emulator.plant.hand_damping = 6;
     emulator.plant.hand = [](double) { return kCentre + from_world({0, 0, -0.03}); };
   });
-  run(arm, 1000, kNoForce, [&] { return arm.reading().position.z < -0.01; });
+  run(driver, 1000, kNoForce, [&] { return driver.reading().position.z < -0.01; });
   const auto floor = [](const Vec3& p) {
     return Vec3(0, 0, p.z < -0.005 ? 400 * (-0.005 - p.z) : 0);
   };
-  run(arm, 1500, floor, kNever);
+  run(driver, 1500, floor, kNever);
   const double rest = -(80 * 0.03 + 400 * 0.005) / 480;
-  EXPECT_NEAR(arm.reading().position.z, rest, 1e-3);
+  EXPECT_NEAR(driver.reading().position.z, rest, 1e-3);
   bench.bus.with(0, [rest](Emulator& emulator) {
     EXPECT_NEAR(to_world(emulator.position() - kCentre).z, rest, 1e-3);
     EXPECT_GT(to_world(emulator.force()).z, 1);
     EXPECT_EQ(emulator.malformed(), 0U);
   });
-  bench.arm.reset();
+  bench.driver.reset();
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
 
@@ -170,48 +171,49 @@ TEST(FalconUsb, SplitShortAndLateRepliesAreBorne) {
     emulator.faults.late_every = 31;
   });
   int lost = 0;
-  run(*bench.arm, 600, kNoForce, [&] {
-    lost += bench.arm->reading().usable() ? 0 : 1;
+  run(*bench.driver, 600, kNoForce, [&] {
+    lost += bench.driver->reading().usable() ? 0 : 1;
     return false;
   });
   EXPECT_EQ(lost, 0);
-  EXPECT_GT(bench.arm->counts().replies, 50U);
-  EXPECT_GT(bench.arm->counts().malformed, 0U);
-  EXPECT_GT(bench.arm->counts().late, 0U);
+  EXPECT_GT(bench.driver->counts().replies, 50U);
+  EXPECT_GT(bench.driver->counts().malformed, 0U);
+  EXPECT_GT(bench.driver->counts().late, 0U);
   EXPECT_EQ(bench.bus.read(0, &Emulator::malformed), 0U);
 }
 
 TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
   ReadyArm bench;
-  FalconArm& arm = *bench.arm;
+  FalconDriver& driver = *bench.driver;
   const auto push = [](const Vec3&) { return Vec3(0, 0, 2); };
-  run(arm, 50, push, kNever);
-  EXPECT_TRUE(arm.reading().usable());
+  run(driver, 50, push, kNever);
+  EXPECT_TRUE(driver.reading().usable());
   EXPECT_FALSE(bench.bus.read(0, &Emulator::torque_is_zero));
   bench.bus.unplug(0);
-  EXPECT_LT(run(arm, 200, push, [&] { return arm.reading().trouble == DeviceTrouble::unplugged; }),
-            200);
-  EXPECT_FALSE(arm.halt());
-  EXPECT_THROW(arm.reopen(), TransportError);
+  EXPECT_LT(
+      run(driver, 200, push, [&] { return driver.reading().trouble == DeviceTrouble::unplugged; }),
+      200);
+  EXPECT_FALSE(driver.halt());
+  EXPECT_THROW(driver.reopen(), TransportError);
   bench.bus.plug(0);
   bool open = false;
   for (int i = 0; i < 200 && !open; ++i) {  // the bus's news take a moment
     try {
-      arm.reopen();
+      driver.reopen();
       open = true;
     } catch (const TransportError&) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }
   ASSERT_TRUE(open);
-  EXPECT_EQ(arm.reading().trouble, DeviceTrouble::none);
+  EXPECT_EQ(driver.reading().trouble, DeviceTrouble::none);
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
 
 TEST(FalconUsb, ComingAndGoingIsNoticed) {
   EmulatedBus bus;
   bus.add("FALCON01");
-  const auto watch = watch_usb();
+  const auto watch = listen_for_hotplug();
   EXPECT_EQ(watch->arrived(), 1);
   const auto poll = [&watch] {
     for (int i = 0; i < 10; ++i) watch->poll(20'000'000);
@@ -230,20 +232,20 @@ TEST(FalconUsb, TwoAtOnce) {
     const int index = bus.add(serial);
     bus.with(index, [](Emulator& emulator) { emulator.preload(true); });
   }
-  std::vector<std::unique_ptr<FalconArm>> arms;
-  arms.reserve(2);
+  std::vector<std::unique_ptr<FalconDriver>> drivers;
+  drivers.reserve(2);
   for (const char* serial : {"TIP", "TAIL"}) {
     auto line = open_usb(serial);
     boot(*line, nullptr);
-    ArmSettings settings;
+    DriverSettings settings;
     settings.silence_ns = 500'000'000;
-    arms.push_back(std::make_unique<FalconArm>(std::move(line), settings));
+    drivers.push_back(std::make_unique<FalconDriver>(std::move(line), settings));
   }
   run(
-      *arms[0], 50, [](const Vec3&) { return Vec3(0, 0, 1); },
+      *drivers[0], 50, [](const Vec3&) { return Vec3(0, 0, 1); },
       [&] {
-        arms[1]->update();
-        arms[1]->push({0, 0, -1});
+        drivers[1]->update();
+        drivers[1]->push({0, 0, -1});
         return false;
       });
   bus.with(0, [](Emulator& emulator) { EXPECT_NEAR(to_world(emulator.force()).z, 1, 0.1); });

@@ -34,7 +34,7 @@ struct Bench {
     line = transport.get();
     line->control(request::kLatency, 1);
     device = std::make_unique<FalconDevice>(
-        std::make_unique<FalconArm>(std::move(transport), ArmSettings{}));
+        std::make_unique<FalconDriver>(std::move(transport), DriverSettings{}));
     settings.weights = {0.1, 0.2, 0.3};
     settings.settle = 2;
     settings.cycles = 1;

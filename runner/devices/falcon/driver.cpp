@@ -1,4 +1,4 @@
-#include "runner/devices/falcon/arm.h"
+#include "runner/devices/falcon/driver.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,21 +11,21 @@
 namespace palpate::runner::falcon {
 namespace {
 
-constexpr int kMaxImplausible = 5;               // in a row; then the counter has lost its place
-constexpr double kSlack = 0.002;                 // m, on top of the fastest hand
+constexpr int kMaxImplausible = 5;  // in a row; more: the encoders have lost their reference
+constexpr double kSlack = 0.002;    // m, beyond what the fastest hand moves
 constexpr std::int64_t kHaltReply = 20'000'000;  // ns
 constexpr int kHaltTries = 3;
 
 }  // namespace
 
-FalconArm::FalconArm(std::unique_ptr<Transport> transport, const ArmSettings& settings)
+FalconDriver::FalconDriver(std::unique_ptr<Transport> transport, const DriverSettings& settings)
     : transport_(std::move(transport)), settings_(settings) {
   restart();
 }
 
-FalconArm::~FalconArm() { halt(); }
+FalconDriver::~FalconDriver() { halt(); }
 
-void FalconArm::restart() noexcept {
+void FalconDriver::restart() noexcept {
   stream_.reset();
   reading_ = {};
   waiting_ = located_ = fresh_ = false;
@@ -34,7 +34,7 @@ void FalconArm::restart() noexcept {
   update();
 }
 
-void FalconArm::reopen() {
+void FalconDriver::reopen() {
   if (reading_.trouble != DeviceTrouble::unplugged && reading_.trouble != DeviceTrouble::silent)
     return;
   transport_->reopen();
@@ -42,10 +42,10 @@ void FalconArm::reopen() {
   restart();
 }
 
-void FalconArm::take_replies(std::int64_t wait_ns) noexcept {
+void FalconDriver::take_replies(std::int64_t wait_ns) noexcept {
   bool fresh = false;
   std::array<std::uint8_t, 256> bytes{};
-  for (std::size_t count = bytes.size(); count == bytes.size(); wait_ns = 0) {  // more may wait
+  for (std::size_t count = bytes.size(); count == bytes.size(); wait_ns = 0) {  // until all is read
     count = transport_->receive(bytes, wait_ns);
     for (const std::uint8_t byte : std::span(bytes).first(count)) {
       const auto packet = stream_.take(byte);
@@ -68,7 +68,7 @@ void FalconArm::take_replies(std::int64_t wait_ns) noexcept {
   }
 }
 
-const ArmReading& FalconArm::update() noexcept {
+const DriverReading& FalconDriver::update() noexcept {
   take_replies(0);
   const bool fresh = std::exchange(fresh_, false);
   if (transport_->gone()) {
@@ -89,7 +89,7 @@ const ArmReading& FalconArm::update() noexcept {
   return reading_;
 }
 
-void FalconArm::locate() noexcept {
+void FalconDriver::locate() noexcept {
   const auto& counts = reply_.counts;
   const auto found = forward(thigh_angles({counts[0], counts[1], counts[2]}),
                              located_ ? falcon_position_ : kCentre);
@@ -98,7 +98,7 @@ void FalconArm::locate() noexcept {
                                                     kSlack + kMaxSpeed * passed);
   if (!plausible) {
     ++counts_.implausible;
-    // The last good place stands in for a few; without one there is nothing to go by.
+    // The last valid position stands in for a few ticks, if there is one.
     const bool lost = ++implausible_in_a_row_ >= kMaxImplausible || !located_;
     reading_.trouble = lost ? DeviceTrouble::implausible : DeviceTrouble::late;
     return;
@@ -111,7 +111,7 @@ void FalconArm::locate() noexcept {
   reading_.trouble = DeviceTrouble::none;
 }
 
-std::array<int, 3> FalconArm::motors_for(const Vec3& force) noexcept {
+std::array<int, 3> FalconDriver::motors_for(const Vec3& force) noexcept {
   std::array<int, 3> motors{};
   const auto legs = inverse(falcon_position_);
   if (!legs) return motors;
@@ -120,7 +120,7 @@ std::array<int, 3> FalconArm::motors_for(const Vec3& force) noexcept {
   Vec3 counts = settings_.counts_per_torque * *torque;
   const double peak = std::max({std::abs(counts.x), std::abs(counts.y), std::abs(counts.z)});
   if (!std::isfinite(counts.x + counts.y + counts.z)) return motors;
-  if (peak > kMaxCount) {  // all together, or the force would turn
+  if (peak > kMaxCount) {  // all three by one factor: clipping singly would turn the force
     counts *= kMaxCount / peak;
     ++counts_.saturated;
   }
@@ -130,7 +130,7 @@ std::array<int, 3> FalconArm::motors_for(const Vec3& force) noexcept {
   return motors;
 }
 
-bool FalconArm::send(const std::array<int, 3>& motors) noexcept {
+bool FalconDriver::send(const std::array<int, 3>& motors) noexcept {
   const bool homed = reply_.all_homed() && reading_.trouble != DeviceTrouble::silent;
   Command command;
   command.motors = motors;
@@ -143,9 +143,9 @@ bool FalconArm::send(const std::array<int, 3>& motors) noexcept {
   return true;
 }
 
-void FalconArm::push(const Vec3& force) noexcept {
+void FalconDriver::push(const Vec3& force) noexcept {
   if (transport_->gone()) return;
-  // Whether the firmware bears more than one packet at a time is not known: one it is.
+  // Whether the firmware can handle several packets at a time is not known: one at a time.
   if (waiting_) {
     if (transport_->now_ns() - sent_ns_ < settings_.resend_ns) {
       ++counts_.late;
@@ -157,7 +157,7 @@ void FalconArm::push(const Vec3& force) noexcept {
   send(reading_.usable() && located_ ? motors_for(force) : std::array<int, 3>{});
 }
 
-bool FalconArm::halt() noexcept {
+bool FalconDriver::halt() noexcept {
   const auto await_reply = [this](std::int64_t wait_ns) {
     const std::int64_t end = transport_->now_ns() + wait_ns;
     for (std::int64_t left = wait_ns; waiting_ && left > 0 && !transport_->gone();
@@ -173,7 +173,7 @@ bool FalconArm::halt() noexcept {
   return false;
 }
 
-double sure_force(double counts_per_torque) {
+double guaranteed_force(double counts_per_torque) {
   const double torque = kMaxCount / std::abs(counts_per_torque);
   double least = force_in_every_direction(kCentre, torque);
   constexpr int kSteps = 12;

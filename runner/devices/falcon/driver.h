@@ -1,0 +1,100 @@
+#pragma once
+// The driver of one Falcon: position of its grip and force on it. `falcon` uses one, `falcon2` two.
+// Each servo tick calls update, then push; neither throws nor waits.
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "runner/devices/falcon/packets.h"
+#include "runner/devices/falcon/parameters.h"
+#include "runner/devices/falcon/transport.h"
+#include "runner/servo/device.h"
+#include "stimuli/vec.h"
+
+namespace palpate::runner::falcon {
+
+struct DriverSettings {
+  double counts_per_torque = kCountsPerTorque;  ///< 1/(N m); from the calibration
+  /// A packet or its reply may get lost: it is sent again after this time.
+  std::int64_t resend_ns = 4'000'000;
+  /// The device counts as lost after this time without a reply.
+  std::int64_t silence_ns = 25'000'000;
+  std::function<void(Transport&)>
+      boot;  ///< starts the firmware, for reopen(); empty: it is always running
+};
+
+struct DriverReading {
+  Vec3 position;  ///< m, world frame, origin at the device's centre; the last valid one when in
+                  ///< trouble
+  std::uint8_t buttons = 0;
+  DeviceTrouble trouble = DeviceTrouble::silent;
+
+  /// The position may be used: at worst the reply is late and the last one stands in for it.
+  bool usable() const { return trouble == DeviceTrouble::none || trouble == DeviceTrouble::late; }
+};
+
+/// Counts of events on the serial line.
+struct DriverCounts {
+  std::uint64_t replies = 0;
+  std::uint64_t late = 0;         ///< commands not sent because a reply was still pending
+  std::uint64_t resent = 0;       ///< commands sent although the reply before had not come
+  std::uint64_t malformed = 0;    ///< packets discarded
+  std::uint64_t implausible = 0;  ///< positions discarded
+  std::uint64_t saturated = 0;    ///< forces scaled down to the limit of the motors
+};
+
+class FalconDriver {
+ public:
+  /// The firmware must be running. Waits for a first reply.
+  FalconDriver(std::unique_ptr<Transport> transport, const DriverSettings& settings);
+  /// Commands zero torque.
+  ~FalconDriver();
+  FalconDriver(const FalconDriver&) = delete;
+  FalconDriver& operator=(const FalconDriver&) = delete;
+
+  const DriverReading& update() noexcept;
+  /// \param force  N, world frame, on the hand. Zero force is sent while in trouble.
+  void push(const Vec3& force) noexcept;
+  /// Commands zero torque and waits up to 60 ms for the reply. False: none came.
+  bool halt() noexcept;
+
+  const DriverReading& reading() const { return reading_; }
+  const DriverCounts& counts() const { return counts_; }
+  const std::string& serial() const { return transport_->serial(); }
+  /// Counts sent last, -4095 to 4095.
+  const std::array<int, 3>& motors() const { return motors_; }
+  double counts_per_torque() const { return settings_.counts_per_torque; }
+  Transport& transport() { return *transport_; }
+  /// Resets the state after the line was opened again; the firmware must be running. Waits for a
+  /// first reply.
+  void restart() noexcept;
+  /// If unplugged or silent: opens the line again, starts the firmware and restarts.
+  /// \throws TransportError
+  void reopen();
+
+ private:
+  void take_replies(std::int64_t wait_ns) noexcept;
+  void locate() noexcept;
+  std::array<int, 3> motors_for(const Vec3& force) noexcept;
+  bool send(const std::array<int, 3>& motors) noexcept;
+
+  std::unique_ptr<Transport> transport_;
+  DriverSettings settings_;
+  PacketStream stream_;
+  DriverReading reading_;
+  DriverCounts counts_;
+  Reply reply_;
+  Vec3 falcon_position_{kCentre};  ///< m, Falcon frame
+  std::int64_t replied_ns_ = 0, sent_ns_ = 0, located_ns_ = 0;
+  bool waiting_ = false, located_ = false, fresh_ = false;
+  int implausible_in_a_row_ = 0;
+  std::array<int, 3> motors_{};
+};
+
+/// The largest force (N) that the motors can show in every direction everywhere in the workspace.
+double guaranteed_force(double counts_per_torque);
+
+}  // namespace palpate::runner::falcon
