@@ -9,8 +9,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr float kDistance = 0.62F;           // m; shows a device's workspace with room around
-constexpr float kFieldOfView = 0.45F;        // rad, upright
+constexpr float kDistance = 0.62F;           // m, of the camera from the centre
+constexpr float kFieldOfView = 0.45F;        // rad, vertical
 constexpr float kNear = 0.02F, kFar = 5.0F;  // m
 constexpr float kSteepestPitch = 1.5F;       // rad
 
@@ -37,13 +37,13 @@ glm::mat4 Camera::matrix() const {
          glm::lookAt(eye(), glm::vec3(0), glm::vec3(0, 1, 0));
 }
 
-glm::vec2 Camera::pixel(const glm::vec3& point) const {
+glm::vec2 Camera::project(const glm::vec3& point) const {
   const glm::vec4 clip = matrix() * glm::vec4(point, 1);
   const float w = std::max(clip.w, kNear);
   return {(clip.x / w + 1) / 2 * width_, (1 - clip.y / w) / 2 * height_};
 }
 
-glm::vec3 Camera::under(const glm::vec2& pixel, const glm::vec3& depth_of) const {
+glm::vec3 Camera::unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const {
   const glm::mat4 view = glm::lookAt(eye(), glm::vec3(0), glm::vec3(0, 1, 0));
   const float depth = std::min(-kNear, (view * glm::vec4(depth_of, 1)).z);
   const float per_pixel = -2 * depth * std::tan(kFieldOfView / 2) / height_;

@@ -6,8 +6,8 @@
 
 namespace palpate::runner {
 
-/// From where the console looks at the workspace. Points in the virtual frame, m; pixels of the
-/// view from its upper left corner.
+/// The camera of the console's 3D view. Points in the virtual frame, m; pixels from the view's
+/// upper left corner.
 class Camera {
  public:
   void resize(float width, float height);
@@ -16,10 +16,10 @@ class Camera {
 
   glm::vec3 eye() const;
   glm::mat4 matrix() const;  ///< virtual frame to clip space
-  glm::vec2 pixel(const glm::vec3& point) const;
-  /// The point under the pixel that is as far into the picture as `depth_of`.
-  glm::vec3 under(const glm::vec2& pixel, const glm::vec3& depth_of) const;
-  glm::vec3 towards_viewer() const;  ///< unit, against the line of sight
+  glm::vec2 project(const glm::vec3& point) const;
+  /// The point seen at a pixel, at the same depth as `depth_of`.
+  glm::vec3 unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const;
+  glm::vec3 towards_viewer() const;  ///< unit, from the centre to the camera
 
  private:
   float width_ = 1, height_ = 1;     ///< px

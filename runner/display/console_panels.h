@@ -1,5 +1,5 @@
 #pragma once
-// Parts of the console, each a piece of the current Dear ImGui window.
+// Panels of the experimenter's console. Each function draws into the current Dear ImGui window.
 
 #include <deque>
 #include <vector>
@@ -8,25 +8,25 @@
 
 namespace palpate::runner {
 
-void style_console(float scale);
-
-/// \param hidden  leave out the shape and whether answers were right
-/// \param beside  two values in a line, where there is more width than height
+/// \param hidden  leaves out the shape and whether answers were correct
+/// \param beside  two values in a row, for low windows
 void draw_status(const ConsoleState& state, bool hidden, bool beside);
-/// What is due before the first trial, large, with a button for each thing to say to it.
-void draw_checklist(const Checklist& list, Ending& ending, std::vector<ConsoleCommand>& asked);
-/// What it asks for is added to `asked`, without a time. Asks for the reason of an end in the
-/// buttons' place: nothing in the console pops up, so nothing can cover the emergency button.
-/// \param beside  as for the status: little height
-void draw_buttons(const ConsoleState& state, bool beside, Ending& ending,
-                  std::vector<ConsoleCommand>& asked);
-/// Along the upper edge of the window, over everything else. It takes no clicks by itself.
-/// \return its lower edge, px
+/// The steps before the first trial: the current one large, with a button for each possible answer.
+void draw_checklist(const Checklist& list, EndRequest& ending,
+                    std::vector<ConsoleCommand>& commands);
+/// Buttons pressed are added to `commands`, without a time. The dialog for ending the session takes
+/// the place of the buttons: the console has no pop-ups, so nothing can cover the emergency button.
+/// \param beside  as for the status
+void draw_buttons(const ConsoleState& state, bool beside, EndRequest& ending,
+                  std::vector<ConsoleCommand>& commands);
+/// The emergency button along the upper edge of the window, over everything else. Only drawn: its
+/// clicks are handled by ConsoleWindow. \return its lower edge, px
 float draw_emergency(bool lit);
 /// Whether forces are off, why, and the button to allow them again.
-/// \param silence  s without news from the session; 0: there are some
-void draw_forces_off(const ConsoleState& state, double silence, std::vector<ConsoleCommand>& asked);
-/// \param brief  only whether it is sound
+/// \param silence  s without an update from the session; 0: updates arrive
+void draw_forces_off(const ConsoleState& state, double silence,
+                     std::vector<ConsoleCommand>& commands);
+/// \param brief  only the servo's faults
 void draw_health(const ConsoleState& state, bool brief);
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);

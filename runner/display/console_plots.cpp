@@ -1,30 +1,21 @@
-#include <imgui.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "runner/display/console_panels.h"
+#include "runner/display/console_widgets.h"
 
 namespace palpate::runner {
 namespace {
 
-constexpr ImU32 kQuietInk = IM_COL32(153, 163, 176, 255);
+constexpr ImU32 kAxisColour = IM_COL32(153, 163, 176, 255);
 
-std::string number(double value, int digits) {
-  std::array<char, 40> out{};
-  std::snprintf(out.data(), out.size(), "%.*f", digits, value);  // NOLINT: bounded
-  return out.data();
-}
-
-/// A frame with a name; where to draw in it.
+/// The area of a plot within its titled frame, px.
 struct Plot {
   ImVec2 from, to;
   ImDrawList* list;
 };
 
-/// \param top  of the scale; 0: there is none
+/// \param top  largest value of the axis; 0: no axis
 Plot plot_frame(const char* name, float width, float height, double top = 0,
                 const char* unit = "") {
   const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -32,7 +23,7 @@ Plot plot_frame(const char* name, float width, float height, double top = 0,
   ImDrawList* const list = ImGui::GetWindowDrawList();
   list->AddRectFilled(at, {at.x + width, at.y + height}, ImGui::GetColorU32(ImGuiCol_FrameBg), 6);
   list->PushClipRect(at, {at.x + width, at.y + height}, true);
-  list->AddText({at.x + 0.6F * size, at.y + 0.4F * size}, kQuietInk, name);
+  list->AddText({at.x + 0.6F * size, at.y + 0.4F * size}, kAxisColour, name);
   list->PopClipRect();
   const Plot plot{{at.x + 3.6F * size, at.y + 2.0F * size},
                   {at.x + width - 0.8F * size, at.y + height - 0.8F * size},
@@ -40,15 +31,15 @@ Plot plot_frame(const char* name, float width, float height, double top = 0,
   for (int i = 0; i <= 2 && top > 0; ++i) {
     const float y = plot.to.y + (plot.from.y - plot.to.y) * static_cast<float>(i) / 2;
     list->AddLine({plot.from.x, y}, {plot.to.x, y}, IM_COL32(255, 255, 255, 26));
-    const std::string label = number(top * i / 2, top < 4 ? 1 : 0) + (i == 2 ? unit : "");
+    const std::string label = fixed_point(top * i / 2, top < 4 ? 1 : 0) + (i == 2 ? unit : "");
     const float wide = ImGui::CalcTextSize(label.c_str()).x;
-    list->AddText({plot.from.x - wide - 6, y - size / 2}, kQuietInk, label.c_str());
+    list->AddText({plot.from.x - wide - 6, y - size / 2}, kAxisColour, label.c_str());
   }
   ImGui::Dummy({width, height});
   return plot;
 }
 
-/// 1, 2 or 5 times a power of ten, not below.
+/// The next of 1, 2 or 5 times a power of ten.
 double round_up(double value) {
   const double power = std::pow(10, std::floor(std::log10(std::max(value, 1e-3))));
   for (const double step : {1.0, 2.0, 5.0}) {
@@ -95,7 +86,7 @@ void draw_times(const std::vector<double>& times, float width, float height) {
 }
 
 void draw_scores(const std::vector<ShapeScore>& scores, float width, float height) {
-  const Plot plot = plot_frame("Right so far, without practice", width, height);
+  const Plot plot = plot_frame("Correct so far, without practice", width, height);
   const float line = ImGui::GetTextLineHeight();
   const float each =
       std::min(1.5F * line, (plot.to.y - plot.from.y) /
@@ -104,9 +95,9 @@ void draw_scores(const std::vector<ShapeScore>& scores, float width, float heigh
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const ShapeScore& score = scores[i];
     const float y = plot.from.y + static_cast<float>(i) * each;
-    const float share =
+    const float fraction =
         score.shown > 0 ? static_cast<float>(score.right) / static_cast<float>(score.shown) : 0;
-    plot.list->AddRectFilled({left, y}, {left + share * wide, y + 0.86F * each},
+    plot.list->AddRectFilled({left, y}, {left + fraction * wide, y + 0.86F * each},
                              IM_COL32(60, 92, 120, 255), 3);
     const float size = std::min(line, 0.86F * each);
     const auto write = [&](float x, const std::string& words) {

@@ -13,20 +13,20 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kForceSpan = 10;  // s, shown in the plot
-constexpr double kSilence = 1;     // s without news before the console says so
+constexpr double kSilence = 1;     // s without an update until the console says so
 
 }  // namespace
 
-// Whoever holds the mouse has to see where.
+// The user of the mouse device must see the scene.
 ConsoleView::ConsoleView(const WindowSettings& settings, bool shared)
     : shared_(shared && settings.mouse == nullptr), hidden_(shared_) {
-  if (settings.mouse != nullptr) hand_.emplace(*settings.mouse, settings.workspace);
+  if (settings.mouse != nullptr) control_.emplace(*settings.mouse, settings.workspace);
 }
 
-void ConsoleView::take(ConsoleState state, double now) {
+void ConsoleView::update(ConsoleState state, double now) {
   state_ = std::move(state);
-  came_ = now;
-  any_ = true;
+  updated_at_ = now;
+  has_state_ = true;
   const double time = static_cast<double>(state_.sample.time_ns) * 1e-9;
   const double force = glm::length(state_.sample.device1 + state_.sample.device2);
   if (!forces_.empty() && time < forces_.back().time) forces_.clear();
@@ -36,11 +36,11 @@ void ConsoleView::take(ConsoleState state, double now) {
 }
 
 std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modifiers) {
-  std::vector<ConsoleCommand> asked;
+  std::vector<ConsoleCommand> commands;
   const ImGuiViewport* const all = ImGui::GetMainViewport();
-  emergency_to_ = draw_emergency(emergency_lit_);
-  ImGui::SetNextWindowPos({all->WorkPos.x, all->WorkPos.y + emergency_to_});
-  ImGui::SetNextWindowSize({all->WorkSize.x, std::max(all->WorkSize.y - emergency_to_, 1.0F)});
+  emergency_bottom_ = draw_emergency(emergency_highlit_);
+  ImGui::SetNextWindowPos({all->WorkPos.x, all->WorkPos.y + emergency_bottom_});
+  ImGui::SetNextWindowSize({all->WorkSize.x, std::max(all->WorkSize.y - emergency_bottom_, 1.0F)});
   ImGui::Begin("console", nullptr,
                ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
                    ImGuiWindowFlags_NoSavedSettings | ImGuiWindowFlags_NoBringToFrontOnFocus);
@@ -51,22 +51,22 @@ std::vector<ConsoleCommand> ConsoleView::draw(double now, const Modifiers& modif
   const float side = std::clamp(0.36F * room.x, 22 * font, 30 * font);
   const bool checks = !state_.checklist.steps.empty();
   const float least = (checks || !hidden_ ? 7.5F : 6.5F) * font;
-  const float high = std::clamp(room.y - controls_ - least_notes() - gap, least,
+  const float high = std::clamp(room.y - controls_ - min_notes_height() - gap, least,
                                 std::max(least, (checks ? 0.6F : 0.45F) * room.y));
   ImGui::BeginChild("picture", narrow ? ImVec2{0, high} : ImVec2{room.x - side - gap, 0}, false,
                     ImGuiWindowFlags_NoScrollbar);
-  draw_picture(modifiers, !narrow, asked);
+  draw_picture(modifiers, !narrow, commands);
   ImGui::EndChild();
   if (!narrow) ImGui::SameLine();
   ImGui::BeginChild("side", {0, 0}, false, ImGuiWindowFlags_NoScrollbar);
-  draw_side(now, narrow, asked);
+  draw_side(now, narrow, commands);
   ImGui::EndChild();
   ImGui::End();
-  return asked;
+  return commands;
 }
 
 void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
-                               std::vector<ConsoleCommand>& asked) {
+                               std::vector<ConsoleCommand>& commands) {
   const float font = ImGui::GetFontSize();
   const ImVec2 spacing = ImGui::GetStyle().ItemSpacing;
   const ImVec2 room = ImGui::GetContentRegionAvail();
@@ -75,7 +75,7 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
   const float height = std::max(room.y - (with_plots ? plots + spacing.y : 0), 40.0F);
   if (!state_.checklist.steps.empty()) {
     ImGui::BeginChild("checklist", {width, height});
-    draw_checklist(state_.checklist, ending_, asked);
+    draw_checklist(state_.checklist, end_request_, commands);
     ImGui::EndChild();
   } else if (hidden_) {
     draw_hidden(width, height);
@@ -100,7 +100,7 @@ void ConsoleView::draw_hidden(float width, float height) {
   ImGui::Dummy({0, std::max(0.0F, height / 2 - 6 * font)});
   ImGui::PushTextWrapPos(0);
   ImGui::TextUnformatted(
-      "One monitor: shape, scene and whether answers are right are hidden here, because the "
+      "One monitor: shape, scene and whether answers are correct are hidden here, because the "
       "participant may see this window.");
   ImGui::PopTextWrapPos();
   if (ImGui::Button("Show them", {10 * font, 2 * font})) hidden_ = false;
@@ -116,28 +116,29 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   const unsigned texture =
       scene_.draw(state_.objects, state_.sample, camera_, static_cast<int>(width * scale.x),
                   static_cast<int>(height * scale.y));
-  // OpenGL's pictures begin at the bottom.
+  // OpenGL textures have their origin at the lower left.
   // NOLINTNEXTLINE(performance-no-int-to-ptr): the identity that the OpenGL back end asks for
   const auto picture = reinterpret_cast<ImTextureID>(std::uintptr_t{texture});
   ImGui::GetWindowDrawList()->AddImageRounded(picture, at, {at.x + width, at.y + height}, {0, 1},
                                               {1, 0}, IM_COL32_WHITE, 6);
   ImGui::InvisibleButton("view", {width, height},
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
-  ImGui::SetItemAllowOverlap();  // the button to hide it
+  ImGui::SetItemAllowOverlap();  // for the button that hides it
   const ImGuiIO& io = ImGui::GetIO();
   PointerMotion pointer;
   pointer.over = ImGui::IsItemHovered() || ImGui::IsItemActive();
   pointer.at = {io.MousePos.x - at.x, io.MousePos.y - at.y};
   pointer.moved = {io.MouseDelta.x, io.MouseDelta.y};
   pointer.wheel = ImGui::IsItemHovered() ? io.MouseWheel : 0;
-  pointer.orbit = ImGui::IsItemActive() && (ImGui::IsMouseDown(ImGuiMouseButton_Right) ||
-                                            (!hand_ && ImGui::IsMouseDown(ImGuiMouseButton_Left)));
+  pointer.orbit =
+      ImGui::IsItemActive() && (ImGui::IsMouseDown(ImGuiMouseButton_Right) ||
+                                (!control_ && ImGui::IsMouseDown(ImGuiMouseButton_Left)));
   pointer.turn =
       modifiers.ctrl || (ImGui::IsItemActive() && ImGui::IsMouseDown(ImGuiMouseButton_Left));
-  pointer.reach = modifiers.shift;
+  pointer.depth = modifiers.shift;
   if (pointer.orbit) camera_.orbit(-0.008F * pointer.moved.x, 0.008F * pointer.moved.y);
-  if (hand_) {
-    hand_->step(pointer, camera_, [this](const glm::vec3& from, const glm::vec3& along) {
+  if (control_) {
+    control_->step(pointer, camera_, [this](const glm::vec3& from, const glm::vec3& along) {
       return scene_.hit(from, along);
     });
   }
@@ -149,7 +150,7 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   if (!scene_.trouble().empty()) label(0, scene_.trouble(), IM_COL32(247, 117, 102, 255));
   const float last = (height / font - 2.1F) / 1.4F;
   const ImU32 quiet = IM_COL32(150, 158, 168, 255);
-  if (hand_) {
+  if (control_) {
     label(last - 1, "pointer: the tip, on what is under it     wheel or Shift: press harder",
           quiet);
     label(last, "Ctrl or left button: turn     right button: look around", quiet);
@@ -162,30 +163,31 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   ImGui::SetCursorScreenPos({at.x, at.y + height + ImGui::GetStyle().ItemSpacing.y});
 }
 
-float ConsoleView::least_notes() {
+float ConsoleView::min_notes_height() {
   return 5.5F * ImGui::GetFontSize() + ImGui::GetFrameHeightWithSpacing() +
          ImGui::GetStyle().ItemSpacing.y;
 }
 
-// In a small window the controls scroll, the newest message never does.
-void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>& asked) {
+// In a small window the controls scroll; the newest message stays visible.
+void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>& commands) {
   const float room = ImGui::GetContentRegionAvail().y;
-  const float notes = std::max(least_notes(), room - controls_);
+  const float notes = std::max(min_notes_height(), room - controls_);
   ImGui::BeginChild("controls", {0, std::max(room - notes, 1.0F)});
-  draw_forces_off(state_, any_ && now - came_ > kSilence ? now - came_ : 0, asked);
+  draw_forces_off(state_, has_state_ && now - updated_at_ > kSilence ? now - updated_at_ : 0,
+                  commands);
   draw_status(state_, hidden_, narrow);
-  draw_buttons(state_, narrow, ending_, asked);
+  draw_buttons(state_, narrow, end_request_, commands);
   const bool brief = narrow || room < 46 * ImGui::GetFontSize();
   if (!brief) ImGui::Dummy({0, 2});
-  const bool crowded = narrow && (ending_.asked || !state_.checklist.steps.empty());
+  const bool crowded = narrow && (end_request_.open || !state_.checklist.steps.empty());
   if (!crowded) draw_health(state_, brief);
   ImGui::Dummy({0, 2});
   controls_ = ImGui::GetCursorPosY();
   ImGui::EndChild();
-  draw_notes(asked);
+  draw_notes(commands);
 }
 
-void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
+void ConsoleView::draw_notes(std::vector<ConsoleCommand>& commands) {
   const float field = ImGui::GetFrameHeightWithSpacing();
   const float room = std::max(ImGui::GetContentRegionAvail().y - field, ImGui::GetFontSize());
   ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
@@ -201,7 +203,7 @@ void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
     ImGui::PopStyleColor();
   }
   ImGui::PopTextWrapPos();
-  // How far down it goes is known a frame after it was drawn first.
+  // The full height is known only a frame after the message was first drawn.
   const std::size_t count = state_.older_messages + state_.messages.size();
   if (count != messages_seen_) frames_to_scroll_ = 3;
   messages_seen_ = count;
@@ -214,7 +216,7 @@ void ConsoleView::draw_notes(std::vector<ConsoleCommand>& asked) {
   ImGui::SetNextItemWidth(-1);
   if (ImGui::InputTextWithHint("##note", "A note, stored with its time; Enter", note_.data(),
                                note_.size(), ImGuiInputTextFlags_EnterReturnsTrue)) {
-    if (note_[0] != 0) asked.push_back({ConsoleCommand::Kind::note, note_.data(), 0});
+    if (note_[0] != 0) commands.push_back({ConsoleCommand::Kind::note, note_.data(), 0});
     note_.fill(0);
   }
 }

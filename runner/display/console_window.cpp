@@ -9,16 +9,16 @@
 
 #include <algorithm>
 
-#include "runner/display/console_panels.h"
+#include "runner/display/console_widgets.h"
 #include "runner/display/console_words.h"
 #include "runner/display/fonts.h"
 #include "runner/display/key_names.h"
-#include "runner/display/lost_display.h"
+#include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
 namespace {
 
-constexpr float kLetters = 16, kTitleLetters = 28;  // px at scale 1
+constexpr float kFontSize = 16, kTitleFontSize = 28;  // px at scale 1
 
 /// \param choices  must outlive the atlas' building, which reads the ranges
 void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float size) {
@@ -34,32 +34,32 @@ void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float 
   }
 }
 
-/// The first font is the console's usual one, the last its title's.
+/// The first font is the usual one, the last that of titles.
 void load_fonts(const std::vector<std::string>& texts, float scale) {
   const std::vector<FontChoice> choices = choose_fonts(texts);
   ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
-  add_font(atlas, choices, kLetters * scale);
-  add_font(atlas, choices, kTitleLetters * scale);
+  add_font(atlas, choices, kFontSize * scale);
+  add_font(atlas, choices, kTitleFontSize * scale);
   atlas.Build();
 }
 
 }  // namespace
 
-ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Places& places,
+ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout& layout,
                              ParticipantWindow& participant)
     : settings_(settings),
       participant_(participant),
-      window_(make_window(settings.title + " - console", places.console)) {
-  glfwSetWindowSizeLimits(window_, std::min(700, places.console.width),
-                          std::min(480, places.console.height), GLFW_DONT_CARE, GLFW_DONT_CARE);
+      window_(make_window(settings.title + " - console", layout.console)) {
+  glfwSetWindowSizeLimits(window_, std::min(700, layout.console.width),
+                          std::min(480, layout.console.height), GLFW_DONT_CARE, GLFW_DONT_CARE);
   context_ = ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // writes no file
-  const auto scale = static_cast<float>(places.console_scale);
+  const auto scale = static_cast<float>(layout.console_scale);
   load_fonts(settings.texts, scale);
   style_console(scale);
   glfwSetWindowUserPointer(window_, this);
   glfwSetKeyCallback(window_, &ConsoleWindow::on_key);
-  glfwSetCharCallback(window_, &ConsoleWindow::on_letter);
+  glfwSetCharCallback(window_, &ConsoleWindow::on_character);
   glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
   glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
   glfwSetCursorPosCallback(window_, &ConsoleWindow::on_pointer);
@@ -67,12 +67,12 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const Places& place
   glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
   ImGui_ImplGlfw_InitForOpenGL(window_, false);
   ImGui_ImplOpenGL3_Init("#version 330 core");
-  view_ = std::make_unique<ConsoleView>(settings, places.shared);
+  view_ = std::make_unique<ConsoleView>(settings, layout.shared);
 }
 
 ConsoleWindow::~ConsoleWindow() {
   if (window_ == nullptr) {
-    // The display is gone, and with it what OpenGL and GLFW would be asked to free.
+    // Without a display OpenGL and GLFW must not be called: leak what they hold.
     static_cast<void>(view_.release());
     return;
   }
@@ -90,10 +90,10 @@ void ConsoleWindow::destroy() {
 }
 
 std::string ConsoleWindow::name_of(ConsoleCommand::Kind kind) const {
-  return "'" + std::string(button_words(kind)) + "'";
+  return "'" + std::string(button_label(kind)) + "'";
 }
 
-void ConsoleWindow::ask(ConsoleCommand::Kind kind, std::string text) {
+void ConsoleWindow::send_command(ConsoleCommand::Kind kind, std::string text) {
   const std::int64_t now = settings_.clock->now_ns();
   if (kind == ConsoleCommand::Kind::emergency_zero && settings_.emergency) settings_.emergency();
   commands_.add({kind, std::move(text), now});
@@ -102,18 +102,18 @@ void ConsoleWindow::ask(ConsoleCommand::Kind kind, std::string text) {
 void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action, int mods) {
   auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
   const bool typing = ImGui::GetIO().WantTextInput;
-  const bool answer = on_keypad(key) && self.participant_.answers(key, scancode);
-  self.swallow_letter_ = answer;
+  const bool answer = on_keypad(key) && self.participant_.is_answer_key(key, scancode);
+  self.ignore_character_ = answer;
   if (action == GLFW_PRESS) {
     if (key == GLFW_KEY_F12 || key == GLFW_KEY_ESCAPE) {
-      self.ask(ConsoleCommand::Kind::emergency_zero, emergency_key(key));
+      self.send_command(ConsoleCommand::Kind::emergency_zero, emergency_key_name(key));
     } else if (answer || !typing) {
-      self.participant_.press(key, scancode);
+      self.participant_.handle_key(key, scancode);
     }
   }
   if (answer) return;
-  // Dear ImGui looks at keys once a frame: one that was down and up between two frames stays down
-  // until it was seen.
+  // Dear ImGui samples keys once a frame: a key pressed and released between two frames is released
+  // after the next one.
   if (action == GLFW_PRESS) self.fresh_keys_.push_back(key);
   if (action == GLFW_RELEASE &&
       std::count(self.fresh_keys_.begin(), self.fresh_keys_.end(), key) > 0) {
@@ -123,26 +123,27 @@ void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action
   }
 }
 
-void ConsoleWindow::on_letter(GLFWwindow* window, unsigned letter) {
+void ConsoleWindow::on_character(GLFWwindow* window, unsigned character) {
   const auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
-  if (!self.swallow_letter_) ImGui_ImplGlfw_CharCallback(window, letter);
+  if (!self.ignore_character_) ImGui_ImplGlfw_CharCallback(window, character);
 }
 
 void ConsoleWindow::on_pointer(GLFWwindow* window, double, double y) {
   auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
   self.pointer_y_ = y;
-  self.view_->light_emergency(self.view_->on_emergency(static_cast<float>(y)));
+  self.view_->highlight_emergency(self.view_->in_emergency_button(static_cast<float>(y)));
 }
 
 void ConsoleWindow::on_button(GLFWwindow* window, int button, int action, int mods) {
   auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
-  // Here, as the event comes, not in a frame of Dear ImGui, where a dialog, a drag or a field that
-  // is being written could have the pointer, and a slow frame would keep it waiting.
-  if (action == GLFW_PRESS && self.view_->on_emergency(static_cast<float>(self.pointer_y_))) {
-    self.ask(ConsoleCommand::Kind::emergency_zero, "the EMERGENCY button");
+  // In the event callback, not in a frame of Dear ImGui, where a drag or an input field could hold
+  // the pointer and a slow frame would delay it.
+  if (action == GLFW_PRESS &&
+      self.view_->in_emergency_button(static_cast<float>(self.pointer_y_))) {
+    self.send_command(ConsoleCommand::Kind::emergency_zero, "the EMERGENCY button");
     return;
   }
-  // For displays without a window manager, which leave the keyboard where it is.
+  // Without a window manager nothing else moves the keyboard focus on a click.
   if (action == GLFW_PRESS && glfwGetWindowAttrib(window, GLFW_FOCUSED) == GLFW_FALSE) {
     glfwFocusWindow(window);
   }
@@ -151,10 +152,10 @@ void ConsoleWindow::on_button(GLFWwindow* window, int button, int action, int mo
 
 void ConsoleWindow::draw() {
   const double now = static_cast<double>(settings_.clock->now_ns()) * 1e-9;
-  if (auto state = states_.take()) view_->take(std::move(*state), now);
+  if (auto state = states_.take()) view_->update(std::move(*state), now);
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
-  if (width <= 0 || height <= 0 || is_gone(window_)) return;
+  if (width <= 0 || height <= 0 || was_destroyed(window_)) return;
   glfwMakeContextCurrent(window_);
   ImGui_ImplOpenGL3_NewFrame();
   ImGui_ImplGlfw_NewFrame();
@@ -170,7 +171,7 @@ void ConsoleWindow::draw() {
   const Modifiers modifiers{held(GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL),
                             held(GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT)};
   for (ConsoleCommand& command : view_->draw(now, modifiers)) {
-    ask(command.kind, std::move(command.text));
+    send_command(command.kind, std::move(command.text));
   }
   fresh_keys_.clear();
   for (const Release& up : late_releases_) {

@@ -14,9 +14,9 @@ namespace palpate::runner {
 /// The experimenter's window. Made and drawn by the display's thread.
 class ConsoleWindow final : public ExperimenterConsole {
  public:
-  /// Keys that answer go to the participant whichever window has the keyboard, but while a note is
-  /// being written; the numeric pad always does. \throws DisplayError
-  ConsoleWindow(const WindowSettings& settings, const Places& places,
+  /// Answer keys go to the participant's screen whichever window has the keyboard focus, except
+  /// while a note is being typed; those of the numeric pad always do. \throws DisplayError
+  ConsoleWindow(const WindowSettings& settings, const WindowLayout& layout,
                 ParticipantWindow& participant);
   ConsoleWindow(const ConsoleWindow&) = delete;
   ConsoleWindow& operator=(const ConsoleWindow&) = delete;
@@ -29,8 +29,8 @@ class ConsoleWindow final : public ExperimenterConsole {
 
   GLFWwindow* handle() const { return window_; }
   void draw();
-  /// From a key of either window or a button. \param text  as ConsoleCommand::text
-  void ask(ConsoleCommand::Kind kind, std::string text = {});
+  /// Queues a command from a key of either window or a button. \param text  ConsoleCommand::text
+  void send_command(ConsoleCommand::Kind kind, std::string text = {});
   /// As the participant's window.
   void destroy();
   void abandon() noexcept { window_ = nullptr; }
@@ -41,7 +41,7 @@ class ConsoleWindow final : public ExperimenterConsole {
   };
   static void on_key(GLFWwindow* window, int key, int scancode, int action, int mods);
   static void on_button(GLFWwindow* window, int button, int action, int mods);
-  static void on_letter(GLFWwindow* window, unsigned letter);
+  static void on_character(GLFWwindow* window, unsigned character);
   static void on_pointer(GLFWwindow* window, double x, double y);
 
   const WindowSettings& settings_;
@@ -49,12 +49,12 @@ class ConsoleWindow final : public ExperimenterConsole {
   GLFWwindow* window_ = nullptr;
   ImGuiContext* context_ = nullptr;
   std::unique_ptr<ConsoleView> view_;
-  double pointer_y_ = -1;               ///< px, of the window; below 0: never there
-  bool swallow_letter_ = false;         ///< the next one came from the numeric pad
-  std::vector<int> fresh_keys_;         ///< went down since the last frame
-  std::vector<Release> late_releases_;  ///< of these
+  double pointer_y_ = -1;          ///< px, in the window; negative: not in it yet
+  bool ignore_character_ = false;  ///< the next character is an answer typed on the numeric pad
+  std::vector<int> fresh_keys_;    ///< pressed since the last frame
+  std::vector<Release> late_releases_;  ///< of fresh_keys_, passed on after the frame
   Mailbox<ConsoleState> states_;
-  Inbox<ConsoleCommand> commands_;
+  EventQueue<ConsoleCommand> commands_;
 };
 
 }  // namespace palpate::runner

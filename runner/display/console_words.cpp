@@ -7,7 +7,7 @@
 
 namespace palpate::runner {
 
-const char* button_words(ConsoleCommand::Kind kind) {
+const char* button_label(ConsoleCommand::Kind kind) {
   using Kind = ConsoleCommand::Kind;
   switch (kind) {
     case Kind::pause:
@@ -43,10 +43,10 @@ std::string state_title(const ConsoleState& state) {
   return state.seconds_left > 0 || state.state == "rest" ? "break" : state.state;
 }
 
-std::string beside_state(const ConsoleState& state) {
+std::string state_detail(const ConsoleState& state) {
   if (!state.stop_plan.empty()) return "stops " + state.stop_plan;
   if (!state.held_by.empty()) return {};
-  if (state.seconds_left > 0) return in_words(state.seconds_left) + " left";
+  if (state.seconds_left > 0) return duration_text(state.seconds_left) + " left";
   for (const char* const page : {"instructions", "practice begins", "block begins", "rest"}) {
     if (state.state == page) return "space bar goes on";
   }
@@ -57,29 +57,29 @@ std::string beside_state(const ConsoleState& state) {
   return {};
 }
 
-double share_done(const ConsoleState& state) {
+double fraction_done(const ConsoleState& state) {
   if (state.trials <= 0) return 0;
   const bool over = state.seconds_left > 0 || state.state == "rest" ||
                     state.state == "block begins" || state.state == "end";
   return std::clamp((state.trial - (over ? 0.0 : 1.0)) / state.trials, 0.0, 1.0);
 }
 
-bool not_on_yet(const ConsoleState& state) {
+bool forces_not_yet_on(const ConsoleState& state) {
   const DeviceTrouble trouble = state.sample.trouble;
   return !state.checklist.steps.empty() && state.fault.empty() &&
          trouble != DeviceTrouble::unplugged && trouble != DeviceTrouble::silent;
 }
 
-std::string words_of_forces(const ConsoleState& state) {
+std::string forces_text(const ConsoleState& state) {
   const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
   if (!off) return state.held_by.empty() ? "No fault" : state.held_by;
-  if (not_on_yet(state)) return "Forces are off: none is needed yet";
+  if (forces_not_yet_on(state)) return "Forces are off: none is needed yet";
   if (!state.held_by.empty()) return "Forces are off: " + state.held_by;
   return "Forces are off: " + forces_off_reason(state) + "; next: '" +
-         button_words(ConsoleCommand::Kind::clear_fault) + "'";
+         button_label(ConsoleCommand::Kind::clear_fault) + "'";
 }
 
-std::string in_words(double seconds) {
+std::string duration_text(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "-";
   const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };
   const long all = std::lround(std::min(seconds, 1e9));

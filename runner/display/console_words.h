@@ -7,20 +7,20 @@
 
 namespace palpate::runner {
 
-/// On the button that asks for it.
-const char* button_words(ConsoleCommand::Kind kind);
+/// The label of the button for a command.
+const char* button_label(ConsoleCommand::Kind kind);
 /// Why forces are off, as far as the session or the servo tells.
 std::string forces_off_reason(const ConsoleState& state);
-/// What is going on, in a word or two, and what goes with it: what it waits for.
+/// The state of the session in a word or two, and what it waits for or what to press.
 std::string state_title(const ConsoleState& state);
-std::string beside_state(const ConsoleState& state);
-/// Of the session's trials, 0 to 1: the one that is said to be under way counts once it is over.
-double share_done(const ConsoleState& state);
-/// Forces are off as they have not been needed yet: nothing is wrong.
-bool not_on_yet(const ConsoleState& state);
+std::string state_detail(const ConsoleState& state);
+/// Fraction of the session's trials that are done, 0 to 1.
+double fraction_done(const ConsoleState& state);
+/// Forces are off only because they have not been needed yet: nothing is wrong.
+bool forces_not_yet_on(const ConsoleState& state);
 /// Whether forces are off, why, and what to press next.
-std::string words_of_forces(const ConsoleState& state);
+std::string forces_text(const ConsoleState& state);
 /// "1 h 05 min", "3 min 20 s"
-std::string in_words(double seconds);
+std::string duration_text(double seconds);
 
 }  // namespace palpate::runner

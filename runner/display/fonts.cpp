@@ -31,7 +31,7 @@ bool european(unsigned letter) {
   return false;
 }
 
-/// The console's own; it draws 16-bit letters one by one, left to right.
+/// Characters beyond the European ones. The console draws 16-bit characters only, left to right.
 std::set<unsigned> letters_of(const std::vector<std::string>& texts) {
   std::set<unsigned> letters;
   for (const std::string& text : texts) {
@@ -72,7 +72,7 @@ bool readable(FcPattern* font, FontChoice& choice) {
   return g_file_test(choice.path.c_str(), G_FILE_TEST_IS_REGULAR) != 0;
 }
 
-/// Takes from `letters` what the font has.
+/// Moves the characters that the font has from `letters` into ranges.
 std::vector<unsigned short> take(FcPattern* font, std::set<unsigned>& letters) {
   std::vector<unsigned short> ranges;
   FcCharSet* has = nullptr;

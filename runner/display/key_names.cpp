@@ -33,7 +33,7 @@ const char* special(int key) {
   }
 }
 
-/// What stands there on a US keyboard; 0: nothing that a protocol would name.
+/// The character of the key on a US keyboard; 0: none that a protocol would name.
 char on_us_keyboard(int key) {
   if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) {
     return static_cast<char>('0' + key - GLFW_KEY_KP_0);
@@ -45,7 +45,7 @@ char on_us_keyboard(int key) {
 
 }  // namespace
 
-const char* emergency_key(int key) {
+const char* emergency_key_name(int key) {
   return key == GLFW_KEY_F12 ? "the key F12" : "the key Escape";
 }
 
@@ -65,11 +65,11 @@ std::vector<std::string> key_names(int key, int scancode) {
   return names;
 }
 
-std::string meant(const std::vector<std::string>& names,
-                  const std::vector<std::pair<std::string, std::string>>& keys) {
+std::string match_key(const std::vector<std::string>& names,
+                      const std::vector<std::pair<std::string, std::string>>& keys) {
   const auto same = [](const std::string& a, const std::string& b) {
     if (a == b) return true;
-    // A protocol may well say "A" where the keyboard says "a".
+    // A protocol may say "A" where the keyboard gives "a".
     return a.size() == 1 && b.size() == 1 && (a[0] | 0x20) == (b[0] | 0x20) &&
            (b[0] | 0x20) >= 'a' && (b[0] | 0x20) <= 'z';
   };

@@ -1,6 +1,6 @@
 #pragma once
-// Between the session's thread and the display's. The lock is held for a swap of pointers, never
-// while anything is drawn or recorded: a display that stalls keeps nobody waiting.
+// Queues between the session's thread and the display's. A lock is held for a swap of pointers
+// only, so that a stalled display blocks nobody.
 
 #include <cstddef>
 #include <mutex>
@@ -10,12 +10,12 @@
 
 namespace palpate::runner {
 
-/// The newest value; older ones that nobody took are dropped.
+/// Holds the newest value only.
 template <class T>
 class Mailbox {
  public:
   void put(T value) {
-    std::optional<T> old(std::move(value));  // whatever it replaces is freed outside of the lock
+    std::optional<T> old(std::move(value));  // the old value is freed outside of the lock
     const std::lock_guard lock(mutex_);
     newest_.swap(old);
   }
@@ -31,10 +31,9 @@ class Mailbox {
   std::optional<T> newest_;
 };
 
-/// Every value, in order, up to a bound: a key that is held down must not fill the memory while
-/// nobody listens.
+/// Every value, in order, up to a bound: a key that is held down must not fill the memory.
 template <class T>
-class Inbox {
+class EventQueue {
  public:
   void add(T value) {
     const std::lock_guard lock(mutex_);

@@ -7,13 +7,13 @@
 #include <algorithm>
 
 #include "runner/display/key_names.h"
-#include "runner/display/lost_display.h"
+#include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
 
-ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const Place& place,
+ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const WindowGeometry& geometry,
                                      double ui_scale)
-    : settings_(settings), window_(make_window(settings.title, place)), ui_scale_(ui_scale) {
+    : settings_(settings), window_(make_window(settings.title, geometry)), ui_scale_(ui_scale) {
   glfwSetInputMode(window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);
@@ -35,22 +35,22 @@ void ParticipantWindow::abandon() noexcept {
   open_.store(false);
 }
 
-bool ParticipantWindow::answers(int key, int scancode) const {
-  const std::string name = meant(key_names(key, scancode), page_.keys);
+bool ParticipantWindow::is_answer_key(int key, int scancode) const {
+  const std::string name = match_key(key_names(key, scancode), page_.keys);
   return std::any_of(page_.keys.begin(), page_.keys.end(),
                      [&](const auto& entry) { return entry.first == name; });
 }
 
-bool ParticipantWindow::press(int key, int scancode) {
+bool ParticipantWindow::handle_key(int key, int scancode) {
   const std::int64_t now = settings_.clock->now_ns();
-  const std::string name = meant(key_names(key, scancode), page_.keys);
+  const std::string name = match_key(key_names(key, scancode), page_.keys);
   if (name.empty()) return false;
-  if (turn(name)) return true;
+  if (turn_page(name)) return true;
   keys_.add({name, now});
   return true;
 }
 
-bool ParticipantWindow::turn(const std::string& key) {
+bool ParticipantWindow::turn_page(const std::string& key) {
   if (page_.kind != Page::Kind::text) return false;
   int to = screen_;
   if (key == "space" || key == "enter" || key == "right") ++to;
@@ -58,7 +58,7 @@ bool ParticipantWindow::turn(const std::string& key) {
   if (to == screen_ || to < 0 || to >= screens_) return false;
   screen_ = to;
   image_ = {};
-  stale_ = true;
+  needs_redraw_ = true;
   return true;
 }
 
@@ -66,19 +66,19 @@ void ParticipantWindow::draw() {
   if (auto page = pages_.take()) {
     if (page->kind != page_.kind || page->text != page_.text) screen_ = 0;
     page_ = std::move(*page);
-    stale_ = true;
+    needs_redraw_ = true;
     image_ = {};
   }
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
-  if (width <= 0 || height <= 0 || is_gone(window_)) return;
+  if (width <= 0 || height <= 0 || was_destroyed(window_)) return;
   if (image_.width != width || image_.height != height) {
-    screens_ = screens_of(page_, width, height, ui_scale_);
+    screens_ = screen_count(page_, width, height, ui_scale_);
     screen_ = std::min(screen_, screens_ - 1);
     image_ = draw_page(page_, width, height, {ui_scale_, screen_});
-    stale_ = true;
+    needs_redraw_ = true;
   }
-  if (stale_) paint(width, height);
+  if (needs_redraw_) paint(width, height);
 }
 
 void ParticipantWindow::paint(int width, int height) {
@@ -88,10 +88,10 @@ void ParticipantWindow::paint(int width, int height) {
                image_.pixels.data());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, frame_);
   glFramebufferTexture2D(GL_READ_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture_, 0);
-  // Upside down: an image begins at its top, OpenGL at the bottom.
+  // Flipped: image rows start at the top, OpenGL's at the bottom.
   glBlitFramebuffer(0, 0, width, height, 0, height, width, 0, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glfwSwapBuffers(window_);
-  stale_ = false;
+  needs_redraw_ = false;
 }
 
 }  // namespace palpate::runner

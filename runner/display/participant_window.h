@@ -3,19 +3,20 @@
 #include <atomic>
 
 #include "runner/display/mailbox.h"
-#include "runner/display/monitors.h"
-#include "runner/display/page_layout.h"
+#include "runner/display/participant_page.h"
 #include "runner/display/window.h"
+#include "runner/display/window_layout.h"
 
 struct GLFWwindow;
 
 namespace palpate::runner {
 
-/// The participant's window. Made, drawn and fed with keys by the display's thread.
+/// The participant's window. Created, drawn and given its keys by the display's thread.
 class ParticipantWindow final : public ParticipantScreen {
  public:
   /// \throws DisplayError
-  ParticipantWindow(const WindowSettings& settings, const Place& place, double ui_scale);
+  ParticipantWindow(const WindowSettings& settings, const WindowGeometry& geometry,
+                    double ui_scale);
   ParticipantWindow(const ParticipantWindow&) = delete;
   ParticipantWindow& operator=(const ParticipantWindow&) = delete;
   ~ParticipantWindow() override;
@@ -25,25 +26,24 @@ class ParticipantWindow final : public ParticipantScreen {
   bool open() const override { return open_.load(); }
 
   GLFWwindow* handle() const { return window_; }
-  /// A key went down, here or in another window; the page says what it means. False: it means
-  /// nothing to the page on show.
-  bool press(int key, int scancode);
-  bool answers(int key, int scancode) const;
-  /// Draws what has changed since the last time; does nothing otherwise.
+  /// A key was pressed, here or in the console. \return false for a key without a name
+  bool handle_key(int key, int scancode);
+  bool is_answer_key(int key, int scancode) const;
+  /// Redraws if anything has changed since the last call.
   void draw();
-  /// What is on the screen was covered: draw it again.
-  void refresh() { stale_ = true; }
+  /// The window was uncovered: the next draw() repaints it.
+  void refresh() { needs_redraw_ = true; }
   void close() noexcept { open_.store(false); }
-  /// Takes it off the screen; nothing may be drawn after that. May throw LostDisplay, which a
-  /// destructor must not.
+  /// Destroys the window; nothing may be drawn after that. Unlike the destructor it may throw
+  /// DisplayLost.
   void destroy();
-  /// The display is gone: the destructor must not ask it for anything.
+  /// The display is lost: the destructor must not use it.
   void abandon() noexcept;
 
  private:
   void paint(int width, int height);
-  /// Within a text that takes several screens. False: there is nothing to turn to.
-  bool turn(const std::string& key);
+  /// Turns to another screen of a long text. False: the key does not, or there is none.
+  bool turn_page(const std::string& key);
 
   const WindowSettings& settings_;
   GLFWwindow* window_ = nullptr;
@@ -52,9 +52,9 @@ class ParticipantWindow final : public ParticipantScreen {
   Page page_;
   int screen_ = 0, screens_ = 1;  ///< of a text
   Image image_;
-  bool stale_ = true;  ///< what is on the screen is not what should be
+  bool needs_redraw_ = true;  ///< the window does not show image_
   Mailbox<Page> pages_;
-  Inbox<KeyPress> keys_;
+  EventQueue<KeyPress> keys_;
   std::atomic<bool> open_{true};
 };
 

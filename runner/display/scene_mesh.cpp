@@ -44,7 +44,7 @@ glm::vec3 on_rim(int corner) {
 
 }  // namespace
 
-DrawnMesh drawn(const std::vector<stimuli::ObjectSpec>& objects) {
+DrawnMesh triangles_of(const std::vector<stimuli::ObjectSpec>& objects) {
   DrawnMesh out;
   for (const stimuli::ObjectSpec& object : objects) add(object, Pose(), out);
   return out;
@@ -56,8 +56,8 @@ DrawnMesh unit_cylinder() {
   const glm::vec3 up(0, 0, 1);
   for (int i = 0; i < kSides; ++i) {
     const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
-    for (const DrawnCorner& corner :
-         {DrawnCorner{a, a}, {b, b}, {b + up, b}, {a, a}, {b + up, b}, {a + up, a}}) {
+    for (const DrawnVertex& corner :
+         {DrawnVertex{a, a}, {b, b}, {b + up, b}, {a, a}, {b + up, b}, {a + up, a}}) {
       out.push_back(corner);
     }
   }
@@ -71,20 +71,20 @@ DrawnMesh unit_cone() {
   for (int i = 0; i < kSides; ++i) {
     const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
     const glm::vec3 normal = glm::normalize(a + b + apex);
-    for (const DrawnCorner& corner : {DrawnCorner{a, normal}, {b, normal}, {apex, normal}}) {
+    for (const DrawnVertex& corner : {DrawnVertex{a, normal}, {b, normal}, {apex, normal}}) {
       out.push_back(corner);
     }
-    for (const DrawnCorner& corner : {DrawnCorner{b, down}, {a, down}, {glm::vec3(0), down}}) {
+    for (const DrawnVertex& corner : {DrawnVertex{b, down}, {a, down}, {glm::vec3(0), down}}) {
       out.push_back(corner);
     }
   }
   return out;
 }
 
-DrawnMesh unit_ball() {
+DrawnMesh unit_sphere() {
   DrawnMesh out;
   add(stimuli::icosphere(1, 3), Pose(), out);
-  for (DrawnCorner& corner : out) corner.normal = corner.position;  // smooth
+  for (DrawnVertex& corner : out) corner.normal = corner.position;  // smooth
   return out;
 }
 

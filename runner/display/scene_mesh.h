@@ -1,5 +1,5 @@
 #pragma once
-// What the console's view draws: triangles with flat normals, virtual frame, m.
+// Meshes for the console's view: triangles with normals, virtual frame, m.
 
 #include <glm/vec3.hpp>
 #include <memory>
@@ -9,17 +9,18 @@
 
 namespace palpate::runner {
 
-struct DrawnCorner {
+struct DrawnVertex {
   glm::vec3 position;  ///< m
   glm::vec3 normal;    ///< unit, outward
 };
-using DrawnMesh = std::vector<DrawnCorner>;  ///< three corners a triangle
+using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
 
-/// Compounds with all their parts. \throws MeshError, std::runtime_error where a file is no mesh
-DrawnMesh drawn(const std::vector<stimuli::ObjectSpec>& objects);
+/// The triangles of all objects, compounds included. \throws MeshError, std::runtime_error where a
+/// file is no mesh
+DrawnMesh triangles_of(const std::vector<stimuli::ObjectSpec>& objects);
 
 DrawnMesh unit_cylinder();  ///< radius 1, from z = 0 to z = 1, without ends
 DrawnMesh unit_cone();      ///< radius 1 at z = 0, apex at z = 1
-DrawnMesh unit_ball();      ///< radius 1
+DrawnMesh unit_sphere();    ///< radius 1
 
 }  // namespace palpate::runner

@@ -15,8 +15,7 @@
 namespace palpate::runner {
 namespace {
 
-constexpr int kSamples =
-    4;  // of each pixel, against jagged edges; too dear without a graphics card
+constexpr int kSamples = 4;  // multisampling; too slow without a graphics card
 constexpr glm::vec4 kGround{0.098F, 0.114F, 0.133F, 1};
 constexpr glm::vec4 kObject{0.60F, 0.68F, 0.76F, 1};
 constexpr glm::vec4 kStylus{0.93F, 0.91F, 0.87F, 1};
@@ -42,7 +41,7 @@ void main() {
   outward = inverse(transpose(mat3(place))) * normal;
   gl_Position = matrix * world;
 })";
-// A sky above, a weaker light from below, a lamp at the viewer's left shoulder.
+// Hemisphere light from above, a lamp above the viewer's left shoulder with a highlight.
 constexpr const char* kFragmentShader = R"(#version 330 core
 in vec3 at, outward;
 uniform vec4 colour;
@@ -95,11 +94,11 @@ SceneView::SceneView() : samples_(draws_in_software() ? 0 : kSamples) {
   eye_at_ = glGetUniformLocation(program_, "eye");
   cylinder_ = upload(unit_cylinder());
   cone_ = upload(unit_cone());
-  ball_ = upload(unit_ball());
+  sphere_ = upload(unit_sphere());
 }
 
 SceneView::~SceneView() {
-  for (Shape* const shape : {&objects_, &cylinder_, &cone_, &ball_}) discard(*shape);
+  for (Shape* const shape : {&objects_, &cylinder_, &cone_, &sphere_}) discard(*shape);
   resize(0, 0);
   glDeleteProgram(program_);
 }
@@ -111,12 +110,12 @@ SceneView::Shape SceneView::upload(const DrawnMesh& mesh) {
   glGenBuffers(1, &shape.buffer);
   glBindVertexArray(shape.vertices);
   glBindBuffer(GL_ARRAY_BUFFER, shape.buffer);
-  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.size() * sizeof(DrawnCorner)),
+  glBufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(mesh.size() * sizeof(DrawnVertex)),
                mesh.data(), GL_STATIC_DRAW);
-  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnCorner), nullptr);
+  glVertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnVertex), nullptr);
   // NOLINTNEXTLINE(performance-no-int-to-ptr): an offset, as OpenGL asks for it
-  const void* const normals = reinterpret_cast<const void*>(offsetof(DrawnCorner, normal));
-  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnCorner), normals);
+  const void* const normals = reinterpret_cast<const void*>(offsetof(DrawnVertex, normal));
+  glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnVertex), normals);
   glEnableVertexAttribArray(0);
   glEnableVertexAttribArray(1);
   glBindVertexArray(0);
@@ -200,10 +199,10 @@ void SceneView::draw_stylus(const Sample& sample) const {
   if (!finite(hand.tip) || !finite(hand.tail)) return;
   const bool touching = sample.rendering.contacts > 0 && finite(sample.rendering.ideal.tip) &&
                         finite(sample.rendering.ideal.tail);
-  // What the hand feels against: the stylus on the surface. Where the hand is: inside it.
+  // In contact the ideal probe lies on the surface and the virtual probe inside: draw both.
   const rendering::LineProbe& seen = touching ? sample.rendering.ideal : hand;
   const auto ball = [&](const Vec3& at, double radius, const glm::vec4& colour) {
-    draw_shape(ball_,
+    draw_shape(sphere_,
                glm::scale(glm::translate(glm::mat4(1), glm::vec3(at)),
                           glm::vec3(static_cast<float>(radius))),
                colour);
@@ -221,9 +220,9 @@ void SceneView::draw_stylus(const Sample& sample) const {
   draw_arrow(seen.tail, sample.device2, kForce);
 }
 
-/// What of the stylus is inside of the object or behind it, faintly: where the tip is that a trial
-/// waits for must be seen.
-void SceneView::draw_through(const Sample& sample) const {
+/// The part of the stylus inside or behind the object, translucent: the experimenter must see where
+/// the tip is.
+void SceneView::draw_hidden_stylus(const Sample& sample) const {
   glDepthFunc(GL_GREATER);
   glDepthMask(GL_FALSE);
   glEnable(GL_BLEND);
@@ -235,7 +234,7 @@ void SceneView::draw_through(const Sample& sample) const {
   glDepthFunc(GL_LESS);
 }
 
-// Moeller & Trumbore 1997, for the triangles that face the line.
+// Moeller & Trumbore 1997, front faces only.
 std::optional<glm::vec3> SceneView::hit(const glm::vec3& from, const glm::vec3& along) const {
   std::optional<float> nearest;
   for (std::size_t i = 0; i + 2 < mesh_.size(); i += 3) {
@@ -262,7 +261,7 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
     shown_ = objects;
     mesh_.clear();
     try {
-      if (objects != nullptr) mesh_ = drawn(*objects);
+      if (objects != nullptr) mesh_ = triangles_of(*objects);
       if (!mesh_.empty()) objects_ = upload(mesh_);
     } catch (const std::exception& fault) {
       trouble_ = fault.what();
@@ -285,7 +284,7 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
   }
   if (objects_.corners > 0) {
     draw_shape(objects_, glm::mat4(1), kObject);
-    draw_through(sample);
+    draw_hidden_stylus(sample);
   }
   draw_stylus(sample);
   glBindVertexArray(0);

@@ -1,5 +1,5 @@
 #pragma once
-// Object and stylus in 3D for the experimenter, drawn off screen into a texture.
+// 3D view of object and stylus for the console, rendered off screen into a texture.
 
 #include <array>
 #include <glm/mat4x4.hpp>
@@ -27,7 +27,7 @@ class SceneView {
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
   unsigned draw(const Objects& objects, const Sample& sample, const Camera& camera, int width,
                 int height);
-  /// Where a line first meets the objects that were drawn last, from outside.
+  /// The first point where a line meets, from outside, the objects drawn last.
   std::optional<glm::vec3> hit(const glm::vec3& from, const glm::vec3& along) const;
   /// Why the objects could not be drawn; empty: they were.
   const std::string& trouble() const { return trouble_; }
@@ -44,12 +44,12 @@ class SceneView {
   void draw_rod(const Vec3& from, const Vec3& to, double radius, const glm::vec4& colour) const;
   void draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4& colour) const;
   void draw_stylus(const Sample& sample) const;
-  void draw_through(const Sample& sample) const;
+  void draw_hidden_stylus(const Sample& sample) const;
 
-  const int samples_;  ///< of each pixel
+  const int samples_;  ///< multisampling, per pixel
   unsigned program_ = 0;
   int matrix_at_ = 0, place_at_ = 0, colour_at_ = 0, eye_at_ = 0;
-  Shape objects_, cylinder_, cone_, ball_;
+  Shape objects_, cylinder_, cone_, sphere_;
   Objects shown_;
   DrawnMesh mesh_;  ///< of these
   std::string trouble_;

@@ -8,12 +8,12 @@ namespace {
 
 using Kind = ConsoleCommand::Kind;
 
-struct Word {
+struct CommandText {
   std::string_view line;
   Kind kind;
 };
 
-constexpr Word kWords[] = {
+constexpr CommandText kCommands[] = {
     {"pause", Kind::pause},
     {"go", Kind::go_on},
     {"repeat", Kind::repeat_trial},
@@ -35,7 +35,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Commands are the same in capital letters.
+/// Commands are not case-sensitive.
 std::string lower(std::string_view text) {
   std::string out(text);
   for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
@@ -44,7 +44,7 @@ std::string lower(std::string_view text) {
 
 bool continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U; }
 
-/// Bytes of the UTF-8 sequence that begins with this one; 0: none does.
+/// Length of the UTF-8 sequence that begins with this byte; 0: none does.
 std::size_t sequence_length(char lead) {
   const auto byte = static_cast<unsigned char>(lead);
   if (byte < 0x80) return 1;
@@ -60,13 +60,13 @@ const char* text_commands_help() {
          "  :pause       before the next trial       :go          go on\n"
          "  :repeat      show this trial again       :note TEXT   a note with its time\n"
          "  :stop        end after this trial        :stop block  end after this block\n"
-         "               (said again: it is taken back)\n"
-         "  :zero, Esc   emergency: forces off       :clear       forces may go on again\n"
+         "               (repeat the command to cancel)\n"
+         "  :zero, Esc   emergency: forces off       :clear       allow forces again\n"
          "  :quit        end at once                 :quit withdrawn  the participant withdraws\n";
 }
 
 std::string_view text_command(Kind kind) {
-  for (const Word& word : kWords) {
+  for (const CommandText& word : kCommands) {
     if (kind == word.kind) return word.line;
   }
   return "note";
@@ -75,7 +75,7 @@ std::string_view text_command(Kind kind) {
 ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
   line = trimmed(line);
   const std::string said = lower(line);
-  for (const Word& word : kWords) {
+  for (const CommandText& word : kCommands) {
     if (said != word.line) continue;
     return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};
   }
@@ -142,13 +142,13 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
       out.emplace_back(emergency("F12"));
     return std::min(end + 1, rest.size());
   }
-  // A terminal writes Alt and a key as Escape and that key, in one piece. Nothing else tells them
-  // from Escape alone, and waiting for what may follow would cost time: zero force in any case.
+  // Terminals send Alt and a key as Escape followed by the key. That cannot be told from Escape
+  // alone without waiting, so it is an emergency too.
   const std::string_view key = rest.substr(1);
   if (!key.empty() && static_cast<unsigned char>(key[0]) > ' ' && key[0] != kDelete &&
       sequence_length(key[0]) == key.size()) {
     out.emplace_back(emergency("Alt+" + std::string(key)));
-    return rest.size();  // it is no answer
+    return rest.size();  // the key is not an answer
   }
   out.emplace_back(emergency("Escape"));
   return 1;

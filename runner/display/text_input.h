@@ -1,6 +1,6 @@
 #pragma once
-// What is typed into a terminal or a pipe, as answers and commands: single keys answer, a line that
-// begins with ':' is a command, Escape or F12 is the emergency key, and so is Alt with any other.
+// Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
+// and F12 are emergency keys, and so is Alt with any key.
 
 #include <cstdint>
 #include <string>
@@ -12,10 +12,10 @@
 
 namespace palpate::runner {
 
-/// The commands of the text console, a line each.
+/// The list of commands of the text console.
 const char* text_commands_help();
 
-/// How it is typed, without the colon.
+/// The text to type for a command, without the colon.
 std::string_view text_command(ConsoleCommand::Kind kind);
 
 /// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
@@ -30,7 +30,7 @@ class TextInput {
 
   /// \param bytes  that arrived together at `time_ns`
   std::vector<Event> feed(std::string_view bytes, std::int64_t time_ns);
-  /// The command being typed, with its colon; empty: none.
+  /// The command line being typed, with its colon; empty: none.
   const std::string& line() const { return line_; }
 
  private:

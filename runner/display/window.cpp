@@ -10,14 +10,14 @@
 
 #include "runner/display/console_window.h"
 #include "runner/display/key_names.h"
-#include "runner/display/lost_display.h"
-#include "runner/display/monitors.h"
 #include "runner/display/participant_window.h"
+#include "runner/display/window_layout.h"
+#include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
 namespace {
 
-constexpr double kFrame = 1.0 / 60;  // s, from frame to frame of the console
+constexpr double kFrame = 1.0 / 60;  // s, between frames of the console
 
 double seconds() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -48,31 +48,31 @@ class Windows final : public DisplayLoop {
  public:
   explicit Windows(const WindowSettings& settings)
       : settings_(settings),
-        places_(place_windows(settings_)),
-        participant_(settings_, places_.participant, places_.participant_scale),
-        console_(settings_, places_, participant_) {
+        layout_(lay_out_windows(settings_)),
+        participant_(settings_, layout_.participant, layout_.participant_scale),
+        console_(settings_, layout_, participant_) {
     GLFWwindow* const window = participant_.handle();
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, &Windows::on_participant_key);
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* from) {
       static_cast<Windows*>(glfwGetWindowUserPointer(from))->participant_.refresh();
     });
-    watch_window(window, window_gone_);
-    watch_window(console_.handle(), window_gone_);
-    survive_lost_display();
+    flag_when_destroyed(window, window_gone_);
+    flag_when_destroyed(console_.handle(), window_gone_);
+    handle_display_errors();
     glfwShowWindow(console_.handle());
-    glfwShowWindow(window);  // last: it has the keyboard
+    glfwShowWindow(window);  // last, so that it has the keyboard focus
   }
 
   ParticipantScreen& participant() override { return participant_; }
   ExperimenterConsole& console() override { return console_; }
 
   std::string warning() const override {
-    if (!places_.shared) return {};
+    if (!layout_.shared) return {};
     std::string text = settings_.mouse != nullptr
-                           ? "one monitor: whoever holds the mouse sees the shape, as they must"
-                           : "one monitor: the console hides shape and scene until it is asked to "
-                             "show them; a second monitor keeps it out of the participant's sight";
+                           ? "one monitor: whoever uses the mouse sees the shape, as is needed"
+                           : "one monitor: the console hides shape and scene until told to show "
+                             "them; a second monitor keeps them out of the participant's sight";
     if (settings_.full_screen)
       text += "; --full-screen needs a second monitor: the windows stand side by side";
     return text;
@@ -83,15 +83,15 @@ class Windows final : public DisplayLoop {
   void run() override {
     try {
       while (!ended_.load() && !window_gone_) {
-        if (display_lost()) throw LostDisplay();
+        if (connection_lost()) throw DisplayLost();
         step();
       }
       if (window_gone_) participant_.close();
-      // Here, not in destructors, the display may still die.
+      // Not in the destructors: these calls throw if the display is lost.
       console_.destroy();
       participant_.destroy();
       library_.close();
-    } catch (const LostDisplay&) {
+    } catch (const DisplayLost&) {
       participant_.abandon();
       console_.abandon();
       library_.abandon();
@@ -108,7 +108,7 @@ class Windows final : public DisplayLoop {
     const double started = seconds();
     participant_.draw();
     console_.draw();
-    // Where a processor has to draw, it has as much time for everything else.
+    // After a slow frame (software rendering) wait as long as it took, to leave half of the time.
     const double drawn = seconds();
     const double next = std::max(started + kFrame, 2 * drawn - started);
     glfwPollEvents();
@@ -118,24 +118,24 @@ class Windows final : public DisplayLoop {
     if (glfwWindowShouldClose(participant_.handle()) != 0) participant_.close();
     if (glfwWindowShouldClose(console_.handle()) != 0) {
       glfwSetWindowShouldClose(console_.handle(), GLFW_FALSE);
-      console_.ask(ConsoleCommand::Kind::quit);
+      console_.send_command(ConsoleCommand::Kind::quit);
     }
   }
 
   static void on_participant_key(GLFWwindow* window, int key, int scancode, int action, int) {
     auto& self = *static_cast<Windows*>(glfwGetWindowUserPointer(window));
     if (action != GLFW_PRESS) return;
-    const bool answer = self.participant_.answers(key, scancode);
+    const bool answer = self.participant_.is_answer_key(key, scancode);
     if (key == GLFW_KEY_F12 || (key == GLFW_KEY_ESCAPE && !answer)) {
-      self.console_.ask(ConsoleCommand::Kind::emergency_zero, emergency_key(key));
+      self.console_.send_command(ConsoleCommand::Kind::emergency_zero, emergency_key_name(key));
     }
-    self.participant_.press(key, scancode);
+    self.participant_.handle_key(key, scancode);
   }
 
   const WindowSettings settings_;
-  bool window_gone_ = false;  ///< outlives the library
+  bool window_gone_ = false;  ///< must outlive the library
   GlfwLibrary library_;
-  const Places places_;
+  const WindowLayout layout_;
   ParticipantWindow participant_;
   ConsoleWindow console_;
   std::atomic<bool> ended_{false};

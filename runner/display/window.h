@@ -12,7 +12,7 @@
 
 namespace palpate::runner {
 
-/// No window: none was built in, no display answers, or it is no good. The text tells which.
+/// No window can be opened: not built in, no display, or an unsuitable one; what() says which.
 class DisplayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -20,31 +20,32 @@ class DisplayError : public std::runtime_error {
 struct WindowSettings {
   std::string title;               ///< UTF-8, of the window frames: study and participant
   bool full_screen = false;        ///< the participant's window, on a monitor of its own
-  double ui_scale = 0;             ///< of letters and buttons; 0: each window's from its monitor
+  double ui_scale = 0;             ///< of text and buttons; 0: taken from each window's monitor
   int participant_monitor = 0;     ///< from 1; 0: the second if there is one, else the first
   int console_monitor = 0;         ///< from 1; 0: the first
-  std::vector<std::string> texts;  ///< UTF-8, of the protocol: the console loads letters for them
+  std::vector<std::string> texts;  ///< UTF-8, of the protocol: the console loads fonts for them
   /// Called at once, in the display's thread, when the emergency key or button is pressed; the
   /// command follows through commands().
   std::function<void()> emergency;
-  MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; may be none
+  MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; nullptr: none
   WorkspaceMap workspace;        ///< of the servo, for the mouse
-  Clock* clock = nullptr;        ///< stamps keys and commands; required; must outlive the windows
+  Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
 };
 
-/// Two windows and the thread that draws them. All but run() may be called from any thread, and
-/// none of it waits for the display.
+/// Participant's screen and console with the loop that draws them. All functions but run() may be
+/// called from any thread and do not wait for the display.
 class DisplayLoop {
  public:
   virtual ~DisplayLoop() = default;
   virtual ParticipantScreen& participant() = 0;
   virtual ExperimenterConsole& console() = 0;
-  /// What the experimenter should know of the monitors: a sentence; empty: nothing.
+  /// A warning about the monitors for the experimenter; empty: none.
   virtual std::string warning() const { return {}; }
-  /// What of the protocol's texts it cannot show: a sentence; empty: nothing.
+  /// A warning about characters of the protocol's texts that it cannot show; empty: none.
   virtual std::string unreadable() const { return {}; }
-  /// Shows both until end() or until the display dies. On the main thread, that made the windows.
-  /// Where it leaves before end(), by an exception as well, the participant's screen is not open.
+  /// Draws both until end() or until the display is lost. Must run in the main thread, which
+  /// created the windows. If it returns (or throws) before end(), the participant's screen is
+  /// closed.
   virtual void run() = 0;
   virtual void end() noexcept = 0;
 };
@@ -52,7 +53,7 @@ class DisplayLoop {
 /// \throws DisplayError
 std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings);
 
-/// What of the texts no installed font can show: a sentence for the experimenter; empty if all can.
+/// A warning about characters of the texts that no installed font has; empty: none.
 std::string missing_letters(const std::vector<std::string>& texts);
 
 }  // namespace palpate::runner

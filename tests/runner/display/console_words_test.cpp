@@ -17,7 +17,7 @@ TEST(ConsoleWords, ABreakIsCalledABreakAndSaysHowLong) {
   ConsoleState state = in("block begins");
   state.seconds_left = 90;
   EXPECT_EQ(state_title(state), "break");
-  EXPECT_EQ(beside_state(state), "1 min 30 s left");
+  EXPECT_EQ(state_detail(state), "1 min 30 s left");
   state.seconds_left = 0;
   EXPECT_EQ(state_title(state), "block begins");
   EXPECT_EQ(state_title(in("rest")), "break");
@@ -25,54 +25,54 @@ TEST(ConsoleWords, ABreakIsCalledABreakAndSaysHowLong) {
 
 TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
   for (const char* const word : {"instructions", "practice begins", "block begins", "rest"})
-    EXPECT_EQ(beside_state(in(word)), "space bar goes on") << word;
-  EXPECT_EQ(beside_state(in("end")), "space bar ends it");
-  EXPECT_EQ(beside_state(in("trial")), "");
+    EXPECT_EQ(state_detail(in(word)), "space bar goes on") << word;
+  EXPECT_EQ(state_detail(in("end")), "space bar ends it");
+  EXPECT_EQ(state_detail(in("trial")), "");
   ConsoleState held = in("rest");
   held.held_by = "'Go on' goes on";
-  EXPECT_EQ(beside_state(held), "") << "the space bar does not";
+  EXPECT_EQ(state_detail(held), "") << "the space bar does not";
 }
 
 TEST(ConsoleWords, TheBarCountsTheTrialThatIsOver) {
   ConsoleState state = in("trial");
-  EXPECT_EQ(share_done(state), 0);
+  EXPECT_EQ(fraction_done(state), 0);
   state.trial = 4;
   state.trials = 8;
-  EXPECT_EQ(share_done(state), 3 / 8.0);
+  EXPECT_EQ(fraction_done(state), 3 / 8.0);
   for (const char* const word : {"rest", "block begins"}) {
     state.state = word;
-    EXPECT_EQ(share_done(state), 4 / 8.0) << word;
+    EXPECT_EQ(fraction_done(state), 4 / 8.0) << word;
   }
   state.trial = 8;
   state.state = "end";
-  EXPECT_EQ(share_done(state), 1);
+  EXPECT_EQ(fraction_done(state), 1);
 }
 
 TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
   ConsoleState state = in("rest");
-  EXPECT_EQ(words_of_forces(state), "No fault");
+  EXPECT_EQ(forces_text(state), "No fault");
   state.sample.faults = servo_fault::kTripped | servo_fault::kEmergency;
   state.fault = "zero force was asked for by the key F12";
-  EXPECT_EQ(words_of_forces(state),
+  EXPECT_EQ(forces_text(state),
             "Forces are off: zero force was asked for by the key F12; next: 'Clear the fault'");
   state.held_by = "the device is unplugged; 'Clear the fault', then 'Go on', goes on";
-  EXPECT_EQ(words_of_forces(state), "Forces are off: " + state.held_by);
+  EXPECT_EQ(forces_text(state), "Forces are off: " + state.held_by);
   state.sample.faults = 0;
-  EXPECT_EQ(words_of_forces(state), state.held_by);
+  EXPECT_EQ(forces_text(state), state.held_by);
 }
 
 TEST(ConsoleWords, BeforeTheFirstTrialForcesThatAreOffAreNoAlarm) {
   ConsoleState state = in("pre-flight");
   state.checklist.steps = {{"Home the device", Checklist::Step::State::now}};
   state.sample.faults = servo_fault::kTripped | servo_fault::kDeviceLost;
-  EXPECT_TRUE(not_on_yet(state));
-  EXPECT_EQ(words_of_forces(state), "Forces are off: none is needed yet");
+  EXPECT_TRUE(forces_not_yet_on(state));
+  EXPECT_EQ(forces_text(state), "Forces are off: none is needed yet");
   state.sample.trouble = DeviceTrouble::unplugged;
-  EXPECT_FALSE(not_on_yet(state)) << "to clear it opens the device again";
+  EXPECT_FALSE(forces_not_yet_on(state)) << "to clear it opens the device again";
   state.sample.trouble = DeviceTrouble::none;
   state.fault = "zero force was asked for by the key F12";
-  EXPECT_FALSE(not_on_yet(state));
-  EXPECT_NE(words_of_forces(state).find("F12; next: 'Clear the fault'"), std::string::npos);
+  EXPECT_FALSE(forces_not_yet_on(state));
+  EXPECT_NE(forces_text(state).find("F12; next: 'Clear the fault'"), std::string::npos);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "runner/display/page_words.h"
+#include "runner/display/pango_text.h"
 
 #include <cmath>
 #include <set>
@@ -24,7 +24,7 @@ void set_colour(cairo_t* canvas, const Colour& colour) {
   cairo_set_source_rgb(canvas, colour.red, colour.green, colour.blue);
 }
 
-Words::Words(cairo_t* canvas, const std::string& text, double size, double width)
+TextBlock::TextBlock(cairo_t* canvas, const std::string& text, double size, double width)
     : layout_(pango_cairo_create_layout(canvas)) {
   pango_layout_set_text(layout_.get(), valid_utf8(text).c_str(), -1);
   pango_layout_set_line_spacing(layout_.get(), kLineSpacing);
@@ -35,24 +35,24 @@ Words::Words(cairo_t* canvas, const std::string& text, double size, double width
   set_size(size);
 }
 
-void Words::set_size(double size) {
+void TextBlock::set_size(double size) {
   PangoFontDescription* const font = pango_font_description_from_string(kFonts);
   pango_font_description_set_absolute_size(font, pango_units_from_double(size));
   pango_layout_set_font_description(layout_.get(), font);
   pango_font_description_free(font);
 }
 
-void Words::cut_at_height(double height) {
+void TextBlock::cut_at_height(double height) {
   pango_layout_set_height(layout_.get(), pango_units_from_double(height));
   pango_layout_set_ellipsize(layout_.get(), PANGO_ELLIPSIZE_END);
 }
 
-void Words::cut_at_width(double width) {
+void TextBlock::cut_at_width(double width) {
   pango_layout_set_width(layout_.get(), pango_units_from_double(width));
   pango_layout_set_ellipsize(layout_.get(), PANGO_ELLIPSIZE_END);
 }
 
-std::vector<std::size_t> Words::line_starts() const {
+std::vector<std::size_t> TextBlock::line_starts() const {
   std::vector<std::size_t> starts;
   for (int i = 0; i < lines(); ++i) {
     const PangoLayoutLine* const line = pango_layout_get_line_readonly(layout_.get(), i);
@@ -61,13 +61,13 @@ std::vector<std::size_t> Words::line_starts() const {
   return starts;
 }
 
-Size Words::size() const {
+Size TextBlock::size() const {
   PangoRectangle box;
   pango_layout_get_extents(layout_.get(), nullptr, &box);
   return {pango_units_to_double(box.width), pango_units_to_double(box.height)};
 }
 
-void Words::draw(cairo_t* canvas, double x, double y, const Colour& colour) const {
+void TextBlock::draw(cairo_t* canvas, double x, double y, const Colour& colour) const {
   set_colour(canvas, colour);
   cairo_move_to(canvas, std::round(x), std::round(y));
   pango_cairo_show_layout(canvas, layout_.get());
@@ -92,8 +92,8 @@ std::string missing_letters(const std::vector<std::string>& texts) {
     }
   }
   if (missing.empty()) return {};
-  return "the participant sees boxes instead of " + std::to_string(missing.size()) +
-         " letters of the protocol's texts, which are in no installed font (" + shown +
+  return "the participant would see boxes instead of " + std::to_string(missing.size()) +
+         " characters of the protocol's texts, which are in no installed font (" + shown +
          (missing.size() > 10 ? "...)" : ")") +
          ": install one that has them, for example the package fonts-noto-core or fonts-noto-cjk";
 }

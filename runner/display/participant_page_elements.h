@@ -1,14 +1,15 @@
 #pragma once
-// Pieces of a page. Sizes in units, px each, that grow with the page.
+// Elements of a participant's page: answer keys, progress bar, checklist, the sign for the space
+// bar. Sizes are in a unit (px) that grows with the page.
 
 #include "runner/display/display.h"
-#include "runner/display/page_words.h"
+#include "runner/display/pango_text.h"
 
 namespace palpate::runner {
 
-inline constexpr double kLetters = 1.4;  ///< units: of a text to read
+inline constexpr double kTextSize = 1.4;  ///< units, of a text to read
 
-/// What each key answers, in as many rows as it takes.
+/// The answer keys with their labels, in as many rows as needed.
 class KeyMap {
  public:
   KeyMap(cairo_t* canvas, const Page& page, double unit, double width);
@@ -17,7 +18,7 @@ class KeyMap {
 
  private:
   struct Item {
-    Words key, answer;
+    TextBlock key, answer;
     double cap_width, width, x;
     std::size_t row;
   };
@@ -26,14 +27,14 @@ class KeyMap {
   std::vector<double> rows_;  ///< px, how wide each row is
 };
 
-/// "Press the space bar to go on", in no language.
+/// A picture of the space bar with an arrow: "press to go on" without words.
 void draw_go_on(cairo_t* canvas, double middle, double top, double unit);
-/// How far the session is, along the upper edge.
+/// Progress of the session, along the upper edge.
 void draw_progress(cairo_t* canvas, const Page& page, double unit, double width);
-/// What is done and what is due, a line each, and how to do it.
+/// The current step's instruction, then a line for each step.
 void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
                     double room);
 double text_width(double width, double unit);
-std::string clock_words(int seconds);  ///< "0:25"
+std::string minutes_and_seconds(int seconds);  ///< "0:25"
 
 }  // namespace palpate::runner

@@ -1,4 +1,4 @@
-#include "runner/display/lost_display.h"
+#include "runner/display/x11_errors.h"
 
 #include <X11/Xlib.h>
 #include <X11/Xresource.h>
@@ -14,21 +14,21 @@ extern "C" Window glfwGetX11Window(GLFWwindow* window);
 namespace palpate::runner {
 namespace {
 
-/// Under which Xlib keeps our windows.
+/// The context under which Xlib stores our flags with the windows.
 XContext our_windows() {
   static const XContext context = XUniqueContext();
   return context;
 }
 
-int stay_quiet(Display*) { return 0; }
+int ignore_io_error(Display*) { return 0; }
 
-// The exceptions pass the frames of Xlib, GLFW and Mesa. These hold locks of the display, which is
-// never used again, and carry the unwinding tables that compilers for Debian always write.
-void leave(Display*, void*) { throw LostDisplay(); }
+// The exception passes frames of Xlib, GLFW and Mesa. They may hold locks of the display, which is
+// never used again, and have unwind tables, as all Debian libraries do.
+void throw_display_lost(Display*, void*) { throw DisplayLost(); }
 
-/// A picture or a focus that could not be had is no reason to end a session. Nothing may be thrown
-/// from here: the display would stay locked.
-int note_or_ignore(Display* display, XErrorEvent* error) {
+/// Errors of single requests are ignored: they are no reason to end a session. Must not throw: the
+/// display would stay locked.
+int flag_destroyed_window(Display* display, XErrorEvent* error) {
   XPointer gone = nullptr;
   if ((error->error_code == BadWindow || error->error_code == BadDrawable) &&
       XFindContext(display, error->resourceid, our_windows(), &gone) == 0) {
@@ -39,22 +39,22 @@ int note_or_ignore(Display* display, XErrorEvent* error) {
 
 }  // namespace
 
-void survive_lost_display() {
+void handle_display_errors() {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return;
-  XSetErrorHandler(&note_or_ignore);
-  XSetIOErrorHandler(&stay_quiet);
-  XSetIOErrorExitHandler(display, &leave, nullptr);
+  XSetErrorHandler(&flag_destroyed_window);
+  XSetIOErrorHandler(&ignore_io_error);
+  XSetIOErrorExitHandler(display, &throw_display_lost, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-void watch_window(GLFWwindow* window, bool& gone) {
+void flag_when_destroyed(GLFWwindow* window, bool& gone) {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return;
   XSaveContext(display, glfwGetX11Window(window), our_windows(), reinterpret_cast<XPointer>(&gone));
 }
 
-bool is_gone(GLFWwindow* window) {
+bool was_destroyed(GLFWwindow* window) {
   Display* const display = glfwGetX11Display();
   XPointer gone = nullptr;
   return display != nullptr &&
@@ -62,7 +62,7 @@ bool is_gone(GLFWwindow* window) {
          *reinterpret_cast<bool*>(gone);
 }
 
-bool display_lost() {
+bool connection_lost() {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return false;
   pollfd connection{ConnectionNumber(display), POLLIN, 0};

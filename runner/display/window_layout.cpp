@@ -1,4 +1,4 @@
-#include "runner/display/monitors.h"
+#include "runner/display/window_layout.h"
 
 #include <epoxy/gl.h>
 // After epoxy, which replaces the GL headers.
@@ -9,10 +9,10 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kParticipantsShare = 0.4;  // of a monitor's width that both windows are on
-constexpr int kFrame = 40;                  // px, room for what the window manager adds
+constexpr double kParticipantFraction = 0.4;  // of a monitor's width that both windows are on
+constexpr int kFrame = 40;                    // px, for the decorations of the window manager
 
-/// \param number  from 1; 0: `otherwise`, or the first where there are not so many
+/// \param number  from 1; 0: `otherwise`, or the first if there are fewer
 GLFWmonitor* monitor(int number, int otherwise) {
   int count = 0;
   GLFWmonitor** const all = glfwGetMonitors(&count);
@@ -25,8 +25,8 @@ GLFWmonitor* monitor(int number, int otherwise) {
   return all[otherwise <= count ? otherwise - 1 : 0];
 }
 
-/// What the desktop asks for; where it asks for nothing, letters on a screen of many lines are
-/// enlarged, or 3840 x 2160 would show them at half their size.
+/// The desktop's scale if it sets one; else larger text on monitors of high resolution, where it
+/// would be too small (3840 x 2160: half the size).
 double scale_for(GLFWmonitor* on, double wanted) {
   constexpr double kMost = 4, kUsualHeight = 1080;  // px
   if (wanted > 0) return wanted;
@@ -39,7 +39,7 @@ double scale_for(GLFWmonitor* on, double wanted) {
   return std::clamp(std::min(height / kUsualHeight, width / (kUsualHeight * 16 / 9)), 1.0, kMost);
 }
 
-/// One and the same, or two that show the same part of the desktop.
+/// The same monitor, or two that show the same part of the desktop.
 bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
   if (a == b) return true;
   int left[2], top[2], width[2], height[2];
@@ -49,8 +49,8 @@ bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
          top[0] < top[1] + height[1] && top[1] < top[0] + height[0];
 }
 
-/// Centred in a part of the monitor. \param from, to  shares of its width
-Place place(GLFWmonitor* on, double from, double to, int width, int height) {
+/// Centred in a part of the monitor. \param from, to  fractions of its width
+WindowGeometry centred_in(GLFWmonitor* on, double from, double to, int width, int height) {
   int left = 0, top = 0, room_width = 1280, room_height = 800;
   if (on != nullptr) glfwGetMonitorWorkarea(on, &left, &top, &room_width, &room_height);
   left += static_cast<int>(from * room_width);
@@ -69,41 +69,42 @@ std::string glfw_reason() {
   return reason != nullptr ? reason : "no reason given";
 }
 
-Places place_windows(const WindowSettings& settings) {
+WindowLayout lay_out_windows(const WindowSettings& settings) {
   GLFWmonitor* const participant = monitor(settings.participant_monitor, 2);
   GLFWmonitor* const console = monitor(settings.console_monitor, 1);
-  Places places;
-  places.shared = participant == nullptr || overlap(participant, console);
-  places.participant_scale = scale_for(participant, settings.ui_scale);
-  places.console_scale = scale_for(console, settings.ui_scale);
-  const double share = places.shared ? kParticipantsShare : 0;
+  WindowLayout layout;
+  layout.shared = participant == nullptr || overlap(participant, console);
+  layout.participant_scale = scale_for(participant, settings.ui_scale);
+  layout.console_scale = scale_for(console, settings.ui_scale);
+  const double fraction = layout.shared ? kParticipantFraction : 0;
   const auto scaled = [](int size, double scale) { return static_cast<int>(size * scale); };
-  places.participant =
-      place(participant, 0, places.shared ? share : 1, scaled(1280, places.participant_scale),
-            scaled(800, places.participant_scale));
-  places.console = place(places.shared ? participant : console, share, 1,
-                         scaled(1480, places.console_scale), scaled(920, places.console_scale));
-  if (settings.full_screen && !places.shared) {
+  layout.participant =
+      centred_in(participant, 0, layout.shared ? fraction : 1,
+                 scaled(1280, layout.participant_scale), scaled(800, layout.participant_scale));
+  layout.console =
+      centred_in(layout.shared ? participant : console, fraction, 1,
+                 scaled(1480, layout.console_scale), scaled(920, layout.console_scale));
+  if (settings.full_screen && !layout.shared) {
     const GLFWvidmode* const mode = glfwGetVideoMode(participant);
-    places.participant = {participant, 0, 0, mode->width, mode->height};
+    layout.participant = {participant, 0, 0, mode->width, mode->height};
   }
-  return places;
+  return layout;
 }
 
-GLFWwindow* make_window(const std::string& title, const Place& place) {
+GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry) {
   glfwDefaultWindowHints();
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
-  // A click into the console must not take the participant's screen away.
+  // A click into the console must not minimise the participant's full-screen window.
   glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
-  GLFWwindow* const window =
-      glfwCreateWindow(place.width, place.height, title.c_str(), place.full_screen_on, nullptr);
+  GLFWwindow* const window = glfwCreateWindow(geometry.width, geometry.height, title.c_str(),
+                                              geometry.full_screen_on, nullptr);
   if (window == nullptr) throw DisplayError("no window with OpenGL 3.3: " + glfw_reason());
-  if (place.full_screen_on == nullptr) glfwSetWindowPos(window, place.left, place.top);
+  if (geometry.full_screen_on == nullptr) glfwSetWindowPos(window, geometry.left, geometry.top);
   glfwMakeContextCurrent(window);
-  glfwSwapInterval(0);  // waiting for one screen's retrace would hold up the keys of both
+  glfwSwapInterval(0);  // waiting for a vertical retrace would delay the keys of both windows
   return window;
 }
 

@@ -1,4 +1,4 @@
-#include "runner/display/page_layout.h"
+#include "runner/display/participant_page.h"
 
 #include <gtest/gtest.h>
 
@@ -89,7 +89,7 @@ TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
   page.kind = Page::Kind::text;
   for (int i = 0; i < 300; ++i) page.text += "Halten Sie den Griffel wie einen Stift. ";
   for (const auto& [width, height] : {std::pair{400, 728}, {1024, 768}, {3840, 2160}}) {
-    const int screens = screens_of(page, width, height);
+    const int screens = screen_count(page, width, height);
     ASSERT_GT(screens, 1);
     std::vector<std::vector<std::uint32_t>> seen;
     for (int i = 0; i < screens; ++i) {
@@ -102,9 +102,9 @@ TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
     EXPECT_EQ(draw_page(page, width, height, {1, screens}).pixels, seen.back());
   }
   page.text = "short";
-  EXPECT_EQ(screens_of(page, 1024, 768), 1);
+  EXPECT_EQ(screen_count(page, 1024, 768), 1);
   page.text = std::string(5000, '\n');
-  EXPECT_EQ(screens_of(page, 1024, 768), 1) << "empty screens are left out";
+  EXPECT_EQ(screen_count(page, 1024, 768), 1) << "empty screens are left out";
 }
 
 TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
@@ -197,7 +197,7 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
     const Image image = draw_page(page, 1280, 800);
     keep(image, "hostile" + std::to_string(text.size()));
     // Beside the bar of a text with several screens stands the number of the one on show.
-    const bool several = screens_of(page, 1280, 800) > 1;
+    const bool several = screen_count(page, 1280, 800) > 1;
     EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? keys : keys_and_bar)
         << text.substr(0, 20);
     EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);

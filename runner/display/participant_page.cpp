@@ -1,22 +1,22 @@
-#include "runner/display/page_layout.h"
+#include "runner/display/participant_page.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "runner/display/page_parts.h"
+#include "runner/display/participant_page_elements.h"
 
 namespace palpate::runner {
 namespace {
 
 constexpr double kSmallestUnit = 14;  // px, at scale 1
 constexpr std::size_t kMostScreens = 200;
-constexpr double kSmallest = 0.45;  // of the normal size; below it text is cut off instead
+constexpr double kSmallestSize = 0.45;  // of the normal size; below it text is truncated instead
 
-/// A text cut between lines into what fits on a screen each, all in letters of one size.
-std::vector<std::string> screenfuls(cairo_t* canvas, const std::string& text, double unit,
-                                    double width, double room) {
+/// Splits a text between lines into screens, all with the same text size.
+std::vector<std::string> split_into_screens(cairo_t* canvas, const std::string& text, double unit,
+                                            double width, double room) {
   const std::string valid = valid_utf8(text);
-  const Words words(canvas, valid, kLetters * unit, text_width(width, unit));
+  const TextBlock words(canvas, valid, kTextSize * unit, text_width(width, unit));
   const std::vector<std::size_t> starts = words.line_starts();
   const double line = words.size().height / std::max(words.lines(), 1);
   const auto fit = static_cast<std::size_t>(std::max(1.0, std::floor(room / line)));
@@ -34,12 +34,12 @@ std::vector<std::string> screenfuls(cairo_t* canvas, const std::string& text, do
 void draw_text(cairo_t* canvas, const std::string& text, double size, double smallest, double width,
                double line_width, double top, double room, const Colour& colour, bool centred) {
   if (text.empty() || room <= 0) return;
-  Words words(canvas, text, size, line_width);
+  TextBlock words(canvas, text, size, line_width);
   while (words.size().height > room && size > smallest) {
     size *= 0.94;
     words.set_size(size);
   }
-  // Pango's limit of height knows nothing of the space between lines.
+  // Pango's height limit ignores the line spacing.
   for (double height = room; words.size().height > room && height > size; height *= 0.94) {
     words.cut_at_height(height);
   }
@@ -48,10 +48,10 @@ void draw_text(cairo_t* canvas, const std::string& text, double size, double sma
              top + (room - std::min(room, words.size().height)) / 2, colour);
 }
 
-/// Where everything goes on a page of some size.
-class PageFrame {
+/// Positions of a page's elements for a screen size.
+class PageLayout {
  public:
-  PageFrame(cairo_t* canvas, const Page& page, double width, double height, double ui_scale)
+  PageLayout(cairo_t* canvas, const Page& page, double width, double height, double ui_scale)
       : canvas_(canvas),
         page_(page),
         width_(width),
@@ -71,14 +71,14 @@ class PageFrame {
 
   std::vector<std::string> screens() const {
     if (page_.kind != Page::Kind::text) return {page_.text};
-    return screenfuls(canvas_, page_.text, unit_, width_, room_);
+    return split_into_screens(canvas_, page_.text, unit_, width_, room_);
   }
 
   void draw(int screen) const {
     keys_.draw(canvas_, width_ / 2, std::max(keys_top_, 0.0));
     draw_progress(canvas_, page_, unit_, width_);
     if (page_.seconds_left > 0)
-      draw_line(clock_words(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
+      draw_line(minutes_and_seconds(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
     if (!page_.reply.empty()) draw_line(page_.reply, 1.2 * unit_, reply_top_, kReply);
     if (page_.kind == Page::Kind::text) {
       draw_go_on(canvas_, width_ / 2, go_on_top_, unit_);
@@ -88,14 +88,14 @@ class PageFrame {
     } else {
       const bool large = page_.kind != Page::Kind::message;
       const double letters = page_.kind == Page::Kind::feedback ? 8 : large ? 2.6 : 1.8;
-      draw_text(canvas_, page_.text, letters * unit_, kSmallest * unit_, width_,
+      draw_text(canvas_, page_.text, letters * unit_, kSmallestSize * unit_, width_,
                 text_width(width_, unit_), top_, room_, page_.go ? kGo : kText, large);
     }
   }
 
  private:
   void draw_line(const std::string& text, double size, double top, const Colour& colour) const {
-    Words words(canvas_, text, size);
+    TextBlock words(canvas_, text, size);
     if (words.size().width > 0.94 * width_) words.cut_at_width(0.94 * width_);
     words.draw(canvas_, (width_ - std::min(words.size().width, 0.94 * width_)) / 2, top, colour);
   }
@@ -104,11 +104,11 @@ class PageFrame {
     const std::vector<std::string> all = screens();
     const auto count = static_cast<int>(all.size());
     const int at = std::clamp(screen, 0, count - 1);
-    // As on its neighbours: a last screen with two lines must not jump to the middle.
-    draw_text(canvas_, all[static_cast<std::size_t>(at)], kLetters * unit_, kSmallest * unit_,
+    // Not centred, like the other screens, even if the last has only two lines.
+    draw_text(canvas_, all[static_cast<std::size_t>(at)], kTextSize * unit_, kSmallestSize * unit_,
               width_, text_width(width_, unit_), top_, room_, kText, false);
     if (count == 1) return;
-    const Words number(canvas_, std::to_string(at + 1) + " / " + std::to_string(count), unit_);
+    const TextBlock number(canvas_, std::to_string(at + 1) + " / " + std::to_string(count), unit_);
     number.draw(canvas_, width_ / 2 + 6 * unit_, go_on_top_ + 0.3 * unit_, kQuietInk);
   }
 
@@ -121,7 +121,7 @@ class PageFrame {
 
 }  // namespace
 
-Image draw_page(const Page& page, int width, int height, const PageSetting& setting) {
+Image draw_page(const Page& page, int width, int height, const PageOptions& setting) {
   Image image{std::max(width, 1), std::max(height, 1), {}};
   image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
@@ -132,24 +132,24 @@ Image draw_page(const Page& page, int width, int height, const PageSetting& sett
   const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
   set_colour(owned.get(), kGround);
   cairo_paint(owned.get());
-  PageFrame(owned.get(), page, image.width, image.height, setting.ui_scale).draw(setting.screen);
+  PageLayout(owned.get(), page, image.width, image.height, setting.ui_scale).draw(setting.screen);
   cairo_surface_flush(surface.get());
   for (std::uint32_t& pixel : image.pixels) pixel |= 0xff000000U;
   return image;
 }
 
-int screens_of(const Page& page, int width, int height, double ui_scale) {
+int screen_count(const Page& page, int width, int height, double ui_scale) {
   if (page.kind != Page::Kind::text) return 1;
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, 1, 1), &cairo_surface_destroy);
   const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
-  const PageFrame frame(owned.get(), page, std::max(width, 1), std::max(height, 1), ui_scale);
+  const PageLayout frame(owned.get(), page, std::max(width, 1), std::max(height, 1), ui_scale);
   return static_cast<int>(frame.screens().size());
 }
 
 std::uint32_t ground_colour() {
-  const auto level = [](double share) {
-    return static_cast<std::uint32_t>(std::lround(share * 255));
+  const auto level = [](double fraction) {
+    return static_cast<std::uint32_t>(std::lround(fraction * 255));
   };
   return 0xff000000U | level(kGround.red) << 16 | level(kGround.green) << 8 | level(kGround.blue);
 }

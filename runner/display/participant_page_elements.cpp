@@ -1,4 +1,4 @@
-#include "runner/display/page_parts.h"
+#include "runner/display/participant_page_elements.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kCapHeight = 2.3, kRowHeight = 5.2;  // units
+constexpr double kKeycapHeight = 2.3, kRowHeight = 5.2;  // units
 
-void cap(cairo_t* canvas, double x, double y, double width, double height) {
+void draw_keycap(cairo_t* canvas, double x, double y, double width, double height) {
   const double radius = 0.18 * height;
   cairo_new_path(canvas);
   cairo_arc(canvas, x + width - radius, y + radius, radius, -M_PI / 2, 0);
@@ -16,14 +16,14 @@ void cap(cairo_t* canvas, double x, double y, double width, double height) {
   cairo_arc(canvas, x + radius, y + height - radius, radius, M_PI / 2, M_PI);
   cairo_arc(canvas, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
   cairo_close_path(canvas);
-  set_colour(canvas, kCap);
+  set_colour(canvas, kKeycap);
   cairo_fill_preserve(canvas);
-  set_colour(canvas, kCapEdge);
+  set_colour(canvas, kKeycapEdge);
   cairo_set_line_width(canvas, std::max(1.0, 0.035 * height));
   cairo_stroke(canvas);
 }
 
-std::string on_the_cap(const std::string& key) {
+std::string keycap_label(const std::string& key) {
   if (key.size() == 1 && key[0] >= 'a' && key[0] <= 'z') {
     return {static_cast<char>(key[0] - 'a' + 'A')};
   }
@@ -36,9 +36,14 @@ KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width) : u
   double right = 0;
   items_.reserve(page.keys.size());
   for (const auto& [key, answer] : page.keys) {
-    Item item{Words(canvas, on_the_cap(key), 1.15 * unit), Words(canvas, answer, unit), 0, 0, 0, 0};
+    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit),
+              TextBlock(canvas, answer, unit),
+              0,
+              0,
+              0,
+              0};
     item.answer.cut_at_width(std::min(item.answer.size().width + 2, 12 * unit));
-    item.cap_width = std::max(kCapHeight * unit, item.key.size().width + 1.2 * unit);
+    item.cap_width = std::max(kKeycapHeight * unit, item.key.size().width + 1.2 * unit);
     item.width = std::max(item.cap_width, item.answer.size().width) + 2 * unit;
     if (rows_.empty() || right + item.width > width) {
       rows_.push_back(0);
@@ -60,21 +65,23 @@ void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
   for (const Item& item : items_) {
     const double centre = middle - rows_[item.row] / 2 + item.x + item.width / 2;
     const double y = top + static_cast<double>(item.row) * kRowHeight * unit_;
-    cap(canvas, std::round(centre - item.cap_width / 2), std::round(y), std::round(item.cap_width),
-        std::round(kCapHeight * unit_));
+    draw_keycap(canvas, std::round(centre - item.cap_width / 2), std::round(y),
+                std::round(item.cap_width), std::round(kKeycapHeight * unit_));
     const Size key = item.key.size(), answer = item.answer.size();
-    item.key.draw(canvas, centre - key.width / 2, y + (kCapHeight * unit_ - key.height) / 2, kText);
-    item.answer.draw(canvas, centre - answer.width / 2, y + (kCapHeight + 0.45) * unit_, kQuietInk);
+    item.key.draw(canvas, centre - key.width / 2, y + (kKeycapHeight * unit_ - key.height) / 2,
+                  kText);
+    item.answer.draw(canvas, centre - answer.width / 2, y + (kKeycapHeight + 0.45) * unit_,
+                     kQuietInk);
   }
 }
 
 void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {
   const double width = 9 * unit, height = 1.9 * unit;
-  cap(canvas, std::round(middle - width / 2), std::round(top), std::round(width),
-      std::round(height));
+  draw_keycap(canvas, std::round(middle - width / 2), std::round(top), std::round(width),
+              std::round(height));
   set_colour(canvas, kQuietInk);
   cairo_set_line_width(canvas, std::max(1.0, 0.1 * unit));
-  // The bar's usual mark, and an arrow: on.
+  // The usual symbol of the space bar, and an arrow to the right.
   const double base = top + 0.62 * height, left = middle - 1.9 * unit;
   cairo_move_to(canvas, left, base - 0.35 * unit);
   cairo_line_to(canvas, left, base);
@@ -93,11 +100,12 @@ double text_width(double width, double unit) { return std::min(0.84 * width, 38 
 
 void draw_progress(cairo_t* canvas, const Page& page, double unit, double width) {
   if (page.trials <= 0 || page.done <= 0) return;
-  const double share = std::min(1.0, static_cast<double>(page.done) / page.trials);
+  const double fraction = std::min(1.0, static_cast<double>(page.done) / page.trials);
   const double left = 0.08 * width, all = 0.84 * width, top = 1.2 * unit;
-  const Words count(canvas, std::to_string(page.done) + " / " + std::to_string(page.trials), unit);
+  const TextBlock count(canvas, std::to_string(page.done) + " / " + std::to_string(page.trials),
+                        unit);
   const double bar = all - count.size().width - unit;
-  for (const auto& [wide, colour] : {std::pair(bar, kCap), std::pair(share * bar, kGo)}) {
+  for (const auto& [wide, colour] : {std::pair(bar, kKeycap), std::pair(fraction * bar, kGo)}) {
     set_colour(canvas, colour);
     cairo_rectangle(canvas, std::round(left), std::round(top), std::round(wide),
                     std::round(0.3 * unit));
@@ -107,7 +115,7 @@ void draw_progress(cairo_t* canvas, const Page& page, double unit, double width)
              kQuietInk);
 }
 
-std::string clock_words(int seconds) {
+std::string minutes_and_seconds(int seconds) {
   const std::string rest = std::to_string(seconds % 60);
   return std::to_string(seconds / 60) + (rest.size() < 2 ? ":0" : ":") + rest;
 }
@@ -120,19 +128,19 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
   while (due < list.steps.size() && list.steps[due].state != State::now) ++due;
   const std::string of = std::to_string(std::min(due + 1, list.steps.size())) + " / " +
                          std::to_string(list.steps.size());
-  Words(canvas, of, 2 * unit).draw(canvas, left, top, kQuietInk);
+  TextBlock(canvas, of, 2 * unit).draw(canvas, left, top, kQuietInk);
   double y = top + 4 * unit;
   const double steps = static_cast<double>(list.steps.size()) * 2.2 * unit;
   std::string instruction = list.instruction;
   if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
   const double instructions = std::max(room - 4 * unit - steps - unit, 3 * unit);
-  Words how(canvas, instruction, kLetters * unit, line_width);
-  for (double size = kLetters * unit; how.size().height > instructions && size > unit;) {
+  TextBlock how(canvas, instruction, kTextSize * unit, line_width);
+  for (double size = kTextSize * unit; how.size().height > instructions && size > unit;) {
     size *= 0.94;
     how.set_size(size);
   }
   how.draw(canvas, left, y, kText);
-  y += how.size().height + 2 * unit;  // where not all fits, the last steps are cut off, not this
+  y += how.size().height + 2 * unit;  // if not everything fits, the last steps are cut off
   for (const Checklist::Step& step : list.steps) {
     const bool now = step.state == State::now;
     const char* const mark = step.state == State::done       ? "\u2713"
@@ -140,8 +148,8 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
                              : now                           ? "\u25b6"
                                                              : "\u25cb";
     const Colour& colour = step.state == State::done ? kGo : now ? kText : kQuietInk;
-    Words(canvas, mark, 1.1 * unit).draw(canvas, left, y, colour);
-    Words(canvas, step.words, 1.1 * unit).draw(canvas, left + 2.4 * unit, y, colour);
+    TextBlock(canvas, mark, 1.1 * unit).draw(canvas, left, y, colour);
+    TextBlock(canvas, step.words, 1.1 * unit).draw(canvas, left + 2.4 * unit, y, colour);
     y += 2.2 * unit;
   }
 }
