@@ -14,7 +14,7 @@ Pose compose(const Pose& outer, const Pose& inner) {
           outer.orientation * inner.orientation};
 }
 
-/// Equal keys, equal meshes.
+/// Shapes with equal keys have equal meshes.
 std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
   std::string key = std::to_string(static_cast<int>(spec.shape)) + (side_contact ? "s" : "p");
   for (const double value : {spec.radius, spec.height, spec.edge}) {

@@ -1,5 +1,5 @@
 #pragma once
-// From what a protocol or scene file says to what the renderers need.
+// Builds the renderers' scenes from the objects of a protocol or scene file.
 
 #include <map>
 #include <memory>
@@ -15,7 +15,7 @@ namespace palpate::runner {
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 
-/// Places the convex parts of objects; equal shapes share one mesh and its trees.
+/// Builds a scene of the convex parts of objects; equal shapes share one mesh and its search trees.
 class SceneBuilder {
  public:
   /// \throws MeshError where a shape is no convex mesh, with the place as a JSON pointer.
@@ -33,7 +33,7 @@ class SceneBuilder {
   std::map<std::string, Prepared> prepared_;
 };
 
-/// The stimuli of a protocol, made once; gives each trial its scene. Safe to share between threads.
+/// The stimuli of a protocol, built once, and the scene of each trial. Threads may share it.
 class StimulusLibrary {
  public:
   /// \throws MeshError naming the stimulus.
@@ -41,7 +41,7 @@ class StimulusLibrary {
 
   /// The trial's stimulus in the trial's orientation, about the origin of the workspace.
   rendering::Scene scene(const protocols::Trial& trial) const;
-  /// Radius about the origin that holds the stimulus in any orientation, m.
+  /// Radius of the sphere about the origin that contains the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
 
  private:

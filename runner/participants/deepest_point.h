@@ -1,5 +1,5 @@
 #pragma once
-// Where a perceived tip or stylus is deepest in each hypothesis of a block.
+// The deepest point of the perceived tip or stylus in each hypothesis of a block.
 
 #include <cmath>
 
@@ -8,8 +8,8 @@
 
 namespace palpate::runner {
 
-// The search along a line ends when the minimum is pinned down to this length. The distance comes
-// out better, within 30 micrometres: it is interpolated between the slopes at both ends.
+// The search along a line ends when the minimum is bracketed within this length. The distance
+// itself is within 30 micrometres: it is interpolated from the slopes at both ends.
 inline constexpr float kSearchedLength = 0.00012f;  // m
 inline constexpr int kMostHalvings = 20;
 
@@ -28,7 +28,7 @@ void find_at_tip(const ShapeLine& shape, Deepest& out) {
   }
 }
 
-/// Surface and slope at one place of the line, of every hypothesis of a block.
+/// Surface and slope at one point of the line, for every hypothesis of a block.
 struct SlopedSurface {
   float distance[ShapeHypotheses::kBlock];  // m
   float slope[ShapeHypotheses::kBlock];     // of the distance along the line
@@ -47,11 +47,11 @@ inline void store(const ShapeLine& shape, int i, float s, SlopedSurface& out) {
   out.z[i] = p.normal.z;
 }
 
-/// The distance to a convex shape is convex along a line, so the sign of its slope tells on which
-/// side the minimum lies.
+/// Bisection: the distance to a convex shape is convex along a line, so the sign of its slope tells
+/// on which side the minimum lies.
 template <class ShapeLine>
 void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
-  // Half of the length that is still in question, and its middle.
+  // Half length and middle of the bracket.
   float reach = 0.5f * length;
   float middle[ShapeHypotheses::kBlock];
   for (float& m : middle) m = reach;
@@ -61,26 +61,26 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
       middle[i] -= std::copysign(reach, shape.slope(i, middle[i]));
     }
   }
-  // A loop each: with both in one, g++ 12 turns the selections into branches and gives up on
-  // vectors.
+  // Separate loops: in a single one g++ 12 turns the selections into branches and does not
+  // vectorise.
   SlopedSurface a;
   SlopedSurface b;
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] - reach, a);
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] + reach, b);
   const float width = 2.0f * reach;
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-    // The tangents at a and b meet at the minimum of a kink and barely below that of a bend; mixed
-    // to slope zero, the two normals give the one that is perpendicular to the line. At an end of
-    // the line the slope has one sign: the other is taken as zero, and that end is the minimum.
+    // The tangents at a and b intersect at the minimum of a kink and just below that of a smooth
+    // minimum. The combination of the two normals with slope zero is perpendicular to the line. If
+    // both slopes have one sign, the other is set to zero and an end of the line is the minimum.
     const float falling = lane::min(a.slope[i], 0.0f);
     const float rising = lane::max(b.slope[i], 0.0f);
     const float bend = lane::max(rising - falling, 1e-6f);
     const float meet =
         lane::clamp((a.distance[i] - b.distance[i] + rising * width) / bend, 0.0f, width);
-    const float share_b = -falling / bend;
-    const float share_a = 1.0f - share_b;
-    const FloatVec n{share_a * a.x[i] + share_b * b.x[i], share_a * a.y[i] + share_b * b.y[i],
-                     share_a * a.z[i] + share_b * b.z[i]};
+    const float weight_b = -falling / bend;
+    const float weight_a = 1.0f - weight_b;
+    const FloatVec n{weight_a * a.x[i] + weight_b * b.x[i], weight_a * a.y[i] + weight_b * b.y[i],
+                     weight_a * a.z[i] + weight_b * b.z[i]};
     const float size = std::sqrt(lane::max(dot(n, n), 1e-12f));
     out.distance[i] = a.distance[i] + falling * meet;
     out.cosine[i] = shape.cosine(i, n) / size;

@@ -34,17 +34,17 @@ Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_s
     : settings_(settings),
       grip_(grip),
       tick_(tick),
-      sink_(settings.motor.indentation * (1 + wall_stiffness / settings.hand.stiffness)),
+      aim_depth_(settings.motor.indentation * (1 + wall_stiffness / settings.hand.stiffness)),
       max_offset_(settings.motor.max_indentation * wall_stiffness / settings.hand.stiffness),
       past_(static_cast<std::size_t>(
           std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
 
 HandTarget Explorer::begin(stimuli::Random random) {
   random_ = random;
-  std::fill(past_.begin(), past_.end(), Felt{});
+  std::fill(past_.begin(), past_.end(), TouchState{});
   now_ = 0;
   draw_approach();
-  stage_ = Stage::approach;
+  motion_ = Motion::approach;
   tip_ = start_;
   axis_ = goal_axis_;
   return {tip_ + grip_ * axis_, Vec3(0), axis_};
@@ -60,77 +60,77 @@ void Explorer::draw_approach() {
   const double tilt = settings_.stylus.tilt + settings_.stylus.tilt_sd * random_.normal();
   goal_axis_ =
       std::cos(tilt) * direction + std::sin(tilt) * random_perpendicular(random_, direction);
-  // The hand stays above the table.
+  // The stylus points upwards: the hand stays above the table.
   goal_axis_.z = std::max(goal_axis_.z, settings_.motor.approach_min_rise);
   goal_axis_ = glm::normalize(goal_axis_);
 }
 
-HandTarget Explorer::step(const Felt& now, const rendering::LineProbe& stylus) {
-  const Felt known = past_[now_];
+HandTarget Explorer::step(const TouchState& now, const rendering::LineProbe& stylus) {
+  const TouchState known = past_[now_];
   past_[now_] = now;
   now_ = (now_ + 1) % past_.size();
   const Vec3 v = velocity(known);
   tip_ += tick_ * v;
   turn_axis();
-  yield_to_force(stylus);
+  limit_force(stylus);
   return {tip_ + grip_ * axis_, v, axis_};
 }
 
-Vec3 Explorer::velocity(const Felt& known) {
+Vec3 Explorer::velocity(const TouchState& known) {
   const auto& motor = settings_.motor;
   left_ -= tick_;
-  switch (stage_) {
-    case Stage::approach:
+  switch (motion_) {
+    case Motion::approach:
       if (known.contact) {
-        stage_ = Stage::follow;
+        motion_ = Motion::follow;
         left_ = -motor.mean_follow * std::log(1 - random_.unit());
         heading_ = random_perpendicular(random_, known.normal);
         return slide(known);
       }
-      // Through and out on the other side, or past the object: come again.
+      // Missed the object: approach again.
       if (glm::dot(tip_ - aim_, aim_ - start_) > 0 && glm::length(tip_) > motor.approach_distance) {
-        stage_ = Stage::retreat;
+        motion_ = Motion::retreat;
         draw_approach();
       }
       return motor.approach_speed * unit_or(aim_ - start_, Vec3(0, 0, -1));
-    case Stage::follow:
+    case Motion::follow:
       if (left_ <= 0) break;
       if (known.contact) return slide(known);
-      stage_ = Stage::search;
+      motion_ = Motion::search;
       left_ = settings_.search.give_up;
       [[fallthrough]];
-    case Stage::search:
+    case Motion::search:
       if (left_ <= 0) break;
       if (known.contact) {
-        stage_ = Stage::follow;
+        motion_ = Motion::follow;
         left_ = -motor.mean_follow * std::log(1 - random_.unit());
         return slide(known);
       }
       heading_ = unit_or(
           heading_ + settings_.search.pull_to_centre * tick_ * unit_or(-tip_, Vec3(0)), heading_);
       return motor.slide_speed * heading_;
-    case Stage::retreat:
-      return fly_to_start();
+    case Motion::retreat:
+      return move_to_start();
   }
-  stage_ = Stage::retreat;
+  motion_ = Motion::retreat;
   draw_approach();
-  return fly_to_start();
+  return move_to_start();
 }
 
-Vec3 Explorer::slide(const Felt& known) {
+Vec3 Explorer::slide(const TouchState& known) {
   const double speed = settings_.motor.slide_speed;
   // A random walk of the heading in the surface whose correlation fades as exp(-t / heading_time).
   const double turn = std::sqrt(2 * tick_ / settings_.motor.heading_time) * random_.normal();
   heading_ -= glm::dot(heading_, known.normal) * known.normal;
   heading_ = unit_or(heading_, any_perpendicular(known.normal));
   heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(known.normal, heading_);
-  // Towards the depth that gives the light force, as far as the felt place is known.
+  // Towards the depth that gives the light force at the sensed contact point.
   const Vec3 aimed = tip_ + known.along * axis_;
-  const double rise = glm::dot(known.surface - aimed, known.normal) - sink_;
+  const double rise = glm::dot(known.surface - aimed, known.normal) - aim_depth_;
   return speed * heading_ + std::clamp(rise / tick_, -speed, speed) * known.normal;
 }
 
-Vec3 Explorer::fly_to_start() {
+Vec3 Explorer::move_to_start() {
   const double speed = settings_.motor.approach_speed;
   const double radius = glm::length(tip_), shell = settings_.motor.approach_distance;
   const Vec3 out = unit_or(tip_, Vec3(0, 0, 1));
@@ -138,10 +138,10 @@ Vec3 Explorer::fly_to_start() {
   const Vec3 way = start_ - tip_;
   const double distance = glm::length(way);
   if (distance <= speed * tick_) {
-    stage_ = Stage::approach;
+    motion_ = Motion::approach;
     return way / tick_;
   }
-  // Round the object, not through it.
+  // Around the object, not through it.
   const Vec3 round = way - glm::dot(way, out) * out;
   const Vec3 level = (shell - radius) / tick_ * out;
   Vec3 v = speed * unit_or(round, any_perpendicular(out)) + level;
@@ -160,7 +160,7 @@ void Explorer::turn_axis() {
   axis_ = glm::normalize(std::cos(step) * axis_ + std::sin(step) * side);
 }
 
-void Explorer::yield_to_force(const rendering::LineProbe& stylus) {
+void Explorer::limit_force(const rendering::LineProbe& stylus) {
   const Vec3 held = stylus.tip + grip_ * unit_or(stylus.tail - stylus.tip, axis_);
   const Vec3 offset = tip_ + grip_ * axis_ - held;
   const double length = glm::length(offset);

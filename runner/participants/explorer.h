@@ -1,6 +1,7 @@
 #pragma once
-// How a simulated hand explores: it comes from above, slides along with a wandering heading and a
-// light indentation, lifts, comes again. It knows of contact only late, and nothing of shapes.
+// The exploration of a simulated hand: it approaches from above, slides over the surface in a
+// randomly changing direction with light pressure, lifts off and approaches again. It senses
+// contact with a reaction delay and knows nothing of the shape.
 
 #include <cstdint>
 #include <vector>
@@ -10,47 +11,49 @@
 
 namespace palpate::runner {
 
-/// What the hand feels at one moment.
-struct Felt {
+/// What the hand senses at one tick.
+struct TouchState {
   bool contact = false;
   Vec3 normal;       ///< unit, of the force
-  Vec3 surface;      ///< m; where the surface was felt
-  double along = 0;  ///< m from the tip along the stylus to that place
+  Vec3 surface;      ///< m; sensed contact point
+  double along = 0;  ///< m from the tip along the stylus to that point
 };
 
 class Explorer {
  public:
-  /// \param grip  m from the tip; \param wall_stiffness  N/m, that a light force is judged by
+  /// \param grip  m from the tip; \param wall_stiffness  N/m, from which the aim depth for a light
+  /// force follows
   Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness, double tick);
 
-  /// Draws the first approach; the stylus at its start.
+  /// Starts a trial with a random approach. \return its start pose
   HandTarget begin(stimuli::Random random);
-  /// One tick. `stylus` and `now` are as felt at this tick; contact in `now` is acted on only after
+  /// One tick. `stylus` and `now` are those of this tick; contact in `now` has an effect only after
   /// the reaction delay.
-  HandTarget step(const Felt& now, const rendering::LineProbe& stylus);
+  HandTarget step(const TouchState& now, const rendering::LineProbe& stylus);
 
  private:
-  enum class Stage { approach, follow, search, retreat };
+  enum class Motion { approach, follow, search, retreat };
 
   void draw_approach();
-  Vec3 velocity(const Felt& known);
-  Vec3 slide(const Felt& known);
-  Vec3 fly_to_start();
+  Vec3 velocity(const TouchState& known);
+  Vec3 slide(const TouchState& known);
+  Vec3 move_to_start();
   void turn_axis();
-  void yield_to_force(const rendering::LineProbe& stylus);
+  void limit_force(const rendering::LineProbe& stylus);
 
   SimulatedSettings settings_;
   double grip_, tick_;
-  double sink_;        ///< m; how far below the felt surface the hand aims
-  double max_offset_;  ///< m; how far the hand's aim may be from where the stylus is
+  double aim_depth_;  ///< m below the sensed surface that the target lies
+  double
+      max_offset_;  ///< m; largest distance of the target from the stylus, which limits the force
   stimuli::Random random_{0};
-  std::vector<Felt> past_;  ///< ring: what was felt during the reaction delay
+  std::vector<TouchState> past_;  ///< ring buffer over the reaction delay
   std::size_t now_ = 0;
-  Stage stage_ = Stage::approach;
-  Vec3 tip_, axis_{0, 0, 1};               ///< where the hand wants the stylus
+  Motion motion_ = Motion::approach;
+  Vec3 tip_, axis_{0, 0, 1};               ///< target pose
   Vec3 start_, aim_, goal_axis_{0, 0, 1};  ///< of the approach
   Vec3 heading_;                           ///< unit
-  double left_ = 0;                        ///< s, of this stage
+  double left_ = 0;                        ///< s left of this motion
 };
 
 }  // namespace palpate::runner

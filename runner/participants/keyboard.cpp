@@ -11,7 +11,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kPause_ns = 5'000'000;
 constexpr std::int64_t kFeedback_ns = 1'000'000'000;
 constexpr std::int64_t kReply_ns = 2'000'000'000;
-constexpr std::int64_t kSteady_ns = 150'000'000;  // at the zone's edge the page must not flicker
+constexpr std::int64_t kSteady_ns = 150'000'000;  // debounces the cue at the edge of the home zone
 
 }  // namespace
 
@@ -95,10 +95,10 @@ void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
 
 void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
-  // Before it shows: whoever is quick answers before this thread goes on.
+  // Taken before the page is shown, so that a very early key press counts.
   const std::int64_t before_ns = clock_.now_ns();
   Page page = between_trials(Page::Kind::text, text);
-  // Asked for before anybody could tell that the last trial is on record.
+  // The end page is shown before set_progress() has been told of the last trial.
   if (&text == &protocol_.texts.end) page.done = page.trials;
   show(std::move(page));
   wait_for_space(before_ns);
@@ -137,7 +137,7 @@ void KeyboardRespondent::begin_trial(const protocols::Trial&) {
   cue_ = Cue::none;
   cue_since_ns_ = 0;
   onset_ns_ = 0;
-  buttons_ = 0xFF;  // a button that is held down from before does not answer
+  buttons_ = 0xFF;  // a button held down since before the trial is not an answer
   pending_.reset();
 }
 

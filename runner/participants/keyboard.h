@@ -1,5 +1,5 @@
 #pragma once
-// A person who answers by keys (row or numeric pad) or by the buttons of the device.
+// A human participant, who answers with keys (digit row or numeric pad) or buttons of the device.
 
 #include <cstdint>
 #include <deque>
@@ -13,23 +13,22 @@
 
 namespace palpate::runner {
 
-/// Looks after everything else while the participant is waited for.
+/// Work to be done while the participant is waited for: device, console, markers.
 class Attendant {
  public:
   virtual ~Attendant() = default;
-  /// Called at every tick of a trial and every few milliseconds between trials. What it throws ends
-  /// the wait.
+  /// Called at every tick of a trial and every 5 ms between trials. An exception ends the wait.
   virtual void attend() = 0;
 };
 
 enum class AnswerBy {
   keys,     ///< the protocol's
-  buttons,  ///< of the device: the first stands for the first of the protocol's keys, and so on
+  buttons,  ///< of the device: button n stands for the n-th key of the protocol
 };
 
 class KeyboardRespondent final : public Respondent {
  public:
-  /// All must outlive it. \param clock  what keys are stamped with
+  /// All arguments must outlive it. \param clock  the one that time-stamps keys
   KeyboardRespondent(const protocols::Protocol& protocol, ParticipantScreen& screen,
                      Attendant& attendant, Clock& clock, AnswerBy by);
 
@@ -39,13 +38,13 @@ class KeyboardRespondent final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   std::optional<Answer> step(const Sample& sample) override;
 
-  /// A page with nothing to press.
+  /// Shows a page without answer keys.
   void show_message(const std::string& text);
-  /// To be called again and again while such a page is shown: keys get their reply.
+  /// To be called repeatedly while such a page is shown: replies to keys.
   void tend();
-  /// Of this session, for the pages between trials.
+  /// Progress of this session, shown on the pages between trials.
   void set_progress(std::size_t done, std::size_t trials);
-  /// s, of the break under way; 0: none is
+  /// s left of a break; 0: no break
   int seconds_left() const { return page_.seconds_left; }
 
  private:
@@ -65,16 +64,16 @@ class KeyboardRespondent final : public Respondent {
   Attendant& attendant_;
   Clock& clock_;
   AnswerBy by_;
-  std::vector<std::pair<std::string, std::string>> keys_;  ///< as shown
+  std::vector<std::pair<std::string, std::string>> keys_;  ///< as displayed
   std::vector<int> stimuli_;                               ///< of keys_, in order
-  Page page_;                                              ///< on show
+  Page page_;                                              ///< displayed now
   int done_ = 0, trials_ = 0;
-  std::int64_t reply_until_ns_ = 0;  ///< 0: there is none
+  std::int64_t reply_until_ns_ = 0;  ///< 0: no reply is shown
   Cue cue_ = Cue::none;
   std::int64_t cue_since_ns_ = 0;
-  std::int64_t onset_ns_ = 0;      ///< 0: not yet
+  std::int64_t onset_ns_ = 0;      ///< of the trial; 0: not yet
   std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
-  std::optional<Answer> pending_;  ///< given until the servo's samples have come as far
+  std::optional<Answer> pending_;  ///< given, until the servo's samples have reached its time
 };
 
 }  // namespace palpate::runner

@@ -1,7 +1,7 @@
 #pragma once
-// Branch-free single-precision functions that a compiler can vectorise (it keeps calls of libm out
-// of vector loops unless -ffast-math is given). Only + - * / and sqrt: the same bits on every
-// machine.
+// Branch-free single-precision functions that compilers can vectorise (loops with calls to libm are
+// not vectorised without -ffast-math). Only + - * / and sqrt, so results are the same to the bit on
+// every machine.
 
 #include <bit>
 #include <cmath>
@@ -15,7 +15,7 @@ inline float clamp(float x, float low, float high) { return min(max(x, low), hig
 inline float positive(float x) { return x > 0.0f ? x : 0.0f; }
 inline float sign(float x) { return x < 0.0f ? -1.0f : 1.0f; }
 
-/// e^x for x <= 88. Relative error below 3e-7; below x = -87 the value stays at e^-87.
+/// e^x for x <= 88. Relative error below 3e-7; clamped to e^-87 below x = -87.
 inline float exp(float x) {
   x = x > -87.0f ? x : -87.0f;
   // Adding 1.5 * 2^23 rounds to an integer and leaves it in the low bits of the mantissa.

@@ -1,4 +1,5 @@
 #pragma once
+// The interface between a session and its participant.
 
 #include <cstdint>
 #include <optional>
@@ -15,25 +16,25 @@ struct Answer {
   std::int64_t time_ns = 0;  ///< session clock, when the event arrived
 };
 
-/// Thrown where a trial is waited for: the attempt is cut off, what() says why.
+/// Ends the current attempt of a trial; what() says why.
 class TrialCutOff : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Who answers: a person at a keyboard, or a model of one.
+/// A participant as the session sees one: a person at a keyboard or a simulated participant.
 class Respondent {
  public:
   virtual ~Respondent() = default;
-  /// A page of the protocol's texts; returns when the participant goes on. Empty: nothing to read.
+  /// Shows a text of the protocol; returns when the participant goes on. Empty: returns at once.
   virtual void read(const std::string& text) = 0;
-  /// A break: as read, but nobody goes on before `until_ns` (session clock).
+  /// A break: like read, but at least until `until_ns` (session clock).
   virtual void rest(const std::string& text, std::int64_t /*until_ns*/) { read(text); }
-  /// Whether the last answer was right, where the protocol says so.
+  /// Shows whether the last answer was correct, if the protocol asks for feedback.
   virtual void feedback(bool correct) = 0;
-  /// A trial is about to begin; the stylus is to go to the home zone.
+  /// A trial is about to begin; the stylus must first be in the home zone.
   virtual void begin_trial(const protocols::Trial& trial) = 0;
-  /// Called with what the servo did. The answer, once there is one; never one of before time zero.
-  /// \throws TrialCutOff where the trial is to be shown again.
+  /// Called with every sample of the servo. Returns the answer once there is one, never one from
+  /// before time zero. \throws TrialCutOff if the trial is to be repeated.
   virtual std::optional<Answer> step(const Sample& sample) = 0;
 };
 

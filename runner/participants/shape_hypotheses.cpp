@@ -35,8 +35,8 @@ std::vector<Mat3> spiral_axes(int count, double lowest) {
   return frames;
 }
 
-/// Of all rotations that carry a cube into the same place, is this the smallest? In Rodrigues'
-/// vector the answer is a cube with its corners cut off (Frank 1988).
+/// Whether this is the smallest of the 24 equivalent rotations of a cube: the cubic fundamental
+/// zone, in Rodrigues vectors a cube with its corners cut off (Frank 1988).
 bool in_cubic_zone(const Quat& q) {
   const double w = std::abs(q.w);
   const double x = std::abs(q.x);
@@ -47,7 +47,7 @@ bool in_cubic_zone(const Quat& q) {
 }
 
 /// Super-Fibonacci spirals (Alexa 2022, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling
-/// of SO(3)", algorithm 1), of which those are kept that a cube can tell apart.
+/// of SO(3)", algorithm 1), restricted to the fundamental zone.
 std::vector<Mat3> cube_rotations() {
   constexpr double kPsi = 1.533751168755204288118041;  // his constant: psi^4 = psi + 4
   std::vector<Mat3> rotations;

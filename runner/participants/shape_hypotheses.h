@@ -1,6 +1,5 @@
 #pragma once
-// What a simulated participant takes into consideration: every stimulus in every orientation that
-// can be told apart from the others.
+// The hypotheses of a simulated participant: every stimulus in every distinguishable orientation.
 
 #include <array>
 #include <cstddef>
@@ -11,13 +10,13 @@
 
 namespace palpate::runner {
 
-/// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads may share one.
+/// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it.
 /// Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
 /// Cube: 384 rotations modulo its 24. Neighbours are 10 to 12 degrees apart; no orientation is
 /// further than 8, 10 and 12 degrees from the grid of cone, cylinder and cube.
 ///
-/// Lies in flat single-precision arrays; a shape fills whole blocks, the rest of its last block
-/// repeats its last hypothesis ("padding").
+/// Stored in flat single-precision arrays; a shape fills whole blocks, the last one padded with its
+/// last hypothesis.
 class ShapeHypotheses {
  public:
   static constexpr int kBlock = 32;
@@ -30,7 +29,7 @@ class ShapeHypotheses {
     int count = 0;        ///< of hypotheses, without the padding
   };
 
-  /// Why a simulated participant does not know a stimulus; empty: it does.
+  /// Why a stimulus cannot be simulated; empty: it can.
   static std::string fault_of(const stimuli::ObjectSpec& stimulus);
 
   /// Shape i is stimulus i in its own frame; poses and materials are ignored.

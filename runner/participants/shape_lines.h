@@ -2,12 +2,12 @@
 // Signed distances of one block of hypotheses along one line p(s) = start + s * along, each with
 // its direction: analytic, branch-free, in single precision (within a micrometre, 0.2 m around).
 //
-// Every class has, for hypothesis i of the block at s metres:
+// Every class has these functions for hypothesis i of the block, s in metres:
 //   distance(i, s)  m, negative inside
-//   slope(i, s)     of the sign of the distance's derivative along the line
-//   surface(i, s)   distance and unit outward normal, in a frame of its own
-//   along(i)        the line's direction, and
-//   cosine(i, v)    the product of a vector of that frame with the perceived direction
+//   slope(i, s)     has the sign of the distance's derivative along the line
+//   surface(i, s)   distance and unit outward normal, in a frame that the class chooses
+//   along(i)        the line's direction in that frame
+//   cosine(i, v)    scalar product of a vector of that frame with the perceived direction
 
 #include <cmath>
 
@@ -33,7 +33,7 @@ struct SurfacePoint {
   FloatVec normal;  // unit
 };
 
-/// What is the same for all hypotheses.
+/// The line, the same for all hypotheses.
 struct Line {
   FloatVec start;      // m, from the object's centre
   FloatVec along;      // unit, or zero for a point
@@ -41,7 +41,7 @@ struct Line {
   FloatVec direction;  // unit, perceived
 };
 
-// Keeps a division by a vanishing length finite; far below any length that matters.
+// Keeps divisions by lengths near zero finite; far below all relevant lengths.
 inline constexpr float kTinyLength = 1e-12f;  // m
 
 class SphereLine {
@@ -74,7 +74,7 @@ class SphereLine {
   float radius_;
 };
 
-/// In the frame of the cube.
+/// Works in the cube's frame.
 class CubeLine {
  public:
   CubeLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
@@ -138,8 +138,8 @@ class CubeLine {
   float direction_[3][ShapeHypotheses::kBlock];
 };
 
-/// Solids of revolution, in the world frame. The line is measured from its point nearest to the
-/// axis: there all terms of the squared radius are positive, so nothing cancels.
+/// Solids of revolution; works in the world frame. Positions on the line are relative to its point
+/// nearest to the axis: all terms of the squared radius are then positive, without cancellation.
 template <class Profile>
 class AxialLine {
  public:

@@ -17,9 +17,9 @@ namespace palpate::runner {
 namespace {
 
 constexpr int kBlock = ShapeHypotheses::kBlock;
-constexpr int kMostPlaces = 64;
+constexpr int kMaxPositions = 64;
 
-/// A percept and the settings, ready for the loops.
+/// A percept and the settings, prepared for the loops.
 struct Query {
   Line line;
   bool contact = false;
@@ -30,10 +30,10 @@ struct Query {
   float inverse_sd = 0;           // 1 / sqrt v, 1/m
   float free_space_weight = 0;
 
-  int places = 0;            // 0: no torque cue
-  float place[kMostPlaces];  // m from the tip
-  float fit[kMostPlaces];    // likelihood of `along` at that place
-  float inverse_scale = 0;   // of the soft minimum, 1/m
+  int positions = 0;              // 0: no torque cue
+  float position[kMaxPositions];  // m from the tip
+  float fit[kMaxPositions];       // likelihood of `along` at that position
+  float inverse_scale = 0;        // of the soft minimum, 1/m
   float torque_floor = 0;
 };
 
@@ -42,11 +42,11 @@ void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& d
                     float* log_likelihood) {
   float weights[kBlock] = {};
   float fits[kBlock] = {};
-  for (int k = 0; k < query.places; ++k) {
-    const float place = query.place[k];
+  for (int k = 0; k < query.positions; ++k) {
+    const float position = query.position[k];
     const float fit = query.fit[k];
     for (int i = 0; i < kBlock; ++i) {
-      const float height = shape.distance(i, place) - deepest.distance[i];
+      const float height = shape.distance(i, position) - deepest.distance[i];
       const float weight = lane::exp(-height * query.inverse_scale);
       weights[i] += weight;
       fits[i] += weight * fit;
@@ -71,7 +71,7 @@ void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_
       log_likelihood[i] =
           query.direction_precision * (deepest.cosine[i] - 1.0f) - d * d * query.half_precision;
     }
-    if (query.places > 0) add_torque_cue(shape, query, deepest, log_likelihood);
+    if (query.positions > 0) add_torque_cue(shape, query, deepest, log_likelihood);
   } else {
     for (int i = 0; i < kBlock; ++i) {
       log_likelihood[i] =
@@ -104,11 +104,11 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.torque_floor = static_cast<float>(settings.torque_floor);
 
   if (percept.contact && percept.ray && percept.along) {
-    query.places = settings.places_along;
-    for (int k = 0; k < query.places; ++k) {
-      const double place = length * k / (query.places - 1);
-      const double error = (place - *percept.along) / settings.along_sd;
-      query.place[k] = static_cast<float>(place);
+    query.positions = settings.places_along;
+    for (int k = 0; k < query.positions; ++k) {
+      const double position = length * k / (query.positions - 1);
+      const double error = (position - *percept.along) / settings.along_sd;
+      query.position[k] = static_cast<float>(position);
       query.fit[k] = lane::exp(static_cast<float>(-0.5 * error * error));
     }
   }
@@ -130,7 +130,7 @@ void check(const ObserverSettings& s) {
        "direction_sd and model_direction_sd: not negative, not both zero");
   want(positive(s.along_sd), "along_sd: positive");
   want(positive(s.soft_min_scale), "soft_min_scale: positive");
-  want(s.places_along >= 2 && s.places_along <= kMostPlaces, "places_along: 2 to 64");
+  want(s.places_along >= 2 && s.places_along <= kMaxPositions, "places_along: 2 to 64");
   want(s.torque_floor >= 1e-30 && s.torque_floor <= 1, "torque_floor: 1e-30 to 1");
   want(not_negative(s.free_space_weight), "free_space_weight: not negative");
   want(std::isfinite(s.floor) && s.floor <= 0, "floor: not positive");
@@ -212,7 +212,7 @@ void ShapeObserver::update(const Percept& percept) {
 }
 
 void ShapeObserver::find_posterior() {
-  // A maximum and a sum for each place in a block: the compiler may not reorder one running sum.
+  // A maximum and a sum for each lane of a block: the compiler may not reorder a single sum.
   const float* const l = log_posterior_.data();
   float most[kBlock];
   std::copy_n(l, kBlock, most);

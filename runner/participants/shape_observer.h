@@ -1,7 +1,7 @@
 #pragma once
 // How a simulated participant identifies a shape: Bayes' rule over shapes and orientations of known
-// size and centre, from a few percepts a second, with a fading memory. A mechanistic model that
-// stands in for no one.
+// size and centre, from a few percepts a second, with exponential forgetting. A mechanistic model,
+// not fitted to any person.
 //
 // With v = contact_sd^2 + model_contact_sd^2, k = 1 / (direction_sd^2 + model_direction_sd^2), and
 // for each hypothesis the signed distance d and outward normal n_h (point: at the tip; ray: the
@@ -16,8 +16,8 @@
 //
 // Where the minimum over the stylus lies on a kink inside the object (the perceived stylus cuts
 // through an edge), the distance has no gradient. n_h is then the one element of its
-// subdifferential that is perpendicular to the stylus, which is what makes the place a minimum and
-// is the normal of a contact between stylus and edge.
+// subdifferential that is perpendicular to the stylus: it makes the point a minimum, and is the
+// normal of a contact between stylus and edge.
 
 #include <numbers>
 #include <optional>
@@ -29,15 +29,15 @@
 namespace palpate::runner {
 
 struct ObserverSettings {
-  double contact_sd = 0.003;                                ///< m; of the perceived place
-  double model_contact_sd = 0.003;                          ///< m; slack of the hypotheses
+  double contact_sd = 0.003;                                ///< m; of the perceived position
+  double model_contact_sd = 0.003;                          ///< m; tolerance of the hypotheses
   double direction_sd = 15 * std::numbers::pi / 180;        ///< rad; of the perceived force
-  double model_direction_sd = 12 * std::numbers::pi / 180;  ///< rad; slack of the hypotheses
-  double along_sd = 0.015;                                  ///< m; of the place along the stylus
-  double soft_min_scale = 0.0015;  ///< m; how much deeper a place must be to count for more
-  int places_along = 15;           ///< places along the stylus, both ends included; 2 to 64
-  double torque_floor = 1e-4;      ///< likelihood of a place that does not fit at all
-  double free_space_weight = 0.2;  ///< share of the evidence of a percept without contact
+  double model_direction_sd = 12 * std::numbers::pi / 180;  ///< rad; tolerance of the hypotheses
+  double along_sd = 0.015;         ///< m; of the contact's position along the stylus
+  double soft_min_scale = 0.0015;  ///< m; scale of the soft minimum over depths along the stylus
+  int places_along = 15;           ///< positions along the stylus, both ends included; 2 to 64
+  double torque_floor = 1e-4;      ///< likelihood of a position that does not fit at all
+  double free_space_weight = 0.2;  ///< weight of the evidence of a percept without contact
   double floor = -6;               ///< least log likelihood of one percept
   double beta = 0.25;              ///< weight of a percept
   double memory = 15;              ///< s; time constant of forgetting
@@ -45,26 +45,26 @@ struct ObserverSettings {
   double threshold = 0.95;         ///< posterior of a shape at which the observer responds
 };
 
-/// One glimpse of touch, noise included. Lengths in m, from the object's centre.
+/// One percept, noise included. Lengths in m, from the object's centre.
 struct Percept {
   bool contact = false;
-  bool ray = false;  ///< the whole stylus touches, not only its tip
+  bool ray = false;  ///< the whole stylus can touch, not only its tip
   Vec3 tip;
   Vec3 tail;                    ///< ray only
   Vec3 direction;               ///< unit, of the force: outward normal; contact only
   std::optional<double> along;  ///< m from the tip to the contact, torque over force; ray only
 };
 
-/// Keeps one posterior; any number may share the hypotheses, which must outlive them. The same
-/// percepts give the same bits in every thread and at every optimisation level.
+/// One posterior. Observers may share the hypotheses, which must outlive them. The same percepts
+/// give the same bits in every thread and at every optimisation level.
 class ShapeObserver {
  public:
   /// \throws std::invalid_argument naming every setting that is out of range.
   explicit ShapeObserver(const ShapeHypotheses& hypotheses, const ObserverSettings& settings = {});
 
-  void reset();  ///< Back to the prior: shapes alike, orientations of a shape alike.
+  void reset();  ///< Sets the prior: shapes equal, orientations of a shape equal.
 
-  /// Takes one percept in; call it percept_rate times a second. Allocates nothing.
+  /// Updates the posterior with a percept; call it percept_rate times a second. Does not allocate.
   /// Single precision: posteriors are within 0.001 of double precision.
   void update(const Percept& percept);
 

@@ -1,5 +1,5 @@
 #pragma once
-// Cylinder and cone in the half-plane that their revolution sweeps: branch-free distances.
+// Signed distances of cylinder and cone in the half-plane (radius, height), branch-free.
 
 #include <cmath>
 
@@ -8,7 +8,7 @@
 
 namespace palpate::runner {
 
-/// Distances and normals in the half-plane (radius, height) of a solid of revolution.
+/// A vector in the half-plane of a solid of revolution.
 struct ProfileVec {
   float radial, axial;
 };
@@ -25,7 +25,7 @@ class CylinderProfile {
     const float y = lane::positive(end);
     return std::sqrt(x * x + y * y) + lane::min(lane::max(side, end), 0.0f);
   }
-  /// Along the outward normal, of any positive length.
+  /// Along the outward normal, of arbitrary positive length.
   ProfileVec outward(float radius, float height) const {
     const float side = radius - radius_;
     const float end = std::fabs(height) - half_;
@@ -60,8 +60,8 @@ class ConeProfile {
   ProfileVec outward(float radius, float height) const {
     const Offsets o = offsets(radius, height);
     const bool outside = lane::max(o.side, o.base) > 0.0f;
-    // Outside, the nearer of slant and base, seen from its nearest point. Inside, the nearer of the
-    // two faces; there the parts past their ends are zero.
+    // Outside: from the nearest point of slant or base, whichever is nearer. Inside: the normal of
+    // the nearer face; the offsets past its ends are zero there.
     const float preference = outside ? o.to_base() - o.to_side() : o.side - o.base;
     const float off_side = outside ? o.side : 1.0f;
     const float off_base = outside ? o.base : 1.0f;

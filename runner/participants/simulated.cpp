@@ -41,17 +41,17 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
 }
 
 std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
-  if (sample.phase != Phase::feeling) return std::nullopt;  // rests at home
+  if (sample.phase != Phase::feeling) return std::nullopt;  // rests in the home zone
   const double time = sample.tick * period_;
-  const Felt felt = feel(sample);
-  stylus_.set_target(in_device(explorer_.step(felt, sample.probe)));
+  const TouchState touch = sense_touch(sample);
+  stylus_.set_target(in_device(explorer_.step(touch, sample.probe)));
   if (answer_at_) {
     if (time < *answer_at_) return std::nullopt;
     return Answer{observer_.best(), sample.time_ns};
   }
   if (time >= next_percept_) {
     next_percept_ += 1 / settings_.observer.percept_rate;
-    observer_.update(perceive(sample, felt));
+    observer_.update(perceive(sample, touch));
     if (observer_.decided()) answer_at_ = time + settings_.non_decision;
   }
   return std::nullopt;
@@ -63,45 +63,45 @@ HandTarget SimulatedParticipant::in_device(HandTarget target) const {
   return target;
 }
 
-Felt SimulatedParticipant::feel(const Sample& sample) {
+TouchState SimulatedParticipant::sense_touch(const Sample& sample) {
   const Vec3 stylus = sample.probe.tail - sample.probe.tip;
   force_ += low_pass_ * (sample.device1 + sample.device2 - force_);
   torque_ += low_pass_ * (glm::cross(stylus, sample.device2) - torque_);
-  Felt felt;
+  TouchState touch;
   const double strength = glm::length(force_);
-  felt.contact = strength > settings_.percept.force_threshold;
-  if (!felt.contact) return felt;
-  felt.normal = force_ / strength;
+  touch.contact = strength > settings_.percept.force_threshold;
+  if (!touch.contact) return touch;
+  touch.normal = force_ / strength;
   const double length = glm::length(stylus);
   const Vec3 axis = stylus / length;
   const Vec3 lever = glm::cross(axis, force_);
   const double lever2 = glm::dot(lever, lever);
-  place_known_ = ray_ && lever2 > 0.01 * strength * strength;
-  if (place_known_) felt.along = std::clamp(glm::dot(lever, torque_) / lever2, 0.0, length);
-  felt.surface = sample.probe.tip + felt.along * axis + force_ / wall_stiffness_;
-  return felt;
+  along_known_ = ray_ && lever2 > 0.01 * strength * strength;
+  if (along_known_) touch.along = std::clamp(glm::dot(lever, torque_) / lever2, 0.0, length);
+  touch.surface = sample.probe.tip + touch.along * axis + force_ / wall_stiffness_;
+  return touch;
 }
 
-Percept SimulatedParticipant::perceive(const Sample& sample, const Felt& felt) {
+Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& touch) {
   const auto noise = [this](double sd) {
     return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
   };
   const auto tilted = [&noise](const Vec3& direction, double sd) {
-    const Vec3 e = noise(sd);  // what of it lies along the direction does not turn it
+    const Vec3 e = noise(sd);  // only its part across the direction matters
     return glm::normalize(direction + e - glm::dot(e, direction) * direction);
   };
   Percept percept;
-  percept.contact = felt.contact;
+  percept.contact = touch.contact;
   percept.ray = ray_;
   const Vec3 stylus = sample.probe.tail - sample.probe.tip;
   const double length = glm::length(stylus);
   percept.tip = sample.probe.tip - centre_error_ + noise(settings_.observer.contact_sd);
   percept.tail = percept.tip + length * tilted(stylus / length, settings_.percept.axis_sd);
-  if (felt.contact) {
-    percept.direction = tilted(felt.normal, settings_.observer.direction_sd);
-    if (place_known_) {
+  if (touch.contact) {
+    percept.direction = tilted(touch.normal, settings_.observer.direction_sd);
+    if (along_known_) {
       percept.along =
-          std::clamp(felt.along + settings_.observer.along_sd * random_.normal(), 0.0, length);
+          std::clamp(touch.along + settings_.observer.along_sd * random_.normal(), 0.0, length);
     }
   }
   return percept;

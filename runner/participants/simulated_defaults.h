@@ -2,7 +2,7 @@
 
 namespace palpate::runner {
 
-/// The frozen settings file, embedded by the build.
+/// The settings file, embedded by the build.
 extern const char* const kSimulatedDefaults;
 
 }  // namespace palpate::runner

@@ -16,22 +16,22 @@ namespace {
 
 using nlohmann::json;
 
-/// Every key of the patch must stand in the defaults, and be a number there.
+/// Every key of the patch must exist in the defaults and be a number there.
 void check_patch(const json& patch, const json& defaults, const std::string& file,
-                 const std::string& place, std::vector<protocols::Fault>& faults) {
+                 const std::string& pointer, std::vector<protocols::Fault>& faults) {
   if (!patch.is_object()) {
-    faults.push_back({file, place, "an object was expected"});
+    faults.push_back({file, pointer, "must be an object"});
     return;
   }
   for (const auto& [key, value] : patch.items()) {
-    const std::string here = std::string(place).append("/").append(key);
+    const std::string here = std::string(pointer).append("/").append(key);
     if (!defaults.contains(key)) {
       faults.push_back({file, here, "no such setting"});
     } else if (defaults[key].is_object()) {
       check_patch(value, defaults[key], file, here, faults);
     } else if (defaults[key].is_number() &&
                !(value.is_number() && std::isfinite(value.get<double>()))) {
-      faults.push_back({file, here, "a number was expected"});
+      faults.push_back({file, here, "must be a number"});
     } else if (key == "version") {
       faults.push_back({file, here, "a patch cannot change the version"});
     }

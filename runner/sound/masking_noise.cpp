@@ -10,13 +10,13 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kPiece = 0.02;  // s, written at a time
+constexpr double kBlock = 0.02;  // s, length of a block
 
-// An output without a clock of its own (a file) takes everything at once: it gets no more than a
-// little ahead. A sound card's clock, which may differ by much less, keeps its own pace.
-constexpr double kAhead = 0.9;
+// Pacing for outputs without a clock (a file), which accept everything at once: a block per 0.9 of
+// its duration. A sound card is slower than that and sets the pace itself.
+constexpr double kPace = 0.9;
 
-/// Adds a tone to what is played, from the moment at which it is asked for.
+/// Adds a tone to the samples after begin().
 class Tone {
  public:
   Tone(double level_db, double rate)
@@ -47,7 +47,7 @@ NoisePlayer::NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t see
 }
 
 NoisePlayer::~NoisePlayer() {
-  asked_ = false;
+  on_ = false;
   quit_ = true;
 }
 
@@ -63,13 +63,13 @@ void NoisePlayer::turn_on() {
     trouble_.clear();
     start();
   }
-  if (asked_) return;
+  if (on_) return;
   frames_before_ = frames_;
   underruns_before_ = underruns_;
-  asked_ = true;
+  on_ = true;
 }
 
-void NoisePlayer::turn_off() { asked_ = false; }
+void NoisePlayer::turn_off() { on_ = false; }
 
 NoiseReport NoisePlayer::report() const {
   return {static_cast<double>(frames_ - frames_before_) / output_->rate(),
@@ -81,14 +81,14 @@ void NoisePlayer::play() noexcept {
   const double rate = output_->rate();
   NoiseSignal signal(noise_, rate, seed_);
   Tone tone(noise_.level_db, rate);
-  std::vector<double> samples(static_cast<std::size_t>(kPiece * rate));
+  std::vector<double> samples(static_cast<std::size_t>(kBlock * rate));
   std::vector<std::int16_t> frames(2 * samples.size());
   const auto pace =
-      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kAhead * kPiece));
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kPace * kBlock));
   Clock::time_point due = Clock::now();
   try {
     while (!quit_ || !signal.silent()) {
-      signal.sound(asked_);
+      signal.turn(on_);
       const bool heard = !signal.silent();
       signal.fill(samples);
       if (const unsigned asked = tones_; asked != tones_begun_) {
@@ -100,10 +100,10 @@ void NoisePlayer::play() noexcept {
         frames[2 * i] = frames[2 * i + 1] =
             static_cast<std::int16_t>(std::lround(32767 * std::clamp(samples[i], -1.0, 1.0)));
       }
-      const int ran_dry = output_->write(frames);
+      const int underruns = output_->write(frames);
       if (heard) {
         frames_ += samples.size();
-        underruns_ += ran_dry;
+        underruns_ += underruns;
       }
       latency_ = output_->latency();
       due = std::max(due + pace, Clock::now());
@@ -111,7 +111,7 @@ void NoisePlayer::play() noexcept {
     }
   } catch (const std::exception& error) {
     trouble_ = error.what();
-    asked_ = false;
+    on_ = false;
     failed_ = true;
   }
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Masking noise in the participant's headphones, so that motors and gears tell nothing.
+// Masking noise in the participant's headphones, which covers the sound of the device's motors.
 
 #include <atomic>
 #include <cstdint>
@@ -13,20 +13,21 @@
 
 namespace palpate::runner {
 
-/// What was heard since it was last turned on.
+/// What was played since the noise was last turned on.
 struct NoiseReport {
-  double seconds = 0;   ///< of noise, fades included
-  int underruns = 0;    ///< gaps
-  std::string trouble;  ///< why it stopped by itself; empty: it did not
+  double seconds = 0;   ///< of noise, including the fades
+  int underruns = 0;    ///< gaps in the output
+  std::string trouble;  ///< why it failed; empty: it did not
 };
 
-/// Plays in a thread of its own, which nothing of the session or the servo waits for: silence while
-/// it is off, so that a device never clicks. Its functions are called from one thread.
+/// Plays in a thread of its own, for which neither session nor servo wait. Plays silence while off,
+/// so that a sound card does not click. To be used by one thread.
 class NoisePlayer {
  public:
   using Opener = std::function<std::unique_ptr<SoundOutput>(const std::string& device)>;
 
-  /// Opens the output and plays silence. \param open  also after it failed: headphones were pulled
+  /// Opens the output and plays silence. \param open  called again after a failure (unplugged
+  /// headphones).
   /// \throws SoundError
   NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed, const std::string& device,
               Opener open = open_sound);
@@ -35,21 +36,21 @@ class NoisePlayer {
   NoisePlayer(const NoisePlayer&) = delete;
   NoisePlayer& operator=(const NoisePlayer&) = delete;
 
-  /// Fades in; returns at once. Where the output has failed it is opened again. \throws SoundError
+  /// Fades in; returns at once. Reopens an output that has failed. \throws SoundError
   void turn_on();
   /// Fades out; returns at once.
   void turn_off();
-  /// "Go": a short tone as loud as the noise, heard latency() later; returns at once.
+  /// A short tone as loud as the noise, heard latency() later; returns at once.
   void tone() { tones_.fetch_add(1); }
-  bool on() const { return asked_.load(); }
-  /// The output has failed since it was turned on.
+  bool on() const { return on_.load(); }
+  /// The output has failed since turn_on().
   bool failed() const { return failed_.load(); }
   NoiseReport report() const;  ///< also after turn_off, until the next turn_on
   const protocols::MaskingNoise& noise() const { return noise_; }
   std::uint64_t seed() const { return seed_; }
   const std::string& device() const { return device_; }
   double rate() const { return output_->rate(); }     ///< Hz
-  double latency() const { return latency_.load(); }  ///< s, until what changes now is heard
+  double latency() const { return latency_.load(); }  ///< s, until a change is heard
 
  private:
   void start();
@@ -59,20 +60,21 @@ class NoisePlayer {
   const std::uint64_t seed_;
   const std::string device_;
   const Opener open_;
-  std::unique_ptr<SoundOutput> output_;  ///< the thread's
+  std::unique_ptr<SoundOutput> output_;  ///< used by the thread
   std::string trouble_;                  ///< written before failed_
-  std::atomic<bool> asked_{false}, failed_{false}, quit_{false};
+  std::atomic<bool> on_{false}, failed_{false}, quit_{false};
   std::atomic<std::uint64_t> frames_{0};  ///< of noise
-  std::atomic<unsigned> tones_{0};        ///< asked for
-  std::atomic<int> underruns_{0};         ///< while it sounded
+  std::atomic<unsigned> tones_{0};        ///< requested
+  std::atomic<int> underruns_{0};         ///< while on
   std::atomic<double> latency_{0};
-  unsigned tones_begun_ = 0;  ///< the thread's
+  unsigned tones_begun_ = 0;  ///< used by the thread
   std::uint64_t frames_before_ = 0;
   int underruns_before_ = 0;
   std::jthread thread_;
 };
 
-/// Events for the session's record, one line of JSON each: what is turned on, and what was heard.
+/// Events for the session's record, as a line of JSON: the settings when turned on, the report
+/// after.
 std::string to_json_text(const NoisePlayer& player);
 std::string to_json_text(const NoiseReport& report);
 

@@ -18,13 +18,13 @@ double in_z_plane(double frequency, double rate) { return std::exp(-2 * kPi * fr
 NoiseSignal::NoiseSignal(const protocols::MaskingNoise& noise, double rate, std::uint64_t seed)
     : random_(seed), fade_step_(1 / (kNoiseFade * rate)) {
   if (noise.kind == protocols::NoiseKind::pink) {
-    // Half of each octave falls by 6 dB, which makes 3 dB an octave with less than 0.05 dB of
-    // ripple; sampling adds half a decibel at a quarter of the rate.
+    // Pole and zero half an octave apart: -6 dB an octave for half of each octave, -3 dB an octave
+    // on average with less than 0.05 dB of ripple; sampling adds 0.5 dB at a quarter of the rate.
     for (double pole = kLowest; pole < rate / 2; pole *= 2) {
       slopes_.push_back({in_z_plane(pole, rate), in_z_plane(pole * std::sqrt(2.0), rate)});
     }
   }
-  double power = 0;  // that the filter gives to each unit of power, from its impulse response
+  double power = 0;  // gain of the filter in power, from its impulse response
   const auto length = static_cast<int>(kLongEnough * rate);
   for (int i = 0; i < length; ++i) {
     const double response = filtered(i == 0 ? 1 : 0);
@@ -45,8 +45,8 @@ double NoiseSignal::filtered(double value) {
 
 void NoiseSignal::fill(std::span<double> samples) {
   for (double& sample : samples) {
-    loudness_ = std::clamp(loudness_ + (on_ ? fade_step_ : -fade_step_), 0.0, 1.0);
-    const double level = 0.5 - 0.5 * std::cos(kPi * loudness_);
+    fade_ = std::clamp(fade_ + (on_ ? fade_step_ : -fade_step_), 0.0, 1.0);
+    const double level = 0.5 - 0.5 * std::cos(kPi * fade_);
     sample = std::clamp(level * gain_ * filtered(2 * random_.unit() - 1), -1.0, 1.0);
   }
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Masking noise as numbers: what goes to the headphones, without a sound card.
+// The signal of the masking noise, independent of the sound output.
 
 #include <cstdint>
 #include <span>
@@ -12,17 +12,17 @@ namespace palpate::runner {
 
 inline constexpr double kNoiseFade = 0.2;  ///< s, from silence to the full level and back
 
-/// Same settings and seed, same samples (up to the rounding of exp on the machine). A raised cosine
-/// takes the level up and down, from wherever it is.
+/// Deterministic from settings and seed (up to the rounding of exp). Fades are raised cosines and
+/// may be reversed at any time.
 class NoiseSignal {
  public:
   /// \param rate  Hz
   NoiseSignal(const protocols::MaskingNoise& noise, double rate, std::uint64_t seed);
 
-  void sound(bool on) { on_ = on; }
-  /// Faded out to the last sample.
-  bool silent() const { return !on_ && loudness_ == 0; }
-  /// The next samples, 1 for full scale.
+  void turn(bool on) { on_ = on; }
+  /// Completely faded out.
+  bool silent() const { return !on_ && fade_ == 0; }
+  /// Fills in the next samples; full scale is 1.
   void fill(std::span<double> samples);
 
  private:
@@ -38,7 +38,7 @@ class NoiseSignal {
   double gain_ = 1;
   double fade_step_;
   bool on_ = false;
-  double loudness_ = 0;  ///< 0 to 1, before it is rounded off to a cosine
+  double fade_ = 0;  ///< 0 to 1, phase of the raised cosine
 };
 
 }  // namespace palpate::runner

@@ -10,7 +10,7 @@ namespace {
 
 constexpr unsigned kRate = 48000;         // Hz
 constexpr unsigned kChannels = 2;         // the same on both ears
-constexpr unsigned kBuffer_us = 200'000;  // what a busy machine may keep the player waiting for
+constexpr unsigned kBuffer_us = 200'000;  // longest delay of the player's thread without a gap
 
 SoundError no_sound(const std::string& device, const std::string& what) {
   return SoundError("no sound from '" + device + "': " + what +
@@ -18,13 +18,13 @@ SoundError no_sound(const std::string& device, const std::string& what) {
                     "there is); --without-noise runs the session without the masking noise");
 }
 
-/// What it would print is in the error that is thrown.
-void stay_quiet(const char*, int, const char*, int, const char*, ...) {}
+/// Silences ALSA's messages: the SoundError has the reason.
+void ignore_message(const char*, int, const char*, int, const char*, ...) {}
 
 class AlsaOutput final : public SoundOutput {
  public:
   explicit AlsaOutput(const std::string& device) : device_(device) {
-    snd_lib_error_set_handler(&stay_quiet);
+    snd_lib_error_set_handler(&ignore_message);
     check(snd_pcm_open(&pcm_, device.c_str(), SND_PCM_STREAM_PLAYBACK, 0));
     const int error = snd_pcm_set_params(pcm_, SND_PCM_FORMAT_S16, SND_PCM_ACCESS_RW_INTERLEAVED,
                                          kChannels, kRate, 1, kBuffer_us);
@@ -36,25 +36,25 @@ class AlsaOutput final : public SoundOutput {
   AlsaOutput(const AlsaOutput&) = delete;
   AlsaOutput& operator=(const AlsaOutput&) = delete;
   ~AlsaOutput() override {
-    snd_pcm_drain(pcm_);  // the end of a fade is in it
+    snd_pcm_drain(pcm_);  // plays the end of a fade
     snd_pcm_close(pcm_);
   }
 
   double rate() const override { return kRate; }
 
   int write(std::span<const std::int16_t> samples) override {
-    int ran_dry = 0;
+    int underruns = 0;
     while (!samples.empty()) {
       const snd_pcm_sframes_t written =
           snd_pcm_writei(pcm_, samples.data(), samples.size() / kChannels);
       if (written < 0) {
-        if (written == -EPIPE) ++ran_dry;
+        if (written == -EPIPE) ++underruns;
         check(snd_pcm_recover(pcm_, static_cast<int>(written), 1));
         continue;
       }
       samples = samples.subspan(static_cast<std::size_t>(written) * kChannels);
     }
-    return ran_dry;
+    return underruns;
   }
 
   double latency() override {

@@ -1,5 +1,5 @@
 #pragma once
-// Where sound goes: a sound card through ALSA, or what a test puts in its place.
+// The interface of a sound output: ALSA, or a substitute in tests.
 
 #include <cstdint>
 #include <memory>
@@ -9,20 +9,20 @@
 
 namespace palpate::runner {
 
-/// No sound can be had; what() says from where, why, and what to do.
+/// No sound output; what() names the device, why, and what to do.
 class SoundError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 class SoundOutput {
  public:
-  /// Plays what it still has.
+  /// Plays what is still in its buffer.
   virtual ~SoundOutput() = default;
   virtual double rate() const = 0;  ///< Hz
-  /// Waits until there is room. \param samples  left and right in turn, full scale 32767
-  /// \return how often it had run dry before. \throws SoundError: it plays no more
+  /// Waits until the buffer has space. \param samples  left and right interleaved, full scale 32767
+  /// \return the number of underruns since the last call. \throws SoundError: the output has failed
   virtual int write(std::span<const std::int16_t> samples) = 0;
-  /// s, until what is written now is heard
+  /// s, until samples written now are heard
   virtual double latency() = 0;
 };
 

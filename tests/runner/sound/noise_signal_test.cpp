@@ -16,7 +16,7 @@ constexpr double kPi = 3.14159265358979323846;
 std::vector<double> noise(protocols::NoiseKind kind, double level, double seconds,
                           std::uint64_t seed = 3) {
   NoiseSignal signal({kind, level}, kRate, seed);
-  signal.sound(true);
+  signal.turn(true);
   std::vector<double> samples(static_cast<std::size_t>((seconds + kNoiseFade) * kRate));
   signal.fill(samples);
   samples.erase(samples.begin(), samples.begin() + static_cast<int>(kNoiseFade * kRate));
@@ -98,14 +98,14 @@ TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
     EXPECT_TRUE(signal.silent());
     signal.fill(before);
     EXPECT_EQ(largest(before), 0);
-    signal.sound(true);
+    signal.turn(true);
     signal.fill(rise);
     EXPECT_FALSE(signal.silent());
     EXPECT_GT(largest(rise), 0);
     // A twentieth of a raised cosine's way up is 0.6 % of its height.
     EXPECT_LT(largest(std::span(rise).first(480)), 0.01);
     signal.fill(steady);
-    signal.sound(false);
+    signal.turn(false);
     signal.fill(fall);
     EXPECT_TRUE(signal.silent());
     const auto faded = static_cast<std::size_t>(kNoiseFade * kRate);
@@ -120,11 +120,11 @@ TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
 TEST(NoiseSignal, TurnedOnInMidFadeItGoesUpFromThere) {
   NoiseSignal signal({protocols::NoiseKind::white, -20}, kRate, 5);
   std::vector<double> first(9600), half(4800), last(9600);
-  signal.sound(true);
+  signal.turn(true);
   signal.fill(first);
-  signal.sound(false);
+  signal.turn(false);
   signal.fill(half);
-  signal.sound(true);
+  signal.turn(true);
   signal.fill(last);
   const auto start = std::span(last).first(480);
   EXPECT_NEAR(largest(start) / largest(first), 0.5, 0.1);

@@ -85,7 +85,7 @@ TEST(FalconBoot, UploadsTheImageToABareDevice) {
   EXPECT_EQ(bench.emulator.image(), bench.image.bytes);
   EXPECT_EQ(bench.emulator.uploads(), 1);
   EXPECT_EQ(bench.emulator.latency_ms(), 1);
-  EXPECT_EQ(bench.reports.back().stage, BootProgress::Stage::running);
+  EXPECT_EQ(bench.reports.back().step, BootProgress::Step::running);
   EXPECT_EQ(bench.reports.back().attempt, 1);
   EXPECT_EQ(bench.emulator.largest_count(), 0);
 }
@@ -103,7 +103,7 @@ TEST(FalconBoot, ReportsProgressInBytes) {
   bench.run(&bench.image);
   std::size_t sent = 0;
   for (const BootProgress& report : bench.reports) {
-    if (report.stage != BootProgress::Stage::uploading) continue;
+    if (report.step != BootProgress::Step::uploading) continue;
     EXPECT_GT(report.sent, sent);
     EXPECT_EQ(report.size, bench.image.bytes.size());
     sent = report.sent;
