@@ -4,7 +4,7 @@
 
 namespace palpate::runner {
 
-/// Compiler and flags, for the record: "g++ 12.2.0, Release, -march=native".
+/// Compiler and build type for the record: "g++ 12.2.0, Release".
 inline std::string build_description() {
 #if defined(__clang__)
   const std::string compiler = "clang " __clang_version__;

@@ -1,9 +1,10 @@
-// palpate: show a shape to a hand, time the answer, know what may be concluded.
+// palpate: a psychophysics experiment runner for touch. The table of its commands.
 // From here to a force in a live session:
-//   commands/run/run.cpp          opens the station (session/station.h): record, device, servo,
-//   displays session/live_session.cpp      experimenter's commands, pauses and faults around the
-//   trials session/session.cpp           the trial loop, the same for simulated participants
-//   servo/servo_thread.cpp        the servo loop's thread
+//
+//   commands/run/run.cpp          opens the station (session/station.h): record, device, displays
+//   session/live_session.cpp      the experimenter's commands, pauses and faults around the trials
+//   session/session.cpp           the trial loop, the same for simulated participants
+//   servo/servo_thread.cpp        the thread of the servo loop
 //   servo/servo.cpp               one tick: read the device, render, limit, command
 //   rendering/renderer.cpp        point or ray; rendering/tick.h, rendering/facet_walk.cpp
 
@@ -35,16 +36,16 @@ constexpr Command kCommands[] = {
      palpate::runner::accuracy_command},
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
      palpate::runner::analyze_command},
-    {"bench", "what a tick of the renderers costs on this machine", palpate::runner::bench_command},
-    {"devices", "what is connected, its limits; whether this machine keeps time; calibration",
+    {"bench", "run time of the renderers' ticks on this machine", palpate::runner::bench_command},
+    {"devices", "connected devices and their limits; timing of this machine; calibration",
      palpate::runner::devices_command},
-    {"export", "the trials of a database as files for others", palpate::runner::export_command},
+    {"export", "a database's trials as CSV, BIDS or Psych-DS", palpate::runner::export_command},
     {"forget", "remove a participant who has withdrawn", palpate::runner::forget_command},
-    {"merge", "stations' databases into one", palpate::runner::merge_command},
+    {"merge", "merge the databases of several stations", palpate::runner::merge_command},
     {"plan", "how many participants and trials find a wanted effect",
      palpate::runner::plan_command},
     {"render", "forces along a recorded path, offline", palpate::runner::render_command},
-    {"replay", "a stored trial through a renderer again", palpate::runner::replay_command},
+    {"replay", "render a stored trial again", palpate::runner::replay_command},
     {"run", "a live session with a person and a device", palpate::runner::run_command},
     {"schedule", "the order of trials that a participant will get",
      palpate::runner::schedule_command},
@@ -68,12 +69,12 @@ void print_help(std::ostream& out) {
          "version.\nExit status: 0 done, 1 failed while running, 2 wrong usage or bad input.\n";
 }
 
-/// Where standard input, output or error came closed, the next file that is opened would take its
-/// place, and messages would go into it.
-void hold_standard_places() {
-  int place = 0;
-  while (place >= 0 && place <= STDERR_FILENO) place = ::open("/dev/null", O_RDONLY);
-  if (place > STDERR_FILENO) ::close(place);
+/// If standard input, output or error is closed, the next file to be opened would get its
+/// descriptor, and messages would be written into it.
+void occupy_standard_descriptors() {
+  int descriptor = 0;
+  while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = ::open("/dev/null", O_RDONLY);
+  if (descriptor > STDERR_FILENO) ::close(descriptor);
 }
 
 int run(int argc, char** argv) {
@@ -99,7 +100,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  hold_standard_places();
+  occupy_standard_descriptors();
   try {
     const int status = run(argc, argv);
     std::cout.flush();

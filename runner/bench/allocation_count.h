@@ -1,11 +1,12 @@
 #pragma once
+// Counts heap allocations, to show that a tick makes none.
 
 #include <cstdint>
 
 namespace palpate::runner {
 
-/// Heap allocations of this thread so far. Counted by a replaced operator new; without it (under
-/// sanitizers, which bring their own) always 0.
+/// Heap allocations of this thread so far, counted by a replaced operator new. Always 0 under
+/// sanitizers, which have their own.
 std::uint64_t allocations();
 
 /// Whether allocations() counts.

@@ -16,14 +16,14 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kRadius = 0.03;    // m
-constexpr double kLength = 0.12;    // m, of the stylus
-constexpr double kSpeed = 0.1;      // m/s, of the tip
-constexpr double kAtRest = 0.2;     // s, outside, before it is led
-constexpr double kHomeRest = 0.02;  // s, that the servo waits for
-constexpr double kFitShare = 2e-4;  // of ticks late by a period: one in five seconds at 1 kHz
-constexpr double kLosses = 2e-3;    // more than that is felt as a buzz
-constexpr int kTripping = 5;        // missed ticks in a row that cut the forces off
+constexpr double kRadius = 0.03;      // m
+constexpr double kLength = 0.12;      // m, of the stylus
+constexpr double kSpeed = 0.1;        // m/s, of the tip
+constexpr double kAtRest = 0.2;       // s, outside of the sphere at first
+constexpr double kHomeRest = 0.02;    // s of rest that the servo requires
+constexpr double kMaxLateFit = 2e-4;  // of ticks late by a period: one in five seconds at 1 kHz
+constexpr double kMaxLateWithLosses = 2e-3;  // the same; more can be felt
+constexpr int kTrippingRun = 5;              // missed ticks in a row that cut the forces off
 
 std::int64_t thread_time_ns() noexcept {
   timespec time{};
@@ -31,10 +31,10 @@ std::int64_t thread_time_ns() noexcept {
   return time.tv_sec * 1'000'000'000LL + time.tv_nsec;
 }
 
-/// Rests outside of the sphere, then is led over it, 1.5 mm deep, turning as it goes.
-class LedStylus final : public Device {
+/// Rests outside of the sphere, then follows a path over it, 1.5 mm deep, turning on the way.
+class ScriptedStylus final : public Device {
  public:
-  explicit LedStylus(double rate) : rate_(rate) {
+  explicit ScriptedStylus(double rate) : rate_(rate) {
     capabilities_.name = "led";
     capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
     capabilities_.max_force = 8.5;
@@ -54,7 +54,7 @@ class LedStylus final : public Device {
 
  private:
   DeviceReading at(const Vec3& tip, double angle) const noexcept {
-    // From pointing away from the sphere to lying along it.
+    // The axis swings between the surface normal and the tangent.
     const Vec3 out = tip / std::sqrt(tip.x * tip.x + tip.y * tip.y + tip.z * tip.z);
     const double lean = 1.2 * std::sin(0.7 * angle) * std::sin(0.7 * angle);
     const Vec3 side(-out.y, out.x, 0);
@@ -68,10 +68,10 @@ class LedStylus final : public Device {
   DeviceCapabilities capabilities_;
 };
 
-/// Notes the servo thread's own time about the transfers of the device it stands for.
+/// Wraps a device and records the servo thread's CPU time before and after its transfers.
 class MeteredDevice final : public Device {
  public:
-  /// \param skip  ticks that are not noted; \param ticks  that are
+  /// \param skip  ticks not recorded at first; \param ticks  recorded after that
   MeteredDevice(Device& device, std::size_t skip, std::size_t ticks)
       : device_(device), skip_(skip) {
     compute_.reserve(ticks);
@@ -99,10 +99,10 @@ class MeteredDevice final : public Device {
     written_ = thread_time_ns();
     if (asking_.size() < asking_.capacity()) asking_.push_back(written_ - asked);
   }
-  /// Between two questions for the time with nothing between them.
+  /// CPU time of a query of the CPU clock.
   const std::vector<std::int64_t>& asking() const { return asking_; }
   const std::vector<std::int64_t>& compute() const { return compute_; }
-  /// From one command to the next reading and from that to its command.
+  /// CPU time from one command to the next, without the device's transfers.
   const std::vector<std::int64_t>& whole() const { return tick_; }
 
  private:
@@ -124,10 +124,10 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
   return values;
 }
 
-/// One long trial; what came of each tick with forces on.
-void feel(ServoThread& servo, double rate, std::size_t wanted, const std::function<bool()>& wait,
-          ServoTiming& out, std::vector<std::int64_t>& compute,
-          std::vector<std::int64_t>& warm_up) {
+/// One long trial; records every tick with forces on.
+void run_trial(ServoThread& servo, double rate, std::size_t wanted,
+               const std::function<bool()>& wait, ServoTiming& out,
+               std::vector<std::int64_t>& compute, std::vector<std::int64_t>& warm_up) {
   const rendering::Scene scene(
       {{std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, 3)), Pose{},
         stimuli::Material{}, 0, nullptr}});
@@ -166,14 +166,14 @@ void feel(ServoThread& servo, double rate, std::size_t wanted, const std::functi
 ServoTiming measure_servo(const TimingSettings& settings, const std::function<bool()>& wait) {
   const double rate = settings.rate;
   const auto wanted = static_cast<std::size_t>(std::llround(settings.seconds * rate));
-  LedStylus own(rate);
+  ScriptedStylus own(rate);
   std::unique_ptr<GuardedDevice> guarded;
   if (settings.guarded) {
     GuardSettings guard;
     guard.rate = rate;
     guard.priority = settings.realtime.priority > 0 ? settings.realtime.priority + 5 : 0;
-    guarded = std::make_unique<GuardedDevice>([rate] { return std::make_unique<LedStylus>(rate); },
-                                              guard);
+    guarded = std::make_unique<GuardedDevice>(
+        [rate] { return std::make_unique<ScriptedStylus>(rate); }, guard);
   }
   MeteredDevice device(guarded ? static_cast<Device&>(*guarded) : own,
                        static_cast<std::size_t>(kAtRest * rate), wanted);
@@ -190,7 +190,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   {
     ServoThread servo(device, clock, servo_settings);
     out.rights = servo.rights();
-    feel(servo, rate, wanted, wait, out, by_clock, warm_up);
+    run_trial(servo, rate, wanted, wait, out, by_clock, warm_up);
   }
   std::sort(out.lateness.begin(), out.lateness.end());
   out.ticks = out.lateness.size();
@@ -201,7 +201,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
   const auto late =
       out.lateness.end() - std::upper_bound(out.lateness.begin(), out.lateness.end(), period_ns);
-  if (out.ticks > 0) out.late_share = static_cast<double>(late) / static_cast<double>(out.ticks);
+  if (out.ticks > 0) out.late_fraction = static_cast<double>(late) / static_cast<double>(out.ticks);
   const auto compute = sorted(device.compute()), whole = sorted(device.whole());
   out.asking_median = quantile(sorted(device.asking()), 0.5);
   by_clock = sorted(std::move(by_clock));
@@ -222,9 +222,9 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
 }
 
 ServoTiming::Verdict ServoTiming::verdict() const {
-  if (ticks == 0 || trips > 0 || worst_run >= kTripping || late_share > kLosses)
+  if (ticks == 0 || trips > 0 || worst_run >= kTrippingRun || late_fraction > kMaxLateWithLosses)
     return Verdict::unfit;
-  return late_share > kFitShare ? Verdict::fit_with_losses : Verdict::fit;
+  return late_fraction > kMaxLateFit ? Verdict::fit_with_losses : Verdict::fit;
 }
 
 std::string ServoTiming::sentence() const {
@@ -234,10 +234,10 @@ std::string ServoTiming::sentence() const {
   std::snprintf(
       text, sizeof text,
       "This machine is %s for the experiment at %g Hz: of %llu ticks %llu were missed, at "
-      "most %d in a row (%d cut the forces off, which happened %llu times), and 99.9 %% "
-      "began within %.0f us of their time.",
+      "most %d in a row (%d in a row cut the forces off, which happened %llu times), and 99.9 %% "
+      "began at most %.0f us late.",
       words[static_cast<int>(verdict())], rate, static_cast<unsigned long long>(ticks),
-      static_cast<unsigned long long>(missed_ticks), worst_run, kTripping,
+      static_cast<unsigned long long>(missed_ticks), worst_run, kTrippingRun,
       static_cast<unsigned long long>(trips), static_cast<double>(lateness_p999) / 1000);
   return text + (rights.missing.empty() ? "" : " " + rights.missing);
 }

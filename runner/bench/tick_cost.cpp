@@ -36,7 +36,7 @@ class Timer {
     empty_ns_ = at(empty, 0.5);
   }
 
-  /// Runs one tick; what it took is kept when `state` is the wanted one.
+  /// Runs one tick; its time is recorded if its state of contact is the wanted one.
   rendering::Rendering tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
                             rendering::RenderState& state, const rendering::LineProbe& probe,
                             bool touching_wanted) {
@@ -51,7 +51,7 @@ class Timer {
 
   std::size_t ticks() const { return counts_.size(); }
 
-  /// The row so far; the next one starts from nothing.
+  /// The statistics of the row; starts a new one.
   TickCost take() {
     TickCost cost;
     cost.ticks = counts_.size();
@@ -68,8 +68,8 @@ class Timer {
   }
 
  private:
-  double at(std::vector<std::uint64_t>& counts, double share) const {
-    const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(counts.size() - 1));
+  double at(std::vector<std::uint64_t>& counts, double quantile) const {
+    const auto k = static_cast<std::ptrdiff_t>(quantile * static_cast<double>(counts.size() - 1));
     std::nth_element(counts.begin(), counts.begin() + k, counts.end());
     return static_cast<double>(counts[static_cast<std::size_t>(k)]) * ns_;
   }
@@ -79,15 +79,15 @@ class Timer {
   std::size_t allocations_ = 0;
 };
 
-/// A seeded path over a solid about the origin, 0.1 mm a tick at 30 mm. For the point the tip
-/// slides; for the ray the contact wanders between the tip and 40 mm along the side.
-class Hand {
+/// A random (seeded) path over a solid about the origin, 0.1 mm a tick. With the point renderer the
+/// tip slides; with the ray the contact moves between the tip and 40 mm along the side.
+class ScriptedHand {
  public:
-  Hand(const rendering::Renderer& renderer, bool touching)
+  ScriptedHand(const rendering::Renderer& renderer, bool touching)
       : side_contact_(renderer.side_contact()), sign_(touching ? 1 : -1) {}
 
-  /// How far out the path runs follows what was felt, so that it keeps to the surface on any mesh:
-  /// `depth` m deep (the last tick's; 0 in free space).
+  /// The next pose. The radius is controlled by the last tick's `depth` (m; 0 in free space), so
+  /// that the path follows the surface of any mesh.
   rendering::LineProbe next(double depth) {
     const double turn = 0.02 * random_.normal();
     heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(normal_, heading_);
@@ -121,21 +121,21 @@ struct Bench {
   double target_ns;        ///< in contact
 };
 
-/// m; how deep the tip or side is by the sphere about it, negative outside: to hover by.
+/// m; depth of tip or side below the bounding sphere, negative outside.
 double depth_below(const rendering::Scene& scene, const rendering::LineProbe& probe) {
   double gap = HUGE_VAL;
   const rendering::ScenePart& part = scene.parts()[0];
   const Vec3 d = probe.tail - probe.tip;
-  const double place =
+  const double fraction =
       std::clamp(glm::dot(part.sphere_centre - probe.tip, d) / glm::dot(d, d), 0.0, 1.0);
-  gap = glm::length(probe.tip + place * d - part.sphere_centre) - part.sphere_radius;
+  gap = glm::length(probe.tip + fraction * d - part.sphere_centre) - part.sphere_radius;
   return -gap;
 }
 
-TickCost touching(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
-                  std::size_t ticks) {
+TickCost time_contact(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+                      std::size_t ticks) {
   rendering::RenderState state = bench.scene.initial_state();
-  Hand hand(renderer, true);
+  ScriptedHand hand(renderer, true);
   double depth = 0;
   for (int i = 0; i < kWarm; ++i)
     depth = renderer.tick(bench.scene, state, hand.next(depth), kTick).deepest.depth;
@@ -144,10 +144,10 @@ TickCost touching(Timer& timer, const rendering::Renderer& renderer, const Bench
   return timer.take();
 }
 
-TickCost hovering(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
-                  std::size_t ticks) {
+TickCost time_free_space(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+                         std::size_t ticks) {
   rendering::RenderState state = bench.scene.initial_state();
-  Hand hand(renderer, false);
+  ScriptedHand hand(renderer, false);
   double depth = -kRadius;
   for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i) {
     const rendering::LineProbe probe = hand.next(depth);
@@ -161,15 +161,15 @@ TickCost hovering(Timer& timer, const rendering::Renderer& renderer, const Bench
   return timer.take();
 }
 
-/// From a random side and 10 mm off, drifting a little along the surface; every second ray with its
-/// side first.
-TickCost meeting(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
-                 std::size_t approaches) {
+/// From a random direction and 10 mm away, drifting along the surface; with the ray every second
+/// time the side first.
+TickCost time_first_contact(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+                            std::size_t approaches) {
   stimuli::Random random(2);
   const auto any = [&] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };
-  // Some pass by.
+  // Some approaches miss.
   for (std::size_t i = 0; i < 4 * approaches && timer.ticks() < approaches; ++i) {
     rendering::RenderState state = bench.scene.initial_state();
     const Vec3 out = any(), level = glm::normalize(glm::cross(out, any()));
@@ -204,7 +204,7 @@ rendering::Scene thousand(const std::shared_ptr<const stimuli::ConvexMesh>& mesh
     object.mesh = mesh;
     object.trees = trees;
     object.object = i;
-    const int k = (i + 555) % 1000;  // the first is in the midst
+    const int k = (i + 555) % 1000;  // puts the first in the middle
     object.pose.position = 0.3 * Vec3(k % 10 - 5, k / 10 % 10 - 5, k / 100 - 5);
     objects.push_back(std::move(object));
   }
@@ -249,10 +249,11 @@ std::vector<TickCost> measure_tick_costs(
         rows.push_back(std::move(cost));
         if (done) done(rows.size(), 6 * all.size());
       };
-      keep(touching(timer, *renderer, bench, settings.ticks), "contact", bench.target_ns);
-      keep(hovering(timer, *renderer, bench, settings.ticks), "free",
+      keep(time_contact(timer, *renderer, bench, settings.ticks), "contact", bench.target_ns);
+      keep(time_free_space(timer, *renderer, bench, settings.ticks), "free",
            std::max(kFreeTarget, bench.target_ns));
-      keep(meeting(timer, *renderer, bench, settings.approaches), "first_contact", kFirstTarget);
+      keep(time_first_contact(timer, *renderer, bench, settings.approaches), "first_contact",
+           kFirstTarget);
     }
   }
   return rows;

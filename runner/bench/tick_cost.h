@@ -1,5 +1,5 @@
 #pragma once
-// What a tick of a renderer costs on this machine.
+// Measures the run time of a renderer's tick on this machine.
 
 #include <cstddef>
 #include <functional>
@@ -8,8 +8,8 @@
 
 namespace palpate::runner {
 
-/// One row: a scene, a renderer and a state of touch. Every tick is timed alone; the cost of
-/// reading the time is in all figures and stands beside as `empty_loop_ns`.
+/// One row: a scene, a renderer and a state of contact. Every tick is timed separately; all values
+/// include the cost of reading the time, which is `empty_loop_ns`.
 struct TickCost {
   std::string mesh;
   std::size_t triangles = 0;  ///< of one object
@@ -19,20 +19,20 @@ struct TickCost {
   double median_ns = 0, p99_ns = 0, max_ns = 0;
   std::size_t allocations = 0;  ///< on the heap, in all timed ticks
   double empty_loop_ns = 0;
-  double target_ns = 0;  ///< of this project, for median_ns - empty_loop_ns
+  double target_ns = 0;  ///< design target for median_ns - empty_loop_ns
 
   double net_ns() const { return median_ns - empty_loop_ns; }
 };
 
 struct TickCostSettings {
   std::size_t ticks = 200'000;    ///< a row
-  std::size_t approaches = 1000;  ///< a row of first contacts, each a trial of its own
+  std::size_t approaches = 1000;  ///< for a row of first contacts, each in a new trial
 };
 
-/// A hand at 0.1 m/s over icospheres of 30 mm radius (20 to 327,680 triangles), the paper's other
-/// three shapes, and one of 1,000 spheres. In contact 1 to 2 mm deep; the ray's contact wanders
-/// between the tip and the side. Warm: 1,000 ticks go before each row but for first contacts, which
-/// begin with a new trial 10 mm off, from a random side.
+/// A path at 0.1 m/s over icospheres of 30 mm radius (20 to 327,680 triangles), the paper's other
+/// three shapes, and one of 1,000 spheres. Penetration depth 1 to 2 mm; the ray's contact moves
+/// between the tip and the side. Warm caches: 1,000 ticks precede each row, except for first
+/// contacts, which start a new trial 10 mm away, from a random direction.
 /// \param done  called after each row with the rows so far and in all
 std::vector<TickCost> measure_tick_costs(
     const TickCostSettings& settings,

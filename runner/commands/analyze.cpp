@@ -37,12 +37,10 @@ int analyze_command(const std::vector<std::string>& args) {
       "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR] "
       "[--force]";
   line.summary =
-      "Is a shape identified faster with the ray than with the point renderer, by how much, how "
-      "sure?\n"
-      "Any renderers of other people's data: each is compared with the first (point where it is "
-      "there).\n"
-      "The answer and its tables go to stdout. Files that are there already are replaced "
-      "with --force alone.";
+      "Are shapes identified faster with the ray than with the point renderer, by how much,\n"
+      "and how certain is it? In data with other renderers each is compared with the first\n"
+      "(point if it is among them). The answer and its tables go to stdout. Existing files\n"
+      "are replaced only with --force.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html   (other "
@@ -55,13 +53,13 @@ int analyze_command(const std::vector<std::string>& args) {
   namespace po = boost::program_options;
   add("db", po::value(&database)->value_name("FILE"), "the study's database");
   add("csv", po::value(&csv)->value_name("FILE"), "trials as CSV, one row a trial");
-  add("json", po::value(&json)->value_name("FILE"), "write every figure as JSON");
-  add("report", po::value(&report)->value_name("FILE.html"), "write a report to look at and print");
+  add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
+  add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
       "write the report's figures as SVG files into this folder");
-  add("force", "replace files that are there");
+  add("force", "replace existing files");
   add("too-fast-s", po::value(&settings.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
-      "leave correct answers before this time out of the times");
+      "exclude correct answers faster than this from the times");
   const auto values = line.parse(args);
   if (!values) return 0;
   if (database.empty() == csv.empty()) {

@@ -1,4 +1,4 @@
-// palpate bench: what a tick costs on this machine.
+// palpate bench: run time of the renderers' ticks on this machine.
 
 #include <unistd.h>
 
@@ -25,7 +25,7 @@ std::string table(const std::vector<TickCost>& rows) {
   out += line;
   for (const TickCost& r : rows) {
     if (r.ticks == 0) {
-      std::snprintf(line, sizeof line, "%-24s%10zu  %-7s%-14s never came about\n", r.mesh.c_str(),
+      std::snprintf(line, sizeof line, "%-24s%10zu  %-7s%-14s did not occur\n", r.mesh.c_str(),
                     r.triangles, r.renderer.c_str(), r.state.c_str());
     } else {
       std::snprintf(line, sizeof line, "%-24s%10zu  %-7s%-14s%8.0f%8.0f%8.1f%9.0f%7.0f%8zu%s\n",
@@ -49,7 +49,7 @@ const TickCost* find(const std::vector<TickCost>& rows, std::size_t triangles,
   return nullptr;
 }
 
-/// What the figures mean to a lab.
+/// What the numbers mean for a lab.
 std::string conclusions(const std::vector<TickCost>& rows) {
   std::string out;
   char text[300];
@@ -65,15 +65,15 @@ std::string conclusions(const std::vector<TickCost>& rows) {
   }
   double p99 = 0;
   for (const TickCost& r : rows) p99 = std::max(p99, r.p99_ns);
-  const double share = p99 / 100'000 * 100;
+  const double percent = p99 / 100'000 * 100;
   std::snprintf(text, sizeof text,
-                "99 %% of ticks of every kind take less than %.1f us: %.1f %% of a period at 10 "
-                "kHz, %.2f %% at 1 kHz. Rendering is %s on this computer; whether ticks come in "
-                "time is the system's part.\n",
-                p99 / 1000, share, share / 10,
-                share < 20    ? "fit for 1 to 10 kHz"
-                : share < 200 ? "fit for 1 kHz, not for 10 kHz"
-                              : "too slow for 1 kHz");
+                "99 %% of ticks in every row take less than %.1f us: %.1f %% of a period at 10 "
+                "kHz, %.2f %% at 1 kHz. Rendering is %s on this computer; for the timing of the "
+                "servo see palpate devices --timing.\n",
+                p99 / 1000, percent, percent / 10,
+                percent < 20    ? "fit for 1 to 10 kHz"
+                : percent < 200 ? "fit for 1 kHz, not for 10 kHz"
+                                : "too slow for 1 kHz");
   return out + text;
 }
 
@@ -85,12 +85,12 @@ nlohmann::ordered_json to_json(const std::vector<TickCost>& rows) {
                                   {"renderer", r.renderer},
                                   {"state", r.state},
                                   {"ticks", r.ticks}};
-    const auto figure = [&](const char* key, double ns) {
+    const auto number = [&](const char* key, double ns) {
       row[key] = r.ticks > 0 ? nlohmann::ordered_json(ns) : nlohmann::ordered_json(nullptr);
     };
-    figure("median_ns", r.median_ns);
-    figure("p99_ns", r.p99_ns);
-    figure("max_ns", r.max_ns);
+    number("median_ns", r.median_ns);
+    number("p99_ns", r.p99_ns);
+    number("max_ns", r.max_ns);
     row["allocations"] = r.allocations;
     row["empty_loop_ns"] = r.empty_loop_ns;
     row["target_ns"] = r.target_ns;
@@ -105,22 +105,22 @@ int bench_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate bench [--json FILE [--force]] [--ticks N]";
   line.summary =
-      "Prints what a tick of the renderers costs on this machine: every tick timed alone, in "
-      "nanoseconds. Quit other programs first.";
+      "Measures the run time of the renderers' ticks on this machine, each tick separately,\n"
+      "in nanoseconds. Quit other programs first.";
   line.example =
       "  palpate bench                       a table, about a minute\n"
       "  palpate bench --json bench.json     the same for programs\n";
   line.options.add_options()                                                               //
-      ("json", po::value<std::string>()->value_name("FILE"), "write the figures as JSON")  //
+      ("json", po::value<std::string>()->value_name("FILE"), "write the numbers as JSON")  //
       ("ticks", po::value<long>()->default_value(200'000)->value_name("N"),
        "ticks a row, 1000 to 100 million")  //
-      ("force", "replace a file that is there");
+      ("force", "replace an existing file");
   const auto values = line.parse(args);
   if (!values) return 0;
   Outputs outputs(*values, {"json"}, {});
   const long ticks = (*values)["ticks"].as<long>();
   if (ticks < 1000 || ticks > 100'000'000)
-    throw UsageError("--ticks: 1000 to 100000000 was expected, not " + std::to_string(ticks));
+    throw UsageError("--ticks: must be 1000 to 100000000, not " + std::to_string(ticks));
   TickCostSettings settings;
   settings.ticks = static_cast<std::size_t>(ticks);
   settings.approaches = std::max<std::size_t>(50, settings.ticks / 200);
@@ -129,13 +129,14 @@ int bench_command(const std::vector<std::string>& args) {
     if (terminal)
       std::fprintf(stderr, "\r%zu of %zu rows%s", so_far, all, so_far == all ? "\n" : "");
   });
-  std::cout << "A tick, ns (max: us); an empty one reads " << rows[0].empty_loop_ns
-            << ", which the net median leaves out. The longest tick is mostly the operating "
-               "system's.\n"
-               "Hand at 0.1 m/s; contact 1 to 2 mm deep; free: 1 to 2 mm off the bounding sphere; "
-               "first_contact: a new trial each.\n\n"
-            << table(rows) << "\n"
-            << conclusions(rows);
+  std::cout
+      << "A tick, ns (max: us). An empty tick takes " << rows[0].empty_loop_ns
+      << ", which is subtracted in the net median. The maximum is mostly due to the operating "
+         "system.\n"
+         "Stylus at 0.1 m/s; contact 1 to 2 mm deep; free: 1 to 2 mm off the bounding sphere; "
+         "first_contact: in a new trial each.\n\n"
+      << table(rows) << "\n"
+      << conclusions(rows);
   outputs.put("json", to_json(rows).dump(2) + "\n");
   outputs.write();
   return 0;

@@ -20,12 +20,12 @@ namespace {
 
 namespace po = boost::program_options;
 
-/// Shows how far the export is, and ends it when that was asked for.
+/// Shows the progress of the export and ends it after Ctrl-C.
 class Progress {
  public:
   Progress(data::Store& store, const std::atomic<bool>& stop_asked)
       : stop_asked_(stop_asked), line_("export") {
-    if (!line_.on_terminal()) return;  // counting a million takes a while
+    if (!line_.on_terminal()) return;  // counting takes long in large databases
     const data::StoreCounts counts = store.counts();
     all_ = static_cast<double>(counts.completed + counts.cut_off);
   }
@@ -41,8 +41,8 @@ class Progress {
   double all_ = 0;
 };
 
-/// Reads what is needed and no more: the text is a record, and exports must work years after the
-/// protocol's rules have changed.
+/// Reads only what an export needs from the stored text, so that old databases can be exported
+/// after the rules for protocols have changed.
 data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
   const auto json = nlohmann::ordered_json::parse(info.text, nullptr, false);
   if (!json.is_object())
@@ -89,81 +89,101 @@ data::ExportResult export_as(const std::string& format, data::Store& store, cons
   return data::export_csv(store, out, settings);
 }
 
-}  // namespace
+struct Request {
+  std::string database, format, out, codebook;
+  data::Times times = data::Times::absolute;
+  bool force = false;
+};
 
-int export_command(const std::vector<std::string>& args) {
-  CommandLine line;
+void add_options(CommandLine& line) {
   line.usage =
       "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
       "       [--times relative|absolute] [--codebook FILE] [--force]";
   line.summary =
-      "Writes the trials of a database for others, whole or not at all. Can be used while a\n"
+      "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
-      "off, where there are any, to attempts.csv in the same folder. bids, psych-ds: a folder\n"
-      "that describes itself, with the servo-rate samples where they were kept.\n"
+      "off, if there are any, in attempts.csv in the same folder. bids, psych-ds: a\n"
+      "self-describing folder, with the servo-rate samples if they were kept.\n"
       "Times are relative in bids and psych-ds: dates are shifted so that a participant's first\n"
-      "trial is at 1900-01-01T00:00:00Z, and the column elapsed counts the seconds from it. csv "
-      "has\n"
-      "the true onset_utc unless --times relative is given.\n"
-      "Texts that a spreadsheet would run (= + - @ in front) get a ' in front; analyze --csv takes "
-      "it\n"
-      "away again.";
+      "trial is at 1900-01-01T00:00:00Z, and the column elapsed counts the seconds from it. csv\n"
+      "has the true onset_utc unless --times relative is given.\n"
+      "Texts that a spreadsheet would run as formulas (beginning with = + - @) get a ' in front;\n"
+      "analyze --csv removes it.";
   line.example =
       "  palpate export --db study.db --format csv --out trials.csv\n"
       "  palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv\n"
       "  palpate export --db study.db --format bids --out study-bids\n"
-      "  palpate export --db study.db --format psych-ds --out study-psychds --force   (replaces "
-      "an\n"
-      "      earlier export; a folder that palpate did not make is never replaced)";
-  std::string database, format, out, times, codebook;
+      "  palpate export --db study.db --format psych-ds --out study-psychds --force\n"
+      "      (replaces an earlier export; a folder that palpate did not make is never replaced)";
   auto add = line.options.add_options();
-  add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
-  add("format", po::value(&format)->required()->value_name("NAME"), "csv, bids or psych-ds");
-  add("out", po::value(&out)->required()->value_name("PATH"),
+  add("db", po::value<std::string>()->required()->value_name("FILE"), "the study's database");
+  add("format", po::value<std::string>()->required()->value_name("NAME"), "csv, bids or psych-ds");
+  add("out", po::value<std::string>()->required()->value_name("PATH"),
       "the file (csv) or folder (others) to write");
-  add("times", po::value(&times)->value_name("WORD"),
+  add("times", po::value<std::string>()->default_value("", "")->value_name("WORD"),
       "relative (default of bids and psych-ds) or absolute (default of csv)");
-  add("codebook", po::value(&codebook)->value_name("FILE"),
+  add("codebook", po::value<std::string>()->default_value("", "")->value_name("FILE"),
       "csv only: what every column, value and fault bit means, as a table");
-  add("force", po::bool_switch(), "replace an export that is there already");
+  add("force", po::bool_switch(), "replace an existing export");
+}
+
+Request request_of(const po::variables_map& values, const std::string& usage) {
+  Request request{values["db"].as<std::string>(), values["format"].as<std::string>(),
+                  values["out"].as<std::string>(), values["codebook"].as<std::string>()};
+  request.force = values["force"].as<bool>();
+  if (request.format != "csv" && request.format != "bids" && request.format != "psych-ds") {
+    throw UsageError("no format '" + request.format +
+                     "'; there are: csv, bids, psych-ds\nUsage: " + usage);
+  }
+  request.times = times_of(values["times"].as<std::string>(), request.format, usage);
+  if (!request.codebook.empty() && request.format != "csv") {
+    throw UsageError("--codebook is for csv; " + request.format +
+                     " describes its columns in JSON files");
+  }
+  return request;
+}
+
+data::ExportDone write_export(const Request& request) {
+  data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
+  warn_of_exposure(request.database);
+  data::ExportSettings settings;
+  settings.force = request.force;
+  settings.program_version = PALPATE_VERSION;
+  settings.facts = facts_of;
+  settings.times = request.times;
+  settings.codebook = request.codebook;
+  settings.fault_bits = fault_bits();
+  Progress progress(store, catch_stop_signals());
+  settings.progress = [&](std::int64_t trials) { progress.show(trials); };
+  return export_as(request.format, store, request.out, settings);
+}
+
+void print(const Request& request, const data::ExportDone& done) {
+  std::cerr << stimuli::printable(request.out) << ": " << done.trials << " trials";
+  if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
+  std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
+  if (!done.attempts_path.empty()) {
+    std::cerr << stimuli::printable(done.attempts_path) << ": " << done.attempts
+              << " attempts that were cut off\n";
+  }
+  if (!request.codebook.empty())
+    std::cerr << stimuli::printable(request.codebook) << ": what the columns mean\n";
+  if (!done.not_recorded.empty()) {
+    std::cerr << "warning: 'palpate forget' will not list this export: "
+              << stimuli::printable(done.not_recorded) << "\n";
+  }
+}
+
+}  // namespace
+
+int export_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  add_options(line);
   const auto values = line.parse(args);
   if (!values) return 0;
-  if (format != "csv" && format != "bids" && format != "psych-ds") {
-    throw UsageError("no format '" + format +
-                     "'; there are: csv, bids, psych-ds\nUsage: " + line.usage);
-  }
-  const data::Times told = times_of(times, format, line.usage);
-  if (!codebook.empty() && format != "csv") {
-    throw UsageError("--codebook is for csv; " + format + " describes its columns in JSON files");
-  }
+  const Request request = request_of(*values, line.usage);
   try {
-    data::Store store = data::Store::open(database, data::Store::Mode::read_only);
-    warn_of_exposure(database);
-    data::ExportSettings settings;
-    settings.force = (*values)["force"].as<bool>();
-    settings.program_version = PALPATE_VERSION;
-    settings.facts = facts_of;
-    settings.times = told;
-    settings.codebook = codebook;
-    settings.fault_bits = fault_bits();
-    data::ExportResult done;
-    {
-      Progress progress(store, watch_stop_signals());
-      settings.progress = [&](std::int64_t trials) { progress.show(trials); };
-      done = export_as(format, store, out, settings);
-    }
-    std::cerr << stimuli::printable(out) << ": " << done.trials << " trials";
-    if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
-    std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
-    if (!done.attempts_path.empty()) {
-      std::cerr << stimuli::printable(done.attempts_path) << ": " << done.attempts
-                << " attempts that were cut off\n";
-    }
-    if (!codebook.empty()) std::cerr << stimuli::printable(codebook) << ": what the columns mean\n";
-    if (!done.not_recorded.empty()) {
-      std::cerr << "warning: 'palpate forget' will not list this export: "
-                << stimuli::printable(done.not_recorded) << "\n";
-    }
+    print(request, write_export(request));
   } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2
   }

@@ -15,7 +15,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-/// \param database whose folder the paths are relative to
+/// \param database  paths of exports are relative to its folder
 void list_exports(const data::ParticipantSummary& holdings, const std::string& database,
                   std::ostream& out) {
   if (holdings.exports.empty()) return;
@@ -26,18 +26,56 @@ void list_exports(const data::ParticipantSummary& holdings, const std::string& d
     const std::string path = place.empty() ? one.path : place;
     out << "  " << stimuli::printable(path) << " (" << one.format << ", "
         << data::format_utc(one.made_utc_ns)
-        << (place.empty() || std::filesystem::exists(path, error) ? ")" : "; not there any more)")
+        << (place.empty() || std::filesystem::exists(path, error) ? ")" : "; no longer there)")
         << "\n";
   }
 }
 
+/// What the database and its exports hold of the participant.
+void print(const data::ParticipantSummary& holdings, const std::string& code,
+           const std::string& database) {
+  if (holdings.protocols > 0) {
+    std::cout << stimuli::printable(code) << ": " << holdings.sessions << " sessions, "
+              << holdings.trials << " trials and " << holdings.cut_off
+              << " attempts that were cut off\n";
+  } else {
+    std::cout << stimuli::printable(code) << " has withdrawn before; remains are removed\n";
+  }
+  list_exports(holdings, database, std::cout);
+  if (!holdings.elsewhere.empty()) {
+    std::cout << "These lie beside the database or its exports and name " << code
+              << "; they are not changed: delete them, or give the command for each database:\n";
+    for (const std::string& path : holdings.elsewhere) {
+      std::cout << "  " << stimuli::printable(path) << "\n";
+    }
+  }
+  if (holdings.mentions > 0) {
+    std::cout << "Notes on other participants that say " << stimuli::printable(code) << ": "
+              << holdings.mentions << "; they are left as they are\n";
+  }
+}
+
 bool confirmed(const std::string& code) {
-  std::cerr << "This cannot be undone. Type the code again to remove it, anything else to leave "
-               "all as it is: "
+  std::cerr << "This cannot be undone. Type the code again to remove it, anything else to keep "
+               "everything: "
             << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
   return answer == code;
+}
+
+/// \return false where a backup could not be deleted
+bool remove(data::Store& store, const std::string& code, const std::string& database) {
+  const data::Withdrawal done = store.forget(code);
+  std::cout << "Removed from " << stimuli::printable(database) << "\n";
+  for (const std::string& backup : done.backups_removed)
+    std::cout << "Deleted " << stimuli::printable(backup) << "\n";
+  for (const std::string& backup : done.backups_left) {
+    std::cerr << stimuli::printable(backup)
+              << ": could not be read or deleted; delete it, it may hold "
+              << stimuli::printable(code) << "\n";
+  }
+  return done.backups_left.empty();
 }
 
 }  // namespace
@@ -46,18 +84,19 @@ int forget_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate forget --db FILE --participant CODE [--yes]";
   line.summary =
-      "Withdrawal: removes everything of a participant from a database, from its log and from the\n"
-      "backups beside it, and lists the exports that hold the participant. What stays is a salted\n"
-      "hash of the code, so that run and merge never take the participant in again. Stopped half\n"
-      "way, the same command finishes it. Copies and merged databases need the same command.";
+      "Withdrawal: removes everything of a participant from a database, from its log and from\n"
+      "the backups beside it, and lists the exports that hold the participant. What stays is\n"
+      "a salted hash of the code, so that run and merge never add the participant again. If\n"
+      "interrupted, the same command finishes the removal. Copies and merged databases need\n"
+      "the same command.";
   line.example =
-      "  palpate forget --db study.db --participant P07         shows what there is, and asks\n"
+      "  palpate forget --db study.db --participant P07         shows what is stored, and asks\n"
       "  palpate forget --db study.db --participant P07 --yes   does not ask";
   std::string database, code;
   auto add = line.options.add_options();
   add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
   add("participant", po::value(&code)->required()->value_name("CODE"),
-      "who has withdrawn; -: asked for, or a line of standard input");
+      "who has withdrawn; -: asked for, or read from standard input");
   add("yes", po::bool_switch(), "remove without asking");
   const auto values = line.parse(args);
   if (!values) return 0;
@@ -74,40 +113,13 @@ int forget_command(const std::vector<std::string>& args) {
   if (holdings.protocols == 0 && !holdings.withdrawn_before) {
     throw UsageError(database + ": there is no participant " + code + " here");
   }
-  if (holdings.protocols > 0) {
-    std::cout << stimuli::printable(code) << ": " << holdings.sessions << " sessions, "
-              << holdings.trials << " trials and " << holdings.cut_off
-              << " attempts that were cut off\n";
-  } else {
-    std::cout << stimuli::printable(code) << " has withdrawn before; what may be left is cleared\n";
-  }
-  list_exports(holdings, database, std::cout);
-  if (!holdings.elsewhere.empty()) {
-    std::cout << "These lie beside the database or its exports and name " << code
-              << "; they are not changed: delete them, or give the command for each database:\n";
-    for (const std::string& path : holdings.elsewhere) {
-      std::cout << "  " << stimuli::printable(path) << "\n";
-    }
-  }
-  if (holdings.mentions > 0) {
-    std::cout << "Notes on other participants that say " << stimuli::printable(code) << ": "
-              << holdings.mentions << "; they are left as they are\n";
-  }
+  print(holdings, code, database);
   std::cout << std::flush;
   if (ask && holdings.protocols > 0 && !confirmed(code)) {
     std::cerr << "nothing was removed\n";
     return 1;
   }
-  const data::Withdrawal done = store.forget(code);
-  std::cout << "Removed from " << stimuli::printable(database) << "\n";
-  for (const std::string& backup : done.backups_removed)
-    std::cout << "Deleted " << stimuli::printable(backup) << "\n";
-  for (const std::string& backup : done.backups_left) {
-    std::cerr << stimuli::printable(backup)
-              << ": could not be read or deleted; delete it, it may hold "
-              << stimuli::printable(code) << "\n";
-  }
-  return done.backups_left.empty() ? 0 : 1;
+  return remove(store, code, database) ? 0 : 1;
 }
 
 }  // namespace palpate::runner

@@ -13,18 +13,47 @@
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
+namespace {
+
 namespace po = boost::program_options;
+
+void refuse_folders(const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (std::filesystem::is_directory(input, error))
+      throw UsageError(input + ": this is a folder; name the databases in it, such as " +
+                       (std::filesystem::path(input) / "*.db").lexically_normal().string());
+  }
+}
+
+void print(const std::string& out, const data::Merged& done) {
+  std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
+            << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
+            << done.counts.cut_off << " attempts that were cut off\n";
+  for (const data::RenumberedParticipant& one : done.renumbered) {
+    std::cout << one.code << " (" << stimuli::printable(one.path) << ") has number " << one.to
+              << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
+              << one.code << " keep the order of number " << one.from << "\n";
+  }
+  for (const data::ExcludedParticipant& one : done.excluded) {
+    std::cerr << stimuli::printable(one.code) << " has withdrawn and is left out, but is still in "
+              << stimuli::printable(one.path) << "; remove with: palpate forget --db '"
+              << stimuli::printable(one.path) << "' --participant " << stimuli::printable(one.code)
+              << "\n";
+  }
+}
+
+}  // namespace
 
 int merge_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate merge --out ALL.db A.db B.db ... [--renumber]";
   line.summary =
-      "Makes one new database of several stations' databases, which are only read. Refuses, with\n"
-      "every reason, what cannot be one study: a participant with different content, one number\n"
-      "for two codes (unless --renumber), different protocols under one name. Who has withdrawn at "
-      "one station is "
-      "left\n"
-      "out from all. Merging a merged database again with its parts changes nothing.";
+      "Merges the databases of several stations, which are only read, into a new one.\n"
+      "Refuses, with every reason, what cannot be one study: a participant with different\n"
+      "content, one number for two codes (unless --renumber), different protocols under one\n"
+      "name. Participants who have withdrawn at one station are left out altogether. Merging\n"
+      "a merged database again with its parts changes nothing.";
   line.example =
       "  palpate merge --out all.db station1.db station2.db\n"
       "  palpate merge --out all2.db all.db station3.db";
@@ -33,23 +62,18 @@ int merge_command(const std::vector<std::string>& args) {
   auto add = line.options.add_options();
   add("out", po::value(&out)->required()->value_name("FILE"), "the new database");
   add("input", po::value(&inputs)->value_name("FILE"),
-      "a station's database; --input itself may be left out");
+      "a station's database; the word --input may be left out");
   add("renumber", po::bool_switch(),
-      "two stations gave one number to two codes: who began later gets the next number after all; "
-      "the number whose order of trials was shown stays on record and orders those to come");
+      "if two stations gave one number to two codes, the one that began later gets the next free "
+      "number; its trials, also future ones, keep the order of the old number, which stays stored");
   line.positional.add("input", -1);
   const auto values = line.parse(args);
   if (!values) return 0;
   if (inputs.empty()) {
     throw UsageError("missing the databases to merge\nUsage: " + line.usage + "\nMore: add --help");
   }
-  for (const std::string& input : inputs) {
-    std::error_code error;
-    if (std::filesystem::is_directory(input, error))
-      throw UsageError(input + ": this is a folder; name the databases in it, such as " +
-                       (std::filesystem::path(input) / "*.db").lexically_normal().string());
-  }
-  const std::atomic<bool>& stop_asked = watch_stop_signals();
+  refuse_folders(inputs);
+  const std::atomic<bool>& stop_asked = catch_stop_signals();
   try {
     ProgressLine progress("sessions");
     const data::MergeResult done = data::merge(
@@ -62,21 +86,7 @@ int merge_command(const std::vector<std::string>& args) {
                                          : data::NumberConflict::refuse);
     progress.clear();
     warn_of_exposure(out);
-    std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
-              << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
-              << done.counts.cut_off << " attempts that were cut off\n";
-    for (const data::RenumberedParticipant& one : done.renumbered) {
-      std::cout << one.code << " (" << stimuli::printable(one.path) << ") has number " << one.to
-                << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
-                << one.code << " keep the order of number " << one.from << "\n";
-    }
-    for (const data::ExcludedParticipant& one : done.excluded) {
-      std::cerr << stimuli::printable(one.code)
-                << " has withdrawn and is left out, but is still in "
-                << stimuli::printable(one.path) << "; remove with: palpate forget --db '"
-                << stimuli::printable(one.path) << "' --participant "
-                << stimuli::printable(one.code) << "\n";
-    }
+    print(out, done);
   } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2
   }

@@ -112,7 +112,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const auto start = std::chrono::steady_clock::now();
   ProgressLine line("trials");
   const StudyProgress progress = simulate_study(
-      protocol, store, simulated, plan, watch_stop_signals(), [&line](const StudyProgress& p) {
+      protocol, store, simulated, plan, catch_stop_signals(), [&line](const StudyProgress& p) {
         line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
       });
   line.clear();

@@ -18,18 +18,18 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kTypicalTrial = 10;  // s; about what the paper's participants took, and a bit
+constexpr double kTypicalTrial = 10;  // s; a little more than the paper's participants took
 
-/// Builds every mesh of an object, as a session would, and adds what is wrong with them.
-void check_meshes(const stimuli::ObjectSpec& object, const std::string& place,
+/// Builds every mesh of an object, as a session does, and adds its faults.
+void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
                   const std::string& file, std::vector<protocols::Fault>& faults) {
   if (object.shape == stimuli::ShapeKind::compound) {
     for (std::size_t i = 0; i < object.parts.size(); ++i) {
-      check_meshes(object.parts[i], place + "/parts/" + std::to_string(i), file, faults);
+      check_meshes(object.parts[i], pointer + "/parts/" + std::to_string(i), file, faults);
     }
     return;
   }
-  const std::string where = object.shape == stimuli::ShapeKind::mesh ? place + "/file" : place;
+  const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
   try {
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(object));
   } catch (const stimuli::MeshError& error) {
@@ -56,7 +56,7 @@ std::string minutes(double seconds) {
   return out.str();
 }
 
-/// A line, or nothing.
+/// The summary's line about masking noise, if there is any.
 std::string masking(const protocols::Protocol& protocol) {
   if (!protocol.masking_noise) return "";
   std::ostringstream out;
@@ -103,7 +103,7 @@ void print_verdict(const std::string& what, const std::vector<std::string>& misf
     out << "      " << stimuli::printable(one.text) << "\n";
 }
 
-/// For which devices, and for simulation; all that is in the way.
+/// Whether each kind of device and simulated participants can show the protocol; if not, why.
 void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
   DeviceConfig config;
   config.rate = protocol.servo_rate;
@@ -132,8 +132,8 @@ int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate validate PROTOCOL.json";
   line.summary =
-      "Checks a protocol with its meshes and its schedule, and lists all faults. Says for which\n"
-      "devices, and for simulation, it is fit, and what is in the way of others.";
+      "Checks a protocol with its meshes and its schedule, and lists all faults. Says which\n"
+      "devices can show it, whether it can be simulated, and what prevents the others.";
   line.example = "  palpate validate protocols/ho2000.json";
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);

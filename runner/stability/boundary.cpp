@@ -5,8 +5,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kClose = 1.002;     // of a boundary, when bisecting
-constexpr double kNoDamping = 1e-6;  // N s/m, as good as none
+constexpr double kClose = 1.002;     // ratio at which the bisection ends
+constexpr double kNoDamping = 1e-6;  // N s/m, practically none
 
 stimuli::Material material_of(const LoopCase& loop, double stiffness) {
   stimuli::Material material;
@@ -35,7 +35,7 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
   point.stiffness = stiffness;
   point.theory = passive_damping(loop, stiffness);
   point.promised = s.resolution == 0 || stiffness <= 2 * s.friction / s.resolution;
-  const LoopScene scene(loop.situation, loop.renderer, material_of(loop, stiffness));
+  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
   const auto stable = [&](double damping) {
     return run_loop(settings_at(loop, stiffness, damping), scene).stable;
   };
@@ -55,10 +55,11 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
 
 double stiffest_stable(const LoopCase& loop, double damping) {
   const auto stable = [&](double stiffness) {
-    const LoopScene scene(loop.situation, loop.renderer, material_of(loop, stiffness));
+    const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
     return run_loop(settings_at(loop, stiffness, damping), scene).stable;
   };
-  // Upwards by steps first: beyond the first buzz there may be quiet again, which helps nobody.
+  // In steps first: beyond the first instability there may be stable stiffnesses again, which do
+  // not count.
   constexpr double kStep = 1.5, kMost = 1e7;
   double low = 1;
   while (low < kMost && stable(kStep * low)) low *= kStep;

@@ -1,5 +1,5 @@
 #pragma once
-// Where a loop stops being stable: measured, and what the theory of passivity says.
+// The stability boundary of a haptic loop: by simulation, and the passivity condition of theory.
 
 #include <span>
 #include <vector>
@@ -8,25 +8,25 @@
 
 namespace palpate::runner {
 
-/// A loop but for the stiffness and the physical damping that are looked for.
+/// A loop without the two quantities that span the boundary: stiffness and physical damping.
 struct LoopCase {
-  Situation situation = Situation::wall;
+  ContactCase contact_case = ContactCase::wall;
   protocols::RendererKind renderer = protocols::RendererKind::point;
-  LoopSettings settings;       ///< damping is not used
+  LoopSettings settings;       ///< its damping is ignored
   double virtual_damping = 0;  ///< N s/m, of the material
-  /// Each end as heavy as makes sampling 60 times faster than its swing on the spring: the case of
-  /// the theory, where the mass plays no part. Else settings.mass.
+  /// The mass of each end is chosen so that it oscillates 60 times more slowly than the sampling
+  /// rate: the case of the theory, which is independent of the mass. Else settings.mass.
   bool heavy = false;
 };
 
 struct BoundaryPoint {
   double stiffness = 0;  ///< N/m
-  double measured = 0;   ///< N s/m, the least damping of each end that is stable
-  double theory = 0;     ///< N s/m, that is passive with any hand
-  /// Friction holds each count of the resolution (K <= 2 f_c / Delta), so the theory applies.
+  double measured = 0;   ///< N s/m, smallest stable damping of each end; 0: stable without
+  double theory = 0;     ///< N s/m, passive with any hand
+  /// The theory applies: friction dissipates the effect of quantisation (K <= 2 f_c / Delta).
   bool promised = true;
 
-  /// The theory promised too much.
+  /// Unstable although the theory promises passivity.
   bool unsafe() const { return promised && measured > 1.001 * theory; }
 };
 
@@ -35,7 +35,7 @@ double passive_damping(const LoopCase& loop, double stiffness);
 
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
 
-/// N/m, up to 10^7: the stiffest that is stable with this damping of each end, and less are.
+/// Largest stiffness, N/m, up to 10^7, up to which all are stable with this damping of each end.
 double stiffest_stable(const LoopCase& loop, double damping);
 
 }  // namespace palpate::runner

@@ -14,11 +14,11 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kDepth = 1e-3;   // m, at rest
-constexpr double kLength = 0.12;  // m
-constexpr double kAtRest = 1e-9;  // m, from crest to trough: nobody's concern
-constexpr double kFarOff = 0.02;  // m, from rest: gone
-constexpr int kMostDelay = 16;    // ticks
+constexpr double kDepth = 1e-3;          // m, at rest
+constexpr double kLength = 0.12;         // m
+constexpr double kRestAmplitude = 1e-9;  // m, peak to peak: counts as rest
+constexpr double kDiverged = 0.02;       // m, from rest: diverged
+constexpr int kMaxDelay = 16;            // ticks
 
 Quat turned_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
 
@@ -32,27 +32,27 @@ rendering::SceneObject object(const stimuli::PolygonSoup& soup, const Pose& pose
   return one;
 }
 
-/// A cube of edge 2 h with one edge up, along y, at x and z = 0.
+/// A cube of edge 2 h with one edge on top, along y, at (x, 0).
 rendering::SceneObject ridge(double h, double x, const stimuli::Material& material, int index) {
   return object(stimuli::cube(2 * h),
                 {{x, 0, -h * std::numbers::sqrt2}, turned_about_y(std::numbers::pi / 4)}, material,
                 index);
 }
 
-std::vector<rendering::SceneObject> objects_of(Situation situation, bool ray,
+std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ray,
                                                const stimuli::Material& material) {
   constexpr double kHalf = 0.03, kRadius = 0.03, kWall = 0.5;
-  switch (situation) {
-    case Situation::wall:
+  switch (contact_case) {
+    case ContactCase::wall:
       return {object(stimuli::cube(2 * kWall), {{0, 0, -kWall}, {1, 0, 0, 0}}, material, 0)};
-    case Situation::edge:
+    case ContactCase::edge:
       return {ridge(kHalf, 0, material, 0)};
-    case Situation::sphere:
+    case ContactCase::sphere:
       return {
           object(stimuli::icosphere(kRadius, 4), {{0, 0, -kRadius}, {1, 0, 0, 0}}, material, 0)};
-    case Situation::two_objects: {
+    case ContactCase::two_objects: {
       if (ray) return {ridge(0.01, -0.03, material, 0), ridge(0.01, 0.03, material, 1)};
-      // Two walls that lean apart, 45 degrees each way.
+      // Two walls that form a groove, 45 degrees each.
       std::vector<rendering::SceneObject> walls;
       for (const double side : {-1.0, 1.0}) {
         const double lean = -side * std::numbers::pi / 4;
@@ -66,23 +66,23 @@ std::vector<rendering::SceneObject> objects_of(Situation situation, bool ray,
   throw std::invalid_argument("no such situation");
 }
 
-/// The stylus at height 0: its lowest point near the origin.
-rendering::LineProbe held(Situation situation, bool ray) {
+/// The stylus at height 0, with its lowest point near the origin.
+rendering::LineProbe stylus_at_height_0(ContactCase contact_case, bool ray) {
   if (!ray) {
-    const double x = situation == Situation::edge     ? 0.004
-                     : situation == Situation::sphere ? 1e-3
-                                                      : 0;
+    const double x = contact_case == ContactCase::edge     ? 0.004
+                     : contact_case == ContactCase::sphere ? 1e-3
+                                                           : 0;
     const Vec3 tip(x, 0.7e-3, 0);
     return {tip, tip + Vec3(0, 0, kLength)};
   }
-  if (situation == Situation::wall) {
+  if (contact_case == ContactCase::wall) {
     const Vec3 tip(0.001, 0.002, 0);
     return {tip, tip + kLength * glm::normalize(Vec3(1, 0, 1))};
   }
-  // Across: a third of it on one side, so that the ends feel it differently.
-  const double share = situation == Situation::two_objects ? 0.5 : 0.35;
+  // Lying across, off-centre, so that the ends get different forces.
+  const double fraction = contact_case == ContactCase::two_objects ? 0.5 : 0.35;
   const Vec3 d(kLength, 0, 0);
-  const Vec3 tip = Vec3(0, 1e-3, 0) - share * d;
+  const Vec3 tip = Vec3(0, 1e-3, 0) - fraction * d;
   return {tip, tip + d};
 }
 
@@ -90,7 +90,7 @@ rendering::LineProbe lowered(const rendering::LineProbe& probe, double tip, doub
   return {probe.tip - Vec3(0, 0, tip), probe.tail - Vec3(0, 0, tail)};
 }
 
-/// One end of the stylus, moving along z under a force held over each tick.
+/// One end of the stylus, moving along z under a force stylus_at_height_0 over each tick.
 class End {
  public:
   End(const LoopSettings& s, double offset) : z_(offset) {
@@ -149,36 +149,36 @@ struct Range {
 
 }  // namespace
 
-const char* to_string(Situation situation) {
-  switch (situation) {
-    case Situation::wall:
+const char* to_string(ContactCase contact_case) {
+  switch (contact_case) {
+    case ContactCase::wall:
       return "wall";
-    case Situation::edge:
+    case ContactCase::edge:
       return "edge";
-    case Situation::sphere:
+    case ContactCase::sphere:
       return "sphere";
-    case Situation::two_objects:
+    case ContactCase::two_objects:
       return "two objects";
   }
   return "";
 }
 
-LoopScene::LoopScene(Situation situation, protocols::RendererKind kind,
+LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
                      const stimuli::Material& material)
     : renderer_(&renderer_for(kind)),
-      scene_(objects_of(situation, renderer_->side_contact(), material),
+      scene_(objects_of(contact_case, renderer_->side_contact(), material),
              renderer_->side_contact()) {
-  const rendering::LineProbe start = held(situation, renderer_->side_contact());
+  const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
   rendering::RenderState state = scene_.initial_state();
   rendering::Rendering r;
   constexpr double kStep = 1e-6;
-  // Down from above until it is deep enough: what lies lower was found by the renderer itself.
+  // Lowered from above to the wanted depth, as first contact needs a path from outside.
   for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
     rest_ = lowered(start, down, down);
     r = renderer_->tick(scene_, state, rest_, 1);
     if (down > 0.05) throw std::logic_error("nothing under the stylus");
   }
-  r = renderer_->tick(scene_, state, rest_, 1);  // at rest: no damping
+  r = renderer_->tick(scene_, state, rest_, 1);  // a second tick at rest: without damping force
   force_tip_ = r.device1.z;
   force_tail_ = r.device2.z;
   contacts_ = static_cast<int>(r.contacts);
@@ -188,7 +188,7 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
   const rendering::Renderer& renderer = loop.renderer();
   rendering::RenderState state = loop.scene().initial_state();
   const double tick = 1 / s.rate;
-  // In from above, as every contact begins.
+  // From above, so that the renderer finds a first contact.
   renderer.tick(loop.scene(), state, lowered(loop.rest(), -5e-3, -5e-3), tick);
   End tip(s, 1e-4), tail(s, 0.6e-4);
   const double stiffness = loop.force_tip() + loop.force_tail() > 0
@@ -199,7 +199,7 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
       16.0, 2 * std::numbers::pi * std::sqrt(mass / (stiffness + s.hand.stiffness)) * s.rate);
   const auto ticks = static_cast<std::uint64_t>(40 * period);
   PassivityController controller({0.5 * s.mass * s.rate}, tick);
-  std::array<std::array<double, 2>, kMostDelay + 1> under_way{};
+  std::array<std::array<double, 2>, kMaxDelay + 1> under_way{};
   for (auto& forces : under_way) forces = {loop.force_tip(), loop.force_tail()};
   const auto read = [&](double z) {
     return s.resolution > 0 ? s.resolution * std::round(z / s.resolution) : z;
@@ -223,19 +223,20 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
     if (renderer.side_contact()) tail.advance(now[1] - loop.force_tail());
     ++outcome.ticks;
     const double z = std::abs(tip.z()) > std::abs(tail.z()) ? tip.z() : tail.z();
-    if (!(std::abs(z) < kFarOff)) {
-      outcome.late = HUGE_VAL;
+    if (!(std::abs(z) < kDiverged)) {
+      outcome.late_amplitude = HUGE_VAL;
       return outcome;
     }
-    // What the springs feel, in metres: a stylus that turns about its contact is no buzz.
+    // Force over stiffness, m: a rotation about the contact is not an oscillation of the contact.
     Range* const part = i >= ticks / 4 && i < ticks / 2 ? &early
                         : i >= 3 * ticks / 4            ? &late
                                                         : nullptr;
     if (part) part->add((r.device1.z + 0.7 * r.device2.z) / stiffness);
   }
-  outcome.early = early.size();
-  outcome.late = late.size();
-  outcome.stable = outcome.late <= std::max({outcome.early, 3 * s.resolution, kAtRest});
+  outcome.early_amplitude = early.size();
+  outcome.late_amplitude = late.size();
+  outcome.stable = outcome.late_amplitude <=
+                   std::max({outcome.early_amplitude, 3 * s.resolution, kRestAmplitude});
   return outcome;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// A hand, two devices at the ends of a stylus, and a renderer in a closed loop, sampled: does a
-// contact come to rest, or does it buzz? For checks and plans, not for the servo.
+// Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
+// does a contact come to rest or oscillate? For studies, not for the servo.
 
 #include <string>
 
@@ -10,7 +10,7 @@
 
 namespace palpate::runner {
 
-/// What the hand does at each end, about where it wants the end to be.
+/// The hand's impedance at each end of the stylus.
 struct EndImpedance {
   double stiffness = 0;  ///< N/m
   double damping = 0;    ///< N s/m
@@ -23,32 +23,32 @@ struct LoopSettings {
   double damping = 0.25;  ///< N s/m, viscous, of each end
   double friction = 0;    ///< N, Coulomb, of each end
   double resolution = 0;  ///< m, of each end's reading; 0: exact
-  int delay = 0;          ///< ticks from a reading to its force, beyond the same tick
+  int delay = 0;          ///< ticks from a reading to its force; 0: within the same tick
   EndImpedance hand;
   bool passivity_controller = false;
 };
 
-/// Where the stylus is pressed in along -z, each end free to move along z alone.
-enum class Situation {
+/// The contact that is pressed along -z; each end of the stylus moves along z only.
+enum class ContactCase {
   wall,         ///< a plane, met by the tip
-  edge,         ///< a cube's edge: the ray lies across it, the point meets a side near it
+  edge,         ///< a cube's edge: the ray lies across it, the point touches a face near it
   sphere,       ///< met by the tip (point), by the side (ray)
   two_objects,  ///< the ray lies across two edges; the point is in a groove between two walls
 };
-inline constexpr Situation kSituations[] = {Situation::wall, Situation::edge, Situation::sphere,
-                                            Situation::two_objects};
-const char* to_string(Situation situation);
+inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
+                                                ContactCase::sphere, ContactCase::two_objects};
+const char* to_string(ContactCase contact_case);
 
-/// A scene and how the stylus rests in it before the loop begins.
+/// A scene and the equilibrium of the stylus in it.
 class LoopScene {
  public:
-  LoopScene(Situation situation, protocols::RendererKind renderer,
+  LoopScene(ContactCase contact_case, protocols::RendererKind renderer,
             const stimuli::Material& material);
 
   const rendering::Scene& scene() const { return scene_; }
   const rendering::Renderer& renderer() const { return *renderer_; }
   const rendering::LineProbe& rest() const { return rest_; }  ///< 1 mm deep, m
-  /// N along z on each end at rest, and how many objects give it.
+  /// N along z on each end at rest, and the number of objects touched.
   double force_tip() const { return force_tip_; }
   double force_tail() const { return force_tail_; }
   int contacts() const { return contacts_; }
@@ -63,13 +63,14 @@ class LoopScene {
 
 struct LoopOutcome {
   bool stable = false;
-  double early = 0, late = 0;  ///< m, of the springs, from crest to trough, early and late
+  double early_amplitude = 0;  ///< m, peak to peak, in the second quarter of the run
+  double late_amplitude = 0;   ///< m, the same in the last quarter
   std::uint64_t ticks = 0;
 };
 
-/// Let go 0.1 mm (tip) and 0.06 mm (tail) off its rest, under the force that holds it there. The
-/// linear part of each end moves exactly (matrix exponential) under a force that is held over the
-/// tick. Unstable: the motion grows, beyond what a count of the resolution makes.
+/// Released 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force that holds
+/// it there. Each end is integrated exactly (matrix exponential) under a force stylus_at_height_0
+/// over the tick. Unstable: the amplitude grows beyond the effect of quantisation.
 LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
 
 }  // namespace palpate::runner

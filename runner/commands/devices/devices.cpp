@@ -130,7 +130,7 @@ Json to_json(const ServoTiming& t) {
         {"p99", t.lateness_p99},
         {"p99.9", t.lateness_p999},
         {"max", t.lateness_max},
-        {"share_above_one_period", t.late_share}}},
+        {"share_above_one_period", t.late_fraction}}},
       {"warm_up_ns",
        {{"median", t.warm_up_median}, {"p99.9", t.warm_up_p999}, {"max", t.warm_up_max}}},
       {"compute_ns", {{"median", t.clock_median}, {"p99.9", t.clock_p999}, {"max", t.clock_max}}},
@@ -162,7 +162,7 @@ void print(const ServoTiming& t) {
   std::printf("%-44s%10.2f\n", "  of which asking for that time", us(t.asking_median));
   std::printf("%-44s%10.2f%10s%10.2f%10.2f\n", "whole tick but the device's transfer",
               us(t.tick_median), "", us(t.tick_p999), us(t.tick_max));
-  std::printf("later than a period: %.4g %% of ticks\n%s\n", t.late_share * 100,
+  std::printf("later than a period: %.4g %% of ticks\n%s\n", t.late_fraction * 100,
               t.sentence().c_str());
 }
 
@@ -205,9 +205,8 @@ int devices_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate devices [--device NAME] [--timing] [--calibrate] [--json FILE]";
   line.summary =
-      "Lists the connected devices with their limits and self-tests; measures whether this "
-      "machine\n"
-      "keeps the servo's timing; calibrates forces. Self-tests command zero force.";
+      "Lists the connected devices with their limits and self-tests; measures whether this\n"
+      "machine keeps the servo's timing; calibrates forces. Self-tests command zero force.";
   line.example =
       "  palpate devices                                       what is there\n"
       "  palpate devices --device falcon --firmware nvent.bin  opens one and tests it\n"
@@ -231,7 +230,7 @@ int devices_command(const std::vector<std::string>& args) {
        "--timing: on this processor only")                                                  //
       ("calibrate", "guided calibration of a device")                                       //
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
-      ("force", "replace a file that is there");
+      ("force", "replace an existing file");
   add_calibrate_options(line.options);
   const auto values = line.parse(args);
   if (!values) return 0;

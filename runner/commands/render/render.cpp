@@ -95,14 +95,14 @@ int render_command(const std::vector<std::string>& args) {
   Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
     const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
-    for (const stimuli::ObjectSpec& object : objects) outputs.keep(object);
+    for (const stimuli::ObjectSpec& object : objects) outputs.protect(object);
     explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
   given(*values, "out", "unless --explain is given");
   const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
-  for (const stimuli::ObjectSpec& object : objects) outputs.keep(object);
+  for (const stimuli::ObjectSpec& object : objects) outputs.protect(object);
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
   const ForceTable table =
       forces_along(build_scene(scene_path, objects, renderer), renderer, poses);

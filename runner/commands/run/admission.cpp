@@ -95,13 +95,13 @@ std::string latest(const std::vector<std::string>& codes) {
   const std::vector<std::string> last(codes.end() - static_cast<std::ptrdiff_t>(shown),
                                       codes.end());
   const std::string all = codes.size() > shown ? std::to_string(codes.size()) + ", the last: " : "";
-  return all + in_words(last);
+  return all + join_names(last);
 }
 
 void confirm_new(const RunSettings& settings, const std::string& code,
                  const std::vector<std::string>& codes) {
   const std::vector<std::string> near = near_codes(code, codes);
-  const std::string alike = in_words(near) + (near.size() == 1 ? " is" : " are");
+  const std::string alike = join_names(near) + (near.size() == 1 ? " is" : " are");
   if (settings.new_participant) return;
   if (!on_a_terminal()) {
     if (!near.empty()) {

@@ -17,11 +17,12 @@ std::optional<std::string> read_line() {
   std::string line;
   while (true) {
     char c = 0;
-    const ssize_t got = read(STDIN_FILENO, &c, 1);  // byte by byte: the rest is somebody else's
+    const ssize_t got = read(STDIN_FILENO, &c, 1);  // byte by byte, to leave later input unread
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0 && line.empty()) return std::nullopt;
     if (got <= 0 || c == '\n') break;
-    if (line.size() == kLongest) throw UsageError("standard input: a short line was expected");
+    if (line.size() == kLongest)
+      throw UsageError("standard input: a line must have at most 200 bytes");
     line += c;
   }
   const std::size_t begin = line.find_first_not_of(" \t\r");
@@ -37,11 +38,11 @@ std::optional<std::string> ask(const std::string& question) {
 std::string given_or_asked(const std::string& given, const std::string& what) {
   if (given != "-") return given;
   const auto answer = ask(what + ": ");
-  if (!answer) throw UsageError("-: a " + what + " was expected on standard input");
+  if (!answer) throw UsageError("-: standard input must hold a " + what);
   return *answer;
 }
 
-std::string in_words(const std::vector<std::string>& names) {
+std::string join_names(const std::vector<std::string>& names) {
   std::string words;
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (i > 0) words += i + 1 == names.size() ? " and " : ", ";

@@ -1,5 +1,5 @@
 #pragma once
-// Questions to whoever sits at the terminal that a command was started from.
+// Questions to the user on the terminal.
 
 #include <optional>
 #include <string>
@@ -7,21 +7,21 @@
 
 namespace palpate::runner {
 
-/// Somebody can be asked: standard input and standard error are a terminal.
+/// Whether the user can be asked: standard input and standard error are a terminal.
 bool on_a_terminal();
 
-/// A line of standard input, without its end and the spaces around it. What follows is left there
-/// for others. None: the input has ended. \throws UsageError: a line of more than 200 bytes.
+/// A line of standard input without its end and surrounding spaces; later input is left unread.
+/// nullopt: the input has ended. \throws UsageError if the line is longer than 200 bytes.
 std::optional<std::string> read_line();
 
-/// Says `question` on standard error and reads the answer; without a terminal reads only.
+/// Prints `question` on standard error, if there is a terminal, and reads the answer.
 std::optional<std::string> ask(const std::string& question);
 
-/// `given`, or what stands on standard input where that is "-": other users of the computer see
-/// every command line. \param what "participant code". \throws UsageError: nothing stands there.
+/// `given`, or a line of standard input if that is "-", because other users of the computer can see
+/// command lines. \param what  "participant code". \throws UsageError if standard input is empty.
 std::string given_or_asked(const std::string& given, const std::string& what);
 
 /// "P01", "P01 and P02", "P01, P02 and P03"
-std::string in_words(const std::vector<std::string>& names);
+std::string join_names(const std::vector<std::string>& names);
 
 }  // namespace palpate::runner

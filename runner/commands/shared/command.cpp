@@ -14,8 +14,7 @@ namespace po = boost::program_options;
 
 namespace {
 
-/// What boost lets through: "-1" as a whole number that has no sign (2^64 - 1), "nan" and "inf" as
-/// numbers.
+/// Refuses what Boost accepts: "-1" for an unsigned number (2^64 - 1), "nan" and "inf".
 void check_number(const std::string& option, const std::string& text, const boost::any& value) {
   const auto refuse = [&](const char* expected) {
     throw UsageError("--" + option + ": expected " + expected + ", found '" +

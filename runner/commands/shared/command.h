@@ -1,5 +1,5 @@
 #pragma once
-// The commands of the program, one file each. main.cpp holds the table of them.
+// The commands of the program, a file or folder each. main.cpp has the table of them.
 //
 // A command gets the arguments after its name and returns the exit status. It writes results to
 // stdout, messages and progress (only on a terminal) to stderr. It throws UsageError for wrong
@@ -18,20 +18,20 @@ class UsageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A command's options: prints --help with the example, checks, and stores the values.
+/// A command's options: parses them, checks numbers and prints --help.
 struct CommandLine {
   std::string usage;    ///< "palpate validate PROTOCOL.json"
   std::string summary;  ///< what it does, in a sentence
-  std::string example;  ///< one or more command lines with what they are for
+  std::string example;  ///< one or more command lines with explanations
   boost::program_options::options_description options{"Options"};
   boost::program_options::positional_options_description positional;
-  std::vector<std::string> positional_names;  ///< hidden from the list of options; all std::string
+  std::vector<std::string> positional_names;  ///< not in the list of options; all std::string
 
-  /// Parses; nullopt when --help was asked for and printed. \throws UsageError.
+  /// nullopt if --help was given: then it has been printed. \throws UsageError.
   std::optional<boost::program_options::variables_map> parse(const std::vector<std::string>& args);
 };
 
-/// Says on stderr, once, where others could get at the database or put files beside it.
+/// Warns on stderr if other users can read the database or create files beside it.
 void warn_of_exposure(const std::string& database);
 
 int accuracy_command(const std::vector<std::string>& args);

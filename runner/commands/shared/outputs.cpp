@@ -50,7 +50,7 @@ bool is_stream(const std::string& path) {
          (fs::exists(path, error) && !fs::is_regular_file(path, error));
 }
 
-/// A reader that has gone is an error like any other, not the end of the program.
+/// Makes writing to a closed pipe an error instead of ending the program.
 class NoPipeSignal {
  public:
   NoPipeSignal() : before_(std::signal(SIGPIPE, SIG_IGN)) {}
@@ -63,7 +63,7 @@ class NoPipeSignal {
 };
 
 void stream_out(const std::string& path, std::string_view text) {
-  std::cout.flush();  // what came before stands before it
+  std::cout.flush();  // keeps the order of the output
   const NoPipeSignal quiet;
   const auto named = data::descriptor_of_path(path);
   const int out = named ? *named : ::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC);
@@ -112,9 +112,9 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
   check();
 }
 
-void Outputs::keep(const stimuli::ObjectSpec& object) {
+void Outputs::protect(const stimuli::ObjectSpec& object) {
   inputs_.add(object.file, "it is a mesh that is read, and would be overwritten");
-  for (const stimuli::ObjectSpec& part : object.parts) keep(part);
+  for (const stimuli::ObjectSpec& part : object.parts) protect(part);
   check();
 }
 
@@ -153,7 +153,7 @@ void Outputs::write() {
   const bool made = !folder_.empty() && fs::create_directories(folder_, error);
   if (error) throw std::runtime_error(folder_ + ": " + error.message());
   try {
-    check();  // much may have happened since
+    check();  // files may have changed since
     std::deque<data::AtomicFile> drafts;
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) continue;

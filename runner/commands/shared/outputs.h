@@ -1,5 +1,6 @@
 #pragma once
-// The files that a command writes: looked at before its work begins, then written, all or none.
+// The files that a command writes: checked before its work begins, then written together or not at
+// all.
 
 #include <boost/program_options.hpp>
 #include <initializer_list>
@@ -11,30 +12,30 @@
 
 namespace palpate::runner {
 
-/// Writes one file whole, private (0600), in place of one that may be there. For what a command
-/// keeps up to date itself (calibrations). \throws StoreError.
+/// Writes one file atomically, private (0600), replacing an existing one. For files that a command
+/// updates (calibrations). \throws StoreError.
 void write_whole(const std::string& path, const std::string& text);
 
 class Outputs {
  public:
-  /// Looks at the files of those options that were given. A file that is there is replaced with
-  /// --force alone; what the options `inputs` name, a database, a device or a folder never is.
-  /// \param folder an option that names a folder of files, or none
-  /// \throws UsageError with every fault; std::runtime_error: a folder cannot be written to.
+  /// Checks the files of the options that were given. An existing file is replaced only with
+  /// --force; never what the options `inputs` name, a database, a device or a folder. \param folder
+  /// an option that names a folder of files, or nullptr \throws UsageError with every fault;
+  /// std::runtime_error if a folder is not writable.
   Outputs(const boost::program_options::variables_map& values,
           std::initializer_list<const char*> options, std::initializer_list<const char*> inputs,
           const char* folder = nullptr);
 
-  /// The mesh files of an object are read as well, though no option names them. \throws UsageError.
-  void keep(const stimuli::ObjectSpec& object);
+  /// Protects the mesh files of an object, which no option names. \throws UsageError.
+  void protect(const stimuli::ObjectSpec& object);
 
   bool wanted(const char* option) const { return values_.count(option) > 0; }
-  /// The text for an option's file; no effect where the option was not given.
+  /// Sets the text of an option's file; no effect if the option was not given.
   void put(const std::string& option, std::string text);
-  /// A file in the folder, where one was given.
+  /// Adds a file in the folder, if one was given.
   void put_into_folder(const std::string& name, std::string text);
 
-  /// All are whole under their names when this returns; when it throws, none has changed.
+  /// Writes all files. If it throws, none has changed.
   void write();
 
  private:

@@ -1,4 +1,5 @@
 #pragma once
+// Progress of a long command, on a terminal only.
 
 #include <string>
 
@@ -7,7 +8,7 @@ namespace palpate::runner {
 /// ns, of a steady clock.
 double now_ns();
 
-/// One line on a terminal: what is done, and how long the rest will take. Gone at the end.
+/// A progress line on a terminal: percentage and time left. Erased at the end.
 class ProgressLine {
  public:
   explicit ProgressLine(std::string what);
@@ -15,19 +16,19 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// Something else begins.
+  /// Starts another task.
   void begin(std::string what);
-  /// \param done  0 to 1; the first call may be beyond 0, where an earlier run has got
+  /// \param done  0 to 1; a resumed task starts above 0
   void show(double done);
   void clear();
-  /// Whether anybody sees it.
+  /// Whether it is shown.
   bool on_terminal() const { return on_terminal_; }
 
  private:
   std::string what_;
   bool on_terminal_;
   double start_ = 0, shown_ = 0;  // ns
-  double first_ = -1;             // done at the start; negative: not known yet
+  double first_ = -1;             // `done` at the first call; negative: none yet
 };
 
 }  // namespace palpate::runner

@@ -44,14 +44,14 @@ std::string what_happened(const ChangedProtocol& changed,
 }
 
 ProtocolChoice ask_which(const std::string& code, bool only_texts) {
-  std::string question = "  s  go on with the protocol as it is stored (Enter alone)\n";
-  if (only_texts) question += "  t  go on with the new texts\n";
-  question += "  n  begin anew, as a new participant under another code\n  q  do nothing\n" + code +
-              ", which? ";
+  std::string question = "  s  use the protocol as it is stored (Enter alone)\n";
+  if (only_texts) question += "  t  use the new texts\n";
+  question +=
+      "  n  begin as a new participant under another code\n  q  quit\n" + code + ", which? ";
   while (true) {
     const auto answer = ask(question);
     if (!answer || answer == "q")
-      throw UsageError("nothing was begun; the same command asks again");
+      throw UsageError("nothing was started; the same command asks again");
     if (answer == "" || answer == "s") return ProtocolChoice::stored;
     if (answer == "t" && only_texts) return ProtocolChoice::new_texts;
     if (answer == "n") return ProtocolChoice::new_code;
@@ -98,25 +98,25 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
   const std::string happened = what_happened(changed, differs);
   if (changed.option == "texts" && !differs.only_texts()) {
     throw UsageError("--changed-protocol texts: " + happened +
-                     ": not only texts. Leave the option out to go on with the protocol as it is "
-                     "stored, or begin anew with another --participant");
+                     ": not only texts. Leave the option out to resume with the protocol as it is "
+                     "stored, or begin again with another --participant");
   }
   if (changed.option == "texts") {
-    say(happened + "; going on with the new texts");
+    say(happened + "; resuming with the new texts");
     return ProtocolChoice::new_texts;
   }
   if (changed.option.empty() && changed.earlier.shown_sha256 == changed.now.sha256) {
-    say(happened + "; going on with these texts, as in the last run");
+    say(happened + "; resuming with these texts, as in the last run");
     return ProtocolChoice::new_texts;
   }
   if (changed.option.empty() && !differs.nothing() && on_a_terminal()) {
     say(happened);
     return ask_which(changed.code, differs.only_texts());
   }
-  say(happened + "; going on with the protocol as it is stored" +
+  say(happened + "; resuming with the protocol as it is stored" +
       (!changed.option.empty() || differs.nothing() ? ""
        : differs.only_texts() ? ". --changed-protocol texts shows the new texts"
-                              : ". To begin anew, give another --participant"));
+                              : ". To begin again, give another --participant"));
   return ProtocolChoice::stored;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
-// A participant who comes back to a protocol that was changed in between: with which is it to go
-// on?
+// When a participant returns and the protocol file was edited in between: which version to use.
 
 #include <cstddef>
 #include <optional>
@@ -12,15 +11,15 @@
 
 namespace palpate::runner {
 
-/// A participant's own protocol, where it is not, to the byte, the one that was named.
+/// The protocol that a participant began with, if it differs from the named one.
 struct EarlierProtocol {
   data::ProtocolInfo info;
-  std::string shown_sha256;  ///< of what the last run was shown with; "": of the participant's own
+  std::string shown_sha256;  ///< of the version shown in the last run; "": the participant's own
   std::size_t trials = 0;    ///< on record
   std::string last_run;      ///< "2026-11-21 15:02 UTC"; "" where there was none
 };
 
-/// The latest protocol of this name but another text that `code` is enrolled in.
+/// The latest protocol of this name with a different text in which `code` is enrolled.
 std::optional<EarlierProtocol> earlier_protocol(data::Store& store,
                                                 const protocols::Protocol& protocol,
                                                 const std::string& code);
@@ -35,12 +34,11 @@ struct ChangedProtocol {
   std::string option;  ///< --changed-protocol; "": not given
 };
 
-/// Asked at the terminal, where there is one; otherwise the stored protocol, if the option says
-/// nothing else. Says what differs. \throws UsageError: the option does not fit, or nothing is to
-/// be done.
+/// From the option, else from the user on a terminal, else the stored protocol. Prints what
+/// differs. \throws UsageError if the option is impossible or the user quits.
 ProtocolChoice choose_protocol(const ChangedProtocol& changed);
 
-/// What differed and what was chosen, for the record.
+/// The differences and the choice, for the record.
 std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice);
 
 }  // namespace palpate::runner

@@ -11,7 +11,7 @@ void ask_to_stop(int) { stop_asked = true; }
 
 }  // namespace
 
-const std::atomic<bool>& watch_stop_signals() {
+const std::atomic<bool>& catch_stop_signals() {
   struct sigaction action = {};
   action.sa_handler = ask_to_stop;
   action.sa_flags = static_cast<int>(SA_RESETHAND);

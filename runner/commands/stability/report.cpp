@@ -17,7 +17,8 @@ std::string times(double factor) { return significant(factor) + " times"; }
 
 analysis::Table theory_table(const StabilityReport& report) {
   analysis::Table table;
-  table.caption = "The theory's own case: a plain wall, ends too heavy for their mass to matter";
+  table.caption =
+      "The case of the theory: a plain wall, ends so heavy that their mass does not matter";
   table.header = {"curve", "stiffness N/m", "damping N s/m: theory", "measured", "ratio"};
   for (const BoundaryCurve& curve : report.theory) {
     for (const BoundaryPoint& p : curve.points) {
@@ -30,7 +31,7 @@ analysis::Table theory_table(const StabilityReport& report) {
 
 analysis::Table curve_table(const StabilityReport& report, const std::string& panel) {
   analysis::Table table;
-  table.caption = "Damping that a loop needs, N s/m at each end: " + panel;
+  table.caption = "Damping needed for stability, N s/m at each end: " + panel;
   table.header = {"curve", "stiffness N/m", "theory", "measured"};
   for (const BoundaryCurve& curve : report.curves) {
     if (curve.panel != panel) continue;
@@ -55,13 +56,13 @@ std::vector<std::string> panels_of(const StabilityReport& report) {
 
 analysis::Table gain_table(const StabilityReport& report) {
   analysis::Table table;
-  table.caption = "The stiffest that is stable, N/m, without the passivity controller and with it";
+  table.caption = "Largest stable stiffness, N/m, without the passivity controller and with it";
   table.header = {"scene", "probe",  "Hz",      "damping N s/m", "resolution um",
                   "delay", "theory", "without", "with",          "factor"};
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
     const LoopSettings& s = g.loop.settings;
-    table.rows.push_back({to_string(g.loop.situation), protocols::to_string(g.loop.renderer),
+    table.rows.push_back({to_string(g.loop.contact_case), protocols::to_string(g.loop.renderer),
                           significant(s.rate), significant(g.damping),
                           significant(1e6 * s.resolution), std::to_string(s.delay),
                           significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
@@ -72,18 +73,18 @@ analysis::Table gain_table(const StabilityReport& report) {
 
 analysis::Table integrator_table(const StabilityReport& report) {
   analysis::Table table;
-  table.caption = "Integrators for what moves, 1 kHz: error after 500 ticks over run time";
+  table.caption = "Integrators of the hand, 1 kHz: error after 500 ticks over run time";
   table.header = {"case", "method", "steps a tick", "ns a tick", "worst error, m"};
   table.n_names = 2;
   for (const IntegratorRow& row : report.integrators) {
     table.rows.push_back({row.oscillator, row.method, std::to_string(row.steps),
                           significant(row.ns_per_tick),
-                          std::isfinite(row.error) ? significant(row.error) : "blows up"});
+                          std::isfinite(row.error) ? significant(row.error) : "diverges"});
   }
   return table;
 }
 
-/// The cheapest of the others that comes within a micrometre, against the exact one, worst case.
+/// Run time of the fastest other method within a micrometre over that of the exact one, worst case.
 double integrator_gain(const StabilityReport& report) {
   double worst = HUGE_VAL;
   for (const IntegratorRow& exact : report.integrators) {
@@ -111,25 +112,27 @@ std::vector<std::string> how_to_read() {
   std::vector<std::string> notes;
   notes.emplace_back(
       "Each end of the stylus is a mass that moves along the direction of pressing, with the "
-      "device's damping and friction and the hand's impedance; exactly (matrix exponential) under "
-      "a force that is held over the tick. The renderers are the program's own. It is let go 0.1 "
-      "mm off its rest, 1 mm deep; it is unstable when what the springs feel swings wider in the "
-      "last quarter of 40 periods than in the second (and wider than three counts of the "
-      "resolution).");
+      "device's damping and friction and the hand's impedance, integrated exactly (matrix "
+      "exponential) under a force held over the tick. The renderers are those of sessions. The "
+      "stylus is released 0.1 mm from equilibrium, 1 mm deep; the loop is unstable when the "
+      "contact "
+      "force oscillates with a larger amplitude in the last quarter of 40 periods than in the "
+      "second (and larger than three counts of the resolution).");
   notes.emplace_back(
       "Theory: b > K (T/2 + t_d) + |B| (Colgate & Schenkel 1997; t_d: delay), as long as friction "
-      "holds each count of the resolution, K <= 2 f_c / Delta (Abbott & Okamura 2005). It bounds "
-      "passivity: below it no hand, however it holds on, can make the loop buzz. A given loop may "
-      "be stable far beyond.");
+      "dissipates the effect of quantisation, K <= 2 f_c / Delta (Abbott & Okamura 2005). This is "
+      "the condition of passivity: up to this stiffness no passive hand can make the loop "
+      "unstable. "
+      "A given loop may be stable far beyond.");
   notes.emplace_back(
-      "Where two objects are touched, or the side of the stylus, the theory is that of one contact "
-      "at one end: the ends share the load.");
+      "Where two objects or the side of the stylus are in contact, the theory still assumes one "
+      "contact at one end, although both ends carry the load.");
   return notes;
 }
 
 Json loop_json(const LoopCase& loop) {
   const LoopSettings& s = loop.settings;
-  return {{"scene", to_string(loop.situation)},
+  return {{"scene", to_string(loop.contact_case)},
           {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
@@ -186,11 +189,12 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
       "The measured boundary of a plain wall is the theory's, b = K (T/2 + t_d), within " +
       significant(100 * report.worst_disagreement()) + " % at all rates, with and without delay.");
   const int unsafe = report.unsafe();
-  out.push_back((unsafe == 0
-                     ? "Everywhere else the loop is stable where the theory promises it: at all "
-                     : "At " + std::to_string(unsafe) +
-                           " points the loop buzzes where the theory promises rest; of all ") +
-                std::to_string(report.points()) + " points of the map.");
+  out.push_back(
+      (unsafe == 0
+           ? "Everywhere else the loop is stable where the theory promises passivity: at all "
+           : "At " + std::to_string(unsafe) +
+                 " points the loop is unstable where the theory promises passivity; of all ") +
+      std::to_string(report.points()) + " points of the map.");
   double ideal = HUGE_VAL, coarse = HUGE_VAL, late = HUGE_VAL;
   for (const ControllerGain& g : report.gains) {
     const LoopSettings& settings = g.loop.settings;
@@ -206,10 +210,8 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
   }
   if (!report.integrators.empty()) {
     out.push_back(
-        "What moves is integrated exactly: within a micrometre, every other method takes at "
-        "least " +
-        times(integrator_gain(report)) +
-        " the run time on the stiff cases, or blows up; none of them is kept.");
+        "The hand is integrated exactly: within a micrometre, every other method takes at least " +
+        times(integrator_gain(report)) + " the run time in the stiff cases, or diverges.");
   }
   return out;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// What `palpate stability` found, as text, JSON, figures and a page.
+// The results of `palpate stability`, as text, JSON, figures and an HTML page.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -18,27 +18,27 @@ struct BoundaryCurve {
   std::vector<BoundaryPoint> points;
 };
 
-/// How far a device of given damping goes, without the passivity controller and with it.
+/// Largest stable stiffness of a device, without and with the passivity controller.
 struct ControllerGain {
   LoopCase loop;                 ///< without
   double damping = 0;            ///< N s/m, of each end
-  double without = 0, with = 0;  ///< N/m, stiffest that is stable
+  double without = 0, with = 0;  ///< N/m, largest stable stiffness
 };
 
 struct StabilityReport {
-  std::vector<BoundaryCurve> theory;  ///< heavy ends: the theory's own case
+  std::vector<BoundaryCurve> theory;  ///< heavy ends: the case of the theory
   std::vector<BoundaryCurve> curves;
   std::vector<ControllerGain> gains;
   std::vector<IntegratorRow> integrators;
 
-  /// Worst |measured / theory - 1| of the plain wall with heavy ends.
+  /// Largest |measured / theory - 1| of the plain wall with heavy ends.
   double worst_disagreement() const;
-  /// Points where the theory promised passivity and the loop was unstable; must be 0.
+  /// Points that are unstable although the theory promises passivity; must be 0.
   int unsafe() const;
   int points() const;
 };
 
-/// The answers in sentences.
+/// The conclusions in sentences.
 std::vector<std::string> stability_sentences(const StabilityReport& report);
 std::vector<analysis::Table> stability_tables(const StabilityReport& report);
 std::string stability_text(const StabilityReport& report);

@@ -44,13 +44,13 @@ std::vector<BoundaryCurve> map_curves() {
   std::vector<BoundaryCurve> out;
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const Situation situation : kSituations) {
+    for (const ContactCase contact_case : kContactCases) {
       LoopCase loop;
-      loop.situation = situation;
+      loop.contact_case = contact_case;
       loop.renderer = renderer;
       out.push_back(
           curve(renderer == protocols::RendererKind::point ? "scenes, point" : "scenes, ray",
-                to_string(situation), loop));
+                to_string(contact_case), loop));
     }
   }
   for (const double rate : kRates) {
@@ -68,8 +68,8 @@ std::vector<BoundaryCurve> map_curves() {
     EndImpedance impedance;
   };
   const Hand hands[] = {{"none", {}},
-                        {"limp: 50 N/m", {50, 1, 0.02}},
-                        {"at ease: 200 N/m", {200, 5, 0.05}},
+                        {"soft: 50 N/m", {50, 1, 0.02}},
+                        {"relaxed: 200 N/m", {200, 5, 0.05}},
                         {"stiff: 1000 N/m", {1000, 10, 0.05}}};
   for (const Hand& hand : hands) {
     LoopCase loop;
@@ -100,9 +100,9 @@ std::vector<ControllerGain> gain_cases() {
   const auto add = [&](const LoopCase& loop) { out.push_back({loop, kEndDamping, 0, 0}); };
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const Situation situation : kSituations) {
+    for (const ContactCase contact_case : kContactCases) {
       LoopCase loop;
-      loop.situation = situation;
+      loop.contact_case = contact_case;
       loop.renderer = renderer;
       add(loop);
     }
@@ -131,8 +131,8 @@ std::vector<double> grid(bool fine) {
   return out;
 }
 
-/// Does all tasks, shared out among threads.
-void do_all(const std::vector<std::function<void()>>& tasks, int jobs) {
+/// Runs all tasks on several threads.
+void run_all(const std::vector<std::function<void()>>& tasks, int jobs) {
   ProgressLine progress("loops");
   std::atomic<std::size_t> next{0};
   std::vector<std::thread> threads;
@@ -171,7 +171,7 @@ StabilityReport study(bool full, int jobs) {
       gain.with = stiffest_stable(with, gain.damping);
     });
   }
-  do_all(tasks, jobs);
+  run_all(tasks, jobs);
   report.integrators = compare_integrators(now_ns);
   return report;
 }
@@ -182,9 +182,10 @@ int stability_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate stability [--full] [--report FILE.html] [--json FILE]";
   line.summary =
-      "At what stiffness does it buzz? A hand, two devices and the renderers in a closed loop,\n"
-      "against a wall, an edge, a sphere and two objects; where the loop stops being stable, and\n"
-      "what the theory of passivity says. Status 1 when the theory promises more than holds.";
+      "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
+      "hand, two devices and renderer against a wall, an edge, a sphere and two objects, and\n"
+      "compares the stability boundary with the passivity condition of theory. Status 1 where\n"
+      "theory is violated.";
   line.example =
       "  palpate stability\n"
       "  palpate stability --full --report stability.html --json stability.json";
@@ -194,15 +195,15 @@ int stability_command(const std::vector<std::string>& args) {
   namespace po = boost::program_options;
   add("full", "four stiffnesses a decade instead of one");
   add("report", po::value(&page)->value_name("FILE"),
-      "write all of it, with figures, as one HTML page");
+      "write a report with figures as an HTML page");
   add("figure", po::value(&figure)->value_name("FILE"), "write the map as SVG");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
-  add("jobs", po::value(&jobs)->value_name("J"), "threads; default: one a core");
-  add("force", "replace files that are there");
+  add("jobs", po::value(&jobs)->value_name("J"), "threads; default: one for each core");
+  add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;
   if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
-    throw UsageError("--jobs: expected 1 to 256, not " + std::to_string(jobs));
+    throw UsageError("--jobs: must be 1 to 256, not " + std::to_string(jobs));
   }
   Outputs outputs(*values, {"json", "report", "figure"}, {});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));

@@ -527,7 +527,7 @@ class Changed(Live):
         with self.run_session(code="K1", **self.TEXTS) as terminal:
             terminal.wait_for("K1 began with another text of protocol two (1 trial on record, last run on ")
             terminal.wait_for("has changed since (only texts: /texts/break)")
-            terminal.wait_for("t  go on with the new texts", "which? ")
+            terminal.wait_for("t  use the new texts", "which? ")
             terminal.wait_for("which? ")
             terminal.type("\n")
             terminal.wait_for("participant K1 has number 1; session 1 of 1")
@@ -557,7 +557,7 @@ class Changed(Live):
             self.finish(terminal)
             self.assertIn("2 of 4 trials on record", terminal.text)
         with self.run_session(code="K1", **self.TEXTS) as terminal:  # that has been answered
-            terminal.wait_for("going on with these texts, as in the last run")
+            terminal.wait_for("resuming with these texts, as in the last run")
             self.finish(terminal)
             self.assertIn("sit down", terminal.text)
             self.assertNotIn("which?", terminal.text)
@@ -573,12 +573,12 @@ class Changed(Live):
         with self.run_session(code="K1", **self.DESIGN) as terminal:
             terminal.wait_for("(stimuli and order: /seed; texts: /texts/break)")
             terminal.wait_for("which? ")
-            self.assertNotIn("t  go on with the new texts", terminal.text)
+            self.assertNotIn("t  use the new texts", terminal.text)
             terminal.type("t\n")
             terminal.wait_for("which? ")
             terminal.type("q\n")
             self.assertEqual(terminal.finish(), 2)
-            self.assertIn("nothing was begun", terminal.text)
+            self.assertIn("nothing was started", terminal.text)
         done = self.run_piped("--changed-protocol", "texts", code="K1", **self.DESIGN)
         self.assertEqual(done.returncode, 2)
         self.assertIn(b"--changed-protocol texts: K1 began with another text", done.stderr)
@@ -617,9 +617,9 @@ class Changed(Live):
             self.assertIn("1 of 4 trials on record; aborted", out)
             return said + err
 
-        self.assertIn("going on with the protocol as it is stored. --changed-protocol texts shows", piped())
-        self.assertIn("going on with the new texts", piped("--changed-protocol", "texts"))
-        self.assertIn("going on with the protocol as it is stored\n", piped("--changed-protocol", "stored"))
+        self.assertIn("resuming with the protocol as it is stored. --changed-protocol texts shows", piped())
+        self.assertIn("resuming with the new texts", piped("--changed-protocol", "texts"))
+        self.assertIn("resuming with the protocol as it is stored\n", piped("--changed-protocol", "stored"))
         self.assertEqual(self.shown_texts(), [None, None, "sit down", None])
         self.assertEqual(self.codes(self.db), ["K1"])
 
@@ -628,7 +628,7 @@ class Changed(Live):
         path.write_text(json.dumps(PROTOCOL, indent=3, sort_keys=True))
         with unittest.mock.patch.object(self, "protocol", lambda **_: path):
             with self.run_session(code="K1") as terminal:
-                terminal.wait_for("(only its layout); going on with the protocol as it is stored")
+                terminal.wait_for("(only its layout); resuming with the protocol as it is stored")
                 self.finish(terminal)
         self.assertEqual(self.codes(self.db), ["K1"])
 

@@ -39,10 +39,10 @@ TEST(Stability, IsWhereTheTheoryPromisesIt) {
   std::vector<LoopCase> loops;
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const Situation situation : kSituations) {
+    for (const ContactCase contact_case : kContactCases) {
       for (const double damping : {0.0, 1.0}) {
         LoopCase loop;
-        loop.situation = situation;
+        loop.contact_case = contact_case;
         loop.renderer = renderer;
         loop.virtual_damping = damping;
         loops.push_back(loop);
@@ -59,7 +59,7 @@ TEST(Stability, IsWhereTheTheoryPromisesIt) {
     for (const double stiffness : {30.0, 3000.0, 30000.0}) {
       const BoundaryPoint p = boundary_at(loop, stiffness);
       EXPECT_TRUE(p.promised);
-      EXPECT_FALSE(p.unsafe()) << to_string(loop.situation) << ", "
+      EXPECT_FALSE(p.unsafe()) << to_string(loop.contact_case) << ", "
                                << protocols::to_string(loop.renderer) << ", B "
                                << loop.virtual_damping << ", " << stiffness << ": " << p.measured
                                << " of " << p.theory;
@@ -70,12 +70,13 @@ TEST(Stability, IsWhereTheTheoryPromisesIt) {
 TEST(Stability, TouchesWhatItSays) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const Situation situation : kSituations) {
-      const LoopScene scene(situation, renderer, stimuli::Material{});
-      EXPECT_EQ(scene.contacts(), situation == Situation::two_objects ? 2 : 1);
+    for (const ContactCase contact_case : kContactCases) {
+      const LoopScene scene(contact_case, renderer, stimuli::Material{});
+      EXPECT_EQ(scene.contacts(), contact_case == ContactCase::two_objects ? 2 : 1);
       EXPECT_GT(scene.force_tip(), 0);
-      const bool side = renderer == protocols::RendererKind::ray && situation != Situation::wall;
-      EXPECT_EQ(scene.force_tail() > 0, side) << to_string(situation);
+      const bool side =
+          renderer == protocols::RendererKind::ray && contact_case != ContactCase::wall;
+      EXPECT_EQ(scene.force_tail() > 0, side) << to_string(contact_case);
     }
   }
 }
@@ -91,13 +92,13 @@ TEST(Stability, FrictionMustHoldACountOfTheResolution) {
 TEST(Stability, ThePassivityControllerExtendsIt) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const Situation situation : kSituations) {
+    for (const ContactCase contact_case : kContactCases) {
       LoopCase loop;
-      loop.situation = situation;
+      loop.contact_case = contact_case;
       loop.renderer = renderer;
       const double without = stiffest_stable(loop, 0.25);
       loop.settings.passivity_controller = true;
-      EXPECT_GT(stiffest_stable(loop, 0.25), 10 * without) << to_string(situation);
+      EXPECT_GT(stiffest_stable(loop, 0.25), 10 * without) << to_string(contact_case);
     }
   }
 }
