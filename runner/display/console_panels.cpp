@@ -37,16 +37,16 @@ std::string of(int number, int all) {
 
 }  // namespace
 
-void draw_status(const ConsoleState& state, bool hidden, bool beside) {
-  if (beside && !state.checklist.steps.empty()) return;  // no trial yet: the space is needed
+void draw_status(const ConsoleState& state, bool hidden, bool compact) {
+  if (compact && !state.checklist.steps.empty()) return;  // no trial yet: the space is needed
   coloured_text(kQuiet, state.study + "  ·  " + state.participant + "  ·  session " +
                             std::to_string(state.session));
   title(state);
   progress(state);
-  if (!ImGui::BeginTable("status", beside ? 4 : 2)) return;
-  for (int i = 0; i < (beside ? 2 : 1); ++i) {
+  if (!ImGui::BeginTable("status", compact ? 4 : 2)) return;
+  for (int i = 0; i < (compact ? 2 : 1); ++i) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed,
-                            (beside ? 6.0F : 7.5F) * ImGui::GetFontSize());
+                            (compact ? 6.0F : 7.5F) * ImGui::GetFontSize());
     ImGui::TableSetupColumn("value");
   }
   const bool practice = state.practice && (state.state == "trial" || state.state == "homing");
@@ -89,7 +89,7 @@ void draw_ending(EndRequest& ending, float half, std::vector<ConsoleCommand>& co
 
 }  // namespace
 
-void draw_buttons(const ConsoleState& state, bool beside, EndRequest& ending,
+void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
                   std::vector<ConsoleCommand>& commands) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
@@ -97,7 +97,7 @@ void draw_buttons(const ConsoleState& state, bool beside, EndRequest& ending,
     draw_ending(ending, half, commands);
     return;
   }
-  if (beside && !state.checklist.steps.empty()) {
+  if (compact && !state.checklist.steps.empty()) {
     if (wide_button("End now...", half)) ending.open = true;
     return;
   }

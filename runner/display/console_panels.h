@@ -9,15 +9,15 @@
 namespace palpate::runner {
 
 /// \param hidden  leaves out the shape and whether answers were correct
-/// \param beside  two values in a row, for low windows
-void draw_status(const ConsoleState& state, bool hidden, bool beside);
+/// \param compact  two values in a row, for low windows
+void draw_status(const ConsoleState& state, bool hidden, bool compact);
 /// The steps before the first trial: the current one large, with a button for each possible answer.
 void draw_checklist(const Checklist& list, EndRequest& ending,
                     std::vector<ConsoleCommand>& commands);
 /// Buttons pressed are added to `commands`, without a time. The dialog for ending the session takes
 /// the place of the buttons: the console has no pop-ups, so nothing can cover the emergency button.
-/// \param beside  as for the status
-void draw_buttons(const ConsoleState& state, bool beside, EndRequest& ending,
+/// \param compact  as for the status
+void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
                   std::vector<ConsoleCommand>& commands);
 /// The emergency button along the upper edge of the window, over everything else. Only drawn: its
 /// clicks are handled by ConsoleWindow. \return its lower edge, px

@@ -87,12 +87,12 @@ struct ShapeScore {
 /// What the experimenter sees; a new one about 30 times a second.
 struct ConsoleState {
   std::string study, participant, state;  ///< state: a word or two, "trial", "rest", "paused"
-  std::string shape, renderer,
-      stop_plan;          ///< of the current trial; "after this trial" when a stop was requested
-  std::string held_by;    ///< why the session waits, and what to press or type; else empty
-  std::string fault;      ///< why forces are off; empty: see sample.faults
-  std::string answer;     ///< the last one, and whether it was correct
-  bool practice = false;  ///< the current trial does not count
+  std::string shape, renderer;            ///< of the current trial
+  std::string stop_plan;                  ///< "after this trial" when a stop was requested
+  std::string held_by;             ///< why the session waits, and what to press or type; else empty
+  std::string fault;               ///< why forces are off; empty: see sample.faults
+  std::string answer;              ///< the last one, and whether it was correct
+  bool practice = false;           ///< the current trial does not count
   std::vector<ShapeScore> scores;  ///< without practice, in the protocol's order
   int seconds_left = 0;            ///< of a break
   Checklist checklist;             ///< before the first trial; else without steps

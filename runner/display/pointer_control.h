@@ -39,9 +39,8 @@ class PointerControl {
   StylusTarget target_;
   glm::vec2 pointer_offset_{0, 0};  ///< px, from the tip to the pointer, kept after a turn
   bool was_over_ = false, touches_ = false;
-  double press_depth_ = 0;  ///< m, penetration depth along the line of sight
-  double plane_distance_ =
-      0;  ///< m, of the plane beside the object, from the centre towards the viewer
+  double press_depth_ = 0;     ///< m, penetration depth along the line of sight
+  double plane_distance_ = 0;  ///< m, from the centre towards the viewer
 };
 
 }  // namespace palpate::runner

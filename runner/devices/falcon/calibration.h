@@ -15,10 +15,9 @@ namespace palpate::runner::falcon {
 struct ForceCalibration {
   std::string serial;
   double counts_per_torque = 0;  ///< 1/(N m) at the thighs; negative
-  double residual = 0;  ///< N, root mean square deviation of the weights from the fitted line
-  double sideways = 0;  ///< horizontal N for each N of weight; ideally 0
-  double arm_weight =
-      0;  ///< N, apparent weight of the device's arms; negative if they rise by themselves
+  double residual = 0;    ///< N, root mean square deviation of the weights from the fitted line
+  double sideways = 0;    ///< horizontal N for each N of weight; ideally 0
+  double arm_weight = 0;  ///< N, apparent weight of the device's arms; < 0: they rise
   std::vector<double> weights;  ///< kg
   std::string made_utc;         ///< ISO 8601
 };
@@ -58,8 +57,8 @@ struct CalibrationVerdict {
   std::string text;  ///< one sentence for each device, with what to do
 };
 
-inline constexpr double kCalibrationDays =
-    90;  ///< days until a calibration is stale: cables and motors age
+/// A calibration becomes stale after these days: cables and motors age.
+inline constexpr double kCalibrationDays = 90;
 
 /// Whether the scale is within kPlausibleFactor of the nominal one. With a wrong scale the force
 /// limits would let a multiple of their value through, or forces could not be felt.

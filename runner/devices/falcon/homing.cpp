@@ -4,7 +4,7 @@ namespace palpate::runner::falcon {
 
 void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
   constexpr std::int64_t kTickNs = 1'000'000;
-  DeviceTrouble told = DeviceTrouble::none;
+  DeviceTrouble announced = DeviceTrouble::none;
   for (;;) {
     clock.wait_until(clock.now_ns() + kTickNs);
     const DeviceReading reading = device.read();
@@ -14,9 +14,9 @@ void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
         reading.trouble == DeviceTrouble::guard_lost) {
       throw GuideError(advice(reading.trouble));
     }
-    if (reading.lost && reading.trouble != told && reading.trouble != DeviceTrouble::guarded) {
-      told = reading.trouble;
-      guide.say(device.capabilities().serial + ": " + advice(told));
+    if (reading.lost && reading.trouble != announced && reading.trouble != DeviceTrouble::guarded) {
+      announced = reading.trouble;
+      guide.say(device.capabilities().serial + ": " + advice(announced));
     }
     if (guide.answer() == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
   }

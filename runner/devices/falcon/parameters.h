@@ -38,9 +38,8 @@ inline constexpr double kLeastSlope = 0.05, kMostSlope = 20;
 inline constexpr double kPlausibleFactor = 4;  ///< of the nominal scale, up or down
 
 // Workspace, m.
-inline constexpr Vec3 kCentre{0, 0, 0.125};  ///< Falcon frame
-inline constexpr double kWorkspaceRadius =
-    0.04;  ///< about the centre, reachable in every direction
+inline constexpr Vec3 kCentre{0, 0, 0.125};                 ///< Falcon frame
+inline constexpr double kWorkspaceRadius = 0.04;            ///< about the centre, all reachable
 inline constexpr double kNearest = 0.06, kFarthest = 0.20;  ///< range of plausible z
 inline constexpr double kWidest = 0.09;                     ///< plausible distance from the axis
 

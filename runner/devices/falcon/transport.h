@@ -17,13 +17,12 @@ class TransportError : public std::runtime_error {
 
 /// Control requests of the USB-serial chip (bRequest); no data, index 0.
 namespace request {
-inline constexpr std::uint8_t kPurge = 0;   ///< 1 and 2: the two FIFOs
-inline constexpr std::uint8_t kModem = 1;   ///< DTR and RTS
-inline constexpr std::uint8_t kFlow = 2;    ///< 0: off
-inline constexpr std::uint8_t kBaud = 3;    ///< divisor of 3 MHz
-inline constexpr std::uint8_t kFormat = 4;  ///< 8: eight bits, no parity, one stop bit
-inline constexpr std::uint8_t kEvent =
-    6;  ///< the character that makes the chip send at once; 0: none
+inline constexpr std::uint8_t kPurge = 0;    ///< 1 and 2: the two FIFOs
+inline constexpr std::uint8_t kModem = 1;    ///< DTR and RTS
+inline constexpr std::uint8_t kFlow = 2;     ///< 0: off
+inline constexpr std::uint8_t kBaud = 3;     ///< divisor of 3 MHz
+inline constexpr std::uint8_t kFormat = 4;   ///< 8: eight bits, no parity, one stop bit
+inline constexpr std::uint8_t kEvent = 6;    ///< character after which the chip sends; 0: none
 inline constexpr std::uint8_t kLatency = 9;  ///< ms
 }  // namespace request
 
