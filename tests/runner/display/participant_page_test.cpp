@@ -228,7 +228,7 @@ TEST(PageLayout, OtherKindsOfPages) {
 TEST(MissingLetters, NamesWhatNoFontCanShow) {
   EXPECT_EQ(missing_letters({"sphere", "Kugel", "σφαίρα"}), "");
   // A private-use letter: in no font that a test may count on.
-  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 letters"), std::string::npos);
+  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 characters"), std::string::npos);
   EXPECT_NO_THROW(missing_letters({"\xff\xc3"}));
 }
 

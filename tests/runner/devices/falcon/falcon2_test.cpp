@@ -204,7 +204,7 @@ TEST(FalconRegistration, GripsThatComeApartAreNoticed) {
     });
     ADD_FAILURE();
   } catch (const GuideError& error) {
-    EXPECT_NE(std::string(error.what()).find("fit only to"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("fit only within"), std::string::npos) << error.what();
   }
 }
 

@@ -90,7 +90,7 @@ TEST(FalconWeighing, FrictionDoesNotCount) {
 TEST(FalconWeighing, AWrongWeightIsNoticed) {
   Bench bench(-5e3);
   const std::string failure = bench.failure({0.1, 0.3, 0.2});  // swapped
-  EXPECT_NE(failure.find("off a line"), std::string::npos) << failure;
+  EXPECT_NE(failure.find("off a straight line"), std::string::npos) << failure;
   EXPECT_TRUE(bench.emulator.torque_is_zero());
 }
 
