@@ -93,12 +93,12 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
       << "  sha256      " << protocol.sha256 << "\n";
 }
 
-void print_verdict(const std::string& what, const std::vector<std::string>& misfits,
+void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
                    const std::vector<LimitedMaterial>& limited, std::ostream& out) {
   out << "    " << std::left << std::setw(12) << what
-      << (misfits.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
-  for (const std::string& misfit : misfits) out << "      " << stimuli::printable(misfit) << "\n";
-  if (!misfits.empty()) return;
+      << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
+  for (const std::string& reason : reasons) out << "      " << stimuli::printable(reason) << "\n";
+  if (!reasons.empty()) return;
   for (const LimitedMaterial& one : limited)
     out << "      " << stimuli::printable(one.text) << "\n";
 }
