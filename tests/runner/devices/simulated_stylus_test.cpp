@@ -51,7 +51,7 @@ SimulatedDeviceSettings ideal_device() {
   return s;
 }
 
-TEST(SimulatedStylus, SettlesWhereHandAndForceBalance) {
+TEST(SimulatedStylus, SettlesInTheEquilibriumOfHandAndForce) {
   const HandImpedance hand;
   SimulatedStylus stylus(ideal_device(), hand, 0.12, 0.06, kStep);
   stylus.reset({{0, 0, 0.1}, {0, 0, 0}, {0, 0, 1}});
@@ -96,7 +96,7 @@ TEST(SimulatedStylus, CoulombFrictionStopsASlowMotion) {
   EXPECT_NEAR(stylus.grip().x, 0, 1e-6);
 }
 
-TEST(SimulatedStylus, EndsAreRoundedToTheResolutionAndStayInTheWorkspace) {
+TEST(SimulatedStylus, EndsAreQuantisedAndStayInTheWorkspace) {
   SimulatedDeviceSettings device;
   SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);
   stylus.reset({{0.01234567, 0.02, -0.03}, {0, 0, 0}, glm::normalize(Vec3(1, 2, 3))});

@@ -23,7 +23,7 @@ TEST(ConsoleWords, ABreakIsCalledABreakAndSaysHowLong) {
   EXPECT_EQ(state_title(in("rest")), "break");
 }
 
-TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
+TEST(ConsoleWords, APageToReadNamesTheKeyToPress) {
   for (const char* const word : {"instructions", "practice begins", "block begins", "rest"})
     EXPECT_EQ(state_detail(in(word)), "space bar goes on") << word;
   EXPECT_EQ(state_detail(in("end")), "space bar ends it");
@@ -33,7 +33,7 @@ TEST(ConsoleWords, APageToReadSaysWhoGoesOn) {
   EXPECT_EQ(state_detail(held), "") << "the space bar does not";
 }
 
-TEST(ConsoleWords, TheBarCountsTheTrialThatIsOver) {
+TEST(ConsoleWords, TheBarCountsATrialOnceItIsOver) {
   ConsoleState state = in("trial");
   EXPECT_EQ(fraction_done(state), 0);
   state.trial = 4;

@@ -50,7 +50,7 @@ TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
   }
 }
 
-TEST(MouseStylus, NoAimMakesAPoseThatIsNotFinite) {
+TEST(MouseStylus, NoTargetGivesAPoseThatIsNotFinite) {
   MouseStylus device(kLength, 1000);
   std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<double> far(-10, 10);
@@ -69,7 +69,7 @@ TEST(MouseStylus, NoAimMakesAPoseThatIsNotFinite) {
   for (int i = 0; i < 2000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);
 }
 
-TEST(MouseStylus, AimedFromAnotherThread) {
+TEST(MouseStylus, TakesTargetsFromAnotherThread) {
   MouseStylus device(kLength, 1000);
   std::thread window([&device] {
     StylusTarget hand = device.initial_target();

@@ -63,14 +63,14 @@ void keep(const Image& image, const std::string& name) {
   }
 }
 
-TEST(PageLayout, TheSamePageGivesTheSamePixels) {
+TEST(ParticipantPage, TheSamePageGivesTheSamePixels) {
   const Image a = draw_page(trial_page(), 1280, 800), b = draw_page(trial_page(), 1280, 800);
   keep(a, "neutral");
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_GT(inked_rows(a), 30);
 }
 
-TEST(PageLayout, ATrialShowsItsWordAndTheKeyMap) {
+TEST(ParticipantPage, ATrialShowsItsWordAndTheKeyMap) {
   Page page = trial_page();
   const Image without = draw_page(page, 1280, 800);
   page.text = "Go";
@@ -84,7 +84,7 @@ TEST(PageLayout, ATrialShowsItsWordAndTheKeyMap) {
   EXPECT_EQ(inked_rows(draw_page(page, 1280, 800)), 0);
 }
 
-TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
+TEST(ParticipantPage, ALongTextContinuesOnTheNextScreenInTheSameSize) {
   Page page;
   page.kind = Page::Kind::text;
   for (int i = 0; i < 300; ++i) page.text += "Halten Sie den Griffel wie einen Stift. ";
@@ -107,7 +107,7 @@ TEST(PageLayout, ALongTextGoesOnOnTheNextScreenInLettersOfTheSameSize) {
   EXPECT_EQ(screen_count(page, 1024, 768), 1) << "empty screens are left out";
 }
 
-TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
+TEST(ParticipantPage, ABreakShowsACountDownAndTheProgress) {
   Page page;
   page.text = "Rest your hand.";
   const Image plain = draw_page(page, 1280, 800);
@@ -122,7 +122,7 @@ TEST(PageLayout, ABreakCountsDownAndTellsHowFarItIs) {
   EXPECT_EQ(inked_rows(plain) < inked_rows(counted) && inked_rows(counted) < inked_rows(far), true);
 }
 
-TEST(PageLayout, AReplyInABreakStandsOffTheEdge) {
+TEST(ParticipantPage, AReplyInABreakKeepsItsDistanceFromTheEdge) {
   Page page;
   page.text = "Rest your hand.";
   page.seconds_left = 25;
@@ -136,7 +136,7 @@ TEST(PageLayout, AReplyInABreakStandsOffTheEdge) {
   }
 }
 
-TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
+TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
   Page page;
   page.kind = Page::Kind::checklist;
   page.checklist.steps = {{"Home the device", Checklist::Step::State::done},
@@ -149,7 +149,7 @@ TEST(PageLayout, AChecklistInANarrowWindowKeepsTheSizeOfItsLetters) {
   EXPECT_GT(inked_rows(draw_page(page, 389, 728)), inked_rows(image)) << "more text, more lines";
 }
 
-TEST(PageLayout, EveryScriptFindsItsPlace) {
+TEST(ParticipantPage, EveryScriptFitsTheScreen) {
   Page page;
   page.kind = Page::Kind::text;
   page.keys = trial_page().keys;
@@ -181,7 +181,7 @@ TEST(PageLayout, EveryScriptFindsItsPlace) {
   }
 }
 
-TEST(PageLayout, HostileTextStaysOnTheScreen) {
+TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
   Page page;
   page.kind = Page::Kind::text;
   page.keys = trial_page().keys;
@@ -209,7 +209,7 @@ TEST(PageLayout, HostileTextStaysOnTheScreen) {
   }
 }
 
-TEST(PageLayout, OtherKindsOfPages) {
+TEST(ParticipantPage, OtherKindsOfPages) {
   Page page;
   page.kind = Page::Kind::feedback;
   page.text = "\u2713";
@@ -225,10 +225,11 @@ TEST(PageLayout, OtherKindsOfPages) {
   EXPECT_GT(inked_rows(message), 10);
 }
 
-TEST(MissingLetters, NamesWhatNoFontCanShow) {
+TEST(MissingLetters, NamesCharactersThatNoFontHas) {
   EXPECT_EQ(missing_letters({"sphere", "Kugel", "σφαίρα"}), "");
   // A private-use letter: in no font that a test may count on.
-  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 characters"), std::string::npos);
+  EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 characters"),
+            std::string::npos);
   EXPECT_NO_THROW(missing_letters({"\xff\xc3"}));
 }
 

@@ -43,14 +43,14 @@ TEST(TextInput, KeypadAnswersAsDigits) {
   EXPECT_EQ(heard("\x1bOp\x1bOy\x1bOM"), "key:0 key:9 key:enter ");
 }
 
-TEST(TextInput, EscapeAndF12AreTheEmergencyAlsoInACommand) {
+TEST(TextInput, EscapeAndF12AreEmergencyKeysAlsoInACommand) {
   EXPECT_EQ(heard("\x1b"), command(Kind::emergency_zero, "the key Escape"));
   EXPECT_EQ(heard("\x1b[24~"), command(Kind::emergency_zero, "the key F12"));
   EXPECT_EQ(heard(":no\x1b"), command(Kind::emergency_zero, "the key Escape"));
   EXPECT_EQ(heard("\x1b[A\x1b[5~"), "") << "cursor keys are none";
 }
 
-TEST(TextInput, AltWithAKeyIsTheEmergencyAndNoAnswer) {
+TEST(TextInput, AltWithAKeyIsAnEmergencyAndNoAnswer) {
   EXPECT_EQ(heard("\x1b\x31"), command(Kind::emergency_zero, "the key Alt+1"));
   EXPECT_EQ(heard("\x1b\xC3\xA4"), command(Kind::emergency_zero, "the key Alt+\xC3\xA4"));
   EXPECT_EQ(heard("\x1b["), command(Kind::emergency_zero, "the key Alt+["));
@@ -70,7 +70,7 @@ TEST(TextInput, LinesAreCommands) {
   EXPECT_EQ(heard(":quitx\n:\n:note\n"), "unknown::quitx unknown:: unknown::note ");
 }
 
-TEST(TextInput, LinesCanBeMended) {
+TEST(TextInput, LinesCanBeEdited) {
   EXPECT_EQ(heard(":pausX\xC3\xA4\x7f\x7f"
                   "e\n"),
             command(Kind::pause));
@@ -82,7 +82,7 @@ TEST(TextInput, LinesCanBeMended) {
             "key:1 ");
 }
 
-TEST(TextInput, BytesComeInAnyPieces) {
+TEST(TextInput, InputMayBeSplitAnywhere) {
   TextInput input;
   EXPECT_EQ(heard(input, ":note \xE2\x82"), "");
   EXPECT_EQ(input.line(), ":note ");
@@ -93,7 +93,7 @@ TEST(TextInput, BytesComeInAnyPieces) {
       << "no UTF-8";
 }
 
-TEST(TextInput, AnythingAtAllIsSurvived) {
+TEST(TextInput, ArbitraryInputIsSurvived) {
   std::uint32_t state = 1;
   TextInput input;
   for (int i = 0; i < 20000; ++i) {

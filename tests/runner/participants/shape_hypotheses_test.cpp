@@ -106,7 +106,7 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
   }
 }
 
-TEST(ShapeHypotheses, NoTwoAreAlike) {
+TEST(ShapeHypotheses, NoTwoAreEqual) {
   for (const stimuli::ShapeKind kind :
        {stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     const ShapeHypotheses hypotheses({spec(kind)});
@@ -127,7 +127,7 @@ std::string message_of(const std::vector<stimuli::ObjectSpec>& stimuli) {
   return {};
 }
 
-TEST(ShapeHypotheses, NamesEveryStimulusThatNobodyKnows) {
+TEST(ShapeHypotheses, NamesEveryStimulusThatCannotBeSimulated) {
   stimuli::ObjectSpec flat = spec(stimuli::ShapeKind::cylinder);
   flat.height = 0;
   const std::string message =

@@ -55,7 +55,7 @@ TEST_F(TwoSpheres, ContactOfAPoint) {
   EXPECT_NEAR(log_odds(), 0.25 * 0.005 * 0.005 / (2 * variance_), 1e-5);
 }
 
-TEST_F(TwoSpheres, DirectionCountsAlikeForBoth) {
+TEST_F(TwoSpheres, DirectionHasTheSameWeightForBoth) {
   Percept p;
   p.contact = true;
   p.tip = {0.030, 0, 0};
@@ -64,7 +64,7 @@ TEST_F(TwoSpheres, DirectionCountsAlikeForBoth) {
   EXPECT_NEAR(log_odds(), 0.25 * 0.005 * 0.005 / (2 * variance_), 1e-5);
 }
 
-TEST_F(TwoSpheres, ContactOfARayIsAtItsDeepestPlace) {
+TEST_F(TwoSpheres, ContactOfARayIsAtItsDeepestPoint) {
   Percept p;
   p.contact = true;
   p.ray = true;
@@ -117,7 +117,7 @@ TEST_F(TwoSpheres, MemoryFadesByLambda) {
   EXPECT_NEAR(log_odds(), before * std::exp(-9 / (6.0 * 15.0)), 2e-5);
 }
 
-TEST(ShapeObserver, StartsFromAlikeShapes) {
+TEST(ShapeObserver, StartsWithEqualShapes) {
   const ShapeHypotheses hypotheses(four_shapes());
   const ShapeObserver observer(hypotheses);
   for (int s = 0; s < 4; ++s) EXPECT_NEAR(observer.probability(s), 0.25, 1e-6);
@@ -136,7 +136,7 @@ TEST(ShapeObserver, ForgetsBackToThePrior) {
   for (int s = 0; s < 4; ++s) EXPECT_NEAR(observer.probability(s), 0.25, 1e-3);
 }
 
-TEST(ShapeObserver, ResetIsTheStart) {
+TEST(ShapeObserver, ResetRestoresThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   const ShapeObserver fresh(hypotheses);
@@ -219,7 +219,7 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
   EXPECT_TRUE(decided);
 }
 
-TEST(ShapeObserver, FreeSpaceSpeaksAgainstAShapeThatWouldHaveBeenHit) {
+TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstAShapeThatWouldBeHit) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   stimuli::Random random(9);
@@ -235,7 +235,7 @@ TEST(ShapeObserver, FreeSpaceSpeaksAgainstAShapeThatWouldHaveBeenHit) {
 
 // A flat contact has no unique place along the stylus: it must not be held against the cube that
 // the torque puts the contact here or there on its face.
-TEST(ShapeObserver, PlaceOnAFlatFaceDoesNotMatterButOnASphereItDoes) {
+TEST(ShapeObserver, PositionMattersOnASphereButNotOnAFlatFace) {
   std::vector<stimuli::ObjectSpec> stimuli{four_shapes()[0], four_shapes()[3]};
   const ShapeHypotheses hypotheses(stimuli);
   ObserverSettings settings;

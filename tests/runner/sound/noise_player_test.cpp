@@ -86,7 +86,7 @@ TEST_F(Players, PlaySilenceUntilTheyAreTurnedOn) {
   EXPECT_EQ(noise->report().underruns, 0);
 }
 
-TEST_F(Players, GiveAToneWhenTheyAreAskedForOneAndThenSilence) {
+TEST_F(Players, PlayOneToneOnRequest) {
   const auto noise = player();
   for (int i = 0; i < 2; ++i) {
     const std::size_t before = ear_.count();
@@ -102,7 +102,7 @@ TEST_F(Players, GiveAToneWhenTheyAreAskedForOneAndThenSilence) {
   EXPECT_FALSE(noise->on());
 }
 
-TEST_F(Players, GiveBothEarsTheSame) {
+TEST_F(Players, PlayTheSameOnBothChannels) {
   const auto noise = player();
   noise->turn_on();
   wait_for([&] { return noise->report().seconds > 0.1; });
@@ -126,7 +126,7 @@ TEST_F(Players, FadeOutWhenTheyEnd) {
   EXPECT_LT(last, loudest / 100);
 }
 
-TEST_F(Players, CountGapsWhileTheySound) {
+TEST_F(Players, CountGapsWhileOn) {
   const auto noise = player();
   ear_.gaps = 1;
   wait_for([&] { return ear_.gaps == 0; });
@@ -137,7 +137,7 @@ TEST_F(Players, CountGapsWhileTheySound) {
   wait_for([&] { return noise->report().underruns == 2; });
 }
 
-TEST_F(Players, TellThatTheyFailedAndOpenAgain) {
+TEST_F(Players, ReportAFailureAndReopen) {
   const auto noise = player();
   noise->turn_on();
   wait_for([&] { return ear_.sounds(); });
@@ -155,7 +155,7 @@ TEST_F(Players, TellThatTheyFailedAndOpenAgain) {
   EXPECT_EQ(ear_.opened, 3);
 }
 
-TEST_F(Players, KeepNobodyWaitingWhenTheOutputHangs) {
+TEST_F(Players, DoNotBlockWhenTheOutputHangs) {
   const auto noise = player();
   ear_.held_up = true;
   noise->turn_on();  // all return at once, or this test never ends
@@ -165,7 +165,7 @@ TEST_F(Players, KeepNobodyWaitingWhenTheOutputHangs) {
   ear_.held_up = false;
 }
 
-TEST(NoisePlayer, WithoutAnOutputThereIsNone) {
+TEST(NoisePlayer, WithoutAnOutputItThrows) {
   EXPECT_THROW(NoisePlayer({}, 1, "no such device"), SoundError);
 }
 

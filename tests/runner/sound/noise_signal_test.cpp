@@ -67,7 +67,7 @@ double density(const std::vector<double>& samples, double frequency) {
   return 10 * std::log10(sum / count);
 }
 
-TEST(NoiseSignal, HasTheLevelThatIsAskedFor) {
+TEST(NoiseSignal, HasTheRequestedLevel) {
   for (const protocols::NoiseKind kind :
        {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     for (const double level : {-12.0, -24.0, -60.0}) {
@@ -90,7 +90,7 @@ TEST(NoiseSignal, PinkFallsByThreeDecibelAnOctaveAndWhiteByNone) {
   }
 }
 
-TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
+TEST(NoiseSignal, TurnsOnAndOffWithoutAClick) {
   for (const protocols::NoiseKind kind :
        {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     NoiseSignal signal({kind, -12}, kRate, 5);
@@ -117,7 +117,7 @@ TEST(NoiseSignal, GoesOnAndOffWithoutAClick) {
   }
 }
 
-TEST(NoiseSignal, TurnedOnInMidFadeItGoesUpFromThere) {
+TEST(NoiseSignal, AFadeCanBeReversed) {
   NoiseSignal signal({protocols::NoiseKind::white, -20}, kRate, 5);
   std::vector<double> first(9600), half(4800), last(9600);
   signal.turn(true);
@@ -131,7 +131,7 @@ TEST(NoiseSignal, TurnedOnInMidFadeItGoesUpFromThere) {
   EXPECT_NEAR(level_of(std::vector(last.end() - 4000, last.end())), -20, 0.5);
 }
 
-TEST(NoiseSignal, FollowsFromItsSeed) {
+TEST(NoiseSignal, IsDeterministicFromItsSeed) {
   EXPECT_EQ(noise(protocols::NoiseKind::pink, -20, 0.1),
             noise(protocols::NoiseKind::pink, -20, 0.1));
   EXPECT_NE(noise(protocols::NoiseKind::pink, -20, 0.1),

@@ -13,7 +13,7 @@
 namespace palpate::runner {
 namespace {
 
-TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
+TEST(Stability, APlainWallBecomesUnstableWhereTheoryPredicts) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const double rate : {500.0, 1000.0, 10000.0}) {
@@ -35,7 +35,7 @@ TEST(Stability, APlainWallBuzzesWhereTheTheorySays) {
   }
 }
 
-TEST(Stability, IsWhereTheTheoryPromisesIt) {
+TEST(Stability, HoldsWhereTheoryPromisesPassivity) {
   std::vector<LoopCase> loops;
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
@@ -67,7 +67,7 @@ TEST(Stability, IsWhereTheTheoryPromisesIt) {
   }
 }
 
-TEST(Stability, TouchesWhatItSays) {
+TEST(Stability, EachCaseTouchesItsObjects) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const ContactCase contact_case : kContactCases) {
@@ -81,7 +81,7 @@ TEST(Stability, TouchesWhatItSays) {
   }
 }
 
-TEST(Stability, FrictionMustHoldACountOfTheResolution) {
+TEST(Stability, TheoryNeedsFrictionAboveQuantisation) {
   LoopCase loop;
   loop.settings.friction = 0.025;
   loop.settings.resolution = 3e-5;
@@ -89,7 +89,7 @@ TEST(Stability, FrictionMustHoldACountOfTheResolution) {
   EXPECT_FALSE(boundary_at(loop, 1700).promised);  // 2 f_c / Delta = 1667 N/m
 }
 
-TEST(Stability, ThePassivityControllerExtendsIt) {
+TEST(Stability, ThePassivityControllerExtendsTheStableRange) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     for (const ContactCase contact_case : kContactCases) {
@@ -103,7 +103,7 @@ TEST(Stability, ThePassivityControllerExtendsIt) {
   }
 }
 
-TEST(Integrators, TheExactOneIsAndTheOthersConverge) {
+TEST(Integrators, TheExactOneIsExactAndTheOthersConverge) {
   const auto rows = compare_integrators([] {
     return std::chrono::duration<double, std::nano>(
                std::chrono::steady_clock::now().time_since_epoch())

@@ -94,7 +94,7 @@ TEST(Falcon2, SensesTheStylus) {
   }
 }
 
-TEST(Falcon2, PushesEachEndWithItsForce) {
+TEST(Falcon2, CommandsEachEndItsForce) {
   Bench bench;
   Falcon2Device device = bench.device();
   bench.hold_stylus({0, 0, 0}, {0.1, 0, 1});
@@ -104,7 +104,7 @@ TEST(Falcon2, PushesEachEndWithItsForce) {
   EXPECT_LT(glm::length(bench.tail_force() - Vec3(-0.5, 0.4, 1)), 0.03);
 }
 
-TEST(Falcon2, AGripThatSlipsOffTheStylusTakesAllForceAway) {
+TEST(Falcon2, AGripThatSlipsOffTheStylusGivesZeroForce) {
   Bench bench;
   Falcon2Device device = bench.device();
   bench.hold_stylus({0, 0, 0}, {0, 0, 1});
@@ -118,7 +118,7 @@ TEST(Falcon2, AGripThatSlipsOffTheStylusTakesAllForceAway) {
   EXPECT_NEAR(device.stylus().stretch(), 0.012, 1e-3);
 }
 
-TEST(Falcon2, EitherDeviceLostTakesBothForcesAway) {
+TEST(Falcon2, EitherDeviceLostGivesZeroForceAtBoth) {
   for (const bool at_tip : {true, false}) {
     Bench bench;
     Falcon2Device device = bench.device();
@@ -139,7 +139,7 @@ TEST(Falcon2, EitherDeviceLostTakesBothForcesAway) {
   }
 }
 
-TEST(Falcon2, ButtonsOfBoth) {
+TEST(Falcon2, ReadsTheButtonsOfBothGrips) {
   Bench bench;
   bench.tip_emulator.buttons = 4;
   bench.tail_emulator.buttons = 1;
@@ -177,7 +177,7 @@ PairRegistration registration(Bench& bench, const Vec3& offset, const std::funct
   return register_pair(tip, tail, clock, guide, {kLength, offset, points, 0.3});
 }
 
-TEST(FalconRegistration, FindsHowTheDevicesStand) {
+TEST(FalconRegistration, FindsTheRelativePoseOfTheDevices) {
   for (const Vec3& offset : {Vec3(0), Vec3(0, 0, kLength)}) {
     Bench bench;
     if (offset == Vec3(0)) bench.tail_in_tip.position = {0.003, -0.005, 0.004};
@@ -194,7 +194,7 @@ TEST(FalconRegistration, FindsHowTheDevicesStand) {
   }
 }
 
-TEST(FalconRegistration, GripsThatComeApartAreNoticed) {
+TEST(FalconRegistration, GripsThatComeApartAreDetected) {
   Bench bench;
   bench.tail_in_tip.position = {0.003, -0.005, 0.004};
   try {
@@ -208,7 +208,7 @@ TEST(FalconRegistration, GripsThatComeApartAreNoticed) {
   }
 }
 
-TEST(FalconRegistration, TheSamePlaceTwiceIsAskedAgain) {
+TEST(FalconRegistration, APointTakenTwiceIsAskedForAgain) {
   Bench bench;
   bench.tail_in_tip.position = {0.003, -0.005, 0.004};
   ScriptedGuide guide([&bench](int question) {

@@ -90,7 +90,7 @@ TEST(FalconBoot, UploadsTheImageToABareDevice) {
   EXPECT_EQ(bench.emulator.largest_count(), 0);
 }
 
-TEST(FalconBoot, LeavesRunningFirmwareAlone) {
+TEST(FalconBoot, DoesNotUploadWhenFirmwareIsRunning) {
   Bench bench;
   bench.emulator.preload(true);
   bench.run(nullptr);
@@ -111,7 +111,7 @@ TEST(FalconBoot, ReportsProgressInBytes) {
   EXPECT_EQ(sent, bench.image.bytes.size());
 }
 
-TEST(FalconBoot, TriesAgainAfterLostAndWrongEchoes) {
+TEST(FalconBoot, RetriesAfterLostAndWrongEchoes) {
   Bench bench;
   bench.emulator.faults.lost_echoes = 2;
   bench.emulator.faults.wrong_echoes = 2;
@@ -122,7 +122,7 @@ TEST(FalconBoot, TriesAgainAfterLostAndWrongEchoes) {
   EXPECT_EQ(bench.emulator.mode(), Emulator::Mode::run);
 }
 
-TEST(FalconBoot, BearsLitterAndADeafMonitor) {
+TEST(FalconBoot, ToleratesExtraBytesAndASlowMonitor) {
   Bench bench;
   bench.emulator.faults.stray_byte = true;
   bench.emulator.faults.deaf_probes = 30;
@@ -145,7 +145,7 @@ TEST(FalconBoot, AnUnpluggedDeviceIsNamed) {
   EXPECT_FALSE(bench.failure(&bench.image).empty());
 }
 
-TEST(FalconBoot, WithoutAFileItSaysWhatIsMissing) {
+TEST(FalconBoot, WithoutAFirmwareFileTheErrorNamesTheOption) {
   Bench bench;
   const std::string failure = bench.failure(nullptr);
   EXPECT_NE(failure.find("--firmware"), std::string::npos) << failure;
@@ -167,7 +167,7 @@ TEST(FalconImage, AcceptsAWellFormedStream) {
   EXPECT_EQ(image.blocks, 2);
 }
 
-TEST(FalconImage, RefusesWhatIsNoneAndNamesThePlace) {
+TEST(FalconImage, RefusesOtherFilesAndNamesTheByte) {
   const std::vector<std::uint8_t> good = synthetic_image(100);
   auto bad = good;
   bad[0] = 0;
@@ -186,7 +186,7 @@ TEST(FalconImage, RefusesWhatIsNoneAndNamesThePlace) {
   EXPECT_FALSE(refusal({0xAA, 0x08}).empty());
 }
 
-TEST(FalconImage, AnyCutAndAnyNoiseIsRefusedOrWellFormed) {
+TEST(FalconImage, TruncatedAndCorruptedStreamsAreRefusedOrWellFormed) {
   const std::vector<std::uint8_t> good = synthetic_image(40);
   for (std::size_t size = 0; size < good.size(); ++size) {
     EXPECT_FALSE(refusal({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)}).empty())
@@ -200,7 +200,7 @@ TEST(FalconImage, AnyCutAndAnyNoiseIsRefusedOrWellFormed) {
   }
 }
 
-TEST(FalconImage, AFileThatIsMissingOrAFolderIsNamed) {
+TEST(FalconImage, NamesAFileThatIsMissingOrAFolder) {
   for (const std::string& file : {std::string("/nowhere/firmware.bin"), ::testing::TempDir()}) {
     try {
       read_image(file);

@@ -34,7 +34,7 @@ std::string refusal(const std::string& text) {
   return "";
 }
 
-TEST(FalconCalibration, ComesBackFromItsFile) {
+TEST(FalconCalibration, IsReadBackAsWritten) {
   const Calibration there = example();
   const Calibration back = parse_calibration(to_json(there), "c.json");
   ASSERT_EQ(back.forces.size(), 2U);
@@ -50,14 +50,14 @@ TEST(FalconCalibration, ComesBackFromItsFile) {
   EXPECT_EQ(to_json(back), to_json(there));
 }
 
-TEST(FalconCalibration, ANewerOneTakesThePlace) {
+TEST(FalconCalibration, ANewerOneReplacesTheOld) {
   Calibration calibration = example();
   calibration.put({"A1", -6000, 0, 0, 0, {}, "2026-11-01T00:00:00Z"});
   EXPECT_EQ(calibration.forces.size(), 2U);
   EXPECT_EQ(calibration.force_of("A1")->counts_per_torque, -6000);
 }
 
-TEST(FalconCalibration, AFileThatIsNotThereHoldsNothing) {
+TEST(FalconCalibration, AMissingFileIsAnEmptyCalibration) {
   EXPECT_TRUE(read_calibration(::testing::TempDir() + "no-such-calibration.json").forces.empty());
 }
 
@@ -76,7 +76,7 @@ TEST(FalconCalibration, EveryFaultIsNamed) {
   EXPECT_NE(refusal(R"({"version": 1)"), "");
 }
 
-TEST(FalconCalibration, OnlyWhatWeighingYieldsIsTaken) {
+TEST(FalconCalibration, OnlyScalesThatWeighingCanGiveAreAccepted) {
   const auto scaled = [](double counts) {
     Calibration calibration;
     calibration.put({"A1", counts, 0.01, 0.02, 0.3, {0.1, 0.2}, "2026-10-31T11:00:00Z"});
@@ -124,7 +124,7 @@ TEST(FalconCalibration, AFileThatOthersCanWriteIsRefused) {
   ::unlink(path.c_str());
 }
 
-TEST(FalconSerial, IsCleanedAndCut) {
+TEST(FalconSerial, IsSanitisedAndTruncated) {
   const auto clean = [](const std::string& text) {
     return clean_serial({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   };
@@ -135,7 +135,7 @@ TEST(FalconSerial, IsCleanedAndCut) {
   EXPECT_EQ(clean(std::string("\0A", 2)), "");
 }
 
-TEST(FalconCalibration, MissingAndStaleAreSaidSo) {
+TEST(FalconCalibration, MissingAndStaleAreReported) {
   const Calibration calibration = example();
   EXPECT_EQ(judge_forces(calibration, {"A1"}, kNow).state, CalibrationState::good);
   EXPECT_EQ(judge_forces(calibration, {"A1", "B2"}, kNow).state, CalibrationState::stale);
@@ -148,7 +148,7 @@ TEST(FalconCalibration, MissingAndStaleAreSaidSo) {
   EXPECT_EQ(judge_pair(calibration, "B2", "A1", kNow).state, CalibrationState::missing);
 }
 
-TEST(FalconCalibration, OneFromTheFutureIsNotBelieved) {
+TEST(FalconCalibration, OneFromTheFutureIsStale) {
   const std::int64_t before = kNow - 200LL * 86400 * 1'000'000'000;
   const CalibrationVerdict verdict = judge_forces(example(), {"A1"}, before);
   EXPECT_EQ(verdict.state, CalibrationState::stale);

@@ -46,7 +46,7 @@ struct Bench {
   Vec3 true_position() const { return to_world(emulator.position() - kCentre); }
 };
 
-TEST(FalconDriver, KnowsWhereTheGripIs) {
+TEST(FalconDriver, ReadsThePositionOfTheGrip) {
   for (const Vec3& at : {kCentre, Vec3(0.02, -0.03, 0.14), Vec3(-0.03, 0.01, 0.11)}) {
     Bench bench(true, at);
     bench.emulator.plant.hand = [at](double) { return at; };
@@ -75,7 +75,7 @@ TEST(FalconDriver, FollowsAHand) {
   EXPECT_EQ(bench.driver->counts().late, 0U);
 }
 
-TEST(FalconDriver, PushesWithTheForceAsked) {
+TEST(FalconDriver, CommandsTheWantedForce) {
   for (const Vec3& force : {Vec3(1, 0, 0), Vec3(0, 2, 0), Vec3(0, 0, -1.5), Vec3(1, -1, 1)}) {
     Bench bench;
     bench.emulator.plant.hand_stiffness = 2000;  // holds it there
@@ -85,7 +85,7 @@ TEST(FalconDriver, PushesWithTheForceAsked) {
   }
 }
 
-TEST(FalconDriver, TooMuchForceKeepsItsDirection) {
+TEST(FalconDriver, ASaturatedForceKeepsItsDirection) {
   Bench bench;
   bench.emulator.plant.hand_stiffness = 50000;
   bench.emulator.plant.hand_damping = 200;
@@ -99,7 +99,7 @@ TEST(FalconDriver, TooMuchForceKeepsItsDirection) {
   EXPECT_GT(glm::length(shown), guaranteed_force(kCountsPerTorque));
 }
 
-TEST(FalconDriver, AForceThatIsNoNumberIsNone) {
+TEST(FalconDriver, AForceThatIsNotFiniteIsZero) {
   Bench bench;
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
@@ -154,7 +154,7 @@ TEST(FalconDriver, NoForceBeforeAllAxesAreHomed) {
   EXPECT_FALSE(bench.emulator.torque_is_zero());
 }
 
-TEST(FalconDriver, HomingLostTakesTheForceAway) {
+TEST(FalconDriver, LostHomingGivesZeroForce) {
   Bench bench;
   const auto push = [](const Vec3&) { return Vec3(0, 0, 2); };
   for (int i = 0; i < 20; ++i) bench.tick(push);
@@ -166,7 +166,7 @@ TEST(FalconDriver, HomingLostTakesTheForceAway) {
   EXPECT_TRUE(bench.emulator.torque_is_zero());
 }
 
-TEST(FalconDriver, SilenceIsNoticed) {
+TEST(FalconDriver, SilenceIsDetected) {
   Bench bench;
   bench.emulator.faults.silent = true;
   EXPECT_EQ(bench.tick().trouble, DeviceTrouble::none);
@@ -180,7 +180,7 @@ TEST(FalconDriver, SilenceIsNoticed) {
   EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::none);
 }
 
-TEST(FalconDriver, SplitShortAndLateRepliesAreBorne) {
+TEST(FalconDriver, ToleratesSplitShortAndLateReplies) {
   Bench bench;
   bench.emulator.plant.hand_stiffness = 400;
   bench.emulator.plant.hand = [](double t) { return kCentre + Vec3(0, 0, 0.02 * std::sin(5 * t)); };
@@ -195,7 +195,7 @@ TEST(FalconDriver, SplitShortAndLateRepliesAreBorne) {
   EXPECT_EQ(bench.emulator.malformed(), 0U);
 }
 
-TEST(FalconDriver, APositionThatJumpsIsNotBelieved) {
+TEST(FalconDriver, APositionThatJumpsIsImplausible) {
   Bench bench;
   bench.tick();
   const Vec3 before = bench.driver->reading().position;
@@ -213,7 +213,7 @@ TEST(FalconDriver, APositionThatJumpsIsNotBelieved) {
   EXPECT_GE(bench.driver->counts().implausible, 4U);
 }
 
-TEST(FalconDriver, UnpluggedAndBackAgain) {
+TEST(FalconDriver, UnpluggedAndReopened) {
   Bench bench;
   const auto push = [](const Vec3&) { return Vec3(0, 0, 2); };
   for (int i = 0; i < 5; ++i) bench.tick(push);
@@ -230,7 +230,7 @@ TEST(FalconDriver, UnpluggedAndBackAgain) {
   EXPECT_TRUE(bench.emulator.torque_is_zero());  // restart leaves none
 }
 
-TEST(FalconDriver, LeavesNoTorqueBehind) {
+TEST(FalconDriver, LeavesTheMotorsWithoutTorque) {
   for (const int fault : {0, 1, 2}) {
     Bench bench;
     for (int i = 0; i < 5; ++i) bench.tick([](const Vec3&) { return Vec3(0, 0, 3); });
@@ -242,7 +242,7 @@ TEST(FalconDriver, LeavesNoTorqueBehind) {
   }
 }
 
-TEST(FalconDriver, ButtonsComeThrough) {
+TEST(FalconDriver, ReadsTheButtons) {
   Bench bench;
   bench.emulator.buttons = 0b0101;
   bench.tick();

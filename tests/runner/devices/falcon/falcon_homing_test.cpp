@@ -34,7 +34,7 @@ struct Bench {
   }
 };
 
-TEST(FalconHoming, AsksAndWaits) {
+TEST(FalconHoming, AsksTheExperimenterAndWaits) {
   Bench bench;
   bench.emulator.plant.hand = [](double t) {
     return kCentre + Vec3(0, 0, 0.035 * std::sin(4 * t));

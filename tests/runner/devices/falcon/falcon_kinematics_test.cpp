@@ -112,7 +112,7 @@ TEST(FalconKinematics, JacobianIsThatOfDifferences) {
   }
 }
 
-TEST(FalconKinematics, ThereAndBackOverTheWorkspace) {
+TEST(FalconKinematics, ForwardInvertsInverseOverTheWorkspace) {
   for (const Vec3& p : workspace()) {
     const Vec3 thighs = thighs_at(p);
     const auto cold = forward(thighs, {0, 0, 0.12});
@@ -136,7 +136,7 @@ TEST(FalconKinematics, TorqueAndForceAreInverses) {
   }
 }
 
-TEST(FalconKinematics, ForceInEveryDirectionIsTheLeastOfAllDirections) {
+TEST(FalconKinematics, ForceInEveryDirectionIsTheSmallestOfAllDirections) {
   const double max_torque = kMaxCount / std::abs(kCountsPerTorque);
   const double sure = force_in_every_direction(kCentre, max_torque);
   EXPECT_NEAR(sure, 6.1, 0.1);  // as the table of the scale says
@@ -155,7 +155,7 @@ TEST(FalconKinematics, ForceInEveryDirectionIsTheLeastOfAllDirections) {
   EXPECT_LT(least, sure * 1.001);
 }
 
-TEST(FalconKinematics, WhatCannotBeIsNotAnswered) {
+TEST(FalconKinematics, UnreachablePosesHaveNoSolution) {
   EXPECT_FALSE(inverse({0, 0, 0.5}));
   EXPECT_FALSE(inverse({0.3, 0, 0.12}));
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -169,7 +169,7 @@ TEST(FalconKinematics, WhatCannotBeIsNotAnswered) {
 }
 
 /// Every 16-bit triple must give a place inside of what can be believed, or none.
-TEST(FalconKinematics, AbsurdCountsGiveNoAbsurdPlace) {
+TEST(FalconKinematics, AbsurdCountsGiveNoPosition) {
   for (int a = -32768; a <= 32767; a += 5461) {
     for (int b = -32768; b <= 32767; b += 5461) {
       for (int c = -32768; c <= 32767; c += 5461) {

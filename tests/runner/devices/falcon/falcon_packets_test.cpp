@@ -28,7 +28,7 @@ TEST(FalconPackets, KnownPackets) {
   EXPECT_EQ(text(encode(command)), "<MAOPCNEAAAAADA>");
 }
 
-TEST(FalconPackets, EveryCommandComesBack) {
+TEST(FalconPackets, EveryCommandIsDecodedAsEncoded) {
   for (int motor = -4095; motor <= 4095; motor += 13) {
     for (int bits = 0; bits < 16; ++bits) {
       const Command sent{{motor, -motor, 4095},
@@ -53,7 +53,7 @@ TEST(FalconPackets, NoMotorGoesBeyondTwelveBits) {
   EXPECT_EQ(got->motors, (std::array<int, 3>{4095, -4095, 4095}));
 }
 
-TEST(FalconPackets, EveryReplyComesBack) {
+TEST(FalconPackets, EveryReplyIsDecodedAsEncoded) {
   for (int count = -32768; count <= 32767; count += 97) {
     for (int bits = 0; bits < 128; bits += 5) {
       const Reply sent{{count, -count - 1, 32767},
@@ -87,7 +87,7 @@ TEST(FalconPackets, BytesBeyondTheirRangeAreRefused) {
   }
 }
 
-TEST(FalconPackets, AStreamIsFoundHoweverItIsCut) {
+TEST(FalconPackets, PacketsAreFoundHoweverTheStreamIsSplit) {
   const std::string first = text(encode(Reply{{1, -2, 3}, 0, 7}));
   const std::string second = text(encode(Reply{{400, 500, -600}, 1, 7}));
   PacketStream stream;

@@ -90,7 +90,7 @@ TEST(FalconUsb, OpensTheOneThatIsNamed) {
   EXPECT_NE(missing.find("there is FALCON01"), std::string::npos) << missing;
 }
 
-TEST(FalconUsb, WhatAnotherProgramHoldsIsSaidSo) {
+TEST(FalconUsb, ADeviceClaimedByAnotherProgramIsReported) {
   EmulatedBus bus;
   bus.add("FALCON01");
   bus.hold(0, true);
@@ -100,7 +100,7 @@ TEST(FalconUsb, WhatAnotherProgramHoldsIsSaidSo) {
   EXPECT_NE(open_failure("").find("another program holds it"), std::string::npos);
 }
 
-TEST(FalconUsb, WithoutPermissionTheRuleIsGiven) {
+TEST(FalconUsb, WithoutPermissionTheErrorGivesTheUdevRule) {
   const std::string text = usb_error("cannot open the Falcon", -3);
   EXPECT_NE(text.find("/etc/udev/rules.d/"), std::string::npos);
   EXPECT_NE(text.find("ATTR{idProduct}==\"cb48\""), std::string::npos);
@@ -163,7 +163,7 @@ TEST(FalconUsb, HomesAndHoldsAWall) {
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
 
-TEST(FalconUsb, SplitShortAndLateRepliesAreBorne) {
+TEST(FalconUsb, ToleratesSplitShortAndLateReplies) {
   ReadyArm bench;
   bench.bus.with(0, [](Emulator& emulator) {
     emulator.faults.short_every = 23;
@@ -210,7 +210,7 @@ TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
 
-TEST(FalconUsb, ComingAndGoingIsNoticed) {
+TEST(FalconUsb, PluggingAndUnpluggingIsDetected) {
   EmulatedBus bus;
   bus.add("FALCON01");
   const auto watch = listen_for_hotplug();
@@ -226,7 +226,7 @@ TEST(FalconUsb, ComingAndGoingIsNoticed) {
   EXPECT_EQ(watch->arrived(), 2);
 }
 
-TEST(FalconUsb, TwoAtOnce) {
+TEST(FalconUsb, TwoDevicesWorkAtOnce) {
   EmulatedBus bus;
   for (const char* serial : {"TIP", "TAIL"}) {
     const int index = bus.add(serial);

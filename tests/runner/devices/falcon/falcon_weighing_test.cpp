@@ -80,21 +80,21 @@ TEST(FalconWeighing, FindsTheTrueScale) {
   }
 }
 
-TEST(FalconWeighing, FrictionDoesNotCount) {
+TEST(FalconWeighing, FrictionCancels) {
   Bench smooth(-5e3, 0), rough(-5e3, 0.5);
   const double a = smooth.weigh_all({0.1, 0.2, 0.3}).counts_per_torque;
   const double b = rough.weigh_all({0.1, 0.2, 0.3}).counts_per_torque;
   EXPECT_NEAR(b / a, 1, 0.03);
 }
 
-TEST(FalconWeighing, AWrongWeightIsNoticed) {
+TEST(FalconWeighing, AWrongWeightIsDetected) {
   Bench bench(-5e3);
   const std::string failure = bench.failure({0.1, 0.3, 0.2});  // swapped
   EXPECT_NE(failure.find("off a straight line"), std::string::npos) << failure;
   EXPECT_TRUE(bench.emulator.torque_is_zero());
 }
 
-TEST(FalconWeighing, WeightsThatWereNotHungAreNoticed) {
+TEST(FalconWeighing, MissingWeightsAreDetected) {
   Bench bench(-5e3);
   const std::string failure = bench.failure({0, 0, 0});
   EXPECT_NE(failure.find("which cannot be"), std::string::npos) << failure;
@@ -128,7 +128,7 @@ TEST(FalconWeighing, StoppingAndUnpluggingEndIt) {
   }
 }
 
-TEST(FalconWeighing, AGripFarFromTheMiddleIsAskedBack) {
+TEST(FalconWeighing, AGripFarFromTheCentreIsSentBack) {
   Bench bench(-1e4);
   ScriptedGuide guide([&bench](int question) {
     bench.emulator.plant.hand_stiffness = question <= 1 ? 300 : 0;
@@ -143,7 +143,7 @@ TEST(FalconWeighing, AGripFarFromTheMiddleIsAskedBack) {
   EXPECT_NE(guide.asked[1].find("-2 cm right"), std::string::npos) << guide.asked[1];
 }
 
-TEST(FalconWeighing, OneWeightAloneIsNoLine) {
+TEST(FalconWeighing, OneWeightAloneIsRefused) {
   EXPECT_THROW(fit_scale({{0, {0, 0, 0.1}}}), GuideError);
   EXPECT_THROW(fit_scale({}), GuideError);
 }

@@ -49,7 +49,7 @@ TEST(StylusFromEnds, NoiseGivesItsResidual) {
   EXPECT_LT(glm::length(fit.tail_in_tip.position - truth.position), 3e-4);
 }
 
-TEST(StylusFromEnds, FlatPointsGiveNoMirrorImage) {
+TEST(StylusFromEnds, CoplanarPointsGiveNoReflection) {
   const Pose truth{{0.1, 0, 0}, glm::normalize(Quat(0, 1, 1, 0))};
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     auto points = paired(truth, 8, 0, seed);
@@ -65,7 +65,7 @@ TEST(StylusFromEnds, FlatPointsGiveNoMirrorImage) {
   }
 }
 
-TEST(StylusFromEnds, PointsThatFixNothingAreRefused) {
+TEST(StylusFromEnds, PointsThatDetermineNothingAreRefused) {
   const Pose truth{};
   EXPECT_THROW(fit_rigid(paired(truth, 3, 0, 1)), RegistrationError);
   EXPECT_THROW(fit_rigid(paired(truth, 8, 0, 1, Vec3(0.03, 0, 0))), RegistrationError);  // a line
@@ -75,7 +75,7 @@ TEST(StylusFromEnds, PointsThatFixNothingAreRefused) {
   EXPECT_THROW(fit_rigid(bad), RegistrationError);
 }
 
-TEST(StylusFromEnds, ThePoseComesFromBoth) {
+TEST(StylusFromEnds, ThePoseComesFromBothDevices) {
   const Pose registered{{0, 0, 0.12}, glm::normalize(Quat(1, 0, 0, 1))};
   StylusFromEnds stylus(registered, 0.12);
   EXPECT_TRUE(
