@@ -143,7 +143,7 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
   return request;
 }
 
-data::ExportDone write_export(const Request& request) {
+data::ExportResult write_export(const Request& request) {
   data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
   warn_of_exposure(request.database);
   data::ExportSettings settings;
@@ -158,7 +158,7 @@ data::ExportDone write_export(const Request& request) {
   return export_as(request.format, store, request.out, settings);
 }
 
-void print(const Request& request, const data::ExportDone& done) {
+void print(const Request& request, const data::ExportResult& done) {
   std::cerr << stimuli::printable(request.out) << ": " << done.trials << " trials";
   if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
   std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");

@@ -199,10 +199,7 @@ DeviceConfig config_of(const po::variables_map& values) {
   return config;
 }
 
-}  // namespace
-
-int devices_command(const std::vector<std::string>& args) {
-  CommandLine line;
+void add_options(CommandLine& line) {
   line.usage = "palpate devices [--device NAME] [--timing] [--calibrate] [--json FILE]";
   line.summary =
       "Lists the connected devices with their limits and self-tests; measures whether this\n"
@@ -232,33 +229,51 @@ int devices_command(const std::vector<std::string>& args) {
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
       ("force", "replace an existing file");
   add_calibrate_options(line.options);
+}
+
+const DeviceKind& kind_of(const std::string& name) {
+  try {
+    return device_kind(name);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+}
+
+/// \param only  the kind that was named, or nullptr for all. \return the exit status
+int list_devices(const DeviceKind* only, const DeviceConfig& config, Json& report) {
+  try {
+    if (only != nullptr) only->check(config);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+  int status = 0;
+  report["devices"] = Json::array();
+  for (const DeviceKind& kind : device_kinds()) {
+    if (only != nullptr && only != &kind) continue;
+    if (!list_kind(kind, config, only != nullptr, report["devices"])) status = 1;
+  }
+  return status;
+}
+
+}  // namespace
+
+int devices_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  add_options(line);
   const auto values = line.parse(args);
   if (!values) return 0;
   const DeviceConfig config = config_of(*values);
   Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
-  Json report = {{"program_version", PALPATE_VERSION}};
-  int status = 0;
-  try {
-    const DeviceKind* const only = named ? &device_kind(name) : nullptr;
-    if (values->count("calibrate") > 0) {
-      if (!named) throw UsageError("--calibrate: name the device with --device");
-      return calibrate_devices(name, config, *values);
-    }
-    if (values->count("timing") > 0) {
-      status = timing(*values, config, report);
-    } else {
-      if (only != nullptr) only->check(config);
-      report["devices"] = Json::array();
-      for (const DeviceKind& kind : device_kinds()) {
-        if (only != nullptr && only != &kind) continue;
-        if (!list_kind(kind, config, named, report["devices"])) status = 1;
-      }
-    }
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--device: ") + error.what());
+  const DeviceKind* const only = named ? &kind_of(name) : nullptr;
+  if (values->count("calibrate") > 0) {
+    if (!named) throw UsageError("--calibrate: name the device with --device");
+    return calibrate_devices(name, config, *values);
   }
+  Json report = {{"program_version", PALPATE_VERSION}};
+  const int status = values->count("timing") > 0 ? timing(*values, config, report)
+                                                 : list_devices(only, config, report);
   outputs.put("json", report.dump(2) + "\n");
   outputs.write();
   return status;
