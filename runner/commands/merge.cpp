@@ -26,7 +26,7 @@ void refuse_folders(const std::vector<std::string>& inputs) {
   }
 }
 
-void print(const std::string& out, const data::Merged& done) {
+void print(const std::string& out, const data::MergeResult& done) {
   std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
             << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
             << done.counts.cut_off << " attempts that were cut off\n";

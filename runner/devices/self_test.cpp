@@ -73,9 +73,9 @@ std::vector<SelfTestResult> self_test(Device& device, double rate) {
     lost += ": ";
     lost += advice(r.trouble);
   }
-  out.push_back({"readings come", r.lost == 0, lost});
-  out.push_back({"readings come in time", r.late <= at / 100,
-                 text("%.0f of %.0f came late", r.late, r.ticks)});
+  out.push_back({"readings arrive", r.lost == 0, lost});
+  out.push_back({"readings arrive in time", r.late <= at / 100,
+                 text("%.0f of %.0f were late", r.late, r.ticks)});
   out.push_back({"positions are finite", r.not_finite == 0,
                  text("%.0f of %.0f were not", r.not_finite, r.ticks)});
   if (r.lost + r.not_finite < r.ticks) {
