@@ -71,7 +71,7 @@ int replay_command(const std::vector<std::string>& args) {
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
   const RecordedTrial recorded = load_recorded_trial(store, name, protocol, folder);
   for (const protocols::StimulusSpec& stimulus : recorded.protocol.stimuli)
-    outputs.keep(stimulus.object);
+    outputs.protect(stimulus.object);
   const ReplayComparison found =
       compare_with_record(recorded.protocol, recorded.stored.record, values->count("compare") > 0);
   if (outputs.wanted("out")) outputs.put("out", to_csv(found));
