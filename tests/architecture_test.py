@@ -75,7 +75,7 @@ PUBLIC = {
                "shapes vec",
     "rendering": "first_contact probe render_fault renderer scene",
     "rendering/verification": "explain extreme_cases reference search",
-    "rendering/accuracy": "methods paper_first_contact peers study",
+    "rendering/accuracy": "paper_first_contact peers study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256",
     "data": "record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "

@@ -44,29 +44,6 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
   if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
 }
 
-void check(const std::string& database, const std::string& csv,
-           const analysis::AnalysisSettings& settings, const std::string& usage) {
-  if (database.empty() == csv.empty()) {
-    throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + usage +
-                     "\nMore: add --help");
-  }
-  if (!(settings.too_fast > 0) || !std::isfinite(settings.too_fast)) {
-    throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
-  }
-}
-
-void put(Outputs& outputs, const analysis::Analysis& analysis,
-         const analysis::ReportRecord& record) {
-  if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
-      outputs.put_into_folder(figure.id + ".svg",
-                              analysis::figure_svg(figure, analysis::light_palette()));
-    }
-  }
-  if (outputs.wanted("json")) outputs.put("json", analysis::report_json(analysis));
-  if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
-}
-
 }  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
