@@ -175,9 +175,10 @@ Approach checked(const stimuli::ConvexMesh& mesh, const Approach& entry, const M
   } else if (!measure_edge(mesh, entry.feature.index, entry.feature.left_ahead, tip, d, at)) {
     return {};
   }
-  const double way = glm::length(m.tip_motion) + glm::length(m.d_motion);
-  const double most = kApart * (mesh.size() + glm::length(d)) + kSameTime * way;
-  const bool on = std::abs(at.depth) <= most && distance_off<kSegment>(mesh, at, tip, d) <= most;
+  const double travel = glm::length(m.tip_motion) + glm::length(m.d_motion);
+  const double tolerance = kApart * (mesh.size() + glm::length(d)) + kSameTime * travel;
+  const bool on =
+      std::abs(at.depth) <= tolerance && distance_off<kSegment>(mesh, at, tip, d) <= tolerance;
   return on ? entry : Approach{};
 }
 

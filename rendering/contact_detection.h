@@ -103,7 +103,7 @@ WalkResult detect_contact(const ScenePart& part, PartState& state, const LinePro
                                  Probe::nearest_feature(mesh, probe.tip, d).depth > part.tolerance);
       return {};
     }
-    if (state.plane.separates(from.tip, from.tail)) return {};  // so was the whole way between
+    if (state.plane.separates(from.tip, from.tail)) return {};  // and all poses between
     first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
   }
   WalkResult hit;

@@ -182,7 +182,7 @@ WalkResult holding_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
                            const Vec3& shift) {
   WalkResult best;
   double nearest = HUGE_VAL;
-  const auto look = [&](const Measured& m) {
+  const auto consider = [&](const Measured& m) {
     if (!(m.depth >= 0) || is_off<kSegment>(mesh, m, tip, d)) return;
     const Vec3 beside = m.depth * m.normal - shift;
     if (!(glm::dot(beside, beside) < nearest)) return;
@@ -190,13 +190,13 @@ WalkResult holding_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
     best = to_result(m, false);
   };
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) {
-    look(measure_facet<kSegment>(mesh, i, tip, d));
+    consider(measure_facet<kSegment>(mesh, i, tip, d));
   }
   if constexpr (kSegment) {
     for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) {
       const Slopes slopes = slopes_at(mesh, mesh.edges()[i], d);
       Measured m;
-      if (slopes.silhouette() && measure_edge(mesh, i, slopes.left >= 0, tip, d, m)) look(m);
+      if (slopes.silhouette() && measure_edge(mesh, i, slopes.left >= 0, tip, d, m)) consider(m);
     }
   }
   return best;

@@ -60,8 +60,8 @@ Nearest nearest_on_tetrahedron(const std::array<Vec3, 4>& p) {
   for (const auto& face : kFaces) {
     const Vec3 &a = p[face[0]], &b = p[face[1]], &c = p[face[2]];
     const Vec3 n = glm::cross(b - a, c - a);
-    // The origin and the fourth corner on different sides (or a flat tetrahedron): a face to look
-    // at.
+    // The origin and the fourth corner on different sides (or a flat tetrahedron): a candidate
+    // face.
     if (glm::dot(n, -a) * glm::dot(n, p[face[3]] - a) > 0) continue;
     const Nearest nearest = nearest_on_triangle(a, b, c);
     const double distance2 = glm::dot(nearest.point, nearest.point);

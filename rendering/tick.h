@@ -1,5 +1,5 @@
 #pragma once
-// One tick of the servo: from the pose of the virtual probe to the force on the hand. The way of a
+// One tick of the servo: from the pose of the virtual probe to the force on the hand. The path of a
 // force: renderer.cpp > tick.h > facet_walk.cpp > minkowski_facets.h.
 //
 // A template over what touches (the tip or the whole segment: point_probe.h, segment_probe.h) and

@@ -14,10 +14,10 @@ namespace {
 using Index = std::uint32_t;
 constexpr Index kNone = 0xffffffff;
 
-// A place is below 2^40 in every coordinate, so a height, a triple product, is below 2^124.
+// Grid coordinates are below 2^40, so a height, a triple product, is below 2^124.
 constexpr double kMostSteps = 0x1p40;
 __extension__ using Wide = __int128;
-using Place = std::array<std::int64_t, 3>;
+using GridPoint = std::array<std::int64_t, 3>;
 
 struct Face {
   std::array<Index, 3> corner{};
@@ -34,7 +34,7 @@ struct Face {
 // to tell in the end how deep they are.
 class Hull {
  public:
-  explicit Hull(std::vector<Place> places) : places_(std::move(places)) {}
+  explicit Hull(std::vector<GridPoint> grid_points) : points_(std::move(grid_points)) {}
 
   bool build() {
     if (!begin()) return false;
@@ -52,18 +52,18 @@ class Hull {
   }
 
  private:
-  Place apart(Index from, Index to) const {
-    const Place &a = places_[from], &b = places_[to];
+  GridPoint apart(Index from, Index to) const {
+    const GridPoint &a = points_[from], &b = points_[to];
     return {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   }
 
-  static std::array<Wide, 3> cross(const Place& a, const Place& b) {
+  static std::array<Wide, 3> cross(const GridPoint& a, const GridPoint& b) {
     return {Wide{a[1]} * b[2] - Wide{a[2]} * b[1], Wide{a[2]} * b[0] - Wide{a[0]} * b[2],
             Wide{a[0]} * b[1] - Wide{a[1]} * b[0]};
   }
 
   Wide exact_height(const Face& face, Index point) const {
-    const Place arm = apart(face.corner[0], point);
+    const GridPoint arm = apart(face.corner[0], point);
     return face.normal[0] * arm[0] + face.normal[1] * arm[1] + face.normal[2] * arm[2];
   }
 
@@ -81,16 +81,16 @@ class Hull {
   template <class Measure>
   Index most(Measure measure) const {
     Index best = 0;
-    for (Index i = 1; i < places_.size(); ++i) {
+    for (Index i = 1; i < points_.size(); ++i) {
       if (measure(i) > measure(best)) best = i;
     }
     return best;
   }
 
   bool begin() {
-    const Index a = most([&](Index i) { return -places_[i][0]; });
+    const Index a = most([&](Index i) { return -points_[i][0]; });
     const Index b = most([&](Index i) {
-      const Place d = apart(a, i);
+      const GridPoint d = apart(a, i);
       return Wide{d[0]} * d[0] + Wide{d[1]} * d[1] + Wide{d[2]} * d[2];
     });
     const Index c = most([&](Index i) { return face_of(a, b, i).length; });
@@ -109,7 +109,7 @@ class Hull {
     faces_[2].across = {1, 3, 0};
     faces_[3].across = {2, 1, 0};
     std::vector<Index> others;
-    for (Index i = 0; i < places_.size(); ++i) {
+    for (Index i = 0; i < points_.size(); ++i) {
       if (i != a && i != b && i != c && i != d) others.push_back(i);
     }
     hand_out(others, 0);
@@ -176,7 +176,7 @@ class Hull {
     std::vector<Index> freed;
     const std::vector<Side> horizon = remove_seen(start, point, freed);
     const auto first = static_cast<Index>(faces_.size());
-    face_from_.resize(places_.size(), kNone);
+    face_from_.resize(points_.size(), kNone);
     for (const Side& side : horizon) {
       const auto made = static_cast<Index>(faces_.size());
       faces_.push_back(face_of(side.from, side.to, point));
@@ -195,7 +195,7 @@ class Hull {
     hand_out(freed, first);
   }
 
-  std::vector<Place> places_;
+  std::vector<GridPoint> points_;
   std::vector<Face> faces_;
   std::vector<Index> waiting_;
   std::vector<Index> face_from_;  // of each point: the new face whose first corner it is
@@ -213,19 +213,19 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
   }
   const Vec3 extent = high - low, far = glm::max(glm::abs(low), glm::abs(high));
   const double size = std::max({extent.x, extent.y, extent.z});
-  // A power of two, and no finer than doubles are so far from the origin: its places are doubles.
+  // A power of two, and no finer than doubles are so far from the origin: grid points are doubles.
   const double least =
       std::max({error / 8, 2 * size / kMostSteps,
                 std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
   const double step = std::exp2(std::ceil(std::log2(least)));
   const Vec3 origin = step * glm::floor(low / step);
-  std::vector<Place> places;
-  places.reserve(points.size());
+  std::vector<GridPoint> grid_points;
+  grid_points.reserve(points.size());
   for (const Vec3& point : points) {
     const Vec3 steps = (point - origin) / step;
-    places.push_back({std::llround(steps.x), std::llround(steps.y), std::llround(steps.z)});
+    grid_points.push_back({std::llround(steps.x), std::llround(steps.y), std::llround(steps.z)});
   }
-  Hull hull(places);
+  Hull hull(grid_points);
   if (!hull.build()) return result;
   std::vector<Index> number(points.size(), kNone);
   for (const Face& face : hull.faces()) {
@@ -234,10 +234,10 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
     for (const Index corner : face.corner) {
       if (number[corner] == kNone) {
         number[corner] = static_cast<Index>(result.soup.vertices.size());
-        const Place& place = places[corner];
-        result.soup.vertices.push_back(origin + step * Vec3(static_cast<double>(place[0]),
-                                                            static_cast<double>(place[1]),
-                                                            static_cast<double>(place[2])));
+        const GridPoint& grid_point = grid_points[corner];
+        result.soup.vertices.push_back(origin + step * Vec3(static_cast<double>(grid_point[0]),
+                                                            static_cast<double>(grid_point[1]),
+                                                            static_cast<double>(grid_point[2])));
       }
       corners.push_back(number[corner]);
     }

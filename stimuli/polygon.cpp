@@ -6,11 +6,11 @@
 namespace palpate::stimuli {
 namespace {
 
-Vec3 farthest_from(const Vec3& place, std::span<const Vec3> corners) {
-  Vec3 farthest = place;
+Vec3 farthest_from(const Vec3& point, std::span<const Vec3> corners) {
+  Vec3 farthest = point;
   double most = 0;
   for (const Vec3& corner : corners) {
-    const Vec3 apart = corner - place;
+    const Vec3 apart = corner - point;
     const double squared = glm::dot(apart, apart);
     if (squared <= most) continue;
     most = squared;

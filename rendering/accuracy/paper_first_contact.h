@@ -10,7 +10,7 @@
 
 namespace palpate::rendering {
 
-/// Ho, Basdogan & Srinivasan 2000, appendix 7, to the letter: the straight way of a point crosses
+/// Ho, Basdogan & Srinivasan 2000, appendix 7, to the letter: the straight path of a point crosses
 /// the facet's polygon, from either side.
 bool crosses_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t facet, const Vec3& before,
                      const Vec3& after);

@@ -54,7 +54,7 @@ class PlainWalk {
     WalkResult result;
     result.normal = Vec3(at.normal);
     result.depth = static_cast<double>(at.depth);
-    result.probe_fraction = std::clamp(static_cast<double>(at.place), 0.0, 1.0);
+    result.probe_fraction = std::clamp(static_cast<double>(at.probe_fraction), 0.0, 1.0);
     if (at.depth >= 0) result.feature = at.feature;
     return result;
   }
@@ -74,7 +74,7 @@ class PlainWalk {
   struct At {
     ContactFeature feature;
     Vector normal;
-    Real depth = 0, place = 0, along = 0;
+    Real depth = 0, probe_fraction = 0, edge_fraction = 0;
   };
 
   At face(std::uint32_t index, const Vector& tip, const Vector& d) const {
@@ -83,7 +83,7 @@ class PlainWalk {
     At at;
     at.feature = {Kind::facet, false, index};
     at.normal = f.normal;
-    at.place = slope >= 0 ? Real(0) : Real(1);
+    at.probe_fraction = slope >= 0 ? Real(0) : Real(1);
     at.depth = slope >= 0 ? height : height - slope;
     return at;
   }
@@ -104,8 +104,8 @@ class PlainWalk {
     at.feature = {Kind::edge, left, index};
     at.normal = (left ? c : -c) / std::sqrt(c2);
     at.depth = -glm::dot(at.normal, w);
-    at.place = glm::dot(glm::cross(w, line), c) / c2;
-    at.along = glm::dot(glm::cross(w, d), c) / c2;
+    at.probe_fraction = glm::dot(glm::cross(w, line), c) / c2;
+    at.edge_fraction = glm::dot(glm::cross(w, d), c) / c2;
     return true;
   }
 
@@ -150,18 +150,18 @@ class PlainWalk {
   bool step(const At& at, const Vector& tip, const Vector& d, At& next) const {
     if (at.feature.kind == Kind::facet) {
       const PlainFacet& f = facets_[at.feature.index];
-      const PlainSide* side = beyond(f, tip + at.place * d + at.depth * at.normal);
+      const PlainSide* side = beyond(f, tip + at.probe_fraction * d + at.depth * at.normal);
       if (!side) return false;
       if (!edge(side->edge, tip, d, next)) next = face(side->across, tip, d);
       return true;
     }
     const stimuli::Edge& e = edges_[at.feature.index];
-    if (at.place < 0 || at.place > 1) {
-      next = face((at.place < 0) == at.feature.left_ahead ? e.left : e.right, tip, d);
+    if (at.probe_fraction < 0 || at.probe_fraction > 1) {
+      next = face((at.probe_fraction < 0) == at.feature.left_ahead ? e.left : e.right, tip, d);
       return true;
     }
-    if (at.along >= 0 && at.along <= 1) return false;
-    const std::uint32_t vertex = at.along > 1 ? e.v1 : e.v0;
+    if (at.edge_fraction >= 0 && at.edge_fraction <= 1) return false;
+    const std::uint32_t vertex = at.edge_fraction > 1 ? e.v1 : e.v0;
     for (std::uint32_t i = fan_first_[vertex]; i < fan_first_[vertex + 1]; ++i) {
       const std::uint32_t other = fan_edges_[i];
       if (other == at.feature.index) continue;

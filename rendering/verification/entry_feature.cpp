@@ -36,7 +36,7 @@ std::optional<ReferenceDepth> measure_feature(const stimuli::ConvexMesh& mesh, b
 std::optional<EntryFeature> entry_feature(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   std::optional<EntryFeature> best;
   double least = std::numeric_limits<double>::infinity(), second = least;
-  const auto look = [&](bool is_edge, std::uint32_t i) {
+  const auto consider = [&](bool is_edge, std::uint32_t i) {
     const auto at = measure_feature(mesh, is_edge, i, probe);
     if (!at) return;
     second = std::min(second, std::max(at->depth, least));
@@ -46,8 +46,8 @@ std::optional<EntryFeature> entry_feature(const stimuli::ConvexMesh& mesh, const
       best = EntryFeature{is_edge, i};
     }
   };
-  for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) look(false, i);
-  for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) look(true, i);
+  for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) consider(false, i);
+  for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) consider(true, i);
   // Where another depth is this near, rounding decides.
   if (second - least < kNeighbouringDepths * mesh.size()) return std::nullopt;
   return best;

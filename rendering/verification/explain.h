@@ -16,7 +16,7 @@ enum class StageTime { once, tick, free, entry, contact };
 
 const char* to_string(StageTime time);  ///< "once a scene", "every tick", "in free space", ...
 
-/// One stage on the way from a pose to forces.
+/// One stage of a tick, from the pose to the forces.
 struct TickStage {
   std::string name;
   StageTime time = StageTime::tick;

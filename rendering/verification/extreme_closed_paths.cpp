@@ -56,13 +56,13 @@ class ClosedPathBench {
 
   Rendering tick(const LineProbe& probe) { return renderer_.tick(scene_, state_, probe, 1e-3); }
 
-  /// Straight in along `way` (unit) until it is kDepth deep; returns the pose there.
+  /// Straight in along `motion` (unit) until it is kDepth deep; returns the pose there.
   /// \param probe  at the object's middle
-  LineProbe press(const LineProbe& probe, const Vec3& way, double from) {
+  LineProbe press(const LineProbe& probe, const Vec3& motion, double from) {
     constexpr double kStep = 1e-4;
     LineProbe now = probe;
     for (double left = from; left > -from; left -= kStep) {
-      now = {probe.tip - left * way, probe.tail - left * way};
+      now = {probe.tip - left * motion, probe.tail - left * motion};
       if (tick(now).deepest.depth > kDepth) break;
     }
     return now;

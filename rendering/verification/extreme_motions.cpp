@@ -81,11 +81,11 @@ ExtremeResult parallel_edge(const Renderer& renderer) {
         const double back = (round % 3) * 0.06;
         Vec3 at(0.005, 0.03 + beside - 2 * beside * (round % 4 == 0), 0.05);
         scene.audited_tick({at - back * u, at + (kStylus - back) * u});
-        const Vec3 ways[] = {{0, 0, -0.001}, {0, 0.001, 0}, {0, -0.001, 0},
-                             {0.003, 0, 0},  {0, 0, 0.001}, {0, 0.0005, -0.0005}};
+        const Vec3 motions[] = {{0, 0, -0.001}, {0, 0.001, 0}, {0, -0.001, 0},
+                                {0.003, 0, 0},  {0, 0, 0.001}, {0, 0.0005, -0.0005}};
         for (int leg = 0; leg < 60; ++leg) {
-          const Vec3 way = leg < 21 ? ways[0] : ways[random.below(6)];
-          at += way;
+          const Vec3 motion = leg < 21 ? motions[0] : motions[random.below(6)];
+          at += motion;
           scene.audited_tick({at - back * u, at + (kStylus - back) * u});
         }
         all.add(scene.result());

@@ -80,12 +80,12 @@ struct PathBuilder {
   }
 
   void smooth() {
-    const Wave3 place(random), turn(random);
+    const Wave3 position(random), turn(random);
     const Wave fraction(random);
     const double step = magnitude(random, -4, -1.5);
     const double reach = 1.5 * mesh.radius();
     for (double at = 0; !full(); at += step) {
-      path.push_back(probe(mesh.centre() + reach * place(at), unit_or_x(turn(at)),
+      path.push_back(probe(mesh.centre() + reach * position(at), unit_or_x(turn(at)),
                            side ? 0.5 + 0.5 * fraction(at) : 0));
     }
   }
@@ -95,10 +95,10 @@ struct PathBuilder {
     const double thickness = reference_depth(mesh, {inside, inside}).depth;
     const double press = magnitude(random, -3, 0.5) * thickness;
     const double step = magnitude(random, -4, -1);
-    const Wave3 place(random), turn(random);
+    const Wave3 position(random), turn(random);
     const Wave fraction(random), pressing(random);
     for (double at = 0; !full(); at += step) {
-      const Vec3 out = unit_or_x(place(at)), direction = unit_or_x(turn(at));
+      const Vec3 out = unit_or_x(position(at)), direction = unit_or_x(turn(at));
       const double at_fraction = side ? 0.5 + 0.5 * fraction(at) : 0;
       double in = 0, outside = 2 * mesh.size() + length;
       for (int halving = 0; halving < 20; ++halving) {
@@ -118,7 +118,7 @@ struct PathBuilder {
       const double step =
           random.below(2) ? kFiveMetresASecond : mesh.size() * magnitude(random, -2, 0.5);
       const Vec3 aim = mesh.centre() + 0.6 * mesh.size() * random.unit() * random_direction(random);
-      const Vec3 way = random_direction(random), from = random_direction(random);
+      const Vec3 motion = random_direction(random), from = random_direction(random);
       const Vec3 axis = random_direction(random);
       const double turn_a_tick = magnitude(random, -4, 0);
       const double fraction = some_fraction();
@@ -126,7 +126,7 @@ struct PathBuilder {
       double gone = -step * (legs + random.unit());
       for (int leg = 0; leg <= 2 * legs && !full(); ++leg, gone += step) {
         const Vec3 direction = glm::angleAxis(turn_a_tick * leg, axis) * from;
-        path.push_back(probe(aim + gone * way, direction, fraction));
+        path.push_back(probe(aim + gone * motion, direction, fraction));
       }
     }
   }
@@ -139,18 +139,19 @@ struct PathBuilder {
         at = glm::mix(at, mesh.vertices()[random.below(mesh.vertices().size())], random.unit());
       }
       const LineProbe inside = probe(at, random_direction(random), some_fraction());
-      const LineProbe felt{inside.tip, side ? inside.tail : inside.tip};
-      const ReferenceDepth way_out = reference_depth(mesh, felt);
-      if (way_out.depth <= 0) continue;
-      const Vec3 way =
-          random.below(2) ? way_out.normal : unit_or_x(way_out.normal + random_direction(random));
-      const double start = way_out.depth + mesh.size() * magnitude(random, -16, 0);
-      const double deepest = way_out.depth * between(random, -2, 1);
-      path.push_back({inside.tip + 2 * mesh.size() * way, inside.tail + 2 * mesh.size() * way});
+      const LineProbe touching{inside.tip, side ? inside.tail : inside.tip};
+      const ReferenceDepth reference = reference_depth(mesh, touching);
+      if (reference.depth <= 0) continue;
+      const Vec3 motion = random.below(2) ? reference.normal
+                                          : unit_or_x(reference.normal + random_direction(random));
+      const double start = reference.depth + mesh.size() * magnitude(random, -16, 0);
+      const double deepest = reference.depth * between(random, -2, 1);
+      path.push_back(
+          {inside.tip + 2 * mesh.size() * motion, inside.tail + 2 * mesh.size() * motion});
       const int steps = 1 + static_cast<int>(random.below(6));
       for (int i = 0; i <= 2 * steps && !full(); ++i) {
         const double out = start + (deepest - start) * (steps - std::abs(i - steps)) / steps;
-        path.push_back({inside.tip + out * way, inside.tail + out * way});
+        path.push_back({inside.tip + out * motion, inside.tail + out * motion});
       }
     }
   }
@@ -178,14 +179,14 @@ struct PathBuilder {
       const Vec3 along = glm::normalize(v1 - v0);
       const Vec3 normal = mesh.facets()[edge.left].normal;
       const Vec3 across = glm::cross(normal, along);
-      const Vec3 ways[] = {along, across, normal, unit_or_x(along + across),
-                           unit_or_x(pick(mesh.vertices()) - v0)};
-      Vec3 direction = unit_or_x(ways[random.below(5)] + tiny() * random_direction(random));
+      const Vec3 directions[] = {along, across, normal, unit_or_x(along + across),
+                                 unit_or_x(pick(mesh.vertices()) - v0)};
+      Vec3 direction = unit_or_x(directions[random.below(5)] + tiny() * random_direction(random));
       if (random.below(2)) direction = -direction;
       const Vec3 touch = random.below(2) ? v0 : v0 + random.unit() * (v1 - v0);
       const Vec3 motions[] = {normal, along, across, direction,
                               unit_or_x(normal + mesh.facets()[edge.right].normal)};
-      const Vec3 way = motions[random.below(5)];
+      const Vec3 motion = motions[random.below(5)];
       const Vec3 second = motions[random.below(5)];
       const double fraction = side && random.below(2)
                                   ? random.unit()
@@ -198,7 +199,7 @@ struct PathBuilder {
           probe(touch + 2 * size * unit_or_x(normal + 0.1 * across), direction, fraction));
       for (int leg = 0; leg <= legs && !full(); ++leg) {
         const double turn = 2 * std::numbers::pi * leg / legs;
-        const Vec3 at = touch + (reach * std::cos(turn) + beside) * way +
+        const Vec3 at = touch + (reach * std::cos(turn) + beside) * motion +
                         (random.below(4) ? 0 : reach * std::sin(turn)) * second;
         path.push_back(probe(at, glm::angleAxis(turning * leg, axis) * direction, fraction));
       }

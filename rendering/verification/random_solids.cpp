@@ -42,7 +42,7 @@ struct Block {
       }
       return at->second;
     };
-    std::map<Index, Index> rim;  // round the cut, against the way round the faces that are left
+    std::map<Index, Index> rim;  // around the cut, clockwise seen from outside
     stimuli::PolygonSoup left;
     std::vector<Plane> planes_left;
     for (std::size_t f = 0; f < soup.faces.size(); ++f) {

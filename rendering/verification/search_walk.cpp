@@ -73,7 +73,7 @@ class Walk {
   void tick(const LineProbe& probe) {
     const bool was_free = has_last_ && !last_held_;
     const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
-    const LineProbe felt = felt_probe(scene_, renderer_, probe);
+    const LineProbe local = felt_probe(scene_, renderer_, probe);
     const TickAudit audit = audit_tick(scene_, renderer_, probe, r);
     fault_.tick = counts_.ticks++;
     depth_ = r.deepest.depth;
@@ -84,7 +84,7 @@ class Walk {
     const auto wrong = [&](bool is, std::uint64_t& count, const char* what, double value) {
       if (!is) return;
       ++count;
-      report(what, value, felt);
+      report(what, value, local);
     };
     wrong(!audit.finite, counts_.not_finite, "not finite", 0);
     wrong(audit.missed > audit.tolerance, counts_.missed, "missed, depth", audit.missed);
@@ -97,31 +97,31 @@ class Walk {
     wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless,
           "walk stopped at its limit of steps", 0);
     wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
-    if (was_free && audit.finite) from_free_space(felt, r, held, audit.tolerance);
-    last_ = felt;
+    if (was_free && audit.finite) from_free_space(local, r, held, audit.tolerance);
+    last_ = local;
     has_last_ = true;
     last_held_ = held;
   }
 
   /// The tick began in free space: what a hundredth of it shows, by brute force.
-  void from_free_space(const LineProbe& felt, const Rendering& r, bool held, double tolerance) {
+  void from_free_space(const LineProbe& local, const Rendering& r, bool held, double tolerance) {
     counts_.entries += held;
-    if (held) count_fallback(felt);
-    if (!held && separated_by_facet_plane(*mesh_, last_, felt)) return;
+    if (held) count_fallback(local);
+    if (!held && separated_by_facet_plane(*mesh_, last_, local)) return;
     ++counts_.walked_finely;
-    const auto time = reference_first_contact(*mesh_, last_, felt, kFineSteps);
+    const auto time = reference_first_contact(*mesh_, last_, local, kFineSteps);
     if (!time) {
-      if (held) expect_touch(felt, tolerance);
+      if (held) expect_touch(local, tolerance);
       return;
     }
     // A start at the surface is within rounding of any facet there.
     if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
     // It entered. Where its feature of entry holds it at every step, the contact must be there.
-    const auto entry = entry_feature(*mesh_, interpolated(last_, felt, *time));
+    const auto entry = entry_feature(*mesh_, interpolated(last_, local, *time));
     if (!entry) return;
     ReferenceDepth at_end;
     for (int step = static_cast<int>(std::ceil(*time * kFineSteps)); step <= kFineSteps; ++step) {
-      const LineProbe there = interpolated(last_, felt, step / double{kFineSteps});
+      const LineProbe there = interpolated(last_, local, step / double{kFineSteps});
       const auto on = measure_feature(*mesh_, entry->is_edge, entry->index, there);
       if (!on || on->depth <= (step < kFineSteps ? -tolerance : tolerance)) return;
       const LineProbe ideal = translated(there, on->depth * on->normal);
@@ -134,7 +134,7 @@ class Walk {
     }
     const bool elsewhere = !held || std::abs(r.deepest.depth - at_end.depth) >
                                         kNeighbouringDepths * (mesh_->size() + at_end.depth);
-    if (turned(felt) > kFastestTurn) {
+    if (turned(local) > kFastestTurn) {
       counts_.turned_elsewhere += elsewhere;
       return;
     }
@@ -142,7 +142,7 @@ class Walk {
     if (elsewhere) {
       ++counts_.passed_through;
       report(held ? "held elsewhere, depth off by" : "passed through, depth",
-             held ? r.deepest.depth - at_end.depth : at_end.depth, felt);
+             held ? r.deepest.depth - at_end.depth : at_end.depth, local);
     }
   }
 
@@ -163,45 +163,46 @@ class Walk {
 
   /// A contact that began although no step shows the probe inside: it must at least come as near as
   /// it moves in one step.
-  void expect_touch(const LineProbe& felt, double tolerance) {
+  void expect_touch(const LineProbe& local, double tolerance) {
     const double step =
-        std::max(glm::length(felt.tip - last_.tip), glm::length(felt.tail - last_.tail)) /
+        std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail)) /
         kFineSteps;
     double gap = std::numeric_limits<double>::infinity();
     for (int i = 0; i <= kFineSteps && gap > step; ++i) {
-      gap = std::min(gap, reference_gap(*mesh_, interpolated(last_, felt, i / double{kFineSteps})));
+      gap =
+          std::min(gap, reference_gap(*mesh_, interpolated(last_, local, i / double{kFineSteps})));
     }
     if (gap <= step + tolerance) return;
     ++counts_.phantom;
-    report("phantom contact, gap", gap, felt);
+    report("phantom contact, gap", gap, local);
   }
 
-  void count_fallback(const LineProbe& felt) {
+  void count_fallback(const LineProbe& local) {
     const ScenePart& part = scene_.parts()[0];
     const FirstContact first =
         renderer_.side_contact()
-            ? first_contact_segment(*mesh_, *part.trees, last_, felt, part.tolerance)
-            : first_contact_point(*mesh_, *part.trees, last_.tip, felt.tip, part.tolerance);
+            ? first_contact_segment(*mesh_, *part.trees, last_, local, part.tolerance)
+            : first_contact_point(*mesh_, *part.trees, last_.tip, local.tip, part.tolerance);
     counts_.fallbacks += first.feature.kind == ContactFeature::Kind::none;
   }
 
   /// How far the probe has turned in the tick, rad.
-  double turned(const LineProbe& felt) const {
-    const Vec3 a = last_.tail - last_.tip, b = felt.tail - felt.tip;
+  double turned(const LineProbe& local) const {
+    const Vec3 a = last_.tail - last_.tip, b = local.tail - local.tip;
     return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
   }
 
-  void report(const char* what, double value, const LineProbe& felt) {
+  void report(const char* what, double value, const LineProbe& local) {
     if (counts_.faults.size() >= SearchCounts::kFaultsKept) return;
     std::ostringstream out;
     out.precision(17);
     out << renderer_.name() << ", " << to_string(kind_) << " path, " << mesh_->facets().size()
         << " facets, size " << mesh_->size() << " m, probe " << length_ << " m: " << what << " "
         << value << " (" << value / mesh_->size() << " sizes), contact depth " << depth_
-        << " m, at (" << felt.tip.x << " " << felt.tip.y << " " << felt.tip.z << ") ("
-        << felt.tail.x << " " << felt.tail.y << " " << felt.tail.z << "), from (" << last_.tip.x
+        << " m, at (" << local.tip.x << " " << local.tip.y << " " << local.tip.z << ") ("
+        << local.tail.x << " " << local.tail.y << " " << local.tail.z << "), from (" << last_.tip.x
         << " " << last_.tip.y << " " << last_.tip.z << ") (" << last_.tail.x << " " << last_.tail.y
-        << " " << last_.tail.z << "), turned by " << turned(felt) << " rad";
+        << " " << last_.tail.z << "), turned by " << turned(local) << " rad";
     fault_.what = out.str();
     counts_.faults.push_back(fault_);
   }
@@ -214,7 +215,7 @@ class Walk {
   PathKind kind_;
   Scene scene_;
   RenderState state_;
-  LineProbe last_;  // as felt, mesh frame
+  LineProbe last_;  // at the last tick, as it can touch; mesh frame
   bool has_last_ = false, last_held_ = false;
   double depth_ = 0;  // m, of the contact under audit
   SearchFault fault_;

@@ -36,7 +36,7 @@ class SurfaceStroke {
   /// path keeps to the surface of any object; negative: above it; 0: off it, unknown how far.
   LineProbe next(double depth) {
     const double scale = std::min(1.0, settings_.radius / 0.03);
-    const double step = 1e-4 * scale;  // m, the way of a tick
+    const double step = 1e-4 * scale;  // m, of a tick
     const double turn = 0.02 * random_.normal();
     heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(normal_, heading_);
     normal_ = glm::normalize(normal_ + step / settings_.radius * heading_);
