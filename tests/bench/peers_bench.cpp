@@ -219,7 +219,7 @@ int main_with(int argc, char** argv) {
       "wrong: depth off by more than 1e-6 of the size from the exact one (every facet looked at), "
       "lost contacts and refusals among them;\nlost: of these, a contact that was not reported; "
       "2nd "
-      "way: a way out that is exact but not the shortest, held since the probe came in by it.\n");
+      "side: a local minimum of the depth that is not the least, on the side of entry.\n");
   for (const bool segment : {true, false}) compare(segment, seconds);
   return 0;
 }

@@ -1,4 +1,5 @@
-// The neighbourhood watch before the contact says the same as looking at every facet and edge.
+// Tracking the probe before the contact gives the same first contact as testing every facet and
+// edge.
 
 #include "rendering/approach.h"
 

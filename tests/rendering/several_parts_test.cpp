@@ -135,7 +135,7 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
   }
 }
 
-// The parts of one object share the probe's way out, other objects know nothing of it: wherever a
+// The parts of one object share the ideal probe's displacement, other objects do not: wherever a
 // compound stands among the scene's objects, the forces are those of each object alone.
 TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
   const auto slab = [](int object, double top, double spring) {

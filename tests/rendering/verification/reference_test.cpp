@@ -112,7 +112,8 @@ TEST(ReferenceFirstContact, SeesAsFinelyAsItsSteps) {
   EXPECT_NEAR(*time, 0.295, 1e-9);
 }
 
-// What a penetration depth is, stated without facets: along no direction is the way out shorter.
+// What a penetration depth is, stated without facets: no direction needs a shorter translation to
+// separate.
 double way_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const Vec3& direction) {
   double support = -std::numeric_limits<double>::infinity();
   for (const Vec3& v : mesh.vertices()) support = std::max(support, glm::dot(direction, v));

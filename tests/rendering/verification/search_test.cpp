@@ -68,7 +68,7 @@ TEST(Search, DoesNotDependOnWhoWalks) {
 /// A renderer that goes wrong now and then.
 class Broken final : public Renderer {
  public:
-  enum class How { deaf, sunk, floating, infinite, weak, endless, blind_to_motion, ghostly };
+  enum class How { missing, sunk, floating, infinite, weak, endless, blind_to_motion, phantom };
   explicit Broken(How how) : how_(how) {}
 
   const char* name() const override { return "broken"; }
@@ -79,7 +79,7 @@ class Broken final : public Renderer {
     if (how_ == How::blind_to_motion && state.has_last) state.last = probe;
     Rendering r = ray_renderer().tick(scene, state, probe, dt);
     const double size = scene.parts()[0].mesh->size();
-    if (how_ == How::ghostly && r.contacts == 0 && unlucky(probe)) {
+    if (how_ == How::phantom && r.contacts == 0 && unlucky(probe)) {
       r.contacts = 1;
       r.object = 0;
       r.deepest.normal = Vec3(1, 0, 0);
@@ -89,7 +89,7 @@ class Broken final : public Renderer {
     }
     if (r.contacts == 0 || !unlucky(probe)) return r;
     switch (how_) {
-      case How::deaf:
+      case How::missing:
         r = Rendering{};
         r.ideal = probe;
         break;
@@ -109,7 +109,7 @@ class Broken final : public Renderer {
         r.faults |= render_fault::kWalkCapped;
         break;
       case How::blind_to_motion:
-      case How::ghostly:
+      case How::phantom:
         break;
     }
     return r;
@@ -136,7 +136,7 @@ SearchCounts search_with(Broken::How how) {
   return counts;
 }
 
-TEST(Search, FindsMissedContacts) { EXPECT_GT(search_with(Broken::How::deaf).missed, 50u); }
+TEST(Search, FindsMissedContacts) { EXPECT_GT(search_with(Broken::How::missing).missed, 50u); }
 
 TEST(Search, FindsIdealProbesThatPenetrate) {
   EXPECT_GT(search_with(Broken::How::sunk).penetrating, 20u);
@@ -161,11 +161,11 @@ TEST(Search, FindsPlatesThatAreCrossed) {
 }
 
 TEST(Search, FindsContactsOutOfNowhere) {
-  EXPECT_GT(search_with(Broken::How::ghostly).phantom, 20u);
+  EXPECT_GT(search_with(Broken::How::phantom).phantom, 20u);
 }
 
 TEST(Search, SaysWhereToLook) {
-  const Broken broken(Broken::How::deaf);
+  const Broken broken(Broken::How::missing);
   SearchCounts counts;
   for (std::uint64_t walk = 0; counts.faults.empty(); ++walk) {
     counts += search_walk(broken, 3, walk);
