@@ -24,7 +24,7 @@ void check(RunSettings& settings) {
     throw UsageError("--hand: must be left or right");
   if (settings.response_latency &&
       !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
-    throw UsageError("--response-latency: must be 0 s or more");
+    throw UsageError("--response-latency: must be 0 or more seconds");
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
