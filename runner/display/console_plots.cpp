@@ -86,7 +86,7 @@ void draw_times(const std::vector<double>& times, float width, float height) {
 }
 
 void draw_scores(const std::vector<ShapeScore>& scores, float width, float height) {
-  const Plot plot = plot_frame("Correct so far, without practice", width, height);
+  const Plot plot = plot_frame("Correct, without practice", width, height);
   const float line = ImGui::GetTextLineHeight();
   const float each =
       std::min(1.5F * line, (plot.to.y - plot.from.y) /
