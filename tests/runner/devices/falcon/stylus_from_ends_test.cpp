@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -37,15 +38,23 @@ TEST(StylusFromEnds, TheFitIsExactWithoutNoise) {
     EXPECT_LT(glm::length(fit.tail_in_tip.position - truth.position), 1e-12);
     EXPECT_GT(std::abs(glm::dot(fit.tail_in_tip.orientation, truth.orientation)), 1 - 1e-12);
     EXPECT_LT(fit.residual, 1e-12);
+    EXPECT_LT(fit.worst, 1e-12);
   }
 }
 
 TEST(StylusFromEnds, NoiseGivesItsResidual) {
   const Pose truth{{0.1, 0.2, 0.3}, glm::normalize(Quat(1, 2, 3, 4))};
-  const RigidFit fit = fit_rigid(paired(truth, 200, 0.0005, 9));
+  const std::vector<PairedPoint> points = paired(truth, 200, 0.0005, 9);
+  const RigidFit fit = fit_rigid(points);
   // Both ends err by 0.5 mm in each of three directions.
   EXPECT_NEAR(fit.residual, 0.0005 * std::sqrt(6.0), 1e-4);
   EXPECT_GT(fit.worst, fit.residual);
+  double farthest = 0;
+  for (const PairedPoint& point : points) {
+    const Vec3 off = apply(fit.tail_in_tip, point.tail_frame) - point.tip_frame;
+    farthest = std::max(farthest, glm::length(off));
+  }
+  EXPECT_NEAR(fit.worst, farthest, 1e-12);
   EXPECT_LT(glm::length(fit.tail_in_tip.position - truth.position), 3e-4);
 }
 
