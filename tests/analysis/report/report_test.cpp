@@ -336,5 +336,17 @@ TEST(TextHelpers, NumbersAndNames) {
   EXPECT_TRUE(stimuli::is_plain_utf8("näïve 形 🙂"));
 }
 
+TEST(Cards, SayFasterOrSlowerBelowOnePercent) {
+  for (const double percent : {0.5, -0.5}) {
+    Analysis analysis = analysis_of_study({});
+    PairedShape& cone = analysis.comparisons[0].shapes[1];
+    cone.percent_reduction_geometric = percent;
+    cone.mean_log_ratio = std::log1p(-percent / 100);
+    const std::string text = page(analysis);
+    EXPECT_TRUE(holds(text, std::string("<b>cone</b><span class=\"value\">0.5\u00a0%</span> ") +
+                                (percent > 0 ? "faster" : "slower")));
+  }
+}
+
 }  // namespace
 }  // namespace palpate::analysis

@@ -255,5 +255,15 @@ TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
   EXPECT_EQ(none.comparisons[0].speed_accuracy[0].reading, "");
 }
 
+TEST(Learning, LevelIsTheMeanOfAllParticipants) {
+  // Without learning, every part has the mean log time: 2, half of the shapes 0.5 longer, the gain.
+  const Analysis analysis =
+      analysis_of({{"A", "point", 0.9}, {"B", "ray", 0.0}, {"C", "point", -0.3}});
+  for (const LearningBin& bin : analysis.practice.learning[1].bins) {
+    ASSERT_TRUE(bin.mean_log);
+    EXPECT_NEAR(*bin.mean_log, 2 + 0.25 + (0.9 + 0.0 - 0.3) / 3, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace palpate::analysis
