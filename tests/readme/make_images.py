@@ -142,7 +142,7 @@ def figure(name):
 
 
 def power(palpate, folder):
-    subprocess.run([palpate, "plan", "--db", simulated_study(palpate, folder), "--effect", "cone=22,cube=11",
+    subprocess.run([palpate, "plan", "--db", simulated_study(palpate, folder), "--effect", "cone=22,cube=11", "--studies", "1000",
                     "--figure", IMAGES / "power.svg", "--force"], stdout=subprocess.DEVNULL, check=True)
 
 
