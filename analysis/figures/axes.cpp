@@ -63,6 +63,7 @@ FigureAxis linear_axis(double low, double high, std::string title) {
 
 FigureAxis log_axis(double low, double high, std::string title) {
   constexpr double kMostWithParts = 3.5;  // decades
+  constexpr double kMostTicks = 9;        // else every second, third ... power has one
   if (!(high > low)) {
     low -= 0.1;
     high += 0.1;
@@ -72,7 +73,9 @@ FigureAxis log_axis(double low, double high, std::string title) {
   axis.low = low;
   axis.high = high;
   const int last = static_cast<int>(std::ceil(high));
+  const int step = std::max(1, static_cast<int>(std::ceil((high - low) / kMostTicks)));
   for (int exponent = static_cast<int>(std::floor(low)); exponent <= last; ++exponent) {
+    if (exponent % step != 0) continue;
     for (const int factor : {1, 2, 5}) {
       const double at = exponent + std::log10(factor);
       if (factor > 1 && high - low > kMostWithParts) continue;

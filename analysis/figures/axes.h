@@ -13,8 +13,8 @@ namespace palpate::analysis {
 FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
 /// Round ticks, ends widened to them.
 FigureAxis linear_axis(double low, double high, std::string title);
-/// For log10 of values: ticks at 1, 2 and 5 times powers of ten, where there are many at the powers
-/// alone. \param low, high log10 of values
+/// For log10 of values: ticks at 1, 2 and 5 times powers of ten, over several decades at the powers
+/// alone, over many at every second or third. \param low, high log10 of values
 FigureAxis log_axis(double low, double high, std::string title);
 /// The same with ends at whole powers of ten. \param low, high values, above 0
 FigureAxis decades_axis(double low, double high, std::string title);

@@ -118,7 +118,7 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
       figure.legend.push_back({std::string(look.method), look.role, analysis::Shape::circle});
     }
   }
-  add_row(figure, report, of_shape, kHand.position, "rms depth error against the shape (m)");
+  add_row(figure, report, of_shape, kHand.position, "rms error against the shape (m)");
   // Levels are named where no line is in the way: a shape of flats has one tessellation.
   const auto flat = std::ranges::find_if(
       figure.panels, [](const analysis::Panel& panel) { return is_flat_sided(panel.title); });
@@ -126,8 +126,7 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
     add_level(*panel, kHand.position, panel == flat ? "a hand feels 1 mm" : "");
     add_level(*panel, kDevice.position, panel == flat ? "a device resolves 0.03 mm" : "");
   }
-  add_row(figure, report, of_polyhedron, kLeastOfPolyhedron,
-          "worst depth error against the polyhedron (m)");
+  add_row(figure, report, of_polyhedron, kLeastOfPolyhedron, "worst error against polyhedron (m)");
   return figure;
 }
 
