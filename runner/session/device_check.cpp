@@ -206,7 +206,8 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     const double needed =
         glm::length(protocol.workspace.centre) +
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
-    if (needed > device.workspace_radius) {
+    constexpr double kRounding = 1e-9;  // m: sums of decimals are no whole decimals
+    if (needed > device.workspace_radius + kRounding) {
       add("stimulus '", stimulus.name, "' with its home zone needs ", needed,
           " m about the centre of '", device.name, "', which reaches ", device.workspace_radius,
           " m: move /workspace/centre_m or raise /workspace/scale");

@@ -47,6 +47,19 @@ double share(const stimuli::Material& material, const DeviceCapabilities& device
   return showable(material, device, rate, scale, controlled).fraction;
 }
 
+TEST(DeviceCheck, AStimulusMayFillTheWorkspaceAndNoMore) {
+  const protocols::Protocol protocol = some_protocol(of(100));
+  const StimulusLibrary library(protocol);
+  const auto faults_where_it_lacks = [&](double metres) {
+    DeviceCapabilities device = some_device();
+    device.workspace_radius = library.reach(0) + protocol.home.margin - metres;
+    return incompatibilities(protocol, library, device).size();
+  };
+  EXPECT_EQ(faults_where_it_lacks(0), 0u);
+  EXPECT_EQ(faults_where_it_lacks(1e-12), 0u) << "a rounding of the sum is no lack of room";
+  EXPECT_EQ(faults_where_it_lacks(1e-6), 1u);
+}
+
 TEST(DeviceCheck, TheBoundsOfAMaterial) {
   const DeviceCapabilities device = some_device();
   EXPECT_EQ(share(of(2000), device), 1);  // at the bound: b = K T / 2
