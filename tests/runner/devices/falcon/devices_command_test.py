@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -66,11 +67,14 @@ class Bench:
 
     def expect(self, text):
         """Reads messages until `text` has come."""
+        hang = threading.Timer(PATIENCE, os.killpg, [self.process.pid, signal.SIGKILL])
+        hang.start()
         while text not in self.messages:
             letter = self.process.stderr.read(1)
             if not letter:
                 self.has_ended(f"'{text}' never came in")
             self.messages += letter
+        hang.cancel()
         self.messages = self.messages.split(text, 1)[1]
 
     def enter(self, text=""):
@@ -140,7 +144,7 @@ class Devices(unittest.TestCase):
         bench.control.tell("scale 1 -5000")
         bench.expect("pull the grip fully out")
         bench.control.tell("shake 1 0.035")
-        bench.expect("middle of its space")
+        bench.expect("centre of its workspace")
         self.assertFalse(bench.state()["torque_before_homing"])
         self.hold(bench)
         time.sleep(0.5)
@@ -175,7 +179,7 @@ class Devices(unittest.TestCase):
     def interrupt(self, end):
         bench = self.calibrate([], "--weights", "0.1")
         self.hold(bench)
-        bench.expect("middle of its space")
+        bench.expect("centre of its workspace")
         time.sleep(0.2)
         bench.enter()
         bench.expect("Let go")
@@ -201,7 +205,7 @@ class Devices(unittest.TestCase):
                                                 str(self.calibration), "--points", "6"])
         places = [(0.02, 0, 0), (-0.02, 0, 0), (0, 0.02, 0), (0, -0.02, 0), (0, 0, 0.02), (0.014, 0.014, -0.015)]
         for number, (x, y, z) in enumerate(places, 1):
-            bench.expect(f"Place {number} of 6")
+            bench.expect(f"Point {number} of 6")
             # In their own frames; the second is turned half round about the vertical, 3 mm off.
             bench.control.tell(f"hand 1 {x} {y} {0.125 + z} 2000 60")
             bench.control.tell(f"hand 2 {-x + 0.003} {y} {0.125 - z} 2000 60")
