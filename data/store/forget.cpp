@@ -234,7 +234,7 @@ Withdrawal Store::forget(const std::string& code) {
     return true;
   });
   impl_->purge_deleted_rows();
-  const Withdrawal done = remove_backups(impl_->file, code);
+  Withdrawal done = remove_backups(impl_->file, code);
   // Temporary files of exports that were killed may hold the participant.
   remove_stale_temporaries_in(fs::path(impl_->file).parent_path());
   if (done.backups_left.empty()) {
