@@ -10,17 +10,7 @@ namespace {
 
 using namespace palpate::data::testing;
 
-class Enrolment : public ::testing::Test {
- protected:
-  Store open() { return Store::open(path_, Store::Mode::write_or_create); }
-  void show(Store& store, const palpate::data::Run& run, int trial) {
-    TrialRecord record = a_record(trial, run.session);
-    record.attempt = store.begin_attempt(run, record, record.onset_ns - 1);
-    store.finish_attempt(run, record);
-  }
-  const TemporaryFolder folder_;
-  const std::string path_ = folder_ / "study.db";
-};
+using Enrolment = StoreOnDisk;
 
 TEST_F(Enrolment, ParticipantsGetTheSmallestUnusedNumberOrTheWantedOne) {
   Store store = open();

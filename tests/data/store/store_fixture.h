@@ -97,4 +97,17 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+/// A database in a folder of its own, and a live trial from its beginning to its record.
+class StoreOnDisk : public ::testing::Test {
+ protected:
+  Store open() { return Store::open(path_, Store::Mode::write_or_create); }
+  void show(Store& store, const palpate::data::Run& run, int trial) {
+    TrialRecord record = a_record(trial, run.session);
+    record.attempt = store.begin_attempt(run, record, record.onset_ns - 1);
+    store.finish_attempt(run, record);
+  }
+  const TemporaryFolder folder_;
+  const std::string path_ = folder_ / "study.db";
+};
+
 }  // namespace palpate::data::testing

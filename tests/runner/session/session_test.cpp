@@ -72,7 +72,10 @@ struct Bench {
   MemoryLog log;
 
   Session session(Respondent& respondent, SessionPlan plan) {
-    return {{protocol, library, std::move(plan), servo, clock, {0, 0}, log}, respondent};
+    return session(respondent, std::move(plan), servo);
+  }
+  Session session(Respondent& respondent, SessionPlan plan, TickSource& another_servo) {
+    return {{protocol, library, std::move(plan), another_servo, clock, {0, 0}, log}, respondent};
   }
 };
 
@@ -142,14 +145,7 @@ TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
     servo.verdict.max_force = 3.5;
     servo.verdict.faults = faults;
     Scripted respondent({});
-    Session session({bench.protocol,
-                     bench.library,
-                     SessionPlan(bench.protocol, 1, 1),
-                     servo,
-                     bench.clock,
-                     {0, 0},
-                     bench.log},
-                    respondent);
+    Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
     run(session);
     for (const data::TrialRecord& record : bench.log.finished) {
       EXPECT_EQ(record.started_inside, faults == rendering::render_fault::kStartedInside);
@@ -209,14 +205,7 @@ TEST(Session, ATrialKeepsEverySampleAndWhatItBeganWith) {
   bench.protocol.samples = true;
   Numbered servo;
   Scripted respondent({});
-  Session session({bench.protocol,
-                   bench.library,
-                   SessionPlan(bench.protocol, 1, 1),
-                   servo,
-                   bench.clock,
-                   {0, 0},
-                   bench.log},
-                  respondent);
+  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
   while (bench.log.finished.empty()) session.step();
   const data::TrialRecord& record = bench.log.finished[0];
   ASSERT_EQ(record.samples.size(), 301u);  // answered at tick 300
@@ -355,14 +344,7 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
   });
   Servo servo(failing, bench.clock, 1000, ForceLimits{});
   Scripted respondent({-1});
-  Session session({bench.protocol,
-                   bench.library,
-                   SessionPlan(bench.protocol, 1, 1),
-                   servo,
-                   bench.clock,
-                   {0, 0},
-                   bench.log},
-                  respondent);
+  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
   EXPECT_THROW(run(session), SessionFault);
   EXPECT_EQ(failing.force, Vec3(0));
   EXPECT_EQ(bench.log.began.size(), 1u);
