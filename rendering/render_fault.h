@@ -22,9 +22,12 @@ inline constexpr std::uint32_t kNonFinite = 1;
 inline constexpr std::uint32_t kStartedInside = 2;
 inline constexpr std::uint32_t kWalkCapped = 4;
 inline constexpr std::uint32_t kContactsDropped = 8;
+// 16 to 2048 are the servo's (runner/servo/servo_fault.h).
+inline constexpr std::uint32_t kContactCapped = 4096;
+inline constexpr std::uint32_t kReleased = 8192;
 }  // namespace render_fault
 
-inline constexpr std::array<FaultBit, 4> kRenderFaults = {{
+inline constexpr std::array<FaultBit, 6> kRenderFaults = {{
     {render_fault::kNonFinite, "non-finite", "not a finite number",
      "the pose or the force was not a finite number: zero force until cleared",
      "a force or pose was not finite"},
@@ -34,6 +37,19 @@ inline constexpr std::array<FaultBit, 4> kRenderFaults = {{
      "the search for the deepest contact met its limit of steps: the force may not be the last"},
     {render_fault::kContactsDropped, "contacts-dropped", "too many contacts",
      "more objects were touched at once than are rendered: the force is too small"},
+    {render_fault::kContactCapped, "contact-capped", "contact cut short",
+     "the search for where several contacts let the ideal tool be met its limit of rounds: it stayed "
+     "where it was"},
+    {render_fault::kReleased, "released", "hooked tool released",
+     "the tool hooked behind an object and turned too far from it: its force faded, and there is none "
+     "from that object until it has been left"},
 }};
+
+/// Every bit of the table.
+inline constexpr std::uint32_t kAllRenderFaults = [] {
+  std::uint32_t all = 0;
+  for (const FaultBit& fault : kRenderFaults) all |= fault.bit;
+  return all;
+}();
 
 }  // namespace palpate::rendering

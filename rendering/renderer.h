@@ -23,6 +23,8 @@ struct Rendering {
   int contacts = 0;  ///< contact points with force
   int object = -1;   ///< of the deepest contact; -1 in free space
   std::uint32_t faults = 0;  ///< render_fault
+  int segment = -1;          ///< of the tool, where the deepest contact is; -1 in free space
+  Vec3 ideal_side{0, 0, 0};  ///< unit, +x of the ideal tool; zero without a tool
 };
 
 class Renderer {

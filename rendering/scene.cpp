@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace palpate::rendering {
 namespace {
@@ -18,7 +19,10 @@ double distance_to_segment(const Vec3& p, const LineProbe& probe) {
 
 }  // namespace
 
-Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
+Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
+    : tool_(std::move(tool)) {
+  if (tool_.segments.size() > Tool::kMostSegments)
+    throw std::invalid_argument("a tool has 1 to 16 segments");
   TickFeatures features;
   parts_.reserve(objects.size());
   for (auto& object : objects) {
@@ -38,6 +42,8 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact) {
     features.friction |= part.material.has_friction();
     features.layers |= !part.material.layers.empty();
     part.object = object.object;
+    part.layer = object.layer;
+    part.break_force = object.break_force;
     parts_.push_back(std::move(part));
   }
   features.several_parts = parts_.size() != 1;

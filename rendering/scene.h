@@ -14,6 +14,7 @@
 #include "rendering/force.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
+#include "rendering/tool.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
@@ -27,6 +28,9 @@ struct SceneObject {
   int object =
       0;  ///< index of the object in the scene; the parts of a compound share it, side by side
   std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
+  int layer = 0;  ///< 0: the object's surface; 1 and on: its layers, each felt on its own
+  /// N; a layer whose force exceeds it gives way until the object has been left
+  double break_force = std::numeric_limits<double>::infinity();
 };
 
 /// One convex part as the tick uses it.
@@ -40,6 +44,8 @@ struct ScenePart {
   double tolerance = 0;      ///< m; shorter is rounding, at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
+  int layer = 0;
+  double break_force = std::numeric_limits<double>::infinity();  ///< N
 
   // Inlined: a tick turns three to five vectors, at ten instructions each.
   [[gnu::always_inline]] Vec3 local_point(const Vec3& world) const {
@@ -95,6 +101,9 @@ struct RenderState {
   double clearance = 0;  ///< m; within it of near_parts_pose the other parts are out of reach
   LineProbe last;        ///< last valid pose
   bool has_last = false;
+  /// Of the tool, world frame, where the caller senses it: written before a tick. Its part at right
+  /// angles to the stylus is +x. Zero: +x is carried along by the smallest rotation.
+  Vec3 measured_side;
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
 };
 
@@ -102,16 +111,19 @@ struct RenderState {
 class Scene {
  public:
   /// \param side_contact  false leaves out what only a segment needs (the tree of edges)
-  explicit Scene(std::vector<SceneObject> objects, bool side_contact = true);
+  /// \param tool          what the stylus carries; empty: nothing but itself
+  explicit Scene(std::vector<SceneObject> objects, bool side_contact = true, Tool tool = {});
 
   const std::vector<ScenePart>& parts() const { return parts_; }
   /// Selects the tick that a renderer runs.
   TickFeatures features() const { return TickFeatures::of(features_index_); }
   std::size_t features_index() const { return features_index_; }
+  const Tool& tool() const { return tool_; }
   RenderState initial_state() const;
 
  private:
   std::vector<ScenePart> parts_;
+  Tool tool_;
   std::size_t features_index_ = 0;
 };
 

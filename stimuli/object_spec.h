@@ -4,6 +4,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,12 @@ namespace palpate::stimuli {
 
 enum class ShapeKind { sphere, cone, cylinder, cube, mesh, compound };
 
-/// A layer of an object, from `depth` on downwards.
+/// A layer of an object: its surface moved inwards, felt beside the surface.
 struct Layer {
-  double depth = 0;      ///< m, below the surface along the contact normal
+  double depth = 0;      ///< m, by which each plane of the surface is moved inwards
   double stiffness = 0;  ///< N/m
+  double damping = 0;    ///< N s/m
+  std::optional<double> break_force = std::nullopt;  ///< N; a greater force makes the layer give way
 };
 
 /// Mechanical properties of an object. What is 0 or empty is left out of the tick.

@@ -43,6 +43,9 @@ inline constexpr auto kFaultTable = [] {
   const auto rest =
       std::copy(rendering::kRenderFaults.begin(), rendering::kRenderFaults.end(), all.begin());
   std::copy(kServoFaults.begin(), kServoFaults.end(), rest);
+  std::sort(all.begin(), all.end(), [](const rendering::FaultBit& a, const rendering::FaultBit& b) {
+    return a.bit < b.bit;
+  });
   return all;
 }();
 static_assert(std::is_sorted(kFaultTable.begin(), kFaultTable.end(),

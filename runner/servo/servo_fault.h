@@ -8,7 +8,7 @@
 
 namespace palpate::runner::servo_fault {
 
-// Bits of Sample::faults; the renderer's bits are the low ones.
+// Bits of Sample::faults; the renderer's are 1 to 8 and 4096 on.
 inline constexpr std::uint32_t kForceLimited = 16;
 inline constexpr std::uint32_t kDeviceLost = 32;
 inline constexpr std::uint32_t kMissedTicks = 64;
