@@ -38,10 +38,12 @@ inline constexpr std::array<FaultBit, 6> kRenderFaults = {{
     {render_fault::kContactsDropped, "contacts-dropped", "too many contacts",
      "more objects were touched at once than are rendered: the force is too small"},
     {render_fault::kContactCapped, "contact-capped", "contact cut short",
-     "the search for where several contacts let the ideal tool be met its limit of rounds: it stayed "
+     "the search for where several contacts let the ideal tool be met its limit of rounds: it "
+     "stayed "
      "where it was"},
     {render_fault::kReleased, "released", "hooked tool released",
-     "the tool hooked behind an object and turned too far from it: its force faded, and there is none "
+     "the tool hooked behind an object and turned too far from it: its force faded, and there is "
+     "none "
      "from that object until it has been left"},
 }};
 

@@ -19,7 +19,8 @@ struct Layer {
   double depth = 0;      ///< m, by which each plane of the surface is moved inwards
   double stiffness = 0;  ///< N/m
   double damping = 0;    ///< N s/m
-  std::optional<double> break_force = std::nullopt;  ///< N; a greater force makes the layer give way
+  std::optional<double> break_force =
+      std::nullopt;  ///< N; a greater force makes the layer give way
 };
 
 /// Mechanical properties of an object. What is 0 or empty is left out of the tick.

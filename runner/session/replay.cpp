@@ -10,7 +10,6 @@
 namespace palpate::runner {
 namespace {
 
-
 protocols::Trial trial_of(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
                           protocols::RendererKind renderer) {
   protocols::Trial trial;
@@ -56,7 +55,8 @@ bool equals_record(const data::SampleRecord& recorded, const Sample& again) {
   return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
          recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
          recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
-         (recorded.faults & rendering::kAllRenderFaults) == (r.faults & rendering::kAllRenderFaults);
+         (recorded.faults & rendering::kAllRenderFaults) ==
+             (r.faults & rendering::kAllRenderFaults);
 }
 
 }  // namespace palpate::runner
