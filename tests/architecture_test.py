@@ -73,7 +73,7 @@ def room_of(name):
 PUBLIC = {
     "stimuli": "convex_mesh input_file large_array mesh_file object_spec orientation primitives printable random "
                "shapes vec",
-    "rendering": "first_contact probe render_fault renderer scene tool",
+    "rendering": "first_contact probe render_fault renderer scene",
     "rendering/verification": "explain extreme_cases reference search",
     "rendering/accuracy": "paper_first_contact peers study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256",
