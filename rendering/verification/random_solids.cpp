@@ -157,6 +157,13 @@ stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts) {
   return polar;
 }
 
+stimuli::PolygonSoup part_below(const stimuli::PolygonSoup& solid, const Vec3& normal,
+                                double offset) {
+  Block block{solid, std::vector<Plane>(solid.faces.size(), Plane{Vec3(0), 0})};
+  block.cut({normal, offset});
+  return block.tidy();
+}
+
 stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors) {
   for (Vec3& v : soup.vertices) v *= factors;
   return soup;

@@ -16,6 +16,11 @@ stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts);
 /// Every corner's coordinates times these factors; convexity is kept.
 stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors);
 
+/// The part of a convex solid below the plane dot(normal, x) == offset, which goes through no
+/// corner.
+stimuli::PolygonSoup part_below(const stimuli::PolygonSoup& solid, const Vec3& normal,
+                                double offset);
+
 /// Turned, scaled by `scale` and then moved.
 stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& turn, double scale,
                                       const Vec3& to);

@@ -1,0 +1,93 @@
+#include "rendering/verification/nearest_point.h"
+
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace palpate::rendering {
+namespace {
+
+// Planes whose normals span less than this (squared sine, or the squared volume of three) meet in
+// no point or line that rounding leaves in place.
+constexpr double kDependent = 1e-13;
+
+/// The multipliers with which `from` comes to lie on all the planes chosen.
+bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
+               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
+  // A plane that is not chosen is replaced by an equation of its own: multiplier = 0.
+  Mat3 products(1);
+  Vec3 gaps(0);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const HalfSpace& a = planes[chosen[i]];
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      products[static_cast<int>(k)][static_cast<int>(i)] =
+          glm::dot(a.normal, planes[chosen[k]].normal);
+    }
+    gaps[static_cast<int>(i)] = a.offset - glm::dot(a.normal, from);
+  }
+  if (chosen.size() > 1 && glm::determinant(products) < kDependent) return false;
+  const Vec3 solved = glm::inverse(products) * gaps;
+  for (std::size_t i = 0; i < chosen.size(); ++i) multipliers[i] = solved[static_cast<int>(i)];
+  return true;
+}
+
+/// Newton's step of the same system takes out what rounding left.
+Vec3 displaced(const Vec3& from, std::span<const HalfSpace> planes,
+               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
+  Vec3 at = from;
+  for (std::size_t i = 0; i < chosen.size(); ++i) at += multipliers[i] * planes[chosen[i]].normal;
+  std::array<double, 3> more{};
+  on_planes(at, planes, chosen, more);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    at += more[i] * planes[chosen[i]].normal;
+    multipliers[i] += more[i];
+  }
+  return at;
+}
+
+bool above_all(const Vec3& point, std::span<const HalfSpace> planes, double tolerance) {
+  return std::all_of(planes.begin(), planes.end(), [&](const HalfSpace& plane) {
+    return glm::dot(plane.normal, point) - plane.offset >= -tolerance;
+  });
+}
+
+}  // namespace
+
+std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const HalfSpace> planes,
+                                          double tolerance) {
+  std::optional<NearestPoint> nearest;
+  double least = 0;
+  const auto try_on = [&](std::span<const std::size_t> chosen) {
+    std::array<double, 3> multipliers{};
+    if (!on_planes(from, planes, chosen, multipliers)) return;
+    const Vec3 point = displaced(from, planes, chosen, multipliers);
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      if (multipliers[i] < 0) return;
+    }
+    if (!above_all(point, planes, tolerance)) return;
+    const double distance = glm::length(point - from);
+    if (nearest && distance >= least) return;
+    least = distance;
+    nearest = NearestPoint{point, std::vector<double>(planes.size(), 0.0)};
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+      nearest->multipliers[chosen[i]] = multipliers[i];
+    }
+  };
+  // Of what satisfies the conditions of Kuhn and Tucker there is one point only; where planes
+  // coincide within the tolerance, several sets of them give it, and any will do.
+  try_on({});
+  const std::size_t n = planes.size();
+  for (std::size_t a = 0; a < n; ++a) try_on(std::array{a});
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a + 1; b < n; ++b) try_on(std::array{a, b});
+  }
+  for (std::size_t a = 0; a < n; ++a) {
+    for (std::size_t b = a + 1; b < n; ++b) {
+      for (std::size_t c = b + 1; c < n; ++c) try_on(std::array{a, b, c});
+    }
+  }
+  return nearest;
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,30 @@
+#pragma once
+// The point nearest to a given one among those above some planes, by trying every vertex, edge and
+// face that they can form. For checks, not for the servo.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "stimuli/vec.h"
+
+namespace palpate::rendering {
+
+/// The points x with dot(normal, x) >= offset.
+struct HalfSpace {
+  Vec3 normal;  ///< unit
+  double offset = 0;
+};
+
+struct NearestPoint {
+  Vec3 point;
+  /// m, one for each plane: point = from + sum of multiplier * normal; none is negative
+  std::vector<double> multipliers;
+};
+
+/// \param tolerance  how far below a plane is still above it
+/// \return empty when no point is above all of them, or none can be told from rounding
+std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const HalfSpace> planes,
+                                          double tolerance);
+
+}  // namespace palpate::rendering

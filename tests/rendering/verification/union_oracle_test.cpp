@@ -1,0 +1,346 @@
+// The oracle of contact with unions of convex parts: against closed forms, against other brute
+// force, and by the definition of an ideal tool.
+
+#include "rendering/verification/union_oracle.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "rendering/renderer.h"
+#include "rendering/verification/nearest_point.h"
+#include "rendering/verification/random_paths.h"
+#include "rendering/verification/random_solids.h"
+#include "rendering/verification/reference.h"
+#include "rendering/verification/union_cases.h"
+#include "stimuli/orientation.h"
+#include "stimuli/primitives.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+const OracleTool kPoint{{Vec3(0), Vec3(0)}};
+
+OracleTool stylus(double length) { return {{Vec3(0), Vec3(0, 0, length)}}; }
+
+/// An axis system with this +z.
+Mat3 axes_along(const Vec3& z) {
+  const Vec3 aside = std::abs(z.x) < 0.5 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
+  const Vec3 x = glm::normalize(glm::cross(aside, z));
+  return {x, glm::cross(z, x), z};
+}
+
+/// An ideal tool led along a path from outside.
+class Led {
+ public:
+  Led(const UnionOracle& oracle, const OraclePose& start) : oracle_(oracle), ideal_(start) {
+    EXPECT_LT(oracle.depth(start), 0);
+  }
+
+  OracleTick to(const OraclePose& virtual_tool) {
+    const OracleTick tick = oracle_.tick(ideal_, virtual_tool);
+    EXPECT_FALSE(tick.failed);
+    ideal_ = tick.ideal;
+    return tick;
+  }
+
+  /// In equal steps, without turning. \return the displacement at the end
+  Vec3 straight_to(const Vec3& tip, int steps) {
+    const Vec3 from = ideal_.tip;
+    for (int i = 1; i <= steps; ++i) to({from + i / double(steps) * (tip - from), ideal_.axes});
+    return ideal_.tip - tip;
+  }
+
+ private:
+  const UnionOracle& oracle_;
+  OraclePose ideal_;
+};
+
+void expect_near(const Vec3& found, const Vec3& expected, double tolerance, const char* what,
+                 double of = 0) {
+  EXPECT_LE(glm::length(found - expected), tolerance)
+      << what << " " << of << ": " << found.x << " " << found.y << " " << found.z << " for "
+      << expected.x << " " << expected.y << " " << expected.z;
+}
+
+// What characterises the nearest point of a convex set: it lies in it, and the way to it is a sum
+// of non-negative multiples of the normals of planes that it lies on.
+TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
+  int found = 0;
+  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+    stimuli::Random random(seed);
+    std::vector<HalfSpace> planes;
+    const std::size_t count = random.below(7);
+    for (std::size_t i = 0; i < count; ++i) {
+      planes.push_back(
+          {stimuli::uniform_rotation(random) * Vec3(0, 0, 1), 2 * random.unit() - 1.5});
+    }
+    const Vec3 from(random.normal(), random.normal(), random.normal());
+    const auto nearest = nearest_point(from, planes, 1e-14);
+    if (!nearest) continue;
+    ++found;
+    Vec3 sum = from;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double height = glm::dot(planes[i].normal, nearest->point) - planes[i].offset;
+      EXPECT_GE(height, -1e-14);
+      EXPECT_GE(nearest->multipliers[i], 0);
+      if (nearest->multipliers[i] > 0) {
+        EXPECT_LE(height, 1e-12);
+      }
+      sum += nearest->multipliers[i] * planes[i].normal;
+    }
+    expect_near(sum, nearest->point, 1e-12, "seed", static_cast<double>(seed));
+  }
+  EXPECT_GT(found, 1500);
+}
+
+TEST(NearestPoint, OfNothingIsNone) {
+  const std::array<HalfSpace, 2> apart{HalfSpace{{0, 0, 1}, 1}, HalfSpace{{0, 0, -1}, 1}};
+  EXPECT_FALSE(nearest_point(Vec3(0), apart, 1e-14).has_value());
+}
+
+// The sums are those of the brute-force reference for one part.
+TEST(UnionOracle, DepthIsThatOfTheReference) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    stimuli::Random random(seed, {1});
+    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(random_solid(random));
+    const double size = mesh->size(), length = size * random.unit();
+    const UnionOracle oracle({{mesh, Pose{}}}, stylus(length));
+    for (int i = 0; i < 20; ++i) {
+      const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+      const Vec3 tip =
+          mesh->centre() + 0.7 * size * Vec3(random.unit(), random.unit(), random.unit());
+      const double reference = reference_depth(*mesh, {tip, tip + length * axis}).depth;
+      if (reference <= 0) continue;
+      EXPECT_NEAR(oracle.depth({tip, axes_along(axis)}), reference, 1e-12 * size) << seed;
+    }
+  }
+}
+
+// While the tool does not turn, the descent and the walk of the renderers follow the same facets.
+TEST(UnionOracle, EqualsTheRenderersOnOneConvexPart) {
+  long in_contact = 0, different = 0;
+  for (std::uint64_t seed = 0; seed < 250; ++seed) {
+    stimuli::Random random(seed, {7});
+    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(random_solid(random));
+    const double length = random.below(3) == 0 ? 0 : (0.05 + random.unit()) * mesh->size();
+    const Renderer& renderer = length > 0 ? ray_renderer() : point_renderer();
+    const auto kind = random.below(2) == 0 ? PathKind::smooth : PathKind::sliding;
+    std::vector<LineProbe> path = random_path(random, kind, *mesh, length, length > 0, 200);
+    const Vec3 along = path[0].tail - path[0].tip;
+    const Mat3 axes = length > 0 ? axes_along(glm::normalize(along)) : Mat3(1);
+    SceneObject object;
+    object.mesh = mesh;
+    const Scene scene({object}, true);
+    RenderState state = scene.initial_state();
+    const UnionOracle oracle({{mesh, Pose{}}}, stylus(length));
+    OraclePose last{path[0].tip, axes};
+    if (oracle.depth(last) > 0) continue;
+    for (const LineProbe& pose : path) {
+      const LineProbe probe{pose.tip, pose.tip + along};
+      const Rendering r = renderer.tick(scene, state, probe, 1e-3);
+      const OracleTick tick = oracle.tick(last, {probe.tip, axes});
+      ASSERT_FALSE(tick.failed);
+      in_contact += r.contacts > 0;
+      different += glm::length(tick.ideal.tip - r.ideal.tip) > 1e-12 * mesh->size();
+      last = {r.ideal.tip, axes};  // the same history
+    }
+  }
+  EXPECT_GT(in_contact, 12'000);
+  EXPECT_LE(different, 3) << "of " << in_contact;  // deep presses through a sliver
+}
+
+TEST(UnionOracle, GroovesOf2To178Degrees) {
+  for (const double degrees : {2.0, 3.0, 5.0, 10.0, 30.0, 60.0, 90.0, 120.0, 150.0, 170.0, 178.0}) {
+    const double opening = degrees * kDegree;
+    for (const OracleTool& tool : {kPoint, stylus(0.12)}) {
+      // The stylus upright in the middle of the groove, where it touches at its tip alone.
+      const UnionOracle oracle(groove(opening), tool);
+      stimuli::Random random(7);
+      for (int i = 0; i < 40; ++i) {
+        const Vec3 bottom(0.002 * (random.unit() - 0.5), 0.02 * random.unit(),
+                          -0.003 * random.unit());
+        Led led(oracle, {{0, 0.01, 0.055}, Mat3(1)});
+        expect_near(led.straight_to(bottom, 50), groove_displacement(opening, bottom),
+                    1e-15 / std::sin(opening / 2) + 1e-15, "opening, degrees", degrees);
+      }
+    }
+  }
+}
+
+// The stylus lies in the valley: the same displacement at every opening.
+TEST(UnionOracle, AStickInAGrooveRestsOnBothWalls) {
+  for (const double degrees : {4.0, 45.0, 90.0, 175.0}) {
+    const UnionOracle oracle(groove(degrees * kDegree), stylus(0.08));
+    const Mat3 level = axes_along(Vec3(0, 1, 0));
+    Led led(oracle, {{0, -0.03, 0.07}, level});
+    led.straight_to({1e-5, -0.03, -0.002}, 70);
+    const OracleTick tick = led.to({{1e-5, -0.03, -0.002}, level});
+    expect_near(tick.ideal.tip, {0, -0.03, 0}, 1e-13, "opening, degrees", degrees);
+    ASSERT_EQ(tick.contacts.size(), 2u) << degrees;
+    for (const OracleContact& contact : tick.contacts) {
+      EXPECT_NEAR(contact.first, 0, 1e-9);
+      EXPECT_NEAR(contact.last, 0.08, 1e-9);
+      EXPECT_GT(contact.share, 0);
+    }
+    EXPECT_TRUE(tick.unique_shares);
+  }
+}
+
+TEST(UnionOracle, SeamsAreNotFelt) {
+  for (const double overlap : {0.0, 1e-16, 1e-9, 0.003}) {
+    OracleParts parts;
+    for (int i = 0; i < 16; ++i) {
+      parts.push_back(box_part({0.006 * i - 0.048, -0.05, -0.04},
+                               {0.006 * (i + 1) - 0.048 + overlap, 0.05, 0}));
+    }
+    for (const OracleTool& tool : {kPoint, stylus(0.12)}) {
+      const UnionOracle oracle(parts, tool);
+      const Mat3 axes = axes_along(glm::normalize(Vec3(0.3, 0.1, 1)));
+      Led led(oracle, {{-0.04, 0, 0.01}, axes});
+      led.to({{-0.04, 0, -0.005}, axes});
+      for (double x = -0.04; x < 0.04; x += 0.0007) {
+        const OracleTick tick = led.to({{x, 0.3 * x, -0.005}, axes});
+        expect_near(tick.ideal.tip, {x, 0.3 * x, 0}, 1e-16, "at x", x);
+      }
+    }
+  }
+}
+
+TEST(UnionOracle, InTheCornerOfAStair) {
+  const OracleParts parts = stairs(5, 0.02, 0.01);
+  const UnionOracle oracle(parts, kPoint);
+  for (int step = 1; step < 5; ++step) {
+    const double edge = 0.02 * (step - 1), tread = -0.01 * step;
+    Led led(oracle, {{edge + 0.01, 0, tread + 0.02}, Mat3(1)});
+    led.straight_to({edge + 0.01, 0, tread + 0.005}, 3);
+    const Vec3 in(edge - 0.004, 0.001, tread - 0.003);
+    expect_near(led.straight_to(in, 20), {0.004, 0, 0.003}, 1e-16, "step", step);
+    // Up along the riser and onto the tread above: down from there it is that tread's.
+    led.straight_to({edge - 0.004, 0, tread + 0.015}, 20);
+    expect_near(led.straight_to({edge - 0.004, 0, tread + 0.008}, 20), {0, 0, 0.002}, 1e-16,
+                "above step", step);
+  }
+}
+
+// Lowered exactly in the plane of an L's wall, the stylus touches the floor alone.
+TEST(UnionOracle, InThePlaneOfAWallItIsNotPushedSideways) {
+  const OracleParts l{box_part({-0.02, -0.05, -0.02}, {0, 0.05, 0.05}),
+                      box_part({-0.02, -0.05, -0.02}, {0.06, 0.05, 0})};
+  const UnionOracle oracle(l, stylus(0.08));
+  const Mat3 level = axes_along(Vec3(0, 1, 0));
+  Led led(oracle, {{0, -0.04, 0.06}, level});
+  for (double z = 0.06; z > -0.002; z -= 3e-4) {
+    const OracleTick tick = led.to({{0, -0.04, z}, level});
+    expect_near(tick.ideal.tip, {0, -0.04, std::max(0.0, z)}, 1e-15, "height", z);
+  }
+}
+
+// A bar across the stylus lies on a cube beside which the tip hangs; the tip alone then bears the
+// push from the side.
+TEST(UnionOracle, AToolOfTwoSegmentsRestsOnBoth) {
+  const OracleParts block{box_part({-0.03, -0.03, -0.06}, {0.03, 0.03, 0})};
+  const OracleTool tool{{Vec3(0), Vec3(0, 0, 0.1)}, {Vec3(0, 0, 0.02), Vec3(-0.02, 0, 0.02)}};
+  const UnionOracle oracle(block, tool);
+  Led led(oracle, {{0.035, 0.004, 0.01}, Mat3(1)});
+  led.straight_to({0.035, 0.004, -0.015}, 10);
+  const Vec3 pressed(0.028, 0.004, -0.023);
+  expect_near(led.straight_to(pressed, 10), {0.002, 0, 0.003}, 1e-16, "pressed");
+  const OracleTick tick = led.to({pressed, Mat3(1)});
+  ASSERT_EQ(tick.contacts.size(), 2u);
+  for (const OracleContact& contact : tick.contacts) {
+    if (contact.segment == 0) {  // along the side, from the tip to the upper edge
+      expect_near(contact.normal, {1, 0, 0}, 1e-15, "upright");
+      EXPECT_NEAR(contact.share, 0.002, 1e-16);
+      EXPECT_NEAR(contact.first, 0, 1e-9);
+      EXPECT_NEAR(contact.last, 0.02, 1e-9);
+    } else {
+      expect_near(contact.normal, {0, 0, 1}, 1e-15, "bar");
+      EXPECT_NEAR(contact.share, 0.003, 1e-16);
+      EXPECT_NEAR(contact.first, 0, 1e-9);
+      EXPECT_NEAR(contact.last, 0.02, 1e-9);
+    }
+  }
+}
+
+// Whatever is cut, a whole solid is felt; deep in it as well.
+TEST(UnionOracle, CutSolidsEqualWholeOnes) {
+  long in_contact = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    stimuli::Random random(seed, {3});
+    const stimuli::PolygonSoup solid =
+        turned_and_moved(cut_cube(random, static_cast<int>(random.below(8))),
+                         stimuli::uniform_rotation(random), 0.05, Vec3(0));
+    const OracleParts whole{part_of(solid)};
+    const OracleParts cut = cut_to_pieces(solid, 1 + static_cast<int>(random.below(2)), random);
+    const OracleTool tool = random_tool(random, 1 + static_cast<int>(random.below(3)));
+    const UnionOracle of_whole(whole, tool), of_cut(cut, tool);
+    const auto path = random_tool_path(random, whole, tool, 1e-3, 300);
+    OraclePose last = path[0];
+    for (const OraclePose& pose : path) {
+      const OracleTick a = of_whole.tick(last, pose), b = of_cut.tick(last, pose);
+      ASSERT_FALSE(a.failed || b.failed) << seed;
+      // Cut open, the steps of a turn may be smaller; where it needed none they are equal.
+      if (a.lagged || b.lagged) break;
+      ASSERT_LE(glm::length(a.ideal.tip - b.ideal.tip), 1e-12 * of_whole.size())
+          << "seed " << seed << ", " << cut.size() << " pieces, " << tool.size() << " segments";
+      in_contact += glm::length(a.ideal.tip - pose.tip) > 0;
+      last = a.ideal;
+    }
+  }
+  EXPECT_GT(in_contact, 3000);
+}
+
+// By definition: outside all parts, and at a local minimum of the distance from the virtual tool.
+TEST(UnionOracle, IsAtALocalMinimumOutsideOfRandomClusters) {
+  long in_contact = 0, lagged = 0, several = 0;
+  for (std::uint64_t seed = 0; seed < 120; ++seed) {
+    stimuli::Random random(seed, {4});
+    const OracleParts parts = random_cluster(random, 3 + static_cast<int>(random.below(6)));
+    const OracleTool tool = random_tool(random, 1 + static_cast<int>(random.below(3)));
+    const UnionOracle oracle(parts, tool);
+    const double speed = seed % 2 == 0 ? 1e-4 : 5e-3;
+    const auto path = random_tool_path(random, parts, tool, speed, 400);
+    OraclePose last = path[0];
+    for (const OraclePose& pose : path) {
+      const OracleTick tick = oracle.tick(last, pose);
+      ASSERT_FALSE(tick.failed) << seed;
+      const OracleAudit audit = oracle.audit(tick.ideal, pose.tip, 1e-11 * oracle.size());
+      ASSERT_LE(audit.penetration, 1e-12 * oracle.size()) << seed;
+      ASSERT_LE(audit.descent, 1e-9 * oracle.size()) << seed;
+      Vec3 sum;
+      for (const OracleContact& contact : tick.contacts) sum += contact.share * contact.normal;
+      ASSERT_LE(glm::length(sum - (tick.ideal.tip - pose.tip)), 1e-10 * oracle.size()) << seed;
+      in_contact += !tick.contacts.empty();
+      several += tick.contacts.size() > 1;
+      lagged += tick.lagged;
+      last = tick.ideal;
+    }
+  }
+  EXPECT_GT(in_contact, 10'000);
+  EXPECT_GT(several, 2'000);
+  EXPECT_LT(lagged, in_contact / 20);
+}
+
+// And the audit sees what is not.
+TEST(UnionOracle, TheAuditSeesWhatIsWrong) {
+  const UnionOracle oracle(groove(90 * kDegree), kPoint);
+  const Vec3 virtual_tip(0.001, 0, -0.003);
+  const double touching = 1e-11 * oracle.size();
+  const auto audit = [&](const Vec3& ideal) {
+    return oracle.audit({ideal, Mat3(1)}, virtual_tip, touching);
+  };
+  EXPECT_LE(audit({0, 0, 0}).descent, 1e-17);
+  EXPECT_NEAR(audit({0, 0, 1e-6}).descent, glm::length(Vec3(1e-3, 0, -3.001e-3)), 1e-9);  // floats
+  EXPECT_NEAR(audit({1e-6, 0, -1e-6}).penetration, 1e-6, 1e-15);  // to the seam
+  EXPECT_NEAR(audit({3e-6, 0, -1e-6}).penetration, 4e-6 * std::sqrt(0.5), 1e-15);
+  // On one wall, from where it slides down.
+  EXPECT_GT(audit({0.01, 0, 0.01}).descent, 0.01);
+}
+
+}  // namespace
+}  // namespace palpate::rendering
