@@ -1,5 +1,6 @@
 #pragma once
-// Text for terminals, SVG and HTML. Nothing that came from a file is printed raw.
+// Formatting of text and numbers for terminals, SVG and HTML. Text from files passes
+// stimuli::printable() or escaped().
 
 #include <cstddef>
 #include <functional>
@@ -11,29 +12,29 @@
 
 namespace palpate::analysis {
 
-/// For text and quoted attributes of XML and HTML.
+/// Escaped for text and quoted attributes of XML and HTML; control characters are made printable.
 std::string escaped(std::string_view text);
 
-/// Characters of a UTF-8 text; each is taken as one column wide.
+/// Number of characters (code points) of a UTF-8 text; each is counted as one column.
 std::size_t width(std::string_view text);
 std::string pad_right(std::string_view text, std::size_t columns);
 std::string pad_left(std::string_view text, std::size_t columns);
 
-/// At most `columns` characters, the last an ellipsis where something was cut.
+/// At most `columns` characters; a longer text is cut and ends in an ellipsis.
 std::string shortened(std::string_view text, std::size_t columns);
 
-/// Lines that fit, broken at spaces but never before a percent sign; a word that does not fit alone
-/// stands alone all the same.
+/// Lines that satisfy `fits`, broken at spaces but not before a percent sign; a single word that
+/// does not fit is a line of its own.
 std::vector<std::string> wrapped(std::string_view text,
                                  const std::function<bool(std::string_view)>& fits);
 
 /// "1 trial", "2 trials".
 std::string counted(std::size_t n, std::string_view one, std::string_view many);
 
-/// Decimal point whatever the locale; a true minus sign (U+2212); never "-0.0".
+/// Fixed notation, independent of the locale: decimal point, minus sign U+2212, no negative zero.
 std::string fixed(double value, int decimals);
 
-/// A p value: "0.042", "<0.001".
+/// A p value with three decimals: "0.042", "<0.001".
 std::string p_text(double p);
 
 /// "a", "a and b", "a, b and c".

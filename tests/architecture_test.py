@@ -85,9 +85,9 @@ PUBLIC = {
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record trials",
-    "analysis/statistics": "analysis paired paper_effects pilot plan wording",
-    "analysis/figures": "axes figures figures_svg marks palette",
-    "analysis/report": "html_page plan_report report_html report_json report_page report_text tables",
+    "analysis/statistics": "analysis conclusions paired paper_effects pilot plan",
+    "analysis/figures": "axes figure_svg figures marks palette",
+    "analysis/report": "html_elements html_page plan_report report_html report_json report_text tables",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source triple_buffer",

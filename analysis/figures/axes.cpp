@@ -11,7 +11,7 @@ namespace palpate::analysis {
 
 namespace {
 
-/// 1, 2 or 5 times a power of ten: about a fifth of `span`.
+/// Distance of ticks: 1, 2 or 5 times a power of ten, near a fifth of `span`.
 double round_step(double span) {
   const double power = std::pow(10.0, std::floor(std::log10(span / 5)));
   const double factor = span / 5 / power;
@@ -62,8 +62,8 @@ FigureAxis linear_axis(double low, double high, std::string title) {
 }
 
 FigureAxis log_axis(double low, double high, std::string title) {
-  constexpr double kMostWithParts = 3.5;  // decades
-  constexpr double kMostTicks = 9;        // else every second, third ... power has one
+  constexpr double kMostWithFactors = 3.5;  // decades; beyond, no ticks at 2 and 5
+  constexpr double kMostTicks = 9;          // beyond, every second, third ... power of ten
   if (!(high > low)) {
     low -= 0.1;
     high += 0.1;
@@ -78,7 +78,7 @@ FigureAxis log_axis(double low, double high, std::string title) {
     if (exponent % step != 0) continue;
     for (const int factor : {1, 2, 5}) {
       const double at = exponent + std::log10(factor);
-      if (factor > 1 && high - low > kMostWithParts) continue;
+      if (factor > 1 && high - low > kMostWithFactors) continue;
       if (at < low - 1e-9 || at > high + 1e-9) continue;
       axis.ticks.push_back({at, log_tick_text(factor, exponent)});
     }

@@ -1,5 +1,5 @@
 #pragma once
-// Axes of panels: their ends, ticks and labels.
+// Axes of panels: range, ticks and tick labels.
 
 #include <cstddef>
 #include <string>
@@ -9,12 +9,15 @@
 
 namespace palpate::analysis {
 
-/// Slots 0..1, 1..2, ... named in their middles; the first `shown` of the names.
+/// Categorical axis: slot i spans i to i + 1 and has its name in the middle. \param shown how many
+/// of the names
 FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
-/// Round ticks, ends widened to them.
+/// Linear axis with ticks at multiples of 1, 2 or 5 times a power of ten; its ends are ticks, at or
+/// beyond low and high.
 FigureAxis linear_axis(double low, double high, std::string title);
-/// For log10 of values: ticks at 1, 2 and 5 times powers of ten, over several decades at the powers
-/// alone, over many at every second or third. \param low, high log10 of values
+/// Logarithmic axis: positions are log10 of the values. Ticks at 1, 2 and 5 times powers of ten;
+/// above 3.5 decades at powers of ten only, above 9 decades at every second, third ... power.
+/// \param low, high log10 of values
 FigureAxis log_axis(double low, double high, std::string title);
 /// The same with ends at whole powers of ten. \param low, high values, above 0
 FigureAxis decades_axis(double low, double high, std::string title);

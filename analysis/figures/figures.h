@@ -1,5 +1,6 @@
 #pragma once
-// Figures as numbers and words in the units of their axes; figure_svg() draws them.
+// A figure (plot) as data: panels, axes and marks in the units of the axes, with its texts.
+// figure_svg() draws it.
 
 #include <cstddef>
 #include <string>
@@ -10,8 +11,10 @@
 
 namespace palpate::analysis {
 
-/// What a colour stands for; each theme has its own value. `third` and on: further renderers or
-/// lines.
+/// What a colour encodes; each palette gives it a value. point, ray, third to eighth: a renderer or
+/// a line of its own; paper: results of Ho, Basdogan & Srinivasan (2000); heat: cells of a matrix;
+/// ink, soft, grid, page: text, secondary text, grid lines, background; amber: warnings, limits,
+/// censored estimates.
 enum class Role {
   page,
   ink,
@@ -32,12 +35,13 @@ enum class Role {
 constexpr std::size_t kRoles = 15;
 const char* to_string(Role role);
 
-/// The diamond is open. Right and left are triangles, the cross stands upright, the saltire not.
-enum class Shape { circle, square, diamond, up, down, dash, right, cross, left, saltire };
+/// The symbol of a data point, distinguishable without colour. diamond: outline only; up, down,
+/// left, right: triangles; cross: +; saltire: x.
+enum class MarkerShape { circle, square, diamond, up, down, dash, right, cross, left, saltire };
 
-/// One thing in a panel, in the panel's own units.
+/// A graphical element of a panel; coordinates in the units of the panel's axes.
 struct Mark {
-  /// A label is a text beside its point, on the side where it hides least.
+  /// label: a text beside its point, placed where it overlaps least.
   enum class Kind { rect, area, line, interval, symbol, text, label };
   Kind kind = Kind::symbol;
   Role role = Role::ink;
@@ -45,17 +49,17 @@ struct Mark {
   /// symbol, text, label: one of each.
   std::vector<double> x, y;
   double opacity = 1;
-  double size = 6;  ///< px: half of a symbol, width of a line, height of a text
-  Shape shape = Shape::circle;
-  std::string text;       ///< a text's own; of others what is shown when they are pointed at
-  std::string person;     ///< marks of one participant are made to stand out together
-  int anchor = 0;         ///< of a text: -1 starts, 0 is centred, 1 ends at x
-  bool bold = false;      ///< of a text
-  bool dashed = false;    ///< of a line
-  double dx = 0, dy = 0;  ///< px, of symbols and texts
-  /// Of a text: width that it may take, in units of x (0: any). A wider one gives way to `shorter`,
-  /// then to nothing.
-  double room = 0;
+  double size = 6;  ///< px: half the width of a symbol, width of a line, font size of a text
+  MarkerShape shape = MarkerShape::circle;
+  std::string text;         ///< of a text or label: itself; of others: the tooltip
+  std::string participant;  ///< code; marks with the same code are highlighted together
+  int anchor = 0;           ///< of a text: -1 begins, 0 is centred, 1 ends at x
+  bool bold = false;        ///< of a text
+  bool dashed = false;      ///< of a line
+  double dx = 0, dy = 0;    ///< px, y down: offset of a symbol or text from (x, y)
+  /// Of a text: largest width in units of x (0: unlimited). A wider text is replaced by `shorter`,
+  /// and left out where that is too wide as well.
+  double max_width = 0;
   std::string shorter;
 };
 
@@ -69,54 +73,56 @@ struct FigureAxis {
   double low = 0, high = 1;  ///< low < high
   std::vector<Tick> ticks;
   bool grid = true;
-  bool names = false;  ///< categories: ticks have no lines
+  bool names = false;  ///< categorical: tick i is the name of the slot i to i + 1
 };
 
 struct Panel {
   std::string title;
   FigureAxis x, y;
-  double width = 400, height = 300;  ///< px; narrower where there is less room
-  bool starts_row = false;           ///< stands below those before it, not beside them
+  double width = 400, height = 300;  ///< px; drawn narrower on a narrow page
+  bool starts_row = false;           ///< begins a new row of panels
   std::vector<Mark> marks;
 };
 
 struct LegendEntry {
   std::string label;
   Role role = Role::ink;
-  Shape shape = Shape::circle;
+  MarkerShape shape = MarkerShape::circle;
 };
 
 struct Figure {
-  std::string id;  ///< "figure15": file name and anchor
+  std::string id;  ///< file name without .svg and anchor in a page, such as "figure15"
   std::string title;
-  std::string subtitle;     ///< how many people and trials
+  std::string subtitle;     ///< how many participants and trials
   std::string label;        ///< "SIMULATED PARTICIPANTS" or empty
-  std::string description;  ///< what a screen reader says
+  std::string description;  ///< text alternative for screen readers: the numbers that are drawn
   std::vector<std::string> notes;
   std::vector<LegendEntry> legend;
   std::vector<Panel> panels;
-  double room = 1000;  ///< px: panels stand side by side within it
+  double max_row_width = 1000;  ///< px: panels are put side by side up to this width
 };
 
-/// Those that the data allow, in the order of display: figure15, speedup, times, confusion,
-/// speed-accuracy, learning, order, servo (unless all trials' longest periods are alike),
-/// exclusions.
-std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& record);
+/// The figures for which there are data, in the order of display: figure15, speedup, times,
+/// confusion, speed-accuracy, learning, order, servo (unless all trials have their longest period
+/// in the same bin), exclusions.
+std::vector<Figure> figures_of(const Analysis& analysis, const StudyRecord& record);
 
-/// Mean time per shape and renderer with 95 % t intervals over participants, and each
-/// participant's line.
+/// Mean response time (s) of each shape and renderer over participants' mean times, with its 95 % t
+/// interval, and each participant's means; as fig. 15 of Ho, Basdogan & Srinivasan (2000).
 Figure figure15_of(const Analysis& analysis);
-/// Percent reduction per shape with its interval, beside the paper's; a panel for each comparison.
+/// Geometric percent reduction of response time for each shape with its 95 % t interval, the
+/// estimate with time-outs as censored times and the paper's percentage; a panel for each
+/// comparison.
 Figure speedup_of(const Analysis& analysis);
 
-/// Why there is no figure of the servo.
-std::string servo_sentence(const Analysis& analysis, const ReportRecord& record);
+/// A sentence that says why there is no figure of the servo periods.
+std::string servo_sentence(const Analysis& analysis, const StudyRecord& record);
 
-/// Shapes that a figure has room for; the tables have all.
+/// Largest number of shapes in a figure; tables and JSON have all.
 constexpr std::size_t kShownShapes = 24;
-/// Renderers likewise: so many are told apart by colour and symbol.
+/// Largest number of renderers in a figure: so many styles (colour and symbol) there are.
 constexpr std::size_t kShownRenderers = 6;
-/// Participants who get a line of their own.
-constexpr std::size_t kShownPeople = 200;
+/// Largest number of participants drawn one by one.
+constexpr std::size_t kShownParticipants = 200;
 
 }  // namespace palpate::analysis

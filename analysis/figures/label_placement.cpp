@@ -11,11 +11,11 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kPoint = 7;               // px: half of a point with a little air
+constexpr double kPoint = 7;               // px: half the width of a point and its margin
 constexpr double kBeside = 11;             // px from the point to its label
 constexpr double kLeft = 12, kRight = 12;  // px beside the panel that a label may take
 
-/// In px from the panel's upper left corner, y down.
+/// Axis-aligned rectangle in px from the panel's upper left corner, y down.
 struct Box {
   double left, right, top, bottom;
 
@@ -41,7 +41,7 @@ class Placement {
     }
   }
 
-  /// Takes the best of the places beside its point.
+  /// Chooses the candidate position with the fewest overlaps and marks it as taken.
   Mark put(const Mark& label) {
     Mark best;
     Box best_box{};
@@ -67,7 +67,7 @@ class Placement {
 
  private:
   void take_segment(double x0, double y0, double x1, double y1) {
-    constexpr int kPieces = 4;  // of one that slants: a box around the whole would hide free room
+    constexpr int kPieces = 4;  // of an oblique segment: one bounding box would cover too much
     const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
     for (int i = 0; i < pieces; ++i) {
       const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
@@ -93,7 +93,7 @@ class Placement {
     return {left, left + wide, base - text.size, base + 3};
   }
 
-  /// To leave the panel is as bad as to hide three things.
+  /// Overlaps of a box; extending beyond the panel counts as three.
   std::ptrdiff_t n_hidden(const Box& box) const {
     const bool outside = box.left < -kLeft || box.right > width_ + kRight;
     return std::ranges::count_if(taken_, [&](const Box& other) { return box.meets(other); }) +
@@ -102,7 +102,7 @@ class Placement {
 
   const Panel& panel_;
   double width_;
-  std::vector<Box> taken_;  ///< points, bars, lines, then labels
+  std::vector<Box> taken_;  ///< points, intervals, lines, then labels placed so far
 };
 
 }  // namespace

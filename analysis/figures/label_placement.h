@@ -1,4 +1,5 @@
 #pragma once
+// Places the labels of data points where they overlap least.
 
 #include <vector>
 
@@ -6,9 +7,9 @@
 
 namespace palpate::analysis {
 
-/// The panel's labels as texts beside their points: right or left, above or below, wherever they
-/// hide least of each other and of points, bars and lines.
-/// \param width px, that the panel is drawn with
+/// The panel's labels (Mark::Kind::label) as texts beside their points: each, in order, at the
+/// candidate position (right or left, several heights) that overlaps the fewest points, intervals,
+/// lines and labels placed before. \param width px, of the panel as it is drawn
 std::vector<Mark> placed_labels(const Panel& panel, double width);
 
 }  // namespace palpate::analysis

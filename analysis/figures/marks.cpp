@@ -6,18 +6,18 @@
 
 namespace palpate::analysis {
 
-std::vector<std::pair<double, double>> outline_of(Shape shape) {
-  constexpr double kArm = 0.36;  // half of a cross's arm's width
+std::vector<std::pair<double, double>> outline_of(MarkerShape shape) {
+  constexpr double kArm = 0.36;  // half the width of an arm of the cross
   std::vector<std::pair<double, double>> corners;
-  if (shape == Shape::right || shape == Shape::left) {
+  if (shape == MarkerShape::right || shape == MarkerShape::left) {
     corners = {{1, 0}, {-0.8, -1}, {-0.8, 1}};
-    if (shape == Shape::left) {
+    if (shape == MarkerShape::left) {
       for (auto& corner : corners) corner.first = -corner.first;
     }
-  } else if (shape == Shape::cross || shape == Shape::saltire) {
+  } else if (shape == MarkerShape::cross || shape == MarkerShape::saltire) {
     corners = {{kArm, -1}, {kArm, -kArm}, {1, -kArm}, {1, kArm},   {kArm, kArm},   {kArm, 1},
                {-kArm, 1}, {-kArm, kArm}, {-1, kArm}, {-1, -kArm}, {-kArm, -kArm}, {-kArm, -1}};
-    if (shape == Shape::saltire) {
+    if (shape == MarkerShape::saltire) {
       const double turn = std::sqrt(0.5);
       for (auto& [x, y] : corners) {
         const double turned = turn * (x - y);
@@ -29,7 +29,7 @@ std::vector<std::pair<double, double>> outline_of(Shape shape) {
   return corners;
 }
 
-Mark symbol(Role role, Shape shape, double x, double y, double size, std::string text) {
+Mark symbol(Role role, MarkerShape shape, double x, double y, double size, std::string text) {
   Mark mark;
   mark.role = role;
   mark.shape = shape;
@@ -41,7 +41,7 @@ Mark symbol(Role role, Shape shape, double x, double y, double size, std::string
 }
 
 Mark text_mark(Role role, double x, double y, std::string text, double size) {
-  Mark mark = symbol(role, Shape::circle, x, y, size, std::move(text));
+  Mark mark = symbol(role, MarkerShape::circle, x, y, size, std::move(text));
   mark.kind = Mark::Kind::text;
   return mark;
 }
@@ -77,19 +77,19 @@ void add_interval(Panel& panel, Role role, double x, double low, double high, st
   bar.size = 2;
   bar.text = std::move(text);
   panel.marks.push_back(bar);
-  const auto end = [&](double y, Shape shape, double half) {
+  const auto end = [&](double y, MarkerShape shape, double half) {
     panel.marks.push_back(symbol(role, shape, x, y, half, bar.text));
   };
   if (high <= panel.y.high) {
-    end(bar.y[1], Shape::dash, 5);
+    end(bar.y[1], MarkerShape::dash, 5);
   } else {
-    end(bar.y[1], Shape::up, 5);
+    end(bar.y[1], MarkerShape::up, 5);
     panel.marks.back().dy = 4;
   }
   if (low >= panel.y.low) {
-    end(bar.y[0], Shape::dash, 5);
+    end(bar.y[0], MarkerShape::dash, 5);
   } else {
-    end(bar.y[0], Shape::down, 5);
+    end(bar.y[0], MarkerShape::down, 5);
     panel.marks.back().dy = -4;
   }
 }
@@ -102,7 +102,7 @@ void add_interval_across(Panel& panel, Role role, double y, double low, double h
   bar.text = text;
   panel.marks.push_back(std::move(bar));
   const double half = 5 * (panel.y.high - panel.y.low) / panel.height;
-  const auto end = [&](double x, bool inside, Shape arrow, double dx) {
+  const auto end = [&](double x, bool inside, MarkerShape arrow, double dx) {
     if (inside) {
       Mark cap = line_mark(role, {x, x}, {y - half, y + half}, 2);
       cap.text = text;
@@ -112,8 +112,8 @@ void add_interval_across(Panel& panel, Role role, double y, double low, double h
       panel.marks.back().dx = dx;
     }
   };
-  end(left, low >= panel.x.low, Shape::left, 4);
-  end(right, high <= panel.x.high, Shape::right, -4);
+  end(left, low >= panel.x.low, MarkerShape::left, 4);
+  end(right, high <= panel.x.high, MarkerShape::right, -4);
 }
 
 }  // namespace palpate::analysis

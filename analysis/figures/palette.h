@@ -1,5 +1,5 @@
 #pragma once
-// The colours of figures and pages, by role.
+// Colours of figures and pages by role.
 
 #include <array>
 #include <string>
@@ -8,17 +8,17 @@
 
 namespace palpate::analysis {
 
-/// Colours by role: what SVG and CSS read.
+/// CSS colours, indexed by Role.
 using Palette = std::array<std::string, kRoles>;
 
-/// For paper. Okabe & Ito's (2008) colours, some darker: told apart with every common colour
-/// vision.
+/// For print and light pages: the colours of Okabe & Ito (2008), distinguishable with colour vision
+/// deficiency, some darker for contrast on white.
 Palette light_palette();
 Palette dark_palette();
-/// "var(--point)" and so on: a page's style has the values.
+/// CSS variables "var(--point)" ..., whose values are in the style of the page.
 Palette page_palette();
 
-/// The colour of a line among others, point's and ray's first; from the ninth on again.
+/// Colour of line number `line` (from 0) of a figure; repeats after eight.
 Role line_role(std::size_t line);
 
 }  // namespace palpate::analysis

@@ -24,8 +24,8 @@ const std::string& colour(const Palette& palette, Role role) {
 
 std::string tick_text(const Tick& tick) { return shortened(tick.label, kLongestName); }
 
-/// Every how many ticks have a label so that none touches the next, and which is the first. 0 has
-/// one where it is a tick.
+/// Which ticks have labels: every `every`-th from `first` on, the fewest left out so that labels do
+/// not overlap; the tick at 0 has one.
 struct LabelStride {
   std::size_t every = 1, first = 0;
   bool has_label(std::size_t tick) const { return tick % every == first; }
@@ -66,22 +66,22 @@ void draw_left_axis(Svg& svg, const PlacedPanel& placed, const Palette& palette)
              {kTickSize, colour(palette, Role::soft), Svg::Anchor::end});
   }
   if (panel.y.title.empty()) return;
-  svg.text(placed.left - left_room(panel) + 12, placed.top + panel.height / 2,
+  svg.text(placed.left - left_axis_width(panel) + 12, placed.top + panel.height / 2,
            fitting(panel.y.title, panel.height + 20, kTickSize),
            {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle, false, -90});
 }
 
-/// Names of categories, turned where one does not fit its slot. \return room taken, px
+/// Names of categories, rotated where one is wider than its slot. \return height used, px
 double draw_names(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
   const Panel& panel = *placed.panel;
   const double bottom = placed.top + panel.height;
   const double slot = placed.width / std::max(1.0, panel.x.high - panel.x.low);
-  const bool turned = std::ranges::any_of(panel.x.ticks, [&](const Tick& tick) {
+  const bool rotated = std::ranges::any_of(panel.x.ticks, [&](const Tick& tick) {
     return text_width(tick_text(tick), kNameSize) > slot - 6;
   });
   for (const Tick& tick : panel.x.ticks) {
     const double x = placed.x(tick.at);
-    if (turned) {
+    if (rotated) {
       svg.text(x + 5, bottom + 20, tick_text(tick),
                {kNameSize, colour(palette, Role::ink), Svg::Anchor::end, false, -30});
     } else {
@@ -89,10 +89,10 @@ double draw_names(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
                {kNameSize, colour(palette, Role::ink), Svg::Anchor::middle});
     }
   }
-  return turned ? 84 : 34;
+  return rotated ? 84 : 34;
 }
 
-/// \return room taken, px
+/// Ticks of a numeric lower axis. \return height used, px
 double draw_numbers(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
   const Panel& panel = *placed.panel;
   const double bottom = placed.top + panel.height;
@@ -113,10 +113,11 @@ double draw_numbers(Svg& svg, const PlacedPanel& placed, const Palette& palette)
 }
 
 void draw_text(Svg& svg, const PlacedPanel& placed, const Palette& palette, const Mark& mark) {
-  const double room =
-      mark.room > 0 ? mark.room * placed.width / (placed.panel->x.high - placed.panel->x.low) : 0;
+  const double available = mark.max_width > 0 ? mark.max_width * placed.width /
+                                                    (placed.panel->x.high - placed.panel->x.low)
+                                              : 0;
   const auto fits = [&](std::string_view text) {
-    return room == 0 || text_width(text, mark.size, mark.bold) <= room;
+    return available == 0 || text_width(text, mark.size, mark.bold) <= available;
   };
   const std::string& text = fits(mark.text) ? mark.text : mark.shorter;
   if (text.empty() || !fits(text)) return;
@@ -130,8 +131,8 @@ void draw_mark(Svg& svg, const PlacedPanel& placed, const Palette& palette, cons
     draw_text(svg, placed, palette, mark);
     return;
   }
-  const bool grouped = !mark.text.empty() || !mark.person.empty();
-  if (grouped) svg.begin_group(mark.text, mark.person);
+  const bool grouped = !mark.text.empty() || !mark.participant.empty();
+  if (grouped) svg.begin_group(mark.text, mark.participant);
   std::vector<double> x, y;
   x.reserve(mark.x.size());
   y.reserve(mark.y.size());
@@ -164,7 +165,7 @@ void draw_mark(Svg& svg, const PlacedPanel& placed, const Palette& palette, cons
 
 }  // namespace
 
-double left_room(const Panel& panel) {
+double left_axis_width(const Panel& panel) {
   constexpr double kLeast = 58, kBeside = 16, kWithTitle = 44;
   double widest = 0;
   for (const Tick& tick : panel.y.ticks) {
@@ -179,12 +180,13 @@ double draw_axes(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
   double below =
       panel.x.names ? draw_names(svg, placed, palette) : draw_numbers(svg, placed, palette);
   if (panel.x.title.empty()) return below;
-  const double room = placed.width + left_room(panel);
-  for (const std::string& line : lines_of(panel.x.title, room, kTickSize)) {
+  const double available = placed.width + left_axis_width(panel);
+  for (const std::string& line : lines_of(panel.x.title, available, kTickSize)) {
     const double half = text_width(line, kTickSize) / 2;
-    // Centred below the panel, but not out of the drawing on the left.
-    const double centre = std::max(placed.left + placed.width / 2,
-                                   placed.left - left_room(panel) + std::min(half, room / 2));
+    // Centred below the panel, but within the drawing on the left.
+    const double centre =
+        std::max(placed.left + placed.width / 2,
+                 placed.left - left_axis_width(panel) + std::min(half, available / 2));
     svg.text(centre, placed.top + panel.height + below + 8, line,
              {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle});
     below += kLineHeight;
@@ -205,30 +207,30 @@ void draw_marks(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
   }
 }
 
-void draw_symbol(Svg& svg, const Palette& palette, Shape shape, Role role, double x, double y,
+void draw_symbol(Svg& svg, const Palette& palette, MarkerShape shape, Role role, double x, double y,
                  double half, double opacity) {
   const std::string& fill = colour(palette, role);
   switch (shape) {
-    case Shape::circle:
+    case MarkerShape::circle:
       svg.circle(x, y, half, fill, opacity);
       break;
-    case Shape::square:
+    case MarkerShape::square:
       svg.square(x, y, 0.9 * half, fill, opacity);
       break;
-    case Shape::diamond:
+    case MarkerShape::diamond:
       svg.diamond(x, y, half, fill, colour(palette, Role::page));
       break;
-    case Shape::up:
-    case Shape::down:
-      svg.triangle(x, y, half, shape == Shape::up, fill);
+    case MarkerShape::up:
+    case MarkerShape::down:
+      svg.triangle(x, y, half, shape == MarkerShape::up, fill);
       break;
-    case Shape::dash:
+    case MarkerShape::dash:
       svg.line(x - half, y, x + half, y, fill, 2, opacity);
       break;
-    case Shape::right:
-    case Shape::cross:
-    case Shape::left:
-    case Shape::saltire: {
+    case MarkerShape::right:
+    case MarkerShape::cross:
+    case MarkerShape::left:
+    case MarkerShape::saltire: {
       std::vector<double> xs, ys;
       for (const auto& [corner_x, corner_y] : outline_of(shape)) {
         xs.push_back(x + half * corner_x);

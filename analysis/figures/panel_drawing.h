@@ -7,10 +7,11 @@
 
 namespace palpate::analysis {
 
-/// A panel at its place in a drawing: px from the drawing's upper left corner, y down.
+/// A panel at its position in the drawing: px from the upper left corner, y down. x() and y()
+/// convert from axis units.
 struct PlacedPanel {
   const Panel* panel = nullptr;
-  double left = 0, top = 0;  ///< of the frame that the axes span
+  double left = 0, top = 0;  ///< of the area that the axes span
   double width = 0;          ///< of the frame; its height is the panel's
 
   double x(double value) const {
@@ -22,15 +23,15 @@ struct PlacedPanel {
   }
 };
 
-/// Room that a panel's left axis takes, px.
-double left_room(const Panel& panel);
+/// px that the left axis with its labels and title takes.
+double left_axis_width(const Panel& panel);
 
-/// \return room that the lower axis takes, px
+/// \return px that the lower axis with its labels and title takes
 double draw_axes(Svg& svg, const PlacedPanel& placed, const Palette& palette);
 void draw_marks(Svg& svg, const PlacedPanel& placed, const Palette& palette);
 
-/// A symbol around (x, y), px.
-void draw_symbol(Svg& svg, const Palette& palette, Shape shape, Role role, double x, double y,
+/// A symbol centred at (x, y). \param half half of its width, px
+void draw_symbol(Svg& svg, const Palette& palette, MarkerShape shape, Role role, double x, double y,
                  double half, double opacity = 1);
 
 }  // namespace palpate::analysis

@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kFont =
     "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
-/// Two decimals, never an exponent, a plain minus: what SVG reads.
+/// Two decimals, no exponent, ASCII minus, as SVG wants.
 std::string coordinate(double value) {
   char digits[512];
   const auto end =
@@ -117,23 +117,23 @@ void Svg::text(double x, double y, std::string_view text, const TextStyle& style
            attribute("fill", style.colour) +
            attribute("text-anchor", kAnchors[static_cast<int>(style.anchor)]);
   if (style.bold) body_ += " font-weight=\"700\"";
-  if (style.turned != 0) {
+  if (style.rotation != 0) {
     std::string turn = "rotate(";
-    turn += coordinate(style.turned) + ' ' + coordinate(x) + ' ' + coordinate(y) + ')';
+    turn += coordinate(style.rotation) + ' ' + coordinate(x) + ' ' + coordinate(y) + ')';
     body_ += attribute("transform", turn);
   }
   body_ += ">" + escaped(text) + "</text>\n";
 }
 
-void Svg::begin_group(std::string_view title, std::string_view person) {
+void Svg::begin_group(std::string_view title, std::string_view participant) {
   body_ += "<g";
-  if (!person.empty()) body_ += attribute("data-person", person);
+  if (!participant.empty()) body_ += attribute("data-person", participant);
   body_ += '>';
   if (!title.empty()) body_ += "<title>" + escaped(title) + "</title>";
   body_ += '\n';
 }
 
-void Svg::begin_alone() { body_ += "<g class=\"alone\">\n"; }
+void Svg::begin_standalone() { body_ += "<g class=\"alone\">\n"; }
 
 void Svg::end_group() { body_ += "</g>\n"; }
 
@@ -159,8 +159,8 @@ std::string Svg::document(double width, double height, std::string_view title,
 }
 
 double text_width(std::string_view text, double size, bool bold) {
-  // DejaVu Sans from the space on, thousandths of the size: the widest of the fonts above, so what
-  // fits with these fits with the others.
+  // Advance widths of DejaVu Sans from U+0020 on, thousandths of the font size: the widest of the
+  // fonts above.
   constexpr std::array<short, 95> kWidths{
       318, 401, 460, 838, 636, 950, 780, 275, 390, 390, 500, 838, 318, 361, 318, 337,
       636, 636, 636, 636, 636, 636, 636, 636, 636, 636, 337, 337, 838, 838, 838, 531,
@@ -174,7 +174,8 @@ double text_width(std::string_view text, double size, bool bold) {
     const auto byte = static_cast<std::uint8_t>(c);
     if (byte >= 0x20 && byte < 0x7F) {
       thousandths += kWidths[byte - 0x20];
-    } else if ((byte & 0xC0U) != 0x80) {  // the first of a character's bytes; from E3: East Asian
+    } else if ((byte & 0xC0U) !=
+               0x80) {  // first byte of a character; from 0xE3 on: East Asian, full width
       thousandths += byte >= 0xE3 ? kWide : kOther;
     }
   }

@@ -1,4 +1,5 @@
 #pragma once
+// Writes SVG 1.1 text: the elements that figures need.
 
 #include <cstddef>
 #include <optional>
@@ -8,7 +9,7 @@
 
 namespace palpate::analysis {
 
-/// Writes the few elements that our figures need. Lengths in px, y down; text is escaped here.
+/// An SVG document under construction. Lengths in px, y down. Texts are escaped here.
 class Svg {
  public:
   enum class Anchor { start, middle, end };
@@ -17,7 +18,7 @@ class Svg {
     std::string_view colour = "#1f2328";
     Anchor anchor = Anchor::start;
     bool bold = false;
-    double turned = 0;  ///< degrees, clockwise, about the anchor
+    double rotation = 0;  ///< degrees, clockwise, about the anchor
   };
 
   void line(double x1, double y1, double x2, double y2, std::string_view colour, double width = 1,
@@ -29,30 +30,31 @@ class Svg {
   void diamond(double x, double y, double half, std::string_view stroke,
                std::string_view fill = "#ffffff");
   void triangle(double x, double y, double half, bool up, std::string_view fill);
-  /// Corners as x and y one by one, equally many. Closed and filled, or an open line.
+  /// area: closed and filled polygon; path: open line. x and y have the same size.
   void area(const std::vector<double>& x, const std::vector<double>& y, std::string_view fill,
             double opacity, std::string_view stroke, double width);
   void path(const std::vector<double>& x, const std::vector<double>& y, std::string_view stroke,
             double width, double opacity, bool dashed = false);
   void text(double x, double y, std::string_view text, const TextStyle& style);
-  /// What follows until end_group() shows `title` when pointed at, and belongs to `person`; either
-  /// may be empty.
-  void begin_group(std::string_view title, std::string_view person = {});
-  /// What follows until end_group() is for a file of its own: a page says it beside the drawing.
-  void begin_alone();
+  /// Elements up to end_group() have the tooltip `title` and belong to `participant` (attribute
+  /// data-person); either may be empty.
+  void begin_group(std::string_view title, std::string_view participant = {});
+  /// Elements up to end_group() belong to the standalone file only; a page has them as HTML beside
+  /// the drawing.
+  void begin_standalone();
   void end_group();
 
-  /// Puts the elements of another on top.
+  /// Draws the elements of another one over these.
   void append(const Svg& other) { body_ += other.body_; }
 
   struct Part {
     double left = 0, right = 0, top = 0, bottom = 0;  ///< px
   };
 
-  /// The finished document. Inside a page it scales, but not below 65 %, where text gets too small,
-  /// nor above its own width.
+  /// The document. In a page it scales with the width, down to 65 % (legible text) and up to 100 %.
   /// \param id starts the ids of title and description: unique within a page
-  /// \param shown the part that a page shows; the whole is in an attribute for whoever saves it
+  /// \param shown the part that a page shows; the attribute data-whole has the view box of all,
+  /// used for saving
   std::string document(double width, double height, std::string_view title,
                        std::string_view description, std::string_view id = "figure",
                        const std::optional<Part>& shown = std::nullopt) const;
@@ -61,7 +63,7 @@ class Svg {
   std::string body_;
 };
 
-/// Rough width of a text in a sans-serif font, px.
+/// Estimated width of a text, px, by the widths of DejaVu Sans (an upper bound for the fonts used).
 double text_width(std::string_view text, double size, bool bold = false);
 /// The text, cut with an ellipsis where it is wider than `width` px.
 std::string fitting(std::string_view text, double width, double size);

@@ -40,7 +40,7 @@ bool CsvReader::fill() {
   try {
     got = file_->read(buffer_.data() + end_, std::min(kBlock, buffer_.size() - end_));
   } catch (const std::runtime_error& error) {
-    trouble_ = error.what();
+    read_error_ = error.what();
   }
   end_ += got;
   if (got == 0) at_end_ = true;
@@ -68,7 +68,7 @@ bool CsvReader::next() {
       }
       seen = end_ - begin_;
       if (fill()) continue;
-      if (!trouble_.empty()) return end_with("cannot be read: " + trouble_);
+      if (!read_error_.empty()) return end_with("cannot be read: " + read_error_);
       if (begin_ == end_) return false;
       newline = buffer_.data() + end_;
     }
@@ -83,7 +83,7 @@ bool CsvReader::next() {
         seen = 0;
         continue;
       }
-      if (!trouble_.empty()) return end_with("cannot be read: " + trouble_);
+      if (!read_error_.empty()) return end_with("cannot be read: " + read_error_);
       return end_with("a quote is opened in this record and never closed");
     }
     std::string_view text(start, static_cast<std::size_t>(newline - start));
@@ -117,10 +117,11 @@ void CsvReader::split_plain(std::string_view text) {
   fields_.emplace_back(from, static_cast<std::size_t>(to - from));
 }
 
-/// Splits the record at begin_ with quotes in it; incomplete: it goes on past what is buffered.
+/// Splits a record with quotes that begins at begin_; incomplete: it continues beyond the buffer.
 CsvReader::Quoted CsvReader::split_quoted() {
   const std::string_view text(buffer_.data() + begin_, end_ - begin_);
-  std::vector<std::pair<std::size_t, std::size_t>> spans;  // of unquoted_, which may still move
+  std::vector<std::pair<std::size_t, std::size_t>>
+      spans;  // offsets into unquoted_, which may be reallocated
   unquoted_.clear();
   std::size_t at = 0, lines = 1, field = 0;
   bool done = false;

@@ -1,5 +1,5 @@
 #pragma once
-// RFC 4180 in a stream: constant memory, fields as views into one buffer.
+// Streaming reader of CSV (RFC 4180): constant memory, fields are views into one buffer.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,19 +16,21 @@ namespace palpate::analysis {
 /// newline and empty lines; quoted fields may hold commas, quotes and newlines.
 class CsvReader {
  public:
-  /// A record may have at most so many bytes: a forgotten quote shall not swallow the file.
+  /// bytes; a larger record is a fault, as after a quote that is not closed.
   static constexpr std::size_t kMaxRecord = std::size_t{1} << 20;
+  /// bytes
   static constexpr std::uintmax_t kMaxFile = std::uintmax_t{1} << 32;
 
   /// \throws std::runtime_error where the file cannot be opened.
   explicit CsvReader(const std::string& path);
 
-  /// Steps to the next record; false at the end, or where nothing after a fault can be trusted.
+  /// Reads the next record; false at the end of the file or after a fault from which it cannot
+  /// recover.
   bool next();
-  /// Views of the record's fields, good until next(). Meaningless where fault() is not empty.
+  /// The record's fields, valid until next(); unspecified where fault() is not empty.
   const std::vector<std::string_view>& fields() const { return fields_; }
-  /// What is wrong with the record as CSV; empty: nothing. Also to be read once after the last
-  /// next(), for a file that breaks off.
+  /// What is wrong with the record as CSV; empty: nothing. Check it also after next() returned
+  /// false: the file may be truncated.
   const std::string& fault() const { return fault_; }
   /// The line, from 1, on which the record starts.
   std::size_t line() const { return line_; }
@@ -46,8 +48,8 @@ class CsvReader {
   std::size_t begin_ = 0, end_ = 0;  ///< unread bytes of buffer_
   bool at_end_ = false, stopped_ = false;
   std::vector<std::string_view> fields_;
-  std::string unquoted_;         ///< holds the text of quoted fields, the quotes taken off
-  std::string fault_, trouble_;  ///< trouble_: reading failed
+  std::string unquoted_;  ///< text of the fields of a record with quotes, without the quotes
+  std::string fault_, read_error_;  ///< read_error_: why reading the file failed
   std::size_t line_ = 0, next_line_ = 1;
 };
 

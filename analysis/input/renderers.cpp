@@ -15,7 +15,7 @@ std::vector<RendererPair> renderer_pairs(const std::vector<std::string>& rendere
   return pairs;
 }
 
-std::string the(const std::string& renderer) {
+std::string with_article(const std::string& renderer) {
   return renderer == "point" || renderer == "ray" ? "the " + renderer : renderer;
 }
 

@@ -45,13 +45,14 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 
 }  // namespace
 
-ReportRecord read_report_record(const std::string& database) {
+StudyRecord read_study_record(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
-  ReportRecord record;
+  StudyRecord record;
   for (const data::ProtocolInfo& protocol : store.protocols()) {
     record.protocols.push_back(protocol_text(protocol));
-    for (const data::Participant& person : store.participants(protocol.sha256)) {
-      if (person.seed) record.seeds.push_back(person.code + ": " + std::to_string(*person.seed));
+    for (const data::Participant& participant : store.participants(protocol.sha256)) {
+      if (participant.seed)
+        record.seeds.push_back(participant.code + ": " + std::to_string(*participant.seed));
     }
   }
   for (const data::StoredRun& run : store.runs()) {

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kShapes{"sphere", "cone", "cylinder", "cube"};
 
-/// The place of a name among the levels: the paper's first, then the protocol's.
+/// Rank of a shape among the levels: those of Ho, Basdogan & Srinivasan (2000), then as the
+/// protocol lists them.
 std::size_t rank(const std::string& name, const std::vector<std::string>& listed) {
   const auto known = std::find(kShapes.begin(), kShapes.end(), name);
   if (known != kShapes.end()) return static_cast<std::size_t>(known - kShapes.begin());
@@ -24,7 +25,7 @@ std::size_t rank(const std::string& name, const std::vector<std::string>& listed
   return kShapes.size() + static_cast<std::size_t>(found - listed.begin());
 }
 
-/// Point and ray stand first; the others keep their order.
+/// Point first, then ray, then all others.
 std::size_t renderer_rank(const std::string& name) {
   return name == "point" ? 0 : name == "ray" ? 1 : 2;
 }
@@ -62,22 +63,22 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   n_simulated_ += raw.simulated;
   n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
   n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
-  places_.push_back({row.participant, raw.session, raw.block, raw.trial,
-                     static_cast<std::uint32_t>(rows_.size())});
+  keys_.push_back({row.participant, raw.session, raw.block, raw.trial,
+                   static_cast<std::uint32_t>(rows_.size())});
   rows_.push_back(row);
   if (raw.line > 0) lines_.push_back(static_cast<std::uint32_t>(raw.line));
 }
 
-void TrialTableBuilder::number_places() {
-  std::sort(places_.begin(), places_.end());
+void TrialTableBuilder::number_trials() {
+  std::sort(keys_.begin(), keys_.end());
   std::uint32_t position = 0;
   std::vector<std::uint32_t> exposures(renderers_.names().size());
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    if (i == 0 || places_[i].participant != places_[i - 1].participant) {
+  for (std::size_t i = 0; i < keys_.size(); ++i) {
+    if (i == 0 || keys_[i].participant != keys_[i - 1].participant) {
       position = 0;
       std::fill(exposures.begin(), exposures.end(), 0U);
     }
-    TrialRow& row = rows_[places_[i].row];
+    TrialRow& row = rows_[keys_[i].row];
     row.position = ++position;
     row.exposure = ++exposures[row.renderer];
   }
@@ -96,13 +97,13 @@ std::string TrialTableBuilder::lines_of(
   return text + ")";
 }
 
-void TrialTableBuilder::check_places(TrialTable& table) {
+void TrialTableBuilder::check_repeated_trials(TrialTable& table) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> repeated, doubled;
   const auto same_time = [](double x, double y) {
     return x == y || (std::isnan(x) && std::isnan(y));
   };
-  for (std::size_t i = 1; i < places_.size(); ++i) {
-    const Place &a = places_[i - 1], &b = places_[i];
+  for (std::size_t i = 1; i < keys_.size(); ++i) {
+    const TrialKey &a = keys_[i - 1], &b = keys_[i];
     if (a.participant != b.participant || a.session != b.session || a.block != b.block ||
         a.trial != b.trial) {
       continue;
@@ -154,8 +155,8 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
                                      const std::vector<std::string>& listed) {
   if (rows_.empty()) throw std::runtime_error("expected at least one trial that is not practice");
   TrialTable table;
-  number_places();
-  check_places(table);
+  number_trials();
+  check_repeated_trials(table);
   fill_times(table);
   table.provenance = std::move(provenance);
   table.participants.assign(participants_.names().begin(), participants_.names().end());
@@ -164,9 +165,9 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
                     : n_simulated_ == rows_.size() ? Simulated::yes
                                                    : Simulated::mixed;
 
-  // Levels into their order; order[new] = old, place[old] = new.
+  // Orders the levels: order[new index] = old index, new_index[old index] = new index.
   const auto& names = stimuli_.names();
-  std::vector<std::uint32_t> order(names.size()), place(names.size());
+  std::vector<std::uint32_t> order(names.size()), new_index(names.size());
   std::iota(order.begin(), order.end(), 0U);
   const auto level = [&](std::uint32_t i) {
     return std::tuple(shown_[i] == 0, rank(names[i], listed), shown_[i], i);
@@ -174,24 +175,25 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   std::sort(order.begin(), order.end(),
             [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
   for (std::uint32_t i = 0; i < order.size(); ++i) {
-    place[order[i]] = i;
+    new_index[order[i]] = i;
     table.answers.push_back(names[order[i]]);
     if (shown_[order[i]] > 0) table.shapes.push_back(names[order[i]]);
   }
-  std::vector<std::uint32_t> renderers(renderers_.names().size()), renderer_place(renderers.size());
+  std::vector<std::uint32_t> renderers(renderers_.names().size()),
+      new_renderer_index(renderers.size());
   std::iota(renderers.begin(), renderers.end(), 0U);
   std::ranges::stable_sort(renderers, {},
                            [&](std::uint32_t i) { return renderer_rank(renderers_.names()[i]); });
   for (std::uint32_t i = 0; i < renderers.size(); ++i) {
-    renderer_place[renderers[i]] = i;
+    new_renderer_index[renderers[i]] = i;
     table.renderers.push_back(renderers_.names()[renderers[i]]);
   }
   for (TrialRow& row : rows_) {
-    row.shape = static_cast<std::uint16_t>(place[row.shape]);
+    row.shape = static_cast<std::uint16_t>(new_index[row.shape]);
     if (row.answer >= 0) {
-      row.answer = static_cast<std::int32_t>(place[static_cast<std::size_t>(row.answer)]);
+      row.answer = static_cast<std::int32_t>(new_index[static_cast<std::size_t>(row.answer)]);
     }
-    row.renderer = static_cast<std::uint16_t>(renderer_place[row.renderer]);
+    row.renderer = static_cast<std::uint16_t>(new_renderer_index[row.renderer]);
   }
   table.rows = std::move(rows_);
 

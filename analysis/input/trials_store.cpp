@@ -15,8 +15,8 @@ namespace palpate::analysis {
 
 namespace {
 
-/// Names of the stimuli in a stored protocol's order. Read leniently: the text was checked when it
-/// was stored, and a mesh file that it names may be gone since.
+/// Names of the stimuli in the order of a stored protocol. Not validated again: it was when it was
+/// stored, and mesh files that it names may be missing now.
 std::vector<std::string> stimuli_of(const std::string& protocol_text) {
   std::vector<std::string> names;
   const auto json = nlohmann::json::parse(protocol_text, nullptr, false);

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/palette.h"
+#include "analysis/report/html_elements.h"
 #include "analysis/report/report_assets.h"
-#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -29,7 +29,7 @@ std::string style() {
          colours(dark_palette()) + "}\n" + std::string(report_style());
 }
 
-/// What is saved has the colours for paper.
+/// The light palette as JSON, for figures that the script saves.
 std::string saved_colours() {
   nlohmann::ordered_json json;
   const Palette light = light_palette();
@@ -67,9 +67,9 @@ void HtmlPage::end_section() { body_ += "</section>\n"; }
 
 void HtmlPage::put_figure(const Figure& figure, const std::vector<std::string>& participants) {
   body_ += "<figure>\n<div class=\"drawing\">\n<div class=\"wide-screen\">" +
-           figure_svg(figure, page_palette(), Stands::in_page) +
+           figure_svg(figure, page_palette(), FigurePlacement::in_page) +
            "</div>\n<div class=\"narrow-screen\">" +
-           figure_svg(figure, page_palette(), Stands::in_narrow_page) + "</div>\n</div>\n";
+           figure_svg(figure, page_palette(), FigurePlacement::in_narrow_page) + "</div>\n</div>\n";
   if (!figure.notes.empty()) {
     body_ += "<figcaption>";
     for (const std::string& note : figure.notes) body_ += escaped_sentence(note) + " ";

@@ -1,5 +1,5 @@
 #pragma once
-// A report as one HTML page.
+// A self-contained HTML page with sections, figures and tables.
 
 #include <string>
 #include <string_view>
@@ -10,33 +10,35 @@
 
 namespace palpate::analysis {
 
-/// A page that is complete in itself: its content security policy allows no network and no script
-/// but its own. Text is escaped here. Figures are SVG; where scripts run they have tooltips, a
-/// participant can be picked out, and they can be saved.
+/// Builds the page. Its content security policy allows no network access and only its own script.
+/// Texts are escaped here, except what is appended to body(), above_title() and below_title().
+/// Figures are SVG; with scripts enabled they have tooltips, highlight a participant and can be
+/// saved as SVG or PNG.
 class HtmlPage {
  public:
-  /// \param title the answer in a sentence \param label "SIMULATED PARTICIPANTS", or empty
+  /// \param title of the page, such as the conclusion in a sentence \param label "SIMULATED
+  /// PARTICIPANTS", or empty
   explicit HtmlPage(std::string title, std::string label = {});
 
   /// A line across the top of the page.
   void put_banner(std::string_view text);
-  /// What stands above the title, and below it.
+  /// Escaped HTML above and below the title.
   std::string& above_title() { return above_title_; }
   std::string& below_title() { return below_title_; }
 
-  /// \param id its anchor, unique \param link its name in the line of links
+  /// \param id anchor, unique \param link text in the navigation
   void begin_section(std::string_view id, std::string_view title, std::string_view link);
   void end_section();
-  /// Into the section: with its notes as caption, and what saves it.
-  /// \param participants one of whom can be picked out, in all figures; none: no choice
+  /// Adds a figure to the section, with its notes as caption and buttons to save it.
+  /// \param participants codes to choose from for highlighting, in all figures; empty: no choice
   void put_figure(const Figure& figure, const std::vector<std::string>& participants = {});
-  /// A section of one figure, under its title.
+  /// A section with one figure, titled as the figure.
   void put_figure_section(const Figure& figure, std::string_view link);
   void put_note(std::string_view text);
   /// HTML that is already escaped.
   std::string& body() { return body_; }
 
-  /// \param footer a sentence
+  /// The complete page. \param footer a sentence
   std::string html(std::string_view footer) const;
 
  private:
@@ -45,7 +47,7 @@ class HtmlPage {
   std::string title_, label_, banner_, above_title_, below_title_, links_, body_;
 };
 
-/// A list of sentences.
+/// Appends an unordered list; nothing for no sentences.
 void put_list(std::string& out, const std::vector<std::string>& sentences);
 
 }  // namespace palpate::analysis

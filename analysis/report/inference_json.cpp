@@ -8,8 +8,8 @@ namespace palpate::analysis {
 namespace {
 
 constexpr const char* kModelNote =
-    "Beside the primary inference (paired_by_shape.*.t_test): the model leaves participant x shape "
-    "variance out, and is too sure where there is some.";
+    "Complements the primary inference (paired_by_shape.*.t_test): the model has no participant x "
+    "shape variance, so its intervals are too narrow where there is some.";
 
 Json model_estimate(const ModelEstimate& value) {
   Json out;
@@ -23,7 +23,7 @@ Json model_estimate(const ModelEstimate& value) {
   return out;
 }
 
-/// Of a mean over participants that stands beside it.
+/// t-test on a mean over participants, whose value has a key of its own.
 void put_test(Json& out, const TTest& test) {
   put_status(out, test.undefined);
   out["sd"] = number(test.sd);
@@ -86,7 +86,7 @@ Json contrasts_json(const std::vector<ModelEstimate>& contrasts, const TrialTabl
   return out;
 }
 
-/// One slope has names of its own; several stand as lists.
+/// With one slope its sd and correlation have keys of their own; with several there are lists.
 Json variance_components(const MixedModel& model, const std::vector<std::string>& renderers) {
   const bool many = model.random_sds.size() > 2;
   Json out;
@@ -173,21 +173,22 @@ Json time_outs_json(const Analysis& analysis) {
       put_status(one, cell.n_trials == 0 ? "no trials" : "");
       one["n_trials"] = cell.n_trials;
       one["n_timeouts"] = cell.n_timeouts;
-      one["share"] = cell.n_trials > 0 ? Json(cell.share()) : Json(nullptr);
+      one["share"] = cell.n_trials > 0 ? Json(cell.proportion()) : Json(nullptr);
       if (cell.lowest_limit) {
         one["limit_s_low"] = *cell.lowest_limit;
         one["limit_s_high"] = *cell.highest_limit;
       }
-      Json& people = one["participants"] = Json::array();
+      Json& participant_cells = one["participants"] = Json::array();
       for (std::size_t g = 0; g < cell.groups.size(); ++g) {
         const TimeOutGroup& group = cell.groups[g];
         if (g > 0 && cell.groups[g - 1].participant == group.participant) {
-          people.back()["n_timeouts"] = people.back()["n_timeouts"].get<std::size_t>() + group.n;
+          participant_cells.back()["n_timeouts"] =
+              participant_cells.back()["n_timeouts"].get<std::size_t>() + group.n;
           continue;
         }
-        people.push_back(
+        participant_cells.push_back(
             {{"participant_id", table.participants[group.participant]},
-             {"n_trials", analysis.description.people[r][s][group.participant].n_trials},
+             {"n_trials", analysis.description.participant_cells[r][s][group.participant].n_trials},
              {"n_timeouts", group.n}});
       }
     }

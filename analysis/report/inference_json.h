@@ -1,5 +1,5 @@
 #pragma once
-// The inference of an analysis as JSON.
+// Inferential statistics as JSON; the keys are described in analysis/README.md.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,13 +12,13 @@ namespace palpate::analysis {
 
 using Json = nlohmann::ordered_json;
 
-/// A number that is too large to be one (the percent of a huge log ratio) is null as well.
+/// null for a missing or infinite value, as the percent change of a huge log ratio.
 Json number(const std::optional<double>& value);
 
-/// "status", and where something is missing "reason".
+/// Sets "status" to "ok" or "undefined", in the latter case also "reason".
 void put_status(Json& out, const std::string& undefined);
 
-/// NAME_low and NAME_high; null where there is no interval.
+/// Sets NAME_low and NAME_high; null without an interval.
 void put_interval(Json& out, const std::string& name, const std::optional<Interval>& interval);
 
 /// The ends of an interval of log ratios as percent reductions, under NAME_ci95_low and
@@ -27,16 +27,16 @@ void put_reduction_ci95(Json& out, const std::string& name,
                         const std::optional<Interval>& log_ratio);
 
 Json censored_json(const CensoredEstimate& censored);
-/// By renderer and shape; participants with time-outs alone are listed.
+/// By renderer and shape; lists the participants who have time-outs.
 Json time_outs_json(const Analysis& analysis);
 Json anova_json(const RmAnova& anova, const TrialTable& table);
 Json mixed_model_json(const Analysis& analysis);
-/// By shape.
+/// Change of accuracy and of time by shape.
 Json speed_accuracy_json(const Comparison& comparison, const TrialTable& table);
-/// What practice does to one comparison, into `out`.
+/// Adds the practice effects of a comparison to `out`.
 void put_pair_practice(Json& out, const PairPractice& practice, const RendererPair& pair,
                        const TrialTable& table);
-/// Learning with each renderer, and the first comparison.
+/// Learning with each renderer, and the practice effects of the first comparison.
 Json practice_json(const Analysis& analysis);
 
 }  // namespace palpate::analysis

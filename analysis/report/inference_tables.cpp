@@ -1,8 +1,10 @@
+// Tables of inferential statistics: speed and accuracy, ANOVA, mixed model, practice.
+
 #include <cmath>
 
 #include "analysis/report/table_cells.h"
 #include "analysis/report/tables.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -13,7 +15,7 @@ std::string sentence(const std::string& what, const std::string& reason) {
   return what + ": " + reason + ".";
 }
 
-/// Percent change of time that a log ratio stands for.
+/// 100 (exp m - 1): percent change of time for a log ratio m.
 std::string percent_change(const std::optional<double>& log_ratio) {
   if (!log_ratio) return kMissing;
   return signed_fixed(100 * std::expm1(*log_ratio), 1) + " %";
@@ -32,11 +34,13 @@ std::string learning_note(const std::string& who, const TTest& test,
   return text + ".";
 }
 
-/// Correlations are named where there is one alone; the JSON file has all.
-std::string spread_note(const MixedModel& model, const std::vector<std::string>& renderers) {
+/// Standard deviations of the random effects and the residual; the correlation if there is only one
+/// (the JSON has all).
+std::string random_effects_note(const MixedModel& model,
+                                const std::vector<std::string>& renderers) {
   std::vector<std::string> slopes;
   for (std::size_t r = 1; r < renderers.size(); ++r) {
-    slopes.push_back(the(renderers[r]) + " " + number(model.random_sds[r], 3));
+    slopes.push_back(with_article(renderers[r]) + " " + number(model.random_sds[r], 3));
   }
   return "Standard deviations of log time: participants' intercepts " +
          number(model.random_sds[0], 3) + ", their slopes for " + joined(slopes) +
@@ -51,12 +55,12 @@ std::string spread_note(const MixedModel& model, const std::vector<std::string>&
 
 Table speed_accuracy_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
-  const std::string who = several(analysis) ? "each renderer" : first.renderer;
+  const std::string who = has_several_comparisons(analysis) ? "each renderer" : first.renderer;
   Table table = comparison_table(
       analysis, "Speed and accuracy together, " + who + " against " + first.reference,
       {"time", "accuracy " + first.reference,
-       several(analysis) ? "own accuracy" : "accuracy " + first.renderer, "accuracy",
-       "95 % interval", "p", "reading"});
+       has_several_comparisons(analysis) ? "own accuracy" : "accuracy " + first.renderer,
+       "accuracy", "95 % interval", "p", "reading"});
   for (const Comparison& comparison : analysis.comparisons) {
     for (std::size_t s = 0; s < comparison.speed_accuracy.size(); ++s) {
       const SpeedAccuracy& shape = comparison.speed_accuracy[s];
@@ -66,8 +70,8 @@ Table speed_accuracy_table(const Analysis& analysis) {
       row.insert(row.end(),
                  {shape.percent_change_time ? signed_fixed(*shape.percent_change_time, 1) + " %"
                                             : kMissing,
-                  percent(hundredfold(shape.accuracy_reference)),
-                  percent(hundredfold(shape.accuracy_renderer)),
+                  percent(to_percent(shape.accuracy_reference)),
+                  percent(to_percent(shape.accuracy_renderer)),
                   shape.accuracy_change ? signed_fixed(100 * *shape.accuracy_change, 1) + " points"
                                         : kMissing,
                   interval ? signed_fixed(100 * interval->low, 1) + " to " +
@@ -129,7 +133,8 @@ Table mixed_model_table(const Analysis& analysis) {
   Table table = comparison_table(
       analysis, "Mixed model: log time ~ renderer * shape + (1 + renderer | participant), REML",
       {"reduction", "95 % interval",
-       several(analysis) ? "− " + all.front().pair.reference : difference_name(all.front().pair),
+       has_several_comparisons(analysis) ? "− " + all.front().pair.reference
+                                         : difference_name(all.front().pair),
        "se", "df", "t", "p", "p (Holm)"});
   Reasons reasons;
   for (std::size_t c = 0; c < all.size(); ++c) {
@@ -151,14 +156,14 @@ Table mixed_model_table(const Analysis& analysis) {
     return table;
   }
   table.notes.push_back(
-      "Beside the paired t-tests, not instead of them: the model leaves participant × shape "
-      "variance out and is too sure where there is some. df: Satterthwaite.");
+      "Complements the paired t-tests: the model has no participant × shape variance, so its "
+      "intervals are too narrow and p too small where there is some. df: Satterthwaite.");
   if (!model.singular.empty()) {
     table.notes.push_back(
-        sentence("Singular fit, on the boundary of what variances can be", model.singular) +
-        " Its intervals and p are to be taken with care.");
+        sentence("Singular fit, on the boundary of the parameter space", model.singular) +
+        " Interpret its intervals and p with caution.");
   }
-  table.notes.push_back(spread_note(model, analysis.table.renderers));
+  table.notes.push_back(random_effects_note(model, analysis.table.renderers));
   reasons.put(table.notes);
   return table;
 }
@@ -197,10 +202,10 @@ Table learning_table(const Analysis& analysis) {
 
 Table renderer_order_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
-  const std::string renderer = several(analysis) ? "renderer" : first.renderer;
+  const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
   Table table = comparison_table(analysis, "Does the order of renderers explain the gain?",
-                                 {first.reference + " first", "people", renderer + " first",
-                                  "people", "difference", "p (Holm)", "balanced", "95 % interval"});
+                                 {first.reference + " first", "n", renderer + " first", "n",
+                                  "difference", "p (Holm)", "balanced", "95 % interval"});
   Reasons reasons;
   std::vector<std::string> interleaved;
   const auto add = [&](const RendererPair& pair, const std::string& name,
@@ -226,19 +231,20 @@ Table renderer_order_table(const Analysis& analysis) {
     }
     add(pair, "all shapes", practice.all_shapes);
     if (practice.n_interleaved == 0) continue;
-    interleaved.push_back(counted(practice.n_interleaved, "participant", "participants") +
-                          " did trials of " +
-                          (several(analysis) ? the(first.reference) + " and " + the(pair.renderer)
-                                             : "both renderers") +
-                          " mixed: no order, not counted here.");
+    interleaved.push_back(
+        counted(practice.n_interleaved, "participant", "participants") + " did trials of " +
+        (has_several_comparisons(analysis)
+             ? with_article(first.reference) + " and " + with_article(pair.renderer)
+             : "both renderers") +
+        " mixed: no order, not counted here.");
   }
   table.notes = {
       "Percent reductions by which renderer came first. Practice makes the second one look faster: "
       "a gain is too large with " +
       first.reference + " first and too small with " +
-      (several(analysis) ? "the other" : first.renderer) + " first. Difference: ratio of " +
-      renderer + " to " + first.reference + " times, " + first.reference + " first against " +
-      renderer +
+      (has_several_comparisons(analysis) ? "the other" : first.renderer) +
+      " first. Difference: ratio of " + renderer + " to " + first.reference + " times, " +
+      first.reference + " first against " + renderer +
       " first; below 0 where practice helps; p adjusted over all tests of practice (slopes over "
       "the trials "
       "and orders, " +

@@ -14,8 +14,8 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr std::array kShapes{Shape::circle, Shape::square, Shape::right,
-                             Shape::cross,  Shape::left,   Shape::saltire};
+constexpr std::array kShapes{MarkerShape::circle, MarkerShape::square, MarkerShape::right,
+                             MarkerShape::cross,  MarkerShape::left,   MarkerShape::saltire};
 
 double log_of(std::size_t participants) { return std::log10(static_cast<double>(participants)); }
 
@@ -23,7 +23,7 @@ std::string power_text(double power) { return fixed(100 * power, 1) + " %"; }
 
 FigureAxis participants_axis(std::size_t least, std::size_t most) {
   constexpr double kFewDecades = 1.7;
-  constexpr std::array kParts{10, 12, 15, 20, 25, 30, 40, 50, 60, 80};  // of ten
+  constexpr std::array kParts{10, 12, 15, 20, 25, 30, 40, 50, 60, 80};  // tenths of a power of ten
   FigureAxis axis = log_axis(log_of(least), log_of(most), "participants");
   if (axis.high - axis.low > kFewDecades) return axis;
   axis.ticks.clear();
@@ -49,7 +49,8 @@ void add_wanted_power(Panel& panel, double power) {
   panel.marks.push_back(std::move(text));
 }
 
-void add_curve(Panel& panel, const Plan& plan, const PlanCurve& curve, Role role, Shape shape) {
+void add_curve(Panel& panel, const Plan& plan, const PlanCurve& curve, Role role,
+               MarkerShape shape) {
   Mark line = line_mark(role, {}, {}, 2);
   for (const PlanPoint& point : curve.points) {
     const std::size_t participants = point.design.participants;
@@ -80,7 +81,7 @@ Figure plan_figure(const Plan& plan) {
   figure.title = "Power to " + goal_text(plan);
   if (!plan.label.empty()) figure.label = plan.label + " IN THE PILOT";
   Panel panel;
-  panel.x = participants_axis(plan.settings.least, plan.settings.most);
+  panel.x = participants_axis(plan.settings.min_participants, plan.settings.max_participants);
   panel.y = linear_axis(0, 100, "power (%)");
   panel.width = 620;
   panel.height = 320;
@@ -88,7 +89,7 @@ Figure plan_figure(const Plan& plan) {
   for (std::size_t c = 0; c < plan.curves.size(); ++c) {
     const PlanCurve& curve = plan.curves[c];
     const std::string name = counted(curve.trials, "trial", "trials");
-    const Shape shape = kShapes[c % kShapes.size()];
+    const MarkerShape shape = kShapes[c % kShapes.size()];
     add_curve(panel, plan, curve, line_role(c), shape);
     figure.legend.push_back({name, line_role(c), shape});
     figure.description += name + " of each shape with each renderer: " +

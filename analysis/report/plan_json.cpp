@@ -18,10 +18,10 @@ Json point_json(const Plan& plan, const PlanPoint& point) {
            {"power", goal_power(plan, power)}};
   const double share = goal_power(plan, power);
   out["simulation_se"] = std::sqrt(share * (1 - share) / static_cast<double>(power.studies));
-  out["power_all"] = power.share(power.all);
-  out["power_any"] = power.share(power.any);
+  out["power_all"] = power.proportion(power.all);
+  out["power_any"] = power.proportion(power.any);
   for (std::size_t s = 0; s < plan.model.shapes.size(); ++s) {
-    out["power_by_shape"][plan.model.shapes[s]] = power.share(power.found[s]);
+    out["power_by_shape"][plan.model.shapes[s]] = power.proportion(power.found[s]);
   }
   return out;
 }
@@ -33,7 +33,7 @@ Json settings_json(const PlanSettings& settings) {
           {"test", settings.simulation.test == StudyTest::paired ? "paired" : "model"},
           {"studies", settings.simulation.studies},
           {"seed", settings.simulation.seed},
-          {"participants", {settings.least, settings.most}}};
+          {"participants", {settings.min_participants, settings.max_participants}}};
 }
 
 Json model_json(const StudyModel& model) {
@@ -48,7 +48,7 @@ Json model_json(const StudyModel& model) {
   out["intercept_sd"] = model.intercept_sd;
   out["correlation"] = model.correlation;
   out["residual_sd"] = model.residual_sd;
-  out["share_used"] = model.share_used;
+  out["share_used"] = model.proportion_used;
   return out;
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// A plan as text, JSON and a figure.
+// A sample size plan as text, JSON and a figure.
 
 #include <string>
 
@@ -10,7 +10,7 @@ namespace palpate::analysis {
 
 std::string plan_text(const Plan& plan);
 std::string plan_json(const Plan& plan);
-/// Power over participants, a line for each number of trials.
+/// Power (%) over the number of participants, a line for each number of trials.
 Figure plan_figure(const Plan& plan);
 
 }  // namespace palpate::analysis

@@ -1,5 +1,5 @@
 #pragma once
-// Files that the build puts into the program for its pages.
+// report.css and report.js, embedded by the build (report_assets.cmake).
 
 #include <string_view>
 

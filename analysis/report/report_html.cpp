@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
+#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/report_cards.h"
-#include "analysis/report/report_page.h"
+#include "analysis/report/reduction_cards.h"
 #include "analysis/report/tables.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -21,26 +21,26 @@ namespace {
 
 constexpr std::size_t kMostProtocol = 200'000;  // bytes
 
-/// A section of the page: its anchor, its title and its name in the line of links.
+/// Heading of a section: anchor, title and text in the navigation.
 struct Heading {
   std::string id, title, link;
 };
 
 class Report {
  public:
-  Report(const Analysis& analysis, const ReportRecord& record)
+  Report(const Analysis& analysis, const StudyRecord& record)
       : analysis_(analysis),
         record_(record),
         label_(simulated_label(analysis.table.simulated)),
         figures_(figures_of(analysis, record)),
-        page_(answer(analysis), label_) {}
+        page_(conclusion(analysis), label_) {}
 
   std::string html() {
     if (!label_.empty()) {
-      page_.put_banner(label_ +
-                       (analysis_.table.simulated == Simulated::yes
-                            ? ": every figure here comes from a model of a person, not from people."
-                            : ": the figures here mix a model of a person with people."));
+      page_.put_banner(
+          label_ + (analysis_.table.simulated == Simulated::yes
+                        ? ": all numbers here are from a model of a participant, not from humans."
+                        : ": the numbers here mix simulated participants with humans."));
     }
     put_header();
     put_sections();
@@ -60,7 +60,7 @@ class Report {
            ", " + counted(counts.n_trials, "trial", "trials") + ", " +
            fixed(100 * counts.accuracy.value_or(0), 1) + "\u00a0% correct; " +
            counted(counts.n_used_for_times, "time", "times") + " used.</p>\n";
-    put_cards(out, analysis_);
+    put_reduction_cards(out, analysis_);
     put_warnings(out);
   }
 
@@ -91,29 +91,31 @@ class Report {
     return found == figures_.end() ? nullptr : &*found;
   }
 
-  /// \return false where the data have no such figure
+  /// \return false if there is no such figure for these data
   bool put_figure(std::string_view id) {
     const Figure* drawn = figure(id);
-    if (drawn) page_.put_figure(*drawn, id == "figure15" ? people() : std::vector<std::string>());
+    if (drawn)
+      page_.put_figure(*drawn, id == "figure15" ? participants() : std::vector<std::string>());
     return drawn != nullptr;
   }
 
-  /// Those with marks of their own.
-  std::vector<std::string> people() const {
+  /// Participants who can be highlighted: those drawn one by one.
+  std::vector<std::string> participants() const {
     std::vector<std::string> names;
     for (const std::string& name : analysis_.table.participants) {
-      if (names.size() == kShownPeople) break;
+      if (names.size() == kShownParticipants) break;
       names.push_back(stimuli::printable(name, 40));
     }
     return names;
   }
 
-  /// A section with a figure and its numbers as tables.
+  /// A section with a figure and tables of its numbers. \param missing sentence in place of a
+  /// missing figure
   void figure_section(const Heading& heading, const std::vector<Table>& tables,
                       std::string_view missing) {
     begin(heading);
     if (!put_figure(heading.id)) page_.put_note(missing);
-    if (!tables.empty()) put_folded(page_.body(), "The numbers as a table", tables);
+    if (!tables.empty()) put_collapsible_tables(page_.body(), "The numbers as a table", tables);
     page_.end_section();
   }
 
@@ -124,7 +126,7 @@ class Report {
   void put_sections() {
     const bool both = analysis_.table.renderers.size() > 1;
     const bool paper = compares_as_paper(analysis_);
-    figure_section({"figure15", paper ? "How long people took (figure 15)" : "How long people took",
+    figure_section({"figure15", paper ? "Mean response times (figure 15)" : "Mean response times",
                     paper ? "Figure 15" : "Mean times"},
                    {times_table(analysis_)}, "No times to show.");
     begin({"speedup",
@@ -144,9 +146,9 @@ class Report {
     }
     std::vector<Table> answers = confusion_tables(analysis_);
     answers.push_back(accuracy_table(analysis_));
-    figure_section({"confusion", "What was taken for what", "Confusion"}, answers, "");
+    figure_section({"confusion", "Shapes shown and answered", "Confusion"}, answers, "");
     if (both) {
-      figure_section({"speed-accuracy", "Was speed bought with errors?", "Speed and accuracy"},
+      figure_section({"speed-accuracy", "Speed-accuracy trade-off", "Speed and accuracy"},
                      {speed_accuracy_table(analysis_)},
                      "Time and accuracy cannot be compared: no participant has both renderers.");
     }
@@ -157,11 +159,11 @@ class Report {
                      {renderer_order_table(analysis_)},
                      "The two orders of the renderers cannot be compared in these data.");
     }
-    figure_section({"servo", "How well the servo kept time", "Servo"}, servo_tables(),
+    figure_section({"servo", "Timing of the servo loop", "Servo"}, servo_tables(),
                    servo_sentence(analysis_, record_));
     std::vector<Table> lost{exclusions_table(analysis_)};
     if (analysis_.time_outs.any) lost.push_back(time_outs_table(analysis_));
-    figure_section({"exclusions", "What was left out", "Exclusions"}, lost, "");
+    figure_section({"exclusions", "Trials excluded from the times", "Exclusions"}, lost, "");
     begin({"tests", "The tests", "Tests"});
     for (const Table& table :
          {tests_table(analysis_), anova_table(analysis_), mixed_model_table(analysis_)}) {
@@ -181,12 +183,13 @@ class Report {
         "renderer",           "trials",         "ticks",      "missed",       "of ticks",
         "trials with missed", "longest period", "with fault", "began inside", "largest force"};
     for (const ServoQuality& servo : record_.servo) {
-      const double share = servo.ticks ? 100 * static_cast<double>(servo.missed_ticks) /
-                                             static_cast<double>(servo.ticks + servo.missed_ticks)
-                                       : 0;
+      const double percent_missed = servo.ticks
+                                        ? 100 * static_cast<double>(servo.missed_ticks) /
+                                              static_cast<double>(servo.ticks + servo.missed_ticks)
+                                        : 0;
       table.rows.push_back(
           {servo.renderer, std::to_string(servo.n_trials), std::to_string(servo.ticks),
-           std::to_string(servo.missed_ticks), fixed(share, 4) + " %",
+           std::to_string(servo.missed_ticks), fixed(percent_missed, 4) + " %",
            std::to_string(servo.n_with_missed), fixed(1000 * servo.longest_period, 3) + " ms",
            std::to_string(servo.n_with_faults), std::to_string(servo.n_started_inside),
            fixed(servo.max_force, 2) + " N"});
@@ -228,7 +231,7 @@ class Report {
     }
   }
 
-  /// Escaped line by line: line ends stay.
+  /// Escaped line by line, since escaped() replaces line ends.
   static std::string protocol_lines(std::string_view text) {
     std::string out;
     const bool cut = text.size() > kMostProtocol;
@@ -247,7 +250,7 @@ class Report {
   }
 
   const Analysis& analysis_;
-  const ReportRecord& record_;
+  const StudyRecord& record_;
   std::string label_;
   std::vector<Figure> figures_;
   HtmlPage page_;
@@ -255,7 +258,7 @@ class Report {
 
 }  // namespace
 
-std::string report_html(const Analysis& analysis, const ReportRecord& record) {
+std::string report_html(const Analysis& analysis, const StudyRecord& record) {
   return Report(analysis, record).html();
 }
 

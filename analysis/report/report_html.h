@@ -1,4 +1,5 @@
 #pragma once
+// The HTML report.
 
 #include <string>
 
@@ -7,7 +8,7 @@
 
 namespace palpate::analysis {
 
-/// The analysis as one HTML page (HtmlPage): the answer, figures, tables, and where all comes from.
-std::string report_html(const Analysis& analysis, const ReportRecord& record);
+/// The analysis as one HTML page (HtmlPage): conclusion, warnings, figures, tables and provenance.
+std::string report_html(const Analysis& analysis, const StudyRecord& record);
 
 }  // namespace palpate::analysis

@@ -91,12 +91,12 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   if (const auto coverage = bca_coverage(shape.n_pairs)) {
     bootstrap["coverage"] = *coverage;
     bootstrap["note"] =
-        "So few pairs: an interval that is meant to hold the truth in 95 % holds it in `coverage` "
-        "(simulated, normal differences; the t interval: 95 %).";
+        "Few pairs: `coverage` is that of the 95 % interval (simulated, normal differences; the t "
+        "interval: 95 %).";
   }
 
   Json& dropped = out["dropped_participants"] = Json::array();
-  for (const Dropped& one : shape.dropped) {
+  for (const DroppedParticipant& one : shape.dropped) {
     dropped.push_back(
         {{"participant_id", table.participants[one.participant]}, {"no_time_with", one.renderers}});
   }
@@ -112,8 +112,8 @@ Json paired_shapes(const Comparison& comparison, const TrialTable& table) {
   return out;
 }
 
-/// The first comparison, of ray with point where both are there, under its own key; what it is of
-/// where it is not that; the others with all that there is of them.
+/// paired_by_shape is the first comparison (ray with point if both are in the data); its renderers
+/// are named if it is not ray with point. Further comparisons are in a list, complete.
 void put_comparisons(Json& out, const Analysis& analysis) {
   const TrialTable& table = analysis.table;
   const std::vector<Comparison>& all = analysis.comparisons;
@@ -189,7 +189,7 @@ std::string report_json(const Analysis& analysis) {
                                              {"n_correct_too_fast", lost.n_too_fast},
                                              {"n_used_for_times", lost.n_used}};
   }
-  // Whatever a file held as text stays valid JSON.
+  // Invalid UTF-8 from a file is replaced, so that the JSON is valid.
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+// The JSON report.
 
 #include <string>
 
@@ -6,8 +7,8 @@
 
 namespace palpate::analysis {
 
-/// The analysis as JSON, its keys as in report_json.cpp: numbers read back exactly; an undefined
-/// one is null, beside "status": "undefined" and a "reason".
+/// The analysis as JSON; the keys are described in analysis/README.md. Numbers have 17 significant
+/// digits; an undefined one is null beside "status": "undefined" and a "reason".
 std::string report_json(const Analysis& analysis);
 
 }  // namespace palpate::analysis

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/report/tables.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -14,8 +14,8 @@ namespace palpate::analysis {
 namespace {
 
 constexpr std::size_t kPageWidth = 100;
-constexpr std::size_t kNameColumns = 24;   // of a name in a table
-constexpr std::size_t kValueColumns = 70;  // of a text in the last table
+constexpr std::size_t kNameColumns = 24;   // largest width of a name in a table
+constexpr std::size_t kValueColumns = 70;  // largest width of a text in the provenance table
 
 std::string repeated(const char* what, std::size_t times) {
   std::string out;
@@ -23,7 +23,7 @@ std::string repeated(const char* what, std::size_t times) {
   return out;
 }
 
-/// Paragraph in lines of at most kPageWidth; a word that is longer is cut.
+/// Appends a paragraph in lines of at most kPageWidth columns; a longer word is cut.
 void put_wrapped(std::string& out, const std::string& text, const std::string& indent) {
   const std::size_t room = kPageWidth - indent.size();
   const auto fits = [&](std::string_view line) { return width(line) <= room; };
@@ -32,7 +32,7 @@ void put_wrapped(std::string& out, const std::string& text, const std::string& i
   }
 }
 
-/// Columns first..last-1 with the names in front, of which there are `n_front`.
+/// Appends columns first to last - 1, preceded by the `n_front` columns of names.
 void put_columns(std::string& out, const std::vector<std::vector<std::string>>& rows,
                  const std::vector<std::size_t>& widths, std::size_t first, std::size_t last,
                  std::size_t n_front, std::size_t n_names) {
@@ -51,7 +51,7 @@ void put_columns(std::string& out, const std::vector<std::vector<std::string>>& 
 }
 
 void put_text_table(std::string& out, const Table& table) {
-  const bool text_only = table.n_names == table.header.size();  // its last column may be long
+  const bool text_only = table.n_names == table.header.size();  // its last column is not aligned
   std::vector<std::vector<std::string>> rows{table.header};
   rows.insert(rows.end(), table.rows.begin(), table.rows.end());
   std::vector<std::size_t> widths(table.header.size());
@@ -89,12 +89,12 @@ std::string report_text(const Analysis& analysis) {
     put_wrapped(
         out,
         label + (analysis.table.simulated == Simulated::yes
-                     ? ": every figure below comes from a model of a person, not from people."
-                     : ": the figures below mix a model of a person with people."),
+                     ? ": all numbers below are from a model of a participant, not from humans."
+                     : ": the numbers below mix simulated participants with humans."),
         "  ");
     out += repeated("═", kPageWidth) + "\n\n";
   }
-  put_wrapped(out, answer(analysis), "");
+  put_wrapped(out, conclusion(analysis), "");
   const Counts& counts = analysis.description.counts;
   put_wrapped(out,
               counted(counts.n_participants, "participant", "participants") + ", " +

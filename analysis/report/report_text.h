@@ -1,4 +1,5 @@
 #pragma once
+// The text report.
 
 #include <string>
 
@@ -6,7 +7,7 @@
 
 namespace palpate::analysis {
 
-/// The analysis for a terminal: the answer first, then the tables. UTF-8, lines of at most 100
+/// The analysis for a terminal: the conclusion, then warnings and tables. UTF-8, at most 100
 /// columns; long names are shortened, wide tables are split.
 std::string report_text(const Analysis& analysis);
 

@@ -10,7 +10,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr std::ptrdiff_t kMostListed = 200;  // shapes of a reason
+constexpr std::ptrdiff_t kMostListed = 200;  // shapes in a note
 
 }  // namespace
 
@@ -22,9 +22,9 @@ std::string percent(const std::optional<double>& value, int decimals) {
   return value && std::isfinite(*value) ? fixed(*value, decimals) + " %" : kMissing;
 }
 
-std::optional<double> hundredfold(const std::optional<double>& share) {
-  if (!share) return std::nullopt;
-  return 100 * *share;
+std::optional<double> to_percent(const std::optional<double>& proportion) {
+  if (!proportion) return std::nullopt;
+  return 100 * *proportion;
 }
 
 std::string signed_fixed(double value, int decimals) {
@@ -46,13 +46,13 @@ std::string caption(const Analysis& analysis, const std::string& what) {
   return label.empty() ? what : what + " (" + label + ")";
 }
 
-bool several(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
+bool has_several_comparisons(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
 
 Table comparison_table(const Analysis& analysis, const std::string& what,
                        const std::vector<std::string>& header) {
   Table table;
   table.caption = caption(analysis, what);
-  if (several(analysis)) table.header.emplace_back("renderer");
+  if (has_several_comparisons(analysis)) table.header.emplace_back("renderer");
   table.header.emplace_back("shape");
   table.n_names = table.header.size();
   table.header.insert(table.header.end(), header.begin(), header.end());
@@ -61,13 +61,13 @@ Table comparison_table(const Analysis& analysis, const std::string& what,
 
 std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
                                    const std::string& shape) {
-  if (several(analysis)) return {pair.renderer, shape};
+  if (has_several_comparisons(analysis)) return {pair.renderer, shape};
   return {shape};
 }
 
 std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
                          const std::string& shape) {
-  return several(analysis) ? shape + " (" + pair.renderer + ")" : shape;
+  return has_several_comparisons(analysis) ? shape + " (" + pair.renderer + ")" : shape;
 }
 
 std::string narrow_bootstrap_note(const Analysis& analysis) {
@@ -84,12 +84,10 @@ std::string narrow_bootstrap_note(const Analysis& analysis) {
     text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
             std::to_string(pairs) + " pairs";
   }
-  return "BCa intervals are too short for few participants: instead of 95 % they hold the truth "
-         "in " +
+  return "BCa intervals are too short for few participants: instead of 95 % their coverage is " +
          text +
-         " (simulated, normal differences; the t interval: 95 %). With skewed differences both "
-         "hold it "
-         "less often.";
+         " (simulated, normal differences; the t interval: 95 %). With skewed differences the "
+         "coverage of both is lower.";
 }
 
 void Reasons::add(const std::string& reason, const std::string& shape) {

@@ -1,5 +1,6 @@
 #pragma once
-// The figures of an analysis as rows of text, for whatever writes them down. Not escaped, not cut.
+// The numbers of an analysis as tables of text, which the text and HTML reports print. Cells are
+// not escaped or shortened.
 
 #include <cstddef>
 #include <string>
@@ -9,37 +10,46 @@
 
 namespace palpate::analysis {
 
+/// A table of text cells.
 struct Table {
-  std::string caption;  ///< says so where the data is simulated
+  std::string caption;  ///< with "SIMULATED PARTICIPANTS" where it applies
   std::vector<std::string> header;
-  std::size_t n_names = 1;  ///< leading columns of names; the others hold figures
-  std::vector<std::vector<std::string>> rows;  ///< as long as the header each
-  std::vector<std::string> notes;              ///< below it: what a reader must know
+  std::size_t n_names = 1;  ///< number of leading columns with names; the others hold numbers
+  std::vector<std::vector<std::string>> rows;  ///< each as long as the header
+  std::vector<std::string> notes;              ///< definitions and reasons for missing values
 };
 
-/// Percent reduction per comparison and shape with its interval, beside the paper's.
+/// Percent reduction of response time per comparison and shape with its 95 % t interval, beside the
+/// paper's.
 Table reduction_table(const Analysis& analysis);
-/// The same with time-outs as censored times; without rows where nobody timed out.
+/// Percent reduction with time-outs as censored times; no rows without time-outs.
 Table censored_table(const Analysis& analysis);
-/// Time-outs by cell; without rows where nobody timed out.
+/// Number and percentage of time-outs, limits and the participant with the largest percentage, by
+/// cell.
 Table time_outs_table(const Analysis& analysis);
+/// Response times (s) of correct trials by cell: mean, sd, median and geometric mean over
+/// participants.
 Table times_table(const Analysis& analysis);
+/// Accuracy by cell, with and without time-outs.
 Table accuracy_table(const Analysis& analysis);
-/// Change of accuracy beside the change of time, per comparison: is speed bought with errors?
+/// Change of time and of accuracy, per comparison and shape: speed-accuracy trade-off.
 Table speed_accuracy_table(const Analysis& analysis);
-/// One for each renderer.
+/// Confusion matrix of each renderer.
 std::vector<Table> confusion_tables(const Analysis& analysis);
+/// Paired t-test, effect sizes, Wilcoxon test and bootstrap interval, per comparison and shape.
 Table tests_table(const Analysis& analysis);
+/// Trials excluded from the times, by renderer and reason.
 Table exclusions_table(const Analysis& analysis);
-/// Renderer x shape with the corrections for sphericity.
+/// Repeated-measures ANOVA, renderer x shape, with sphericity corrections.
 Table anova_table(const Analysis& analysis);
-/// Contrasts, variances and how far to trust them.
+/// Contrasts of the mixed model with Satterthwaite tests; standard deviations of the random effects
+/// in a note.
 Table mixed_model_table(const Analysis& analysis);
-/// Log times over the trials with each renderer.
+/// Geometric mean times (s) over eighths of the trials with each renderer; slopes in notes.
 Table learning_table(const Analysis& analysis);
-/// Gains by which renderer came first, per comparison.
+/// Percent reduction by which renderer came first, per comparison.
 Table renderer_order_table(const Analysis& analysis);
-/// What and where from: two columns of text.
+/// Source, protocol, checksums and versions.
 Table provenance_table(const Analysis& analysis);
 
 /// All of them in the order of display.

@@ -12,13 +12,13 @@ namespace palpate::analysis {
 namespace {
 
 constexpr double kMuchExcluded = 0.10;       // of a renderer's trials
-constexpr double kUnequallyExcluded = 0.05;  // difference of the renderers' shares
+constexpr double kUnequallyExcluded = 0.05;  // difference of two renderers' proportions
 constexpr double kManyTimeOuts = 0.05;       // of a cell's trials
-constexpr double kUnequalTimeOuts = 0.025;   // difference of two renderers' shares for a shape
-constexpr double kConcentrated = 1.5;        // a participant's share of a cell's
-constexpr std::size_t kMostNamed = 6;        // shapes or comparisons in a warning
+constexpr double kUnequalTimeOuts = 0.025;   // difference of two renderers' proportions for a shape
+constexpr double kConcentrated = 1.5;        // ratio of a participant's proportion to the cell's
+constexpr std::size_t kMostNamed = 6;        // shapes or comparisons named in a warning
 constexpr double kAlpha = 0.05;
-constexpr double kLongTime = 600;  // s; a mean above it looks like milliseconds
+constexpr double kLongTime = 600;  // s; a longer mean suggests times in milliseconds
 
 Exclusions count_exclusions(const Description& description, std::size_t renderer) {
   Exclusions out;
@@ -36,44 +36,46 @@ Exclusions count_exclusions(const Description& description, std::size_t renderer
 void warn_of_exclusions(Analysis& analysis) {
   const auto& renderers = analysis.table.renderers;
   for (std::size_t r = 0; r < renderers.size(); ++r) {
-    const double share = analysis.exclusions[r].share_excluded();
-    if (share > kMuchExcluded) {
-      analysis.warnings.push_back(fixed(100 * share, 1) + " % of the trials with " + renderers[r] +
+    const double proportion = analysis.exclusions[r].proportion_excluded();
+    if (proportion > kMuchExcluded) {
+      analysis.warnings.push_back(fixed(100 * proportion, 1) + " % of the trials with " +
+                                  renderers[r] +
                                   " are not in the times (wrong, no response or too fast).");
     }
   }
   if (renderers.size() < 2) return;
   const auto [least, most] =
-      std::ranges::minmax_element(analysis.exclusions, {}, &Exclusions::share_excluded);
-  if (most->share_excluded() - least->share_excluded() <= kUnequallyExcluded) return;
-  const auto share = [&](const Exclusions& one) {
-    return fixed(100 * one.share_excluded(), 1) + " % with " +
+      std::ranges::minmax_element(analysis.exclusions, {}, &Exclusions::proportion_excluded);
+  if (most->proportion_excluded() - least->proportion_excluded() <= kUnequallyExcluded) return;
+  const auto proportion = [&](const Exclusions& one) {
+    return fixed(100 * one.proportion_excluded(), 1) + " % with " +
            renderers[static_cast<std::size_t>(&one - analysis.exclusions.data())];
   };
-  analysis.warnings.push_back("Exclusions differ between renderers (" +
-                              share(*std::min(least, most)) + ", " + share(*std::max(least, most)) +
-                              "): the times compare different selections of trials.");
+  analysis.warnings.push_back(
+      "Exclusions differ between renderers (" + proportion(*std::min(least, most)) + ", " +
+      proportion(*std::max(least, most)) + "): the times compare different selections of trials.");
 }
 
 /// "12.2 % with the point (38.2 % of P3's trials)"
 std::string time_outs_with(const Analysis& analysis, std::size_t renderer, std::size_t shape) {
   const TimeOutCell& cell = analysis.time_outs.cells[renderer][shape];
-  std::string text =
-      fixed(100 * cell.share(), 1) + " % with " + the(analysis.table.renderers[renderer]);
-  if (cell.most_in && cell.largest_share > kConcentrated * cell.share()) {
-    text += " (" + fixed(100 * cell.largest_share, 1) + " % in " +
-            analysis.table.participants[*cell.most_in] + ")";
+  std::string text = fixed(100 * cell.proportion(), 1) + " % with " +
+                     with_article(analysis.table.renderers[renderer]);
+  if (cell.most_affected && cell.largest_proportion > kConcentrated * cell.proportion()) {
+    text += " (" + fixed(100 * cell.largest_proportion, 1) + " % in " +
+            analysis.table.participants[*cell.most_affected] + ")";
   }
   return text;
 }
 
-/// What time-outs do to one shape of a comparison; empty where they do little.
+/// Time-outs of one shape of a comparison and their effect on its reduction; empty if few, similar
+/// and without effect.
 std::string time_outs_of(const Analysis& analysis, const Comparison& comparison,
                          std::size_t shape) {
   const std::size_t reference = *comparison.pair.reference_at,
                     renderer = *comparison.pair.renderer_at;
-  const double a = analysis.time_outs.cells[reference][shape].share(),
-               b = analysis.time_outs.cells[renderer][shape].share();
+  const double a = analysis.time_outs.cells[reference][shape].proportion(),
+               b = analysis.time_outs.cells[renderer][shape].proportion();
   if (a + b == 0) return {};
   const CensoredEstimate& censored = comparison.censored[shape];
   const PairedShape& paired = comparison.shapes[shape];
@@ -103,8 +105,8 @@ void warn_of_time_outs(Analysis& analysis) {
       text += "; and " + std::to_string(shapes.size() - kMostNamed) + " shapes more";
     }
     analysis.warnings.push_back(
-        "Time-outs are left out of the times, so that what is slow looks "
-        "faster than it is: " +
+        "Time-outs are excluded from the times, which biases the times of slow "
+        "conditions downwards: " +
         text + ".");
   };
   std::size_t said = 0;
@@ -113,7 +115,7 @@ void warn_of_time_outs(Analysis& analysis) {
     for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
       if (!comparison.pair.in_data()) {
         const std::size_t renderer = comparison.pair.reference_at.value_or(0);
-        if (analysis.time_outs.cells[renderer][s].share() > kManyTimeOuts) {
+        if (analysis.time_outs.cells[renderer][s].proportion() > kManyTimeOuts) {
           shapes.push_back(analysis.table.shapes[s] + " " + time_outs_with(analysis, renderer, s));
         }
       } else if (!comparison.censored.empty()) {
@@ -126,15 +128,15 @@ void warn_of_time_outs(Analysis& analysis) {
   }
 }
 
-/// "P3 (point: cone; ray: every shape)" for each participant without a pair somewhere.
+/// Names each participant without a pair for some shape: "P3 (point: cone; ray: every shape)".
 void warn_of_dropped(Analysis& analysis) {
   const TrialTable& table = analysis.table;
   if (table.renderers.size() < 2) return;
-  // By participant and renderer; a reference without a time is missed in every comparison.
+  // [participant][renderer]: shapes without a time. The reference is the same in every comparison.
   std::map<std::size_t, std::map<std::size_t, std::vector<std::string>>> shapes_of;
   for (std::size_t s = 0; s < table.shapes.size(); ++s) {
     for (const Comparison& comparison : analysis.comparisons) {
-      for (const Dropped& dropped : comparison.shapes[s].dropped) {
+      for (const DroppedParticipant& dropped : comparison.shapes[s].dropped) {
         for (const std::string& renderer : dropped.renderers) {
           auto& shapes = shapes_of[dropped.participant][static_cast<std::size_t>(
               std::ranges::find(table.renderers, renderer) - table.renderers.begin())];
@@ -143,18 +145,18 @@ void warn_of_dropped(Analysis& analysis) {
       }
     }
   }
-  std::vector<std::string> people;
+  std::vector<std::string> participants;
   for (const auto& [participant, renderers] : shapes_of) {
     std::string text;
     for (const auto& [renderer, shapes] : renderers) {
       text += (text.empty() ? "" : "; ") + table.renderers[renderer] + ": " +
               (shapes.size() == table.shapes.size() ? "every shape" : joined(shapes));
     }
-    people.push_back(table.participants[participant] + " (" + text + ")");
+    participants.push_back(table.participants[participant] + " (" + text + ")");
   }
-  if (people.empty()) return;
+  if (participants.empty()) return;
   analysis.warnings.push_back(
-      "Left out of paired comparisons where there is no time: " + joined(people) + ".");
+      "Left out of paired comparisons where there is no time: " + joined(participants) + ".");
 }
 
 void warn_of_times(Analysis& analysis) {
@@ -169,7 +171,7 @@ void warn_of_times(Analysis& analysis) {
   }
 }
 
-/// A gain that practice may have made.
+/// Warns where practice may explain a gain: one order only, or an effect of order.
 void warn_of_practice(Analysis& analysis) {
   for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
     const RendererPair& pair = analysis.comparisons[c].pair;
@@ -180,23 +182,25 @@ void warn_of_practice(Analysis& analysis) {
     if (reference_first + renderer_first > 0 && (reference_first == 0 || renderer_first == 0)) {
       const bool reference = renderer_first == 0;
       analysis.warnings.push_back(
-          "All participants had " + the(reference ? pair.reference : pair.renderer) +
-          (many ? " before " + the(reference ? pair.renderer : pair.reference) : " first") +
-          ": what practice does and what the renderer does cannot be told apart.");
+          "All participants had " + with_article(reference ? pair.reference : pair.renderer) +
+          (many ? " before " + with_article(reference ? pair.renderer : pair.reference)
+                : " first") +
+          ": effects of practice and renderer are confounded.");
     } else if (order.test.p_holm.value_or(1) < kAlpha) {
       analysis.warnings.push_back(
-          (many ? "The gain of " + the(pair.renderer) + " over " + the(pair.reference) +
+          (many ? "The gain of " + with_article(pair.renderer) + " over " +
+                      with_article(pair.reference) +
                       " depends on which of them came first (adjusted p "
                 : "The gain depends on which renderer came first (adjusted p ") +
           p_text(*order.test.p_holm) +
-          "): see practice; the gain with the two orders balanced stands there.");
+          "): see practice for the gain with the two orders balanced.");
     }
   }
 }
 
 }  // namespace
 
-double Exclusions::share_excluded() const {
+double Exclusions::proportion_excluded() const {
   if (n_trials == 0) return 0;
   return static_cast<double>(n_trials - n_used) / static_cast<double>(n_trials);
 }
@@ -209,8 +213,8 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.description = describe(table, settings.too_fast);
   out.time_outs = time_outs(table, out.description);
   out.comparisons = compare_renderers(table, out.description, out.time_outs, settings.seed);
-  out.rm_anova = rm_anova(out.description.people);
-  out.mixed_model = mixed_model(out.description.people, table.renderers, table.shapes);
+  out.rm_anova = rm_anova(out.description.participant_cells);
+  out.mixed_model = mixed_model(out.description.participant_cells, table.renderers, table.shapes);
   out.practice = practice_effects(table, out.description, settings.too_fast);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     out.exclusions.push_back(count_exclusions(out.description, r));
@@ -219,7 +223,7 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.table = std::move(table);
   if (out.table.simulated == Simulated::mixed) {
     out.warnings.push_back(
-        "People and simulated participants are pooled: no conclusion about people.");
+        "Human and simulated participants are pooled: no conclusion about humans.");
   }
   if (out.table.provenance.protocol_sha256.size() > 1) {
     out.warnings.push_back("Trials of " +

@@ -1,5 +1,5 @@
 #pragma once
-// The whole analysis of a study as values; the reports only write it down.
+// The complete analysis of a study as values; reports and figures only present it.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,31 +16,36 @@
 
 namespace palpate::analysis {
 
+/// Choices of the user.
 struct AnalysisSettings {
-  double too_fast = 0.2;      ///< s, > 0; correct answers before it are left out of the times
+  double too_fast =
+      0.2;  ///< s, > 0; correct answers with a shorter time are excluded from the times
   std::uint64_t seed = 2000;  ///< of the bootstrap
 };
 
-/// What a renderer loses on the way from trials to times.
+/// Trials of a renderer that are excluded from the times, by reason: n_trials = n_timeouts +
+/// n_wrong + n_too_fast + n_used.
 struct Exclusions {
   std::size_t n_trials = 0, n_timeouts = 0, n_wrong = 0, n_too_fast = 0, n_used = 0;
-  double share_excluded() const;  ///< of n_trials; 0 without trials
+  double proportion_excluded() const;  ///< of n_trials; 0 without trials
 };
 
+/// All results.
 struct Analysis {
   AnalysisSettings settings;
-  std::string program_version;  ///< of the program that analyses
+  std::string program_version;  ///< of the analysing program
   TrialTable table;
   Description description;
   TimeOuts time_outs;
-  std::vector<Comparison> comparisons;  ///< one at least
+  std::vector<Comparison> comparisons;  ///< at least one
   RmAnova rm_anova;
   MixedModel mixed_model;
   Practice practice;
   std::vector<Exclusions> exclusions;  ///< one for each of table.renderers
-  std::vector<std::string> warnings;   ///< the table's, and what limits the conclusions
+  std::vector<std::string> warnings;   ///< of the table, and limits of the conclusions
 };
 
+/// Runs every analysis on the table. \param program_version is stored as it is
 Analysis analyze(TrialTable table, const AnalysisSettings& settings,
                  const std::string& program_version);
 

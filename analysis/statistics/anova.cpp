@@ -17,11 +17,11 @@ using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
 constexpr double kNoVariance = 1e-10;  // relative to the mean, as for the paired tests
-constexpr double kRounding = 1e-10;    // of epsilons and eigenvalues, relative
+constexpr double kRounding = 1e-10;    // relative, of epsilons and eigenvalues
 
 constexpr const char* kFlat = "no variance: the effect is alike in all participants";
 
-/// Rows of contrasts of `levels`, orthonormal and each summing to 0 (Helmert).
+/// Orthonormal Helmert contrasts of `levels`, one a row, each summing to 0.
 MatrixXd contrasts(Index levels) {
   MatrixXd rows = MatrixXd::Zero(levels - 1, levels);
   for (Index i = 0; i + 1 < levels; ++i) {
@@ -36,7 +36,7 @@ MatrixXd average(Index levels) {
   return MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels)));
 }
 
-/// Scores of each participant on an effect's contrasts, split into their mean and the rest.
+/// Participants' scores on an effect's contrasts, split into their mean and the deviations from it.
 struct Scores {
   RowVectorXd mean;
   MatrixXd rest;  // participants x contrasts
@@ -63,11 +63,11 @@ Scores score(const MatrixXd& cells, const MatrixXd& of_renderer, const MatrixXd&
   return out;
 }
 
-double upper_tail(double f, double num_df, double den_df) {
+double f_upper_tail(double f, double num_df, double den_df) {
   return cdf(complement(boost::math::fisher_f(num_df, den_df), f));
 }
 
-/// Mauchly's W from the eigenvalues of the contrasts' scatter. \param df n - 1
+/// Mauchly's W from the eigenvalues of the contrasts' scatter matrix. \param df n - 1
 void mauchly(const VectorXd& eigenvalues, double df, double n_cells, Sphericity& out) {
   const auto p = static_cast<double>(eigenvalues.size());
   const double log_w =
@@ -103,13 +103,13 @@ Sphericity sphericity(const Scores& scores, double n_cells, const AnovaEffect& e
     out.undefined = effect.undefined;
     return out;
   }
-  // The smaller of the two scatter matrices; both have the same non-zero eigenvalues.
+  // The smaller one of X X' and X'X, which have the same non-zero eigenvalues.
   const bool wide = scores.rest.cols() > scores.rest.rows();
   const MatrixXd scatter = wide ? MatrixXd(scores.rest * scores.rest.transpose())
                                 : MatrixXd(scores.rest.transpose() * scores.rest);
   const double e = std::min(1.0, scatter.trace() * scatter.trace() / (p * scatter.squaredNorm()));
   out.gg_epsilon = e;
-  out.gg_p = upper_tail(*effect.f, *effect.num_df * e, *effect.den_df * e);
+  out.gg_p = f_upper_tail(*effect.f, *effect.num_df * e, *effect.den_df * e);
   if (n - 1 < p) {
     add_reason(out.undefined, "Mauchly's test needs more participants than degrees of freedom");
   } else {
@@ -121,14 +121,14 @@ Sphericity sphericity(const Scores& scores, double n_cells, const AnovaEffect& e
       mauchly(eigenvalues, n - 1, n_cells, out);
     }
   }
-  const double room = n - 1 - p * e;  // never below 0 but for rounding
-  if (room <= kRounding * n) {
+  const double denominator = n - 1 - p * e;  // >= 0 up to rounding
+  if (denominator <= kRounding * n) {
     add_reason(out.undefined, "Huynh and Feldt's epsilon: too few participants");
   } else {
-    out.hf_epsilon_raw = (n * p * e - 2) / (p * room);
+    out.hf_epsilon_raw = (n * p * e - 2) / (p * denominator);
     out.hf_epsilon_used = std::min(1.0, *out.hf_epsilon_raw);
-    out.hf_p = upper_tail(*effect.f, *effect.num_df * *out.hf_epsilon_used,
-                          *effect.den_df * *out.hf_epsilon_used);
+    out.hf_p = f_upper_tail(*effect.f, *effect.num_df * *out.hf_epsilon_used,
+                            *effect.den_df * *out.hf_epsilon_used);
   }
   return out;
 }
@@ -144,9 +144,9 @@ void test(const Scores& scores, double all_error, double n_cells, AnovaEffect& e
     effect.undefined = kFlat;
   } else {
     effect.f = (scores.ss / p) / (scores.ss_error / *effect.den_df);
-    effect.p = upper_tail(*effect.f, p, *effect.den_df);
+    effect.p = f_upper_tail(*effect.f, p, *effect.den_df);
   }
-  // Without any spread at all there is no share of it to speak of.
+  // Eta squared is 0 / 0 without any variance.
   if (std::sqrt((scores.ss + all_error) / n) > kNoVariance) {
     effect.generalized_eta_squared = scores.ss / (scores.ss + all_error);
   }
@@ -155,18 +155,18 @@ void test(const Scores& scores, double all_error, double n_cells, AnovaEffect& e
 
 }  // namespace
 
-RmAnova rm_anova(const People& people) {
+RmAnova rm_anova(const ParticipantCells& participant_cells) {
   RmAnova out;
   constexpr std::array kNames{"renderer", "shape", "renderer:shape"};
   for (std::size_t i = 0; i < kNames.size(); ++i) out.effects[i].name = kNames[i];
-  const std::size_t n_renderers = people.size();
-  const std::size_t n_shapes = n_renderers == 0 ? 0 : people[0].size();
-  const std::size_t n_people = n_shapes == 0 ? 0 : people[0][0].size();
+  const std::size_t n_renderers = participant_cells.size();
+  const std::size_t n_shapes = n_renderers == 0 ? 0 : participant_cells[0].size();
+  const std::size_t n_participants = n_shapes == 0 ? 0 : participant_cells[0][0].size();
   const auto cell = [&](std::size_t p, std::size_t c) -> const ParticipantCell& {
-    return people[c / n_shapes][c % n_shapes][p];
+    return participant_cells[c / n_shapes][c % n_shapes][p];
   };
   std::vector<std::size_t> complete;
-  for (std::size_t p = 0; p < n_people; ++p) {
+  for (std::size_t p = 0; p < n_participants; ++p) {
     bool all = true;
     for (std::size_t c = 0; all && c < n_renderers * n_shapes; ++c) all = cell(p, c).n_used > 0;
     (all ? complete : out.dropped).push_back(p);
@@ -209,7 +209,7 @@ RmAnova rm_anova(const People& people) {
         return !effect.undefined.empty();
       })) {
     out.undefined = kFlat;
-    // A share of what varies, where nothing varies but people, would say 1 of any difference.
+    // Without error variance eta squared would be 1 for any difference.
     for (AnovaEffect& effect : out.effects) effect.generalized_eta_squared.reset();
   }
   return out;

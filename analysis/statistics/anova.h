@@ -1,5 +1,6 @@
 #pragma once
-// Repeated-measures analysis of variance, renderer x shape, on participants' mean log times.
+// Two-way repeated-measures analysis of variance, renderer x shape, on participants' mean log times
+// (natural log of s).
 
 #include <array>
 #include <cstddef>
@@ -11,37 +12,40 @@
 
 namespace palpate::analysis {
 
-/// Departure from sphericity of one effect's contrasts, and what corrects for it.
+/// Test of sphericity of an effect's contrasts, and the corrected p values.
 struct Sphericity {
-  /// Why something is missing; empty: all is there. With one degree of freedom there is nothing to
-  /// test or to correct, and nothing is here.
+  /// Why values are missing; empty: all are defined. With one degree of freedom sphericity holds
+  /// trivially and all are missing.
   std::string undefined;
-  std::optional<double> mauchly_w;  ///< Mauchly (1940)
-  /// From Box's (1949) series to its second order. `mauchly_p` is what R's packages print (afex and
-  /// car: the number of cells stands in one place of that term where Box has the number of
-  /// contrasts), `mauchly_p_box` Box's own.
+  std::optional<double> mauchly_w;  ///< W = det S / (tr S / p)^p; Mauchly (1940)
+  /// By the chi-squared series of Box (1949) to second order. mauchly_p_box: as Box has it;
+  /// mauchly_p: as R's afex and car print it, which have the number of cells once where Box has the
+  /// number of contrasts.
   std::optional<double> mauchly_p, mauchly_p_box;
   std::optional<double> gg_epsilon, gg_p;                       ///< Greenhouse & Geisser (1959)
   std::optional<double> hf_epsilon_raw, hf_epsilon_used, hf_p;  ///< Huynh & Feldt (1976); used <= 1
 };
 
+/// F test of a main effect or the interaction.
 struct AnovaEffect {
   std::string name;       ///< "renderer", "shape", "renderer:shape"
-  std::string undefined;  ///< why F is missing; empty: it is there
+  std::string undefined;  ///< why F is missing; empty: defined
   std::optional<double> num_df, den_df, f, p;
   /// SS / (SS + SS_participants + all three error SS); Olejnik & Algina (2003).
   std::optional<double> generalized_eta_squared;
   Sphericity sphericity;
 };
 
+/// The analysis of variance.
 struct RmAnova {
-  std::string undefined;  ///< why there is no two-way analysis; an effect may stand all the same
+  std::string
+      undefined;  ///< why there is no two-way analysis; single effects may be defined all the same
   std::size_t n_participants_used = 0;
   std::array<AnovaEffect, 3> effects;  ///< renderer, shape, renderer:shape
   std::vector<std::size_t> dropped;    ///< participants without a time in some cell
 };
 
-/// On the participants who have a time in every cell. Any numbers of renderers and shapes.
-RmAnova rm_anova(const People& people);
+/// Analyses the participants with a time in every cell; any numbers of renderers and shapes.
+RmAnova rm_anova(const ParticipantCells& participant_cells);
 
 }  // namespace palpate::analysis

@@ -17,7 +17,7 @@ double normal_quantile(double p) { return quantile(boost::math::normal(), p); }
 /// (Davison & Hinkley 1997, eq. 5.8).
 double resample_quantile(const std::vector<double>& sorted, double p) {
   const double count = static_cast<double>(sorted.size());
-  const double place = (count + 1) * p, whole = std::floor(place);
+  const double position = (count + 1) * p, whole = std::floor(position);
   if (whole < 1) return sorted.front();
   if (whole >= count) return sorted.back();
   const double below = sorted[static_cast<std::size_t>(whole) - 1];
@@ -36,17 +36,18 @@ Bootstrap bca_interval(const std::vector<double>& differences, std::vector<doubl
   const double sd = *standard_deviation(differences);
   std::sort(means.begin(), means.end());
 
-  // Resamples that equal the mean itself (common for few participants) count half on each side;
-  // the tolerance lets sums in another order still be equal.
+  // Resampled means equal to the mean (frequent for few participants) count half on each side; the
+  // tolerance allows for rounding of sums in another order.
   const double tolerance = 1e-12 * std::max(std::fabs(m), sd);
   const auto below = std::lower_bound(means.begin(), means.end(), m - tolerance) - means.begin();
   const auto up_to = std::upper_bound(means.begin(), means.end(), m + tolerance) - means.begin();
-  const double share = static_cast<double>(below + up_to) / (2 * static_cast<double>(means.size()));
-  if (share <= 0 || share >= 1) {
+  const double proportion =
+      static_cast<double>(below + up_to) / (2 * static_cast<double>(means.size()));
+  if (proportion <= 0 || proportion >= 1) {
     out.undefined = "every resample lies on one side of the mean";
     return out;
   }
-  out.bias_correction = normal_quantile(share);
+  out.bias_correction = normal_quantile(proportion);
 
   double squares = 0, cubes = 0;
   for (const double d : differences) {
@@ -68,8 +69,8 @@ Bootstrap bca_interval(const std::vector<double>& differences, std::vector<doubl
 }
 
 std::optional<double> bca_coverage(std::size_t pairs) {
-  // From 2 pairs on; with 2 the interval reaches from one to the other, which holds the mean in
-  // half of all cases. The others: tests/analysis/fixtures/bca_coverage.R, 5,000 studies each.
+  // Element i: i + 2 pairs. With 2 the interval is their range, whose coverage is exactly 1/2; the
+  // others are simulated, 5,000 studies each: tests/analysis/fixtures/bca_coverage.R.
   constexpr std::array kCoverage{0.50, 0.73, 0.79, 0.84, 0.87, 0.88, 0.89, 0.90, 0.90,
                                  0.91, 0.91, 0.91, 0.92, 0.92, 0.92, 0.92, 0.92, 0.92};
   if (pairs < 2 || pairs - 2 >= kCoverage.size()) return std::nullopt;
@@ -79,7 +80,7 @@ std::optional<double> bca_coverage(std::size_t pairs) {
 Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
                          std::size_t resamples) {
   Bootstrap out;
-  const TTest spread = t_test(differences);  // the same cases leave nothing to resample
+  const TTest spread = t_test(differences);  // undefined in the same cases
   if (!spread.undefined.empty()) {
     out.undefined = spread.undefined;
     return out;

@@ -14,11 +14,12 @@ namespace {
 
 constexpr double kLogRoot2Pi = 0.91893853320467274178;
 constexpr int kMostSteps = 100;
-constexpr double kClose = 1e-13;      // of a step's gain in likelihood, relative
-constexpr double kEndless = 1e8;      // 1 / sd of residuals: the times fit without rest
-constexpr double kLongestRatio = 50;  // |log ratio|: no data end there
+constexpr double kClose = 1e-13;      // relative gain in likelihood of a Newton step at convergence
+constexpr double kEndless = 1e8;      // 1 / residual sd: the fit is exact
+constexpr double kLongestRatio = 50;  // |log ratio|: the estimate diverges
 
-/// The upper tail of the standard normal distribution: its log, and the hazard density / tail.
+/// log of the upper tail probability of the standard normal distribution, and its hazard (density /
+/// tail).
 struct Tail {
   double log = 0, hazard = 0;
 };
@@ -28,7 +29,7 @@ Tail upper_tail(double z) {
   Tail tail;
   if (z < 20) {
     tail.log = std::log(0.5 * std::erfc(z / std::sqrt(2.0)));
-  } else {  // erfc would vanish: Abramowitz & Stegun 26.2.12, to 1e-10 from here
+  } else {  // erfc underflows: Abramowitz & Stegun 26.2.12, relative error below 1e-10 from here on
     const double q = 1 / (z * z);
     tail.log =
         log_density - std::log(z) + std::log1p(-q * (1 - q * (3 - q * (15 - q * (105 - 945 * q)))));
@@ -45,11 +46,11 @@ struct Cell {
   bool empty() const { return n == 0 && censored.empty(); }
 };
 
-/// [0]: reference, [1]: renderer.
-using Person = std::array<Cell, 2>;
+/// A participant's cells: [0] reference, [1] renderer.
+using ParticipantData = std::array<Cell, 2>;
 
-/// With Olsen's (1978) parameters the likelihood is concave: precision = 1 / sd, the others times
-/// precision.
+/// Parameters of Olsen (1978), in which the log likelihood is concave: precision = 1 / residual sd;
+/// intercepts and slope (log ratio) are multiplied by it.
 struct Parameters {
   std::vector<double> intercepts;
   double slope = 0, precision = 1;
@@ -61,7 +62,7 @@ struct Curvature {
   double a = 0, b = 0, g = 0, aa = 0, ab = 0, ag = 0, bb = 0, bg = 0, gg = 0;
 };
 
-/// Adds a cell's part. \return its log likelihood
+/// Adds a cell's derivatives. \return its log likelihood
 double add_cell(const Cell& cell, double intercept, const Parameters& at, bool renderer,
                 Curvature& out) {
   const double centre = intercept + (renderer ? at.slope : 0), g = at.precision;
@@ -97,30 +98,30 @@ double add_cell(const Cell& cell, double intercept, const Parameters& at, bool r
   return value;
 }
 
-/// The likelihood and its curvature at one place, a participant at a time.
+/// Log likelihood and its derivatives at given parameters, by participant.
 struct Evaluation {
   double log_likelihood = 0;
-  std::vector<Curvature> people;
+  std::vector<Curvature> participants;
 };
 
-Evaluation evaluate(const std::vector<Person>& people, const Parameters& at) {
+Evaluation evaluate(const std::vector<ParticipantData>& participants, const Parameters& at) {
   Evaluation out;
-  out.people.resize(people.size());
-  for (std::size_t p = 0; p < people.size(); ++p) {
+  out.participants.resize(participants.size());
+  for (std::size_t p = 0; p < participants.size(); ++p) {
     for (const bool renderer : {false, true}) {
-      out.log_likelihood +=
-          add_cell(people[p][renderer ? 1 : 0], at.intercepts[p], at, renderer, out.people[p]);
+      out.log_likelihood += add_cell(participants[p][renderer ? 1 : 0], at.intercepts[p], at,
+                                     renderer, out.participants[p]);
     }
   }
   return out;
 }
 
-/// What is left of slope and precision when every participant's intercept follows them.
+/// Information on slope and precision with the intercepts profiled out (Schur complement).
 struct Reduced {
   double b = 0, g = 0, bb = 0, bg = 0, gg = 0;
 
   double determinant() const { return bb * gg - bg * bg; }
-  /// Solves for slope and precision.
+  /// Newton step of slope and precision.
   std::pair<double, double> solve(double by_b, double by_g) const {
     return {(gg * by_b - bg * by_g) / determinant(), (bb * by_g - bg * by_b) / determinant()};
   }
@@ -128,7 +129,7 @@ struct Reduced {
 
 Reduced reduce(const Evaluation& evaluation) {
   Reduced out;
-  for (const Curvature& c : evaluation.people) {
+  for (const Curvature& c : evaluation.participants) {
     out.b += c.b - c.ab * c.a / c.aa;
     out.g += c.g - c.ag * c.a / c.aa;
     out.bb += c.bb - c.ab * c.ab / c.aa;
@@ -138,12 +139,12 @@ Reduced reduce(const Evaluation& evaluation) {
   return out;
 }
 
-Parameters first_guess(const std::vector<Person>& people) {
+Parameters first_guess(const std::vector<ParticipantData>& participants) {
   double n = 0, squares = 0;
   Parameters out;
-  for (const Person& person : people) {
+  for (const ParticipantData& participant : participants) {
     double weight = 0, sum = 0;
-    for (const Cell& cell : person) {
+    for (const Cell& cell : participant) {
       n += cell.n;
       squares += cell.squares;
       weight += cell.n;
@@ -160,55 +161,57 @@ Parameters first_guess(const std::vector<Person>& people) {
   return out;
 }
 
-/// Newton's method with halved steps where a whole one leads down.
-/// \return why there is no end; empty where there is one
-std::string climb(const std::vector<Person>& people, Parameters& at, Evaluation& here) {
-  at = first_guess(people);
-  here = evaluate(people, at);
+/// Newton's method with step halving. \return why there is no maximum; empty: converged
+std::string maximise_likelihood(const std::vector<ParticipantData>& participants, Parameters& at,
+                                Evaluation& here) {
+  at = first_guess(participants);
+  here = evaluate(participants, at);
   for (int step = 0; step < kMostSteps; ++step) {
     const Reduced reduced = reduce(here);
-    if (!(reduced.determinant() > 0)) return "renderers and participants cannot be told apart";
+    if (!(reduced.determinant() > 0)) return "effects of renderer and participant are confounded";
     const auto [by_slope, by_precision] = reduced.solve(reduced.b, reduced.g);
     double gain = reduced.b * by_slope + reduced.g * by_precision;
     std::vector<double> by_intercept;
-    by_intercept.reserve(people.size());
-    for (const Curvature& c : here.people) {
+    by_intercept.reserve(participants.size());
+    for (const Curvature& c : here.participants) {
       by_intercept.push_back((c.a - c.ab * by_slope - c.ag * by_precision) / c.aa);
       gain += c.a * c.a / c.aa;
     }
     if (gain <= kClose * (1 + std::fabs(here.log_likelihood))) return {};
-    double share = 1;
-    for (;; share /= 2) {
-      if (share < 1e-10) return {};  // nothing is higher: this is the top up to rounding
+    double step_length = 1;
+    for (;; step_length /= 2) {
+      if (step_length < 1e-10)
+        return {};  // no higher value along the step: the maximum up to rounding
       Parameters next = at;
-      next.slope += share * by_slope;
-      next.precision += share * by_precision;
-      for (std::size_t p = 0; p < people.size(); ++p) {
-        next.intercepts[p] += share * by_intercept[p];
+      next.slope += step_length * by_slope;
+      next.precision += step_length * by_precision;
+      for (std::size_t p = 0; p < participants.size(); ++p) {
+        next.intercepts[p] += step_length * by_intercept[p];
       }
       if (!(next.precision > 0)) continue;
-      Evaluation there = evaluate(people, next);
+      Evaluation there = evaluate(participants, next);
       if (!(there.log_likelihood >= here.log_likelihood)) continue;
       at = std::move(next);
       here = std::move(there);
       break;
     }
     if (at.precision > kEndless) return "no variance: the times fit without a residual";
-    if (std::fabs(at.slope / at.precision) > kLongestRatio) return "the difference has no end";
+    if (std::fabs(at.slope / at.precision) > kLongestRatio)
+      return "the estimate of the difference diverges";
   }
-  return "the likelihood has no maximum that can be found";
+  return "the maximum of the likelihood was not found";
 }
 
-void put_errors(const Parameters& at, const Evaluation& top, CensoredEstimate& out) {
-  const Reduced reduced = reduce(top);
-  // log ratio = slope / precision: its derivatives by both.
+void put_errors(const Parameters& at, const Evaluation& maximum, CensoredEstimate& out) {
+  const Reduced reduced = reduce(maximum);
+  // Delta method: derivatives of log ratio = slope / precision.
   const double by_b = 1 / at.precision, by_g = -at.slope / (at.precision * at.precision);
   const auto [weight_b, weight_g] = reduced.solve(by_b, by_g);
   out.se_model = std::sqrt(by_b * weight_b + by_g * weight_g);
-  const auto n = static_cast<double>(top.people.size());
+  const auto n = static_cast<double>(maximum.participants.size());
   double squares = 0;
-  for (const Curvature& c : top.people) {
-    // A participant's scores of the own intercept sum to 0 at the top.
+  for (const Curvature& c : maximum.participants) {
+    // At the maximum the score of each participant's intercept is 0.
     const double influence = weight_b * c.b + weight_g * c.g;
     squares += influence * influence;
   }
@@ -226,47 +229,49 @@ void put_errors(const Parameters& at, const Evaluation& top, CensoredEstimate& o
   out.log_ratio_ci95 = Interval{*out.log_ratio - half, *out.log_ratio + half};
 }
 
-CensoredEstimate estimate(const std::vector<Person>& people, const RendererPair& pair) {
+CensoredEstimate estimate(const std::vector<ParticipantData>& participants,
+                          const RendererPair& pair) {
   CensoredEstimate out;
-  out.n_participants = people.size();
+  out.n_participants = participants.size();
   std::array<double, 2> observed{};
   double limits = 0;
-  for (const Person& person : people) {
+  for (const ParticipantData& participant : participants) {
     for (std::size_t r = 0; r < 2; ++r) {
-      observed[r] += person[r].n;
-      for (const auto& [limit, n] : person[r].censored) limits += n;
+      observed[r] += participant[r].n;
+      for (const auto& [limit, n] : participant[r].censored) limits += n;
     }
   }
   out.n_observed = static_cast<std::size_t>(observed[0] + observed[1]);
   out.n_censored = static_cast<std::size_t>(limits);
-  if (people.empty()) {
+  if (participants.empty()) {
     out.undefined = "no participant has trials with both renderers and a time";
   } else if (observed[0] == 0 || observed[1] == 0) {
-    out.undefined = "no time with " + the(observed[0] == 0 ? pair.reference : pair.renderer) +
+    out.undefined = "no time with " +
+                    with_article(observed[0] == 0 ? pair.reference : pair.renderer) +
                     ": how much longer than the limit its trials take is not known";
   }
   if (!out.undefined.empty()) return out;
   Parameters at;
-  Evaluation top;
-  out.undefined = climb(people, at, top);
+  Evaluation maximum;
+  out.undefined = maximise_likelihood(participants, at, maximum);
   if (!out.undefined.empty()) return out;
   out.log_ratio = at.slope / at.precision;
   out.residual_sd = 1 / at.precision;
-  out.log_likelihood = top.log_likelihood;
-  put_errors(at, top, out);
+  out.log_likelihood = maximum.log_likelihood;
+  put_errors(at, maximum, out);
   return out;
 }
 
 CensoredEstimate estimate_shape(const Description& description, const TimeOuts& time_outs,
                                 const RendererPair& pair, std::size_t shape) {
   const std::array<std::size_t, 2> renderers{*pair.reference_at, *pair.renderer_at};
-  std::vector<Person> all(description.people[0][shape].size());
+  std::vector<ParticipantData> all(description.participant_cells[0][shape].size());
   for (std::size_t r = 0; r < 2; ++r) {
     for (std::size_t p = 0; p < all.size(); ++p) {
-      const ParticipantCell& cell = description.people[renderers[r]][shape][p];
+      const ParticipantCell& cell = description.participant_cells[renderers[r]][shape][p];
       all[p][r].n = static_cast<double>(cell.n_used);
       all[p][r].mean = cell.mean_log;
-      all[p][r].squares = cell.squares_log;
+      all[p][r].squares = cell.sum_of_squares_log;
     }
     for (const TimeOutGroup& group : time_outs.cells[renderers[r]][shape].groups) {
       if (!group.has_limit()) {
@@ -278,8 +283,9 @@ CensoredEstimate estimate_shape(const Description& description, const TimeOuts& 
                                                       static_cast<double>(group.n));
     }
   }
-  std::erase_if(all, [](const Person& person) {
-    return person[0].empty() || person[1].empty() || person[0].n + person[1].n == 0;
+  std::erase_if(all, [](const ParticipantData& participant) {
+    return participant[0].empty() || participant[1].empty() ||
+           participant[0].n + participant[1].n == 0;
   });
   return estimate(all, pair);
 }
@@ -296,7 +302,7 @@ std::vector<CensoredEstimate> censored_by_shape(const Description& description,
   };
   if (!timed_out(*pair.reference_at) && !timed_out(*pair.renderer_at)) return {};
   std::vector<CensoredEstimate> out;
-  const std::size_t n_shapes = description.people[0].size();
+  const std::size_t n_shapes = description.participant_cells[0].size();
   out.reserve(n_shapes);
   for (std::size_t s = 0; s < n_shapes; ++s) {
     out.push_back(estimate_shape(description, time_outs, pair, s));

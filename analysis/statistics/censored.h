@@ -1,6 +1,6 @@
 #pragma once
-// What a renderer gains when a time-out counts as what it is, a time longer than the limit. Leaving
-// time-outs out makes a slow renderer look faster than it is.
+// Log-normal regression with time-outs as right-censored times (longer than the limit). Excluding
+// time-outs instead biases the times of a slow renderer downwards.
 
 #include <cstddef>
 #include <optional>
@@ -14,25 +14,25 @@
 
 namespace palpate::analysis {
 
-/// Of one shape: log T = participant + log_ratio [with the renderer] + residual_sd N(0, 1), by
-/// maximum likelihood; correct answers as the times use them, time-outs censored at their limit,
-/// wrong answers left out. Participants: those with trials of both renderers (of these two kinds)
-/// and one time at least.
+/// Estimate for one shape: log T = intercept of the participant + log_ratio (with the renderer) +
+/// residual_sd N(0, 1), by maximum likelihood. Observed: the correct answers that the times use;
+/// censored at their limit: time-outs; wrong answers are excluded. Participants have such trials
+/// with both renderers and at least one observed time.
 struct CensoredEstimate {
-  std::string undefined;
+  std::string undefined;  ///< why values are missing; empty: all are defined
   std::size_t n_participants = 0, n_observed = 0, n_censored = 0;
   std::optional<double> log_ratio, residual_sd;
-  std::optional<double> log_likelihood;  ///< of the times themselves, not their logs
-  /// From the curvature: what holds where all participants gain alike.
+  std::optional<double> log_likelihood;  ///< of the times, not of their logs
+  /// From the observed information: valid if all participants have the same gain.
   std::optional<double> se_model;
-  /// From the scores summed by participant (Liang & Zeger 1986) times sqrt(n / (n - 1)), so that it
-  /// has the spread of participants' gains in it: with equally many trials in all cells and no
-  /// time-out it is the paired t-test's.
+  /// Cluster-robust (sandwich) standard error with participants as clusters (Liang & Zeger 1986)
+  /// times sqrt(n / (n - 1)): allows participants' gains to vary. With equal numbers of trials in
+  /// all cells and no time-out it equals that of the paired t-test.
   std::optional<double> se_log_ratio, df;
   std::optional<Interval> log_ratio_ci95;  ///< by t with df = n_participants - 1
 };
 
-/// One for each shape. Where nobody timed out with either renderer: none at all.
+/// One estimate for each shape; empty without any time-out with the two renderers.
 std::vector<CensoredEstimate> censored_by_shape(const Description& description,
                                                 const TimeOuts& time_outs,
                                                 const RendererPair& pair);

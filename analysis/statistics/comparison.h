@@ -1,5 +1,5 @@
 #pragma once
-// A renderer against the reference, shape by shape.
+// All comparisons of a renderer with the reference, shape by shape.
 
 #include <cstdint>
 #include <vector>
@@ -14,14 +14,15 @@
 
 namespace palpate::analysis {
 
+/// Results of one pair of renderers.
 struct Comparison {
   RendererPair pair;
   std::vector<PairedShape> shapes;            ///< one for each of table.shapes
   std::vector<SpeedAccuracy> speed_accuracy;  ///< likewise
-  std::vector<CensoredEstimate> censored;     ///< likewise, or none: nobody timed out
+  std::vector<CensoredEstimate> censored;     ///< likewise; empty without time-outs
 };
 
-/// One for each of renderer_pairs(). Holm's adjustment is over all shapes of all comparisons.
+/// Compares each of renderer_pairs(). Holm's adjustment is over all shapes of all comparisons.
 /// \param seed of the bootstrap
 std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
                                           const TimeOuts& time_outs, std::uint64_t seed);

@@ -8,7 +8,7 @@ namespace palpate::analysis {
 
 namespace {
 
-std::optional<double> share(std::size_t part, std::size_t whole) {
+std::optional<double> proportion(std::size_t part, std::size_t whole) {
   if (whole == 0) return std::nullopt;
   return static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -17,19 +17,20 @@ bool used_for_times(const TrialRow& row, double too_fast) {
   return row.correct && row.answer >= 0 && row.response_time >= too_fast;
 }
 
-/// The rows that times use, sorted by cell and participant in one pass: times[start[c]] and on.
+/// Response times that the times use, by cell and participant (counting sort): those of c begin at
+/// times[start[c]].
 struct Buckets {
   std::vector<std::size_t> start;
   std::vector<double> times;
 };
 
 Buckets sort_times(const TrialTable& table, double too_fast) {
-  const std::size_t n_shapes = table.shapes.size(), n_people = table.participants.size();
+  const std::size_t n_shapes = table.shapes.size(), n_participants = table.participants.size();
   const auto cell = [&](const TrialRow& row) {
-    return (row.renderer * n_shapes + row.shape) * n_people + row.participant;
+    return (row.renderer * n_shapes + row.shape) * n_participants + row.participant;
   };
   Buckets buckets;
-  buckets.start.resize(table.renderers.size() * n_shapes * n_people + 1);
+  buckets.start.resize(table.renderers.size() * n_shapes * n_participants + 1);
   for (const TrialRow& row : table.rows) {
     if (used_for_times(row, too_fast)) ++buckets.start[cell(row) + 1];
   }
@@ -43,7 +44,7 @@ Buckets sort_times(const TrialTable& table, double too_fast) {
 }
 
 /// Turns the times into their logs.
-void describe_person(std::vector<double>& times, ParticipantCell& cell) {
+void describe_participant(std::vector<double>& times, ParticipantCell& cell) {
   cell.n_used = times.size();
   if (times.empty()) return;
   cell.mean = mean(times);
@@ -52,19 +53,19 @@ void describe_person(std::vector<double>& times, ParticipantCell& cell) {
   for (double& time : times) logs += time = std::log(time);
   cell.mean_log = logs / static_cast<double>(times.size());
   for (const double log : times) {
-    cell.squares_log += (log - cell.mean_log) * (log - cell.mean_log);
+    cell.sum_of_squares_log += (log - cell.mean_log) * (log - cell.mean_log);
   }
 }
 
-TimesCell describe_times(const std::vector<ParticipantCell>& people) {
+TimesCell describe_times(const std::vector<ParticipantCell>& participants) {
   TimesCell cell;
   std::vector<double> means, medians, logs;
-  for (const ParticipantCell& person : people) {
-    if (person.n_used == 0) continue;
-    cell.n_trials += person.n_used;
-    means.push_back(person.mean);
-    medians.push_back(person.median);
-    logs.push_back(person.mean_log);
+  for (const ParticipantCell& participant : participants) {
+    if (participant.n_used == 0) continue;
+    cell.n_trials += participant.n_used;
+    means.push_back(participant.mean);
+    medians.push_back(participant.median);
+    logs.push_back(participant.mean_log);
   }
   cell.n_participants = means.size();
   if (means.empty()) return cell;
@@ -77,12 +78,12 @@ TimesCell describe_times(const std::vector<ParticipantCell>& people) {
   return cell;
 }
 
-void finish_accuracy(const std::vector<ParticipantCell>& people, AccuracyCell& cell) {
-  cell.accuracy = share(cell.n_correct, cell.n_trials);
-  cell.accuracy_answered = share(cell.n_correct, cell.n_trials - cell.n_timeouts);
+void finish_accuracy(const std::vector<ParticipantCell>& participants, AccuracyCell& cell) {
+  cell.accuracy = proportion(cell.n_correct, cell.n_trials);
+  cell.accuracy_answered = proportion(cell.n_correct, cell.n_trials - cell.n_timeouts);
   std::vector<double> accuracies;
-  for (const ParticipantCell& person : people) {
-    if (const auto accuracy = share(person.n_correct, person.n_trials)) {
+  for (const ParticipantCell& participant : participants) {
+    if (const auto accuracy = proportion(participant.n_correct, participant.n_trials)) {
       accuracies.push_back(*accuracy);
     }
   }
@@ -112,24 +113,25 @@ double median(std::vector<double>& values) {
 
 Description describe(const TrialTable& table, double too_fast) {
   const std::size_t n_renderers = table.renderers.size(), n_shapes = table.shapes.size(),
-                    n_people = table.participants.size(), n_answers = table.answers.size();
+                    n_participants = table.participants.size(), n_answers = table.answers.size();
   Description out;
   out.accuracy.assign(n_renderers, std::vector<AccuracyCell>(n_shapes));
   out.times.assign(n_renderers, std::vector<TimesCell>(n_shapes));
   out.confusion.assign(n_renderers, std::vector<std::vector<std::size_t>>(
                                         n_shapes, std::vector<std::size_t>(n_answers + 1)));
-  out.people.assign(n_renderers, std::vector<std::vector<ParticipantCell>>(
-                                     n_shapes, std::vector<ParticipantCell>(n_people)));
+  out.participant_cells.assign(n_renderers,
+                               std::vector<std::vector<ParticipantCell>>(
+                                   n_shapes, std::vector<ParticipantCell>(n_participants)));
 
   for (const TrialRow& row : table.rows) {
     AccuracyCell& cell = out.accuracy[row.renderer][row.shape];
-    ParticipantCell& person = out.people[row.renderer][row.shape][row.participant];
+    ParticipantCell& participant = out.participant_cells[row.renderer][row.shape][row.participant];
     const bool answered = row.answer >= 0 && !row.timed_out;
     const bool fast = answered && row.response_time < too_fast;
     ++cell.n_trials;
-    ++person.n_trials;
+    ++participant.n_trials;
     cell.n_correct += row.correct;
-    person.n_correct += row.correct;
+    participant.n_correct += row.correct;
     cell.n_timeouts += row.timed_out;
     cell.n_too_fast += fast;
     cell.n_correct_too_fast += fast && row.correct;
@@ -142,16 +144,16 @@ Description describe(const TrialTable& table, double too_fast) {
   std::size_t bucket = 0;
   for (std::size_t r = 0; r < n_renderers; ++r) {
     for (std::size_t s = 0; s < n_shapes; ++s) {
-      for (std::size_t p = 0; p < n_people; ++p, ++bucket) {
+      for (std::size_t p = 0; p < n_participants; ++p, ++bucket) {
         const auto at = [&](std::size_t i) {
           return buckets.times.begin() + static_cast<std::ptrdiff_t>(buckets.start[i]);
         };
         times.assign(at(bucket), at(bucket + 1));
-        describe_person(times, out.people[r][s][p]);
+        describe_participant(times, out.participant_cells[r][s][p]);
       }
       AccuracyCell& cell = out.accuracy[r][s];
-      finish_accuracy(out.people[r][s], cell);
-      out.times[r][s] = describe_times(out.people[r][s]);
+      finish_accuracy(out.participant_cells[r][s], cell);
+      out.times[r][s] = describe_times(out.participant_cells[r][s]);
       out.counts.n_trials += cell.n_trials;
       out.counts.n_correct += cell.n_correct;
       out.counts.n_timeouts += cell.n_timeouts;
@@ -159,8 +161,8 @@ Description describe(const TrialTable& table, double too_fast) {
       out.counts.n_used_for_times += out.times[r][s].n_trials;
     }
   }
-  out.counts.n_participants = n_people;
-  out.counts.accuracy = share(out.counts.n_correct, out.counts.n_trials);
+  out.counts.n_participants = n_participants;
+  out.counts.accuracy = proportion(out.counts.n_correct, out.counts.n_trials);
   return out;
 }
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "analysis/statistics/reml.h"
-#include "analysis/statistics/reml_data.h"
+#include "analysis/statistics/reml_reduction.h"
 
 namespace palpate::analysis {
 
@@ -19,14 +19,14 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kMaxModelRenderers = 8;
 
-/// Of one evaluation of the criterion's derivatives: a product of matrices as large as there are
-/// cells for each parameter of the participants' covariance.
+/// Cost of one evaluation of the derivatives: a product of cells x cells matrices for each
+/// parameter of the random effects' covariance.
 double model_work(std::size_t renderers, Index cells) {
   const auto q = static_cast<double>(renderers), n = static_cast<double>(cells);
   return q * (q + 1) / 2 * n * n * n;
 }
 
-/// Treatment coding: its columns in R's order, each as values at the non-empty cells.
+/// Treatment coding: columns in R's order, as values at the non-empty cells.
 struct Columns {
   std::vector<std::string> names, left_out;
   MatrixXd values;  ///< cells x columns, square
@@ -48,7 +48,7 @@ Columns treatment_columns(const ModelCells& cells, const std::vector<std::string
         }
       }
     }
-    // As R does: a column that follows from those before it is left out.
+    // As in R, a column that depends linearly on those before it is left out.
     VectorXd rest = column;
     for (int again = 0; again < 2; ++again) {
       const VectorXd known = basis.leftCols(rank).transpose() * rest;
@@ -77,7 +77,7 @@ Columns treatment_columns(const ModelCells& cells, const std::vector<std::string
   return out;
 }
 
-/// Inverse of the full Hessian, without the directions in which the criterion is flat.
+/// Pseudo-inverse of the full Hessian: without directions of zero curvature.
 MatrixXd inverse_of_curved(const MatrixXd& hessian) {
   const VectorXd scale =
       hessian.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
@@ -89,21 +89,21 @@ MatrixXd inverse_of_curved(const MatrixXd& hessian) {
          eigen.eigenvectors().transpose() * scale.asDiagonal();
 }
 
-/// Estimates and tests linear functions of the cells' means.
+/// Estimates and tests linear combinations of the cell means.
 class Tester {
  public:
-  Tester(const ModelData& data, const RemlPoint& point)
+  Tester(const ReducedModel& data, const RemlPoint& point)
       : data_(data),
         point_(point),
         means_(data.cell_means(point.beta)),
         spread_(2 * inverse_of_curved(point.full_hessian)) {}
 
-  /// Satterthwaite (1946) as in lmerTest (Kuznetsova et al. 2017): the variance's own variance by
-  /// the delta method from the curvature of the likelihood in (theta, sigma).
+  /// Degrees of freedom of Satterthwaite (1946) as in lmerTest (Kuznetsova et al. 2017): 2 v^2 /
+  /// var(v), with var(v) by the delta method from the Hessian of the deviance in (theta, sigma).
   ModelEstimate operator()(const VectorXd& weights) const {
     ModelEstimate out;
     out.estimate = weights.dot(means_);
-    const ModelData::Loading load = data_.load(weights);
+    const ReducedModel::Loading load = data_.load(weights);
     const VectorXd loaded = point_.inverse_xx * load.inside;
     const double variance = point_.sigma_squared * (load.inside.dot(loaded) + load.outside);
     out.se = std::sqrt(variance);
@@ -135,7 +135,7 @@ class Tester {
   }
 
  private:
-  const ModelData& data_;
+  const ReducedModel& data_;
   const RemlPoint& point_;
   VectorXd means_;
   MatrixXd spread_;
@@ -182,13 +182,13 @@ void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& r
   }
 }
 
-std::string why_no_fit(const People& people, const ModelCells& cells) {
-  if (people.size() < 2) return "only one renderer in the data";
+std::string why_no_fit(const ParticipantCells& participant_cells, const ModelCells& cells) {
+  if (participant_cells.size() < 2) return "only one renderer in the data";
   if (cells.n == 0) return "no trial can be used for times";
-  if (cells.renderers.size() < people.size())
+  if (cells.renderers.size() < participant_cells.size())
     return "no trial with one of the renderers can be used for times";
-  if (people.size() > kMaxModelRenderers ||
-      model_work(people.size(), cells.n) > model_work(2, 400)) {
+  if (participant_cells.size() > kMaxModelRenderers ||
+      model_work(participant_cells.size(), cells.n) > model_work(2, 400)) {
     return "too many renderers and shapes for this model";
   }
   return {};
@@ -196,11 +196,12 @@ std::string why_no_fit(const People& people, const ModelCells& cells) {
 
 }  // namespace
 
-MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
+MixedModel mixed_model(const ParticipantCells& participant_cells,
+                       const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes) {
   MixedModel out;
-  const ModelCells cells = model_cells(people);
-  for (const auto& renderer : people) {
+  const ModelCells cells = model_cells(participant_cells);
+  for (const auto& renderer : participant_cells) {
     for (const auto& shape : renderer) {
       for (const ParticipantCell& cell : shape) out.n_observations += cell.n_used;
     }
@@ -208,36 +209,37 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
   ModelEstimate nothing;
   const auto refuse = [&](const std::string& reason) {
     out.undefined = nothing.undefined = reason;
-    out.contrasts.assign(std::max<std::size_t>(people.size(), 2) - 1,
+    out.contrasts.assign(std::max<std::size_t>(participant_cells.size(), 2) - 1,
                          std::vector<ModelEstimate>(shapes.size(), nothing));
     return out;
   };
-  if (const std::string reason = why_no_fit(people, cells); !reason.empty()) return refuse(reason);
-  const ModelData prepared(people, cells);
+  if (const std::string reason = why_no_fit(participant_cells, cells); !reason.empty())
+    return refuse(reason);
+  const ReducedModel prepared(participant_cells, cells);
   out.n_participants = prepared.data.groups.size();
   if (out.n_participants < 2) return refuse("one participant cannot tell chance from effect");
   if (!prepared.shared) {
-    return refuse(people.size() == 2
+    return refuse(participant_cells.size() == 2
                       ? "no participant has times for both renderers"
                       : "two of the renderers have no participant with times for both");
   }
-  if (prepared.freedom < 1) {
+  if (prepared.degrees_of_freedom < 1) {
     return refuse("too few trials: none is left to tell the residual variance");
   }
-  if (std::sqrt(prepared.least_square / prepared.freedom) <=
+  if (std::sqrt(prepared.least_square / prepared.degrees_of_freedom) <=
       1e-10 * std::max(1.0, prepared.scale)) {
     return refuse("no residual variance: participants and shapes explain every time");
   }
 
-  const auto q = static_cast<Index>(people.size());
+  const auto q = static_cast<Index>(participant_cells.size());
   MatrixXd coding = MatrixXd::Identity(q, q);
   coding.col(0).setOnes();
   const RemlOptimum optimum = reml_optimum(prepared.data, coding);
   if (!optimum.converged) return refuse("the fit did not converge");
 
   const Columns columns = treatment_columns(cells, renderers, shapes);
-  // Incidences of a graph and unit vectors: the determinant is 1 or -1, and nothing of it is in the
-  // likelihood.
+  // The change of basis has determinant 1 or -1 (incidence matrix and unit vectors), so the
+  // likelihood is unchanged.
   const MatrixXd from_cells = columns.values.inverse();
   out.log_likelihood_reml = -(optimum.point.deviance + prepared.log_determinant()) / 2;
   out.left_out = columns.left_out;
@@ -250,7 +252,7 @@ MixedModel mixed_model(const People& people, const std::vector<std::string>& ren
   }
   nothing.undefined = "no trial of one of the renderers can be used for times";
   std::vector<std::optional<double>> p;
-  for (std::size_t r = 1; r < people.size(); ++r) {
+  for (std::size_t r = 1; r < participant_cells.size(); ++r) {
     std::vector<ModelEstimate> contrasts(shapes.size(), nothing);
     for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
       const Index first = cells.column[0][s], other = cells.column[r][s];

@@ -1,5 +1,7 @@
 #pragma once
-// log(response_time) ~ renderer * shape + (1 + renderer | participant), by REML.
+// Linear mixed model log(response_time) ~ renderer * shape + (1 + renderer | participant) by
+// restricted maximum likelihood (REML), as R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova et
+// al. 2017).
 
 #include <cstddef>
 #include <optional>
@@ -11,44 +13,49 @@
 
 namespace palpate::analysis {
 
-/// One coefficient or contrast with Satterthwaite's degrees of freedom. Natural log of seconds.
+/// Estimate and test of a coefficient or contrast (natural log of s) with Satterthwaite's degrees
+/// of freedom.
 struct ModelEstimate {
-  std::string undefined;  ///< why it cannot be estimated, or tested; empty: all is there
+  std::string undefined;  ///< why values are missing; empty: all are defined
   std::optional<double> estimate, se, df_satterthwaite, t, p;
   std::optional<Interval> ci95;
-  std::optional<double> p_holm;  ///< contrasts only: over all of them
+  std::optional<double> p_holm;  ///< contrasts only: adjusted over all contrasts
 };
 
+/// A fixed effect in treatment coding.
 struct FixedEffect {
   std::string name;  ///< as R prints it: "(Intercept)", "rendererray", "rendererray:shapecone"
   ModelEstimate value;
 };
 
+/// The fitted model.
 struct MixedModel {
-  std::string undefined;  ///< why there is no fit; empty: there is
-  std::string singular;   ///< what lies on the boundary of the parameter space; empty: nothing
+  std::string undefined;  ///< why there is no fit; empty: fitted
+  std::string
+      singular;  ///< which parameters lie on the boundary of the parameter space; empty: none
   std::size_t n_observations = 0, n_participants = 0;
   std::optional<double> log_likelihood_reml;
-  /// Treatment coding, first renderer and first shape as reference. Those of `left_out` are not
-  /// among them.
+  /// Treatment coding with the first renderer and the first shape as reference levels; without
+  /// those of `left_out`.
   std::vector<FixedEffect> fixed_effects;
-  std::vector<std::string> left_out;  ///< coefficients that empty cells leave without an estimate
+  std::vector<std::string>
+      left_out;  ///< coefficients that cannot be estimated because of empty cells
   std::optional<double> residual_sd;
-  /// Of the participants' intercept, then of the slope of each further renderer.
+  /// Standard deviations of participants' intercepts and of the slopes of each further renderer.
   std::vector<double> random_sds;
-  /// Correlations of them, row by row below the diagonal; none where an sd is 0.
+  /// Their correlations, below the diagonal by rows; none where a standard deviation is 0.
   std::vector<std::optional<double>> random_correlations;
-  /// [renderer - 1][shape]: each further renderer minus the first. With point and ray:
-  /// contrasts[0].
+  /// [renderer - 1][shape]: each further renderer minus the first.
   std::vector<std::vector<ModelEstimate>> contrasts;
 };
 
-/// The true optimum of the REML criterion: Newton's method with exact derivatives from several
-/// starts, on the boundary with the Karush-Kuhn-Tucker condition checked.
-/// Refuses what would take hours: more than 8 renderers, or so many shapes with them that their
-/// cells' matrices are larger than those of 200 shapes with two renderers.
-/// \param people as describe() gives it; \param renderers, shapes names of the levels
-MixedModel mixed_model(const People& people, const std::vector<std::string>& renderers,
+/// Fits the model: global optimum of the REML criterion by Newton's method with exact derivatives
+/// from several starting values; on the boundary the Karush-Kuhn-Tucker conditions are checked. Not
+/// fitted (would take hours): more than 8 renderers, or more work than 200 shapes with two
+/// renderers. \param participant_cells as of describe() \param renderers, shapes names of the
+/// levels
+MixedModel mixed_model(const ParticipantCells& participant_cells,
+                       const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes);
 
 }  // namespace palpate::analysis

@@ -15,12 +15,12 @@ namespace palpate::analysis {
 namespace {
 
 constexpr std::size_t kManyPairs =
-    1000;  // from here a bootstrap takes longer than a thread's start
+    1000;  // pairs from which bootstraps run in parallel: they outweigh the start of a thread
 constexpr const char* kOnePair = "one participant cannot tell chance from effect";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
 constexpr const char* kAllAlike = "no variance: all differences are alike";
 
-/// Why differences do not allow inference; empty where they do.
+/// Why inference from these differences is impossible; empty: possible.
 std::string no_inference(const std::vector<double>& differences) {
   if (differences.empty()) return kNoPairs;
   if (differences.size() == 1) return kOnePair;
@@ -104,14 +104,16 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
     std::vector<double> references, others;
     for (std::size_t p = 0; p < table.participants.size(); ++p) {
       const ParticipantCell nothing;
-      const auto& a = pair.reference_at ? description.people[*pair.reference_at][s][p] : nothing;
-      const auto& b = pair.renderer_at ? description.people[*pair.renderer_at][s][p] : nothing;
+      const auto& a =
+          pair.reference_at ? description.participant_cells[*pair.reference_at][s][p] : nothing;
+      const auto& b =
+          pair.renderer_at ? description.participant_cells[*pair.renderer_at][s][p] : nothing;
       if (a.n_used > 0 && b.n_used > 0) {
         shape.differences.push_back(b.mean_log - a.mean_log);
         references.push_back(a.mean);
         others.push_back(b.mean);
       } else if (a.n_trials + b.n_trials > 0) {
-        Dropped dropped{p, {}};
+        DroppedParticipant dropped{p, {}};
         if (a.n_used == 0) dropped.renderers.push_back(pair.reference);
         if (b.n_used == 0) dropped.renderers.push_back(pair.renderer);
         shape.dropped.push_back(std::move(dropped));
@@ -136,7 +138,7 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
 
 void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed) {
   std::atomic<std::size_t> next{0};
-  // Streams of their own: threads change nothing but the time it takes.
+  // A random stream for each: the result does not depend on the number of threads.
   const auto work = [&] {
     for (std::size_t i = next++; i < tests.size(); i = next++) {
       stimuli::Random random(seed, {i});

@@ -1,7 +1,8 @@
 #pragma once
-// Is a shape identified faster with one renderer than with another? Differences over participants,
-// always renderer minus reference (ray minus point) on the natural log scale: negative when the
-// renderer is faster. Percent reductions are then positive.
+// Paired comparison of two renderers, shape by shape. Differences are participants' mean log times
+// with the renderer minus with the reference (ray minus point), natural logs: negative if the
+// renderer is faster. The percent reduction of a mean difference m is 100 (1 - exp m): positive if
+// the renderer is faster.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,26 +20,28 @@ class Random;
 
 namespace palpate::analysis {
 
-/// Ends of a 95 % interval. Of log ratios, or of the percent reductions they stand for.
+/// 95 % confidence interval, of log ratios or of percent reductions.
 struct Interval {
   double low = 0, high = 0;
 };
 
 /// 100 (1 - exp m), in percent.
 double percent_reduction(double log_ratio);
-/// The same interval as percent reductions: the ends swap.
+/// The interval as percent reductions; low and high swap.
 Interval percent_reduction(const Interval& log_ratio);
 
-/// In each of these `undefined` says in words why something is missing; empty: all is there.
+/// Result of a t-test. Here and below `undefined` is the reason for missing values; empty: all are
+/// defined.
 struct TTest {
   std::string undefined;
-  std::optional<double> sd, se, t, df, p;  ///< p two-sided
+  std::optional<double> sd, se, t, df, p;  ///< p is two-sided
   std::optional<Interval> log_ratio_ci95;
-  std::optional<double> p_holm;  ///< over the shapes and comparisons with a p
+  std::optional<double> p_holm;  ///< Holm-adjusted over all shapes and comparisons with a p
 };
-/// Student's paired t-test on differences.
+/// Student's t-test of differences against 0: t = mean / (sd / sqrt(n)), df = n - 1.
 TTest t_test(const std::vector<double>& differences);
 
+/// Standardised mean difference of pairs.
 struct EffectSize {
   std::string undefined;
   std::optional<double> dz, hedges_gz;
@@ -46,64 +49,68 @@ struct EffectSize {
 /// dz = mean / sd; Hedges' gz = J dz, J exact (Hedges 1981, eq. 6e).
 EffectSize effect_size(const std::vector<double>& differences);
 
+/// Result of the signed-rank test.
 struct Wilcoxon {
   std::string undefined;
   std::size_t n_nonzero = 0;
-  std::optional<double> positive_rank_sum;  ///< V
+  std::optional<double> positive_rank_sum;  ///< V, as R names it
   std::optional<double> p;                  ///< two-sided
   bool exact = true;                        ///< false: normal approximation, beyond kExactWilcoxon
 };
-/// Pairs up to which Wilcoxon's p is exact.
+/// Largest number of pairs with an exact Wilcoxon p.
 constexpr std::size_t kExactWilcoxon = 500;
-/// Signed-rank test: zeros dropped, midranks for ties, p from all 2^n signs. Differences that
-/// agree up to rounding (1e-10) are ties, as they are zeros.
+/// Wilcoxon signed-rank test: zeros dropped, midranks for ties, exact p from the distribution over
+/// all 2^n signs. Differences within rounding (1e-10) of each other are ties, of 0 are zeros.
 Wilcoxon wilcoxon(const std::vector<double>& differences);
 
+/// BCa bootstrap interval of a mean.
 struct Bootstrap {
   std::string undefined;
   std::size_t resamples = 0;
   std::uint64_t seed = 0;
-  std::optional<double> bias_correction, acceleration;  ///< z0 and a
+  std::optional<double> bias_correction, acceleration;  ///< z0 and a of Efron (1987)
   std::optional<Interval> log_ratio_ci95;
 };
 constexpr std::size_t kResamples = 9999;
-/// How often BCa's 95 % interval holds the mean of so many normal differences; none from 20 on,
-/// where it comes close, and below 2.
+/// Coverage of the 95 % BCa interval for the mean of normal differences; none from 20 pairs on,
+/// where it is near 0.95, and below 2.
 std::optional<double> bca_coverage(std::size_t pairs);
-/// BCa interval of the mean (Efron 1987) from `resamples` draws of all participants.
+/// BCa interval of the mean (Efron 1987) from `resamples` resamples of the participants.
 Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
                          std::size_t resamples = kResamples);
-/// The part of it after the draws. \param means of the resamples; reorders
+/// The interval from the resamples' means. \param means reordered
 Bootstrap bca_interval(const std::vector<double>& differences, std::vector<double>& means);
 
-/// Holm's (1979) adjustment over those that have a p.
+/// p values adjusted by Holm (1979) over those that are defined.
 std::vector<std::optional<double>> holm(const std::vector<std::optional<double>>& p);
 
-/// A participant who has trials of a shape but no time for it in one renderer of the pair or both.
-struct Dropped {
+/// A participant with trials of a shape, but without a usable time with one or both renderers of
+/// the pair.
+struct DroppedParticipant {
   std::size_t participant = 0;         ///< index into TrialTable::participants
-  std::vector<std::string> renderers;  ///< without a usable time
+  std::vector<std::string> renderers;  ///< those without a usable time
 };
 
+/// Comparison of a pair of renderers for one shape.
 struct PairedShape {
   std::size_t n_pairs = 0;
-  std::string undefined;  ///< why there are no pairs
-  std::vector<double> differences;
+  std::string undefined;            ///< why there are no pairs
+  std::vector<double> differences;  ///< of mean log times, one for each pair
   std::optional<double> percent_reduction_arithmetic;
   std::optional<double> mean_log_ratio, percent_reduction_geometric;
   TTest t_test;
   EffectSize effect_size;
   Wilcoxon wilcoxon;
   Bootstrap bootstrap;
-  std::vector<Dropped> dropped;
+  std::vector<DroppedParticipant> dropped;
 };
 
-/// One for each of table.shapes, still without `bootstrap` and `t_test.p_holm`.
+/// Compares each of table.shapes; leaves out `bootstrap` and `t_test.p_holm`.
 std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Description& description,
                                           const RendererPair& pair);
-/// Each has its own stream of the seed, by its number.
+/// Sets `bootstrap` of each. Random stream i of the seed is that of tests[i].
 void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed);
-/// Holm's adjustment over all of them.
+/// Sets `t_test.p_holm` by Holm's adjustment over all.
 void adjust_all(const std::vector<PairedShape*>& tests);
 
 }  // namespace palpate::analysis

@@ -14,14 +14,14 @@ struct ShapeGain {
   double variance = 0;  ///< >= 0
 };
 
-/// Of single trials around their participant's mean in a cell; `otherwise` where all are alone.
-double variance_in_cells(const People& people, double otherwise) {
+/// Variance of log times within participants' cells; `otherwise` if no cell has two trials.
+double variance_in_cells(const ParticipantCells& participant_cells, double otherwise) {
   double squares = 0, freedom = 0;
-  for (const auto& renderer : people) {
+  for (const auto& renderer : participant_cells) {
     for (const auto& shape : renderer) {
       for (const ParticipantCell& cell : shape) {
         if (cell.n_used < 2) continue;
-        squares += cell.squares_log;
+        squares += cell.sum_of_squares_log;
         freedom += static_cast<double>(cell.n_used - 1);
       }
     }
@@ -29,18 +29,20 @@ double variance_in_cells(const People& people, double otherwise) {
   return freedom > 0 ? squares / freedom : otherwise;
 }
 
-/// Interaction of participants and shapes in the differences renderer - reference, less what single
-/// trials add to it.
-ShapeGain shape_gain(const People& people, const RendererPair& pair, double residual_variance) {
-  const std::size_t n_shapes = people[0].size(), n_people = people[0][0].size();
+/// Variance of the participant x shape interaction of differences renderer - reference, without the
+/// part of residual variance.
+ShapeGain shape_gain(const ParticipantCells& participant_cells, const RendererPair& pair,
+                     double residual_variance) {
+  const std::size_t n_shapes = participant_cells[0].size(),
+                    n_participants = participant_cells[0][0].size();
   std::vector<std::vector<double>> rows;
   double noise = 0;
-  for (std::size_t p = 0; p < n_people; ++p) {
+  for (std::size_t p = 0; p < n_participants; ++p) {
     std::vector<double> row;
     double own = 0;
     for (std::size_t s = 0; s < n_shapes; ++s) {
-      const ParticipantCell &a = people[*pair.reference_at][s][p],
-                            &b = people[*pair.renderer_at][s][p];
+      const ParticipantCell &a = participant_cells[*pair.reference_at][s][p],
+                            &b = participant_cells[*pair.renderer_at][s][p];
       if (a.n_used == 0 || b.n_used == 0) break;
       row.push_back(b.mean_log - a.mean_log);
       own += 1 / static_cast<double>(a.n_used) + 1 / static_cast<double>(b.n_used);
@@ -86,12 +88,12 @@ Pilot read_pilot(const Analysis& analysis) {
   model.correlation = fit.random_correlations[0].value_or(0);
   model.residual_sd = *fit.residual_sd;
   const Counts& counts = analysis.description.counts;
-  model.share_used =
+  model.proportion_used =
       static_cast<double>(counts.n_used_for_times) / static_cast<double>(counts.n_trials);
 
-  const double in_cells =
-      variance_in_cells(analysis.description.people, model.residual_sd * model.residual_sd);
-  const ShapeGain extra = shape_gain(analysis.description.people, out.pair, in_cells);
+  const double in_cells = variance_in_cells(analysis.description.participant_cells,
+                                            model.residual_sd * model.residual_sd);
+  const ShapeGain extra = shape_gain(analysis.description.participant_cells, out.pair, in_cells);
   if (extra.known) {
     const auto k = static_cast<double>(model.shapes.size());
     model.shape_gain_sd = std::sqrt(extra.variance);

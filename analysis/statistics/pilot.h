@@ -1,5 +1,6 @@
 #pragma once
-// What a pilot says about a study to come.
+// Estimates the model that studies are simulated from, for sample size planning, from a pilot
+// study.
 
 #include <string>
 #include <vector>
@@ -9,19 +10,20 @@
 
 namespace palpate::analysis {
 
+/// Estimates from a pilot.
 struct Pilot {
-  RendererPair pair;      ///< that it is a pilot of: the study's first comparison
-  std::string undefined;  ///< why nothing can be drawn from it; empty: something can
-  StudyModel model;       ///< its effects are what the pilot found
-  std::string label;      ///< "SIMULATED PARTICIPANTS" and the like; empty: people
+  RendererPair pair;      ///< the first comparison of the pilot
+  std::string undefined;  ///< why there is no model; empty: there is
+  StudyModel model;       ///< effects as estimated in the pilot
+  std::string label;      ///< as of simulated_label(); empty: human participants
   std::vector<std::string> notes;
 };
 
-/// The fitted mixed model, and what it leaves out: the standard deviation of a participant's gain
-/// for a shape beyond the gain common to all, by moments from the participants' mean differences
-/// (complete ones; 0 where chance alone explains them). Where there is some, the random slope and
-/// the residual of the fit hold a part of it each: it is taken out of the slope, and the residual
-/// is that within the cells.
+/// The parameters of the fitted mixed model, and the participant x shape standard deviation of
+/// gains, which that model does not have: by moments from the mean differences of participants with
+/// all cells (0 if residual variance explains them). If it is above 0 it is subtracted from the
+/// variance of the random slope, which contains a part of it, and the residual is that within
+/// cells.
 Pilot read_pilot(const Analysis& analysis);
 
 }  // namespace palpate::analysis

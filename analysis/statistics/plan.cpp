@@ -13,14 +13,14 @@ namespace {
 
 constexpr std::size_t kGridPoints = 12;
 
-/// About evenly on a log scale, both ends included.
+/// Numbers of participants, about equidistant on a log scale, both ends included.
 std::vector<std::size_t> grid(std::size_t least, std::size_t most) {
   std::vector<std::size_t> out;
   const double low = std::log(static_cast<double>(least)),
                high = std::log(static_cast<double>(most));
   for (std::size_t i = 0; i < kGridPoints; ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(kGridPoints - 1);
-    out.push_back(static_cast<std::size_t>(std::lround(std::exp(low + share * (high - low)))));
+    const double fraction = static_cast<double>(i) / static_cast<double>(kGridPoints - 1);
+    out.push_back(static_cast<std::size_t>(std::lround(std::exp(low + fraction * (high - low)))));
   }
   out.erase(std::unique(out.begin(), out.end()), out.end());
   return out;
@@ -55,7 +55,7 @@ std::size_t trials_per_participant(const Plan& plan, std::size_t trials) {
 }
 
 double goal_power(const Plan& plan, const Power& power) {
-  return power.share(plan.settings.goal == Goal::all ? power.all : power.any);
+  return power.proportion(plan.settings.goal == Goal::all ? power.all : power.any);
 }
 
 Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string> notes,
@@ -73,7 +73,8 @@ Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string>
       return enough;
     };
     std::optional<std::size_t> enough, short_of;
-    for (const std::size_t participants : grid(plan.settings.least, plan.settings.most)) {
+    for (const std::size_t participants :
+         grid(plan.settings.min_participants, plan.settings.max_participants)) {
       const bool here = reaches(participants);
       if (here && !enough) enough = participants;
       if (!here && !enough) short_of = participants;

@@ -1,5 +1,6 @@
 #pragma once
-// How many participants, for so many trials each, find a wanted effect with a wanted power.
+// Sample size planning: the number of participants that reaches a given power, for given numbers of
+// trials.
 
 #include <cstddef>
 #include <functional>
@@ -11,43 +12,47 @@
 
 namespace palpate::analysis {
 
-enum class Goal { all, any };  ///< find every shape with an effect, or at least one
+enum class Goal { all, any };  ///< significant for every shape with an effect, or for at least one
 
+/// Range of designs and the goal.
 struct PlanSettings {
-  std::vector<std::size_t> trials;  ///< of each shape with each renderer: a curve each
-  std::size_t least = 2, most = 2;  ///< participants, 2 <= least <= most
-  double power = 0.8;
+  std::vector<std::size_t> trials;  ///< of each shape with each renderer: a power curve for each
+  std::size_t min_participants = 2, max_participants = 2;  ///< 2 <= min <= max
+  double power = 0.8;                                      ///< wanted probability to reach the goal
   Goal goal = Goal::all;
   PowerSettings simulation;
 };
 
+/// Power of one design.
 struct PlanPoint {
   StudyDesign design;
   Power power;
 };
 
+/// Power over the number of participants.
 struct PlanCurve {
   std::size_t trials = 0;
-  std::vector<PlanPoint> points;  ///< by participants
-  std::optional<PlanPoint>
-      smallest;  ///< fewest participants that reach the power; none: not so far
+  std::vector<PlanPoint> points;  ///< ascending in participants
+  /// Fewest participants that reach the power; none: not up to the maximum.
+  std::optional<PlanPoint> smallest;
 };
 
+/// The plan.
 struct Plan {
   StudyModel model;
   PlanSettings settings;
   std::vector<std::string> notes;
   std::vector<PlanCurve> curves;
-  std::string label;  ///< where the pilot's participants are simulated: said on the figure
+  std::string label;  ///< as of the pilot: simulated participants
 };
 
-/// A grid of participants, then halving between its points. Power grows with participants; near the
-/// wanted one a study more or less is within the simulation's error.
-/// \param progress which curve (from 1) and which point of it is being simulated
+/// Simulates a logarithmic grid of numbers of participants, then bisects between the points around
+/// the wanted power. Power increases with participants up to the error of simulation. \param
+/// progress called with the curve and point (both from 1) that is simulated next
 Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string> notes,
                const std::function<void(std::size_t, std::size_t)>& progress);
 
-/// Of the goal.
+/// Probability to reach the goal.
 double goal_power(const Plan& plan, const Power& power);
 
 /// "find the gain for cone (22.0 %) and cube (11.0 %), all of them"

@@ -16,21 +16,21 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr std::size_t kChunk = 50;  // studies that a thread takes at a time
+constexpr std::size_t kChunk = 50;  // studies in a unit of work of a thread
 
-/// How many of n trials give a time: a binomial draw by its distribution function.
+/// Number of usable of n trials: binomial, drawn by inversion of the distribution function.
 class UsedTrials {
  public:
-  UsedTrials(std::size_t n, double share) : n_(n) {
-    if (share >= 1) return;
+  UsedTrials(std::size_t n, double proportion) : n_(n) {
+    if (proportion >= 1) return;
     const auto trials = static_cast<double>(n);
     double sum = 0;
     up_to_.reserve(n + 1);
     for (std::size_t k = 0; k <= n; ++k) {
       const auto used = static_cast<double>(k);
       sum += std::exp(std::lgamma(trials + 1) - std::lgamma(used + 1) -
-                      std::lgamma(trials - used + 1) + used * std::log(share) +
-                      (trials - used) * std::log1p(-share));
+                      std::lgamma(trials - used + 1) + used * std::log(proportion) +
+                      (trials - used) * std::log1p(-proportion));
       up_to_.push_back(sum);
     }
   }
@@ -57,46 +57,48 @@ double gamma_draw(double shape, stimuli::Random& random) {
   }
 }
 
-/// Draws the cells of a study: means and squares are all that the tests look at.
+/// Draws the sufficient statistics of a study: cells' numbers of trials, means and sums of squares.
 void draw_study(const StudyModel& model, const UsedTrials& used_trials, bool squares,
-                stimuli::Random& random, People& people) {
-  const std::size_t n_people = people[0][0].size();
+                stimuli::Random& random, ParticipantCells& participant_cells) {
+  const std::size_t n_participants = participant_cells[0][0].size();
   const double other = std::sqrt(std::max(0.0, 1 - model.correlation * model.correlation));
-  for (std::size_t p = 0; p < n_people; ++p) {
+  for (std::size_t p = 0; p < n_participants; ++p) {
     const double first = random.normal(), second = random.normal();
     const double intercept = model.intercept_sd * first;
     const double gain = model.gain_sd * (model.correlation * first + other * second);
     for (std::size_t s = 0; s < model.shapes.size(); ++s) {
       const double shape_gain = model.shape_gain_sd * random.normal();
       for (std::size_t r = 0; r < 2; ++r) {
-        ParticipantCell& cell = people[r][s][p];
+        ParticipantCell& cell = participant_cells[r][s][p];
         cell.n_used = used_trials(random);
         if (cell.n_used == 0) continue;
         const auto n = static_cast<double>(cell.n_used);
         cell.mean_log = intercept + (r == 1 ? model.log_ratios[s] + gain + shape_gain : 0) +
                         model.residual_sd / std::sqrt(n) * random.normal();
         if (squares) {
-          cell.squares_log = cell.n_used < 2 ? 0
-                                             : 2 * model.residual_sd * model.residual_sd *
-                                                   gamma_draw((n - 1) / 2, random);
+          cell.sum_of_squares_log = cell.n_used < 2 ? 0
+                                                    : 2 * model.residual_sd * model.residual_sd *
+                                                          gamma_draw((n - 1) / 2, random);
         }
       }
     }
   }
 }
 
-/// What a test says of a shape: p before Holm's adjustment, and which way.
+/// Result of a test for a shape: unadjusted p and the sign of the effect.
 struct Verdicts {
   std::vector<std::optional<double>> p;
   std::vector<double> estimates;
 };
 
-void test_pairs(const People& people, Verdicts& out) {
+void test_pairs(const ParticipantCells& participant_cells, Verdicts& out) {
   for (std::size_t s = 0; s < out.p.size(); ++s) {
-    double n = 0, mean_difference = 0, squares = 0;  // Welford
-    for (std::size_t p = 0; p < people[0][s].size(); ++p) {
-      if (people[0][s][p].n_used == 0 || people[1][s][p].n_used == 0) continue;
-      const double difference = people[1][s][p].mean_log - people[0][s][p].mean_log;
+    double n = 0, mean_difference = 0, squares = 0;  // Welford (1962)
+    for (std::size_t p = 0; p < participant_cells[0][s].size(); ++p) {
+      if (participant_cells[0][s][p].n_used == 0 || participant_cells[1][s][p].n_used == 0)
+        continue;
+      const double difference =
+          participant_cells[1][s][p].mean_log - participant_cells[0][s][p].mean_log;
       const double before = difference - mean_difference;
       mean_difference += before / ++n;
       squares += before * (difference - mean_difference);
@@ -111,9 +113,10 @@ void test_pairs(const People& people, Verdicts& out) {
   }
 }
 
-void test_model(const People& people, const std::vector<std::string>& shapes, Verdicts& out) {
+void test_model(const ParticipantCells& participant_cells, const std::vector<std::string>& shapes,
+                Verdicts& out) {
   static const std::vector<std::string> kRenderers{"point", "ray"};
-  const MixedModel model = mixed_model(people, kRenderers, shapes);
+  const MixedModel model = mixed_model(participant_cells, kRenderers, shapes);
   for (std::size_t s = 0; s < out.p.size(); ++s) {
     const ModelEstimate& contrast = model.contrasts.front()[s];
     out.p[s] = contrast.p;
@@ -140,11 +143,12 @@ void count(const StudyModel& model, const Verdicts& verdicts, double alpha, Powe
 
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings) {
-  const UsedTrials used_trials(design.trials, model.share_used);
+  const UsedTrials used_trials(design.trials, model.proportion_used);
   const std::size_t n_shapes = model.shapes.size();
   std::atomic<std::size_t> next{0}, done{0};
   const auto work = [&](Power& out, bool reports) {
-    People people(2, {n_shapes, std::vector<ParticipantCell>(design.participants)});
+    ParticipantCells participant_cells(
+        2, {n_shapes, std::vector<ParticipantCell>(design.participants)});
     Verdicts verdicts{std::vector<std::optional<double>>(n_shapes), std::vector<double>(n_shapes)};
     for (;;) {
       const std::size_t begin = next.fetch_add(kChunk);
@@ -152,11 +156,12 @@ Power simulate_power(const StudyModel& model, const StudyDesign& design,
       const std::size_t end = std::min(begin + kChunk, settings.studies);
       for (std::size_t study = begin; study < end; ++study) {
         stimuli::Random random(settings.seed, {design.participants, design.trials, study});
-        draw_study(model, used_trials, settings.test == StudyTest::model, random, people);
+        draw_study(model, used_trials, settings.test == StudyTest::model, random,
+                   participant_cells);
         if (settings.test == StudyTest::model) {
-          test_model(people, model.shapes, verdicts);
+          test_model(participant_cells, model.shapes, verdicts);
         } else {
-          test_pairs(people, verdicts);
+          test_pairs(participant_cells, verdicts);
         }
         count(model, verdicts, settings.alpha, out);
       }

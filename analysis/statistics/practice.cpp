@@ -10,7 +10,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kPer = 100;  // trials that a slope is given for
+constexpr double kPer = 100;  // trials that slopes refer to
 const std::string kTooFew =
     "fewer than " + std::to_string(kSlopeTrials) + " times or no shape twice";
 
@@ -21,14 +21,14 @@ struct ShapeSums {
 };
 
 /// One participant's trials with one renderer.
-struct PersonSums {
+struct ParticipantSums {
   std::vector<ShapeSums> shapes;
   std::array<double, kLearningBins> relative{};     // sums of log - mean log of the cell
-  std::array<std::size_t, kLearningBins> trials{};  // used ones
+  std::array<std::size_t, kLearningBins> trials{};  // usable trials
   std::uint32_t first = std::numeric_limits<std::uint32_t>::max(), last = 0;  // positions
-  std::uint32_t exposures = 0;                                                // the last number
+  std::uint32_t exposures = 0;  // number of trials with the renderer
 
-  /// Within shapes, per kPer trials; none where there are few trials or no shape was met twice.
+  /// Least-squares slope within shapes per kPer trials; none with few trials or no shape twice.
   std::optional<double> slope() const {
     double n = 0, xx = 0, xy = 0;
     for (const ShapeSums& shape : shapes) {
@@ -38,49 +38,54 @@ struct PersonSums {
       xy += shape.xy;  // the logs' own sum is 0
     }
     if (n < static_cast<double>(kSlopeTrials)) return std::nullopt;
-    if (xx <= 0.25) return std::nullopt;  // exposures are whole numbers: two of them give 0.5
+    if (xx <= 0.25)
+      return std::nullopt;  // exposures are integers: two different ones give at least 0.5
     return kPer * xy / xx;
   }
 };
 
-using AllSums = std::vector<std::vector<PersonSums>>;  // [renderer][participant]
+using AllSums = std::vector<std::vector<ParticipantSums>>;  // [renderer][participant]
 
 AllSums sum_up(const TrialTable& table, const Description& description, double too_fast) {
-  PersonSums empty;
+  ParticipantSums empty;
   empty.shapes.resize(table.shapes.size());
-  AllSums all(table.renderers.size(), std::vector<PersonSums>(table.participants.size(), empty));
+  AllSums all(table.renderers.size(),
+              std::vector<ParticipantSums>(table.participants.size(), empty));
   for (const TrialRow& row : table.rows) {
-    PersonSums& person = all[row.renderer][row.participant];
-    person.first = std::min(person.first, row.position);
-    person.last = std::max(person.last, row.position);
-    person.exposures = std::max(person.exposures, row.exposure);
+    ParticipantSums& participant = all[row.renderer][row.participant];
+    participant.first = std::min(participant.first, row.position);
+    participant.last = std::max(participant.last, row.position);
+    participant.exposures = std::max(participant.exposures, row.exposure);
   }
   for (const TrialRow& row : table.rows) {
     if (!row.correct || row.answer < 0 || row.response_time < too_fast) continue;
-    PersonSums& person = all[row.renderer][row.participant];
+    ParticipantSums& participant = all[row.renderer][row.participant];
     const double x = row.exposure;
-    const double y = std::log(row.response_time) -
-                     description.people[row.renderer][row.shape][row.participant].mean_log;
-    ShapeSums& shape = person.shapes[row.shape];
+    const double y =
+        std::log(row.response_time) -
+        description.participant_cells[row.renderer][row.shape][row.participant].mean_log;
+    ShapeSums& shape = participant.shapes[row.shape];
     ++shape.n;
     shape.x += x;
     shape.xx += x * x;
     shape.xy += x * y;
     const std::size_t bin =
-        std::size_t{row.exposure - 1} * kLearningBins / std::max(1U, person.exposures);
-    person.relative[bin] += y;
-    ++person.trials[bin];
+        std::size_t{row.exposure - 1} * kLearningBins / std::max(1U, participant.exposures);
+    participant.relative[bin] += y;
+    ++participant.trials[bin];
   }
   return all;
 }
 
 /// Mean over participants of the mean over their shapes.
-std::optional<double> overall_mean(const People& people, std::size_t renderer) {
+std::optional<double> overall_mean(const ParticipantCells& participant_cells,
+                                   std::size_t renderer) {
   std::vector<double> means;
-  const std::size_t n_people = people[renderer].empty() ? 0 : people[renderer][0].size();
-  for (std::size_t p = 0; p < n_people; ++p) {
+  const std::size_t n_participants =
+      participant_cells[renderer].empty() ? 0 : participant_cells[renderer][0].size();
+  for (std::size_t p = 0; p < n_participants; ++p) {
     std::vector<double> logs;
-    for (const auto& shape : people[renderer]) {
+    for (const auto& shape : participant_cells[renderer]) {
       if (shape[p].n_used > 0) logs.push_back(shape[p].mean_log);
     }
     if (!logs.empty()) means.push_back(mean(logs));
@@ -89,16 +94,17 @@ std::optional<double> overall_mean(const People& people, std::size_t renderer) {
   return mean(means);
 }
 
-Learning learning(const std::vector<PersonSums>& people, const std::optional<double>& overall) {
+Learning learning(const std::vector<ParticipantSums>& participants,
+                  const std::optional<double>& overall) {
   Learning out;
   std::array<std::vector<double>, kLearningBins> relative;
   std::vector<double> slopes;
-  for (const PersonSums& person : people) {
-    if (const auto slope = person.slope()) slopes.push_back(*slope);
+  for (const ParticipantSums& participant : participants) {
+    if (const auto slope = participant.slope()) slopes.push_back(*slope);
     for (std::size_t b = 0; b < kLearningBins; ++b) {
-      if (person.trials[b] == 0) continue;
-      relative[b].push_back(person.relative[b] / static_cast<double>(person.trials[b]));
-      out.bins[b].n_trials += person.trials[b];
+      if (participant.trials[b] == 0) continue;
+      relative[b].push_back(participant.relative[b] / static_cast<double>(participant.trials[b]));
+      out.bins[b].n_trials += participant.trials[b];
     }
   }
   for (std::size_t b = 0; b < kLearningBins; ++b) {
@@ -122,7 +128,7 @@ Learning learning(const std::vector<PersonSums>& people, const std::optional<dou
 
 enum class First { reference, renderer, mixed };
 
-First first_of(const PersonSums& reference, const PersonSums& renderer) {
+First first_of(const ParticipantSums& reference, const ParticipantSums& renderer) {
   if (reference.last < renderer.first) return First::reference;
   if (renderer.last < reference.first) return First::renderer;
   return First::mixed;
@@ -151,7 +157,8 @@ OrderEffect order_effect(const RendererPair& pair, const std::vector<double>& re
     out.undefined = "no participant did one renderer after the other";
   } else if (reference_first.empty() || renderer_first.empty()) {
     out.undefined = "all participants had " +
-                    the(reference_first.empty() ? pair.renderer : pair.reference) + " first";
+                    with_article(reference_first.empty() ? pair.renderer : pair.reference) +
+                    " first";
   }
   if (!out.undefined.empty()) {
     out.test.undefined = out.undefined;
@@ -189,11 +196,11 @@ OrderEffect order_effect(const RendererPair& pair, const std::vector<double>& re
 void compare_orders(const Description& description, const AllSums& sums, const RendererPair& pair,
                     PairPractice& out) {
   const std::size_t reference = *pair.reference_at, renderer = *pair.renderer_at;
-  const std::size_t n_shapes = description.people[0].size();
+  const std::size_t n_shapes = description.participant_cells[0].size();
   std::vector<std::vector<double>> reference_first(n_shapes), renderer_first(n_shapes);
   std::vector<double> all_reference_first, all_renderer_first;
   for (std::size_t p = 0; p < sums[0].size(); ++p) {
-    const PersonSums &with_reference = sums[reference][p], &with_renderer = sums[renderer][p];
+    const ParticipantSums &with_reference = sums[reference][p], &with_renderer = sums[renderer][p];
     if (with_reference.last == 0 || with_renderer.last == 0) continue;
     const First first = first_of(with_reference, with_renderer);
     if (first == First::mixed) {
@@ -202,8 +209,8 @@ void compare_orders(const Description& description, const AllSums& sums, const R
     }
     std::vector<double> differences;
     for (std::size_t s = 0; s < n_shapes; ++s) {
-      const ParticipantCell& a = description.people[reference][s][p];
-      const ParticipantCell& b = description.people[renderer][s][p];
+      const ParticipantCell& a = description.participant_cells[reference][s][p];
+      const ParticipantCell& b = description.participant_cells[renderer][s][p];
       if (a.n_used == 0 || b.n_used == 0) continue;
       differences.push_back(b.mean_log - a.mean_log);
       (first == First::reference ? reference_first : renderer_first)[s].push_back(
@@ -226,7 +233,7 @@ PairPractice pair_practice(const Description& description, const AllSums& sums,
   if (!pair.in_data()) {
     out.slope_difference.undefined = out.all_shapes.undefined = out.all_shapes.test.undefined =
         "only one renderer in the data";
-    out.shapes.assign(description.people[0].size(), out.all_shapes);
+    out.shapes.assign(description.participant_cells[0].size(), out.all_shapes);
     return out;
   }
   std::vector<double> differences;
@@ -246,7 +253,7 @@ PairPractice pair_practice(const Description& description, const AllSums& sums,
   return out;
 }
 
-/// Holm's adjustment over every test of practice.
+/// Holm's adjustment over all tests of practice.
 void adjust(Practice& practice) {
   std::vector<TTest*> tests;
   for (Learning& learning : practice.learning) tests.push_back(&learning.slope);
@@ -272,7 +279,7 @@ Practice practice_effects(const TrialTable& table, const Description& descriptio
   Practice out;
   const AllSums sums = sum_up(table, description, too_fast);
   for (std::size_t r = 0; r < sums.size(); ++r) {
-    out.learning.push_back(learning(sums[r], overall_mean(description.people, r)));
+    out.learning.push_back(learning(sums[r], overall_mean(description.participant_cells, r)));
   }
   for (const RendererPair& pair : renderer_pairs(table.renderers)) {
     out.pairs.push_back(pair_practice(description, sums, pair));

@@ -1,5 +1,5 @@
 #pragma once
-// Does practice explain the gain? Learning over trials, and which renderer came first.
+// Effects of practice on the gain: learning over trials, and order of the renderers.
 
 #include <array>
 #include <cstddef>
@@ -14,23 +14,25 @@
 
 namespace palpate::analysis {
 
-/// A participant's trials with a renderer are cut, in order, into so many parts of equal length.
+/// Number of bins of equal length into which a participant's trials with a renderer are divided, in
+/// order.
 constexpr std::size_t kLearningBins = 8;
 
-/// Mean over participants of log times (natural log of s), each taken relative to the participant's
-/// own mean for the shape, so that a chance mix of shapes does not look like learning.
+/// Mean over participants of log times (natural log of s) in a bin, relative to the participant's
+/// mean for the shape, so that the mix of shapes in a bin does not bias it.
 struct LearningBin {
   std::size_t n_participants = 0, n_trials = 0;
   std::optional<double> mean_log;     ///< with the renderer's overall mean added back
   std::optional<double> se_mean_log;  ///< over participants, of the relative part
 };
 
-/// Trials with a renderer that the times use, from which a participant has a slope: a change per
-/// 100 trials from fewer is an extrapolation that says nothing.
+/// Smallest number of usable trials with a renderer for which a participant's slope is estimated:
+/// fewer extrapolate too far to 100 trials.
 constexpr std::size_t kSlopeTrials = 32;
 
-/// Of one renderer. The slope is each participant's least-squares slope of log time on the number
-/// of the trial with this renderer, within shapes; then a t interval over participants.
+/// Learning with one renderer. A participant's slope is the least-squares slope of log time on the
+/// number of the trial with this renderer, within shapes; mean and t interval are over
+/// participants.
 struct Learning {
   std::array<LearningBin, kLearningBins> bins;
   TTest slope;  ///< per 100 trials, in log seconds; sd, se, t, df, p, interval over participants
@@ -44,33 +46,36 @@ struct OrderGroup {
   std::optional<double> mean_log_ratio;
 };
 
-/// Two-period crossover (Hills & Armitage 1979). Practice makes the second renderer look faster: a
-/// gain is reference-first's too large and renderer-first's too small by the same amount.
+/// Two-period crossover (Hills & Armitage 1979). Practice speeds up the renderer that comes second,
+/// which biases the gain by the same amount upwards with the reference first and downwards with the
+/// renderer first.
 struct OrderEffect {
   OrderGroup reference_first, renderer_first;
-  std::string undefined;  ///< why the two orders cannot be compared
-  /// Mean log ratio of reference first minus renderer first; pooled variance. Negative: practice
-  /// helps.
+  std::string undefined;  ///< why the two orders cannot be compared; empty: they can
+  /// Mean log ratio with reference first minus with renderer first; negative: practice shortens
+  /// times.
   std::optional<double> difference;
-  TTest test;  ///< of the difference
-  /// Mean of the two groups' mean log ratios: the gain with practice balanced.
+  TTest test;  ///< of the difference, pooled variance
+  /// Mean of the two groups' mean log ratios: the gain without the effect of order.
   std::optional<double> balanced_log_ratio;
   std::optional<Interval> balanced_ci95;  ///< of log ratio
 };
 
-/// What practice does to the gain of a renderer over the reference.
+/// Effects of practice on the gain of a renderer over the reference.
 struct PairPractice {
   TTest slope_difference;  ///< renderer - reference, participants with both, per 100 trials
   std::optional<double> mean_slope_difference;
-  std::size_t n_interleaved = 0;    ///< participants whose trials of both are mixed: no order
+  std::size_t n_interleaved = 0;    ///< participants with interleaved trials of both: no order
   OrderEffect all_shapes;           ///< mean over shapes, participants with a pair in each
   std::vector<OrderEffect> shapes;  ///< one for each of table.shapes
 };
 
+/// All effects of practice.
 struct Practice {
   std::vector<Learning> learning;   ///< one for each of table.renderers
   std::vector<PairPractice> pairs;  ///< one for each of renderer_pairs()
-  std::size_t n_tests = 0;          ///< slopes and orders with a p: one family for their p_holm
+  std::size_t n_tests =
+      0;  ///< tests (slopes and orders) with a p: one family for Holm's adjustment
 };
 
 /// \param too_fast s, as in describe()

@@ -14,9 +14,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMaxSteps = 200;
-// Participants. With more the criterion has one valley, and two starts are enough to check that.
+// Participants. With more the criterion has been found to have one minimum: two starting values
+// check it.
 constexpr std::size_t kFew = 500;
-constexpr double kOnBoundary = 1e-4;  // of a diagonal theta, as lme4's isSingular()
+constexpr double kOnBoundary = 1e-4;  // threshold of a diagonal theta, as in lme4's isSingular()
 
 /// Lambda's lower triangle with a diagonal >= 0 from any root of Lambda Lambda'.
 VectorXd theta_of(const MatrixXd& root) {
@@ -38,7 +39,7 @@ std::vector<Index> diagonal(Index q) {
   return out;
 }
 
-/// Newton's step with every curvature taken positive, so that it leads down.
+/// Newton step with the absolute values of the Hessian's eigenvalues: a descent direction.
 VectorXd newton_step(const RemlPoint& point) {
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(point.hessian);
   const VectorXd curvature = eigen.eigenvalues().cwiseAbs();
@@ -47,15 +48,15 @@ VectorXd newton_step(const RemlPoint& point) {
                                      .cwiseQuotient(curvature.cwiseMax(floor));
 }
 
-/// Of the deviance. Large effects beside a small residual cost digits.
+/// Rounding error of the deviance, larger for large effects with a small residual.
 double rounding(const RemlOptimum& at) {
   return std::min(
       1e-6, 1e-13 * std::max(1.0, std::fabs(at.point.deviance)) * (1 + at.theta.squaredNorm()));
 }
 
-/// From theta down to where the gradient vanishes. Along a theta whose diagonal is 0 the criterion
-/// is even, so a start on the boundary stays there.
-RemlOptimum descend(const RemlData& data, const MatrixXd& coding, VectorXd theta) {
+/// Descends from theta until the gradient vanishes. The criterion is even in a diagonal theta, so a
+/// starting value on the boundary stays there.
+RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd theta) {
   RemlOptimum out;
   out.theta = std::move(theta);
   out.point = reml_point(data, coding, out.theta, true);
@@ -73,7 +74,8 @@ RemlOptimum descend(const RemlData& data, const MatrixXd& coding, VectorXd theta
       if (lower) out.theta += length * step;
     }
     if (!lower) break;
-    // Down to rounding: the last steps may no longer lower the deviance, but still the gradient.
+    // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
+    // the gradient.
     const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
     out.point = std::move(next);
     if (promised < noise) out.converged = true;
@@ -82,7 +84,8 @@ RemlOptimum descend(const RemlData& data, const MatrixXd& coding, VectorXd theta
   return out;
 }
 
-/// Directions in which Psi is 0: no way down there, or the one that leads down most.
+/// Among the directions in which Psi is 0, that of steepest descent; none: the Karush-Kuhn-Tucker
+/// conditions hold.
 VectorXd way_off_boundary(const RemlOptimum& at, const MatrixXd& coding, Index q) {
   const MatrixXd lambda = lower_triangle(at.theta, q);
   const MatrixXd slope = coding.transpose() * at.point.slope * coding;  // by Lambda Lambda'
@@ -106,9 +109,10 @@ VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
   return theta;
 }
 
-/// descend(), off the boundary again where that leads down, and exactly onto it where it ends
-/// there.
-RemlOptimum optimum_from(const RemlData& data, const MatrixXd& coding, const VectorXd& start) {
+/// descend(), then leaves the boundary where that lowers the deviance, and sets parameters near 0
+/// to exactly 0.
+RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
+                         const VectorXd& start) {
   const Index q = data.levels;
   RemlOptimum best = descend(data, coding, start);
   for (int i = 0; i < 10; ++i) {
@@ -126,7 +130,7 @@ RemlOptimum optimum_from(const RemlData& data, const MatrixXd& coding, const Vec
     if (off.point.deviance >= best.point.deviance) break;
     best = std::move(off);
   }
-  // theta_of() once more: a step may have turned a sign.
+  // theta_of() again: a step may have changed the sign of a diagonal.
   best.theta = theta_of(lower_triangle(best.theta, q));
   for (const Index k : diagonal(q)) best.theta(k) = std::fabs(best.theta(k));
   best.point = reml_point(data, coding, best.theta, true);
@@ -134,16 +138,16 @@ RemlOptimum optimum_from(const RemlData& data, const MatrixXd& coding, const Vec
   return best;
 }
 
-/// Psi by moments: covariance of participants' means less what single trials add to it.
-MatrixXd by_moments(const RemlData& data) {
+/// Moment estimate of Psi: covariance of participants' means minus the part of residual variance.
+MatrixXd by_moments(const RemlStatistics& data) {
   const Index q = data.levels;
   const RemlPoint flat =
       reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
   const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
                                           flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
-                                             std::max(1.0, data.freedom));
+                                             std::max(1.0, data.degrees_of_freedom));
   MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
-  for (const RemlGroup& group : data.groups) {
+  for (const RemlParticipant& group : data.groups) {
     const VectorXd rest = group.y - group.x * flat.beta;
     products(group.levels, group.levels) += rest * rest.transpose();
     pairs(group.levels, group.levels).array() += 1;
@@ -161,16 +165,16 @@ MatrixXd by_moments(const RemlData& data) {
 
 }  // namespace
 
-RemlOptimum reml_optimum(const RemlData& data, const MatrixXd& coding) {
+RemlOptimum reml_optimum(const RemlStatistics& data, const MatrixXd& coding) {
   const Index q = data.levels;
   const MatrixXd inverse = coding.inverse();
   const MatrixXd moments = inverse * by_moments(data) * inverse.transpose();
   const VectorXd first = theta_of(moments.llt().matrixL());
   std::vector<VectorXd> starts{first};
-  starts.push_back(theta_of(MatrixXd::Identity(q, q)));  // lme4's
+  starts.push_back(theta_of(MatrixXd::Identity(q, q)));  // starting value of lme4
   if (data.groups.size() <= kFew) {
     starts.push_back(theta_of(0.1 * MatrixXd::Identity(q, q)));
-    MatrixXd turned = lower_triangle(first, q);  // correlations the other way
+    MatrixXd turned = lower_triangle(first, q);  // correlations with the opposite sign
     turned.triangularView<Eigen::StrictlyLower>() *= -1;
     starts.push_back(theta_of(turned));
   }

@@ -6,10 +6,11 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kNotableTime = 1;         // percent
-constexpr double kNotableAccuracy = 0.01;  // share
+constexpr double kNotableTime = 1;         // percent, smallest change of time that counts
+constexpr double kNotableAccuracy = 0.01;  // proportion, smallest change of accuracy that counts
 
-/// Which way both go; noise smaller than what anybody cares for is no direction.
+/// Compares the directions of the changes of time and accuracy; smaller changes than the thresholds
+/// have none.
 std::string read(double percent_change_time, double accuracy_change) {
   const bool faster = percent_change_time<-kNotableTime, slower = percent_change_time> kNotableTime;
   const bool worse = accuracy_change<-kNotableAccuracy, better = accuracy_change> kNotableAccuracy;
@@ -33,8 +34,8 @@ std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Descrip
     one.accuracy_renderer = description.accuracy[renderer][s].mean_of_participant_accuracies;
     std::vector<double> changes;
     for (std::size_t p = 0; p < table.participants.size(); ++p) {
-      const ParticipantCell& a = description.people[reference][s][p];
-      const ParticipantCell& b = description.people[renderer][s][p];
+      const ParticipantCell& a = description.participant_cells[reference][s][p];
+      const ParticipantCell& b = description.participant_cells[renderer][s][p];
       if (a.n_trials == 0 || b.n_trials == 0) continue;
       changes.push_back(static_cast<double>(b.n_correct) / static_cast<double>(b.n_trials) -
                         static_cast<double>(a.n_correct) / static_cast<double>(a.n_trials));

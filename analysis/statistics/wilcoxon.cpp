@@ -1,3 +1,5 @@
+// Wilcoxon signed-rank test.
+
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
@@ -12,10 +14,10 @@ namespace {
 struct Signed {
   double size;
   bool positive;
-  std::uint64_t twice_rank = 0;  // midranks are halves
+  std::uint64_t twice_rank = 0;  // midranks are multiples of 1/2
 };
 
-/// Midranks; sizes within `tolerance` of the first of their group are ties.
+/// Assigns midranks; sizes within `tolerance` of the smallest of their group are ties.
 void rank(std::vector<Signed>& values, double tolerance) {
   std::sort(values.begin(), values.end(),
             [](const Signed& a, const Signed& b) { return a.size < b.size; });
@@ -25,7 +27,8 @@ void rank(std::vector<Signed>& values, double tolerance) {
   }
 }
 
-/// P(V <= v) when every sign is a fair coin: each rank in turn is in the sum or not.
+/// P(V <= v) under the null hypothesis (independent signs with probability 1/2), by convolution
+/// over the ranks.
 double exact_lower_tail(const std::vector<Signed>& values, std::uint64_t twice_v) {
   std::uint64_t total = 0;
   for (const Signed& value : values) total += value.twice_rank;
@@ -44,7 +47,7 @@ double exact_lower_tail(const std::vector<Signed>& values, std::uint64_t twice_v
   return tail;
 }
 
-/// The same from the normal distribution; the variance is that of the midranks.
+/// Normal approximation of the same, with the variance of the midranks.
 double normal_lower_tail(const std::vector<Signed>& values, std::uint64_t twice_v) {
   double total = 0, squares = 0;
   for (const Signed& value : values) {
@@ -82,7 +85,8 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
   }
   test.positive_rank_sum = static_cast<double>(twice_v) / 2;
   test.exact = values.size() <= kExactWilcoxon;
-  const std::uint64_t lower = std::min(twice_v, total - twice_v);  // V is symmetric
+  const std::uint64_t lower =
+      std::min(twice_v, total - twice_v);  // the distribution of V is symmetric
   const double tail =
       test.exact ? exact_lower_tail(values, lower) : normal_lower_tail(values, lower);
   test.p = std::min(1.0, 2 * tail);

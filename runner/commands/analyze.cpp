@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
-#include "analysis/figures/figures_svg.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
@@ -33,7 +33,7 @@ void check(const std::string& database, const std::string& csv,
 }
 
 void put(Outputs& outputs, const analysis::Analysis& analysis,
-         const analysis::ReportRecord& record) {
+         const analysis::StudyRecord& record) {
   if (outputs.wanted("figures")) {
     for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
       outputs.put_into_folder(figure.id + ".svg",
@@ -82,9 +82,9 @@ int analyze_command(const std::vector<std::string>& args) {
 
   const analysis::Analysis analysis =
       analysis::analyze(read_study_trials(database, csv), settings, PALPATE_VERSION);
-  analysis::ReportRecord record;
+  analysis::StudyRecord record;
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
-    record = analysis::read_report_record(database);
+    record = analysis::read_study_record(database);
   }
   put(outputs, analysis, record);
   outputs.write();

@@ -1,4 +1,4 @@
-"""The analyze command from outside: files are well-formed, names are text, statuses are right.
+"""The analyze command: well-formed files, escaped names, statuses, exit codes.
 
 Usage: analyze_command_test.py PALPATE FIXTURES
 """
@@ -35,7 +35,7 @@ class Tags(HTMLParser):
 
 
 def without_scripts(page):
-    """The page as XML and what its scripts hold."""
+    """The page without scripts, and the contents of its scripts."""
     page = page.removeprefix("<!DOCTYPE html>\n")
     pattern = re.compile(r"<script[^>]*>(.*?)</script>", re.S)
     return pattern.sub("", page), pattern.findall(page)
@@ -51,10 +51,10 @@ class Analyze(unittest.TestCase):
         return subprocess.run([PALPATE, "analyze", *map(str, args)], capture_output=True, text=True,
                               encoding="utf-8")
 
-    def hostile(self, people, shapes):
-        """A study whose names are markup."""
+    def hostile(self, participants, shapes):
+        """A study with markup as names."""
         rows = []
-        for who in people:
+        for who in participants:
             for number, (renderer, shape) in enumerate(
                     ((r, s) for r in ("point", "ray") for s in shapes for _ in range(2)), 1):
                 quoted = ['"%s"' % name.replace('"', '""') for name in (who, shape)]

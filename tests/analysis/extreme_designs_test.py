@@ -1,4 +1,4 @@
-"""Designs and times at the limits: a figure is there or is said to be undefined, with a reason.
+"""Extreme designs and times: each value is defined, or undefined with a reason.
 
 Usage: extreme_designs_test.py PALPATE
 """
@@ -18,11 +18,11 @@ SHAPES = ["sphere", "cone", "cylinder", "cube"]
 NO_NUMBER = re.compile(r"(?<![\w])-?(nan|inf|infinity|1e\+?30)(?![\w])", re.I)
 
 
-def study(people, repetitions, time, renderers=("point", "ray"), shapes=SHAPES,
+def study(participants, repetitions, time, renderers=("point", "ray"), shapes=SHAPES,
           keep=lambda *cell: True, correct=lambda *cell: 1):
-    """CSV of a study; time, keep and correct are asked with (person, renderer, shape, repetition)."""
+    """CSV of a study; time, keep and correct are functions of (participant, renderer, shape, repetition)."""
     rows = []
-    for who in people:
+    for who in participants:
         number = 0
         for renderer in renderers:
             for shape in shapes:
@@ -45,8 +45,8 @@ DRAW = random.Random(3)
 SOME = log_normal(DRAW)
 # name: (rows, status of mixed_model, of rm_anova, of its effects)
 DESIGNS = {
-    "one person": (study("A", 5, SOME), "undefined", "undefined", "undefined"),
-    "two people": (study("AB", 5, SOME), None, "ok", "ok"),
+    "one participant": (study("A", 5, SOME), "undefined", "undefined", "undefined"),
+    "two participants": (study("AB", 5, SOME), None, "ok", "ok"),
     "one trial a cell": (study("ABCD", 1, SOME), None, "ok", "ok"),
     "one trial": (study("A", 1, SOME, ["ray"], ["cone"]), "undefined", "undefined", "undefined"),
     "two trials": (study("A", 1, SOME, shapes=["cone"]), "undefined", "undefined", "undefined"),
@@ -58,7 +58,7 @@ DESIGNS = {
                                    keep=lambda who, renderer, shape, i: DRAW.random() < 0.7), None,
                              None, None),
     "constant": (study("ABCDE", 3, lambda *cell: 5), "undefined", "undefined", "undefined"),
-    "constant by person": (study("ABCDE", 3, lambda who, *cell: ord(who)), "undefined", "undefined",
+    "constant by participant": (study("ABCDE", 3, lambda who, *cell: ord(who)), "undefined", "undefined",
                            "undefined"),
     "all at the least time": (study("ABC", 3, lambda *cell: 0.2), "undefined", "undefined", "undefined"),
     "constant up to rounding": (study("ABCDE", 3, lambda who, renderer, shape, i:
@@ -74,14 +74,14 @@ DESIGNS = {
     "nearly no residual": (study("ABCDE", 5, lambda who, *cell:
                                  f"{ord(who) * (1 + 1e-7 * DRAW.random()):.17g}"), None, "ok",
                            None),
-    "nobody right": (study("ABC", 3, SOME, correct=lambda *cell: 0), "undefined", "undefined",
+    "no correct answer": (study("ABC", 3, SOME, correct=lambda *cell: 0), "undefined", "undefined",
                      "undefined"),
     "ray never right": (study("ABC", 3, SOME, correct=lambda who, renderer, *cell:
                               int(renderer == "point")), "undefined", "undefined", "undefined"),
-    "other people with each renderer": (study("ABCDEF", 5, SOME, keep=lambda who, renderer, *cell:
+    "other participants with each renderer": (study("ABCDEF", 5, SOME, keep=lambda who, renderer, *cell:
                                               (ord(who) % 2 == 0) == (renderer == "ray")),
                                         "undefined", "undefined", "undefined"),
-    "each person a shape": (study("ABCDEFGH", 4, SOME, keep=lambda who, renderer, shape, i:
+    "each participant a shape": (study("ABCDEFGH", 4, SOME, keep=lambda who, renderer, shape, i:
                                   SHAPES.index(shape) == ord(who) % 4), None, "undefined",
                             "undefined"),
     "each renderer other shapes": (study("ABCDEFGH", 4, SOME, keep=lambda who, renderer, shape, i:
@@ -92,7 +92,7 @@ DESIGNS = {
 
 class ExtremeDesigns(unittest.TestCase):
     def check_statuses(self, value, place=""):
-        """undefined and singular always come with a reason; null only beside one of them."""
+        """undefined and singular have a reason; null occurs only with one of them."""
         if isinstance(value, list):
             for i, each in enumerate(value):
                 self.check_statuses(each, f"{place}/{i}")

@@ -1,4 +1,4 @@
-"""The plan command from outside.
+"""The plan command: output, exit codes and reproducibility.
 
 Usage: plan_command_test.py PALPATE FIXTURES
 """
@@ -82,16 +82,16 @@ class Plan(unittest.TestCase):
             self.assertIn("SIMULATED PARTICIPANTS", text)
 
     def six_shapes(self):
-        """A pilot with shapes of its own, all of them slower with the point."""
+        """A pilot with other shapes, all slower with the point."""
         rows = ["participant_id,session,block,trial,renderer,shape,response,correct,response_time"]
         trial = 0
-        for person in range(4):
+        for participant in range(4):
             for shape in ["kugel", "kugel-gross", "platte", "winkel", "kegel", "wuerfel-hart"]:
                 for renderer in ["point", "ray"]:
                     for repeat in range(4):
                         trial += 1
-                        time = 5 + person + (trial * 7 % 13) / 5 - (renderer == "ray") * 0.8
-                        rows.append(f"P{person},1,1,{trial},{renderer},{shape},{shape},1,{time}")
+                        time = 5 + participant + (trial * 7 % 13) / 5 - (renderer == "ray") * 0.8
+                        rows.append(f"P{participant},1,1,{trial},{renderer},{shape},{shape},1,{time}")
         path = self.dir / "six.csv"
         path.write_text("\n".join(rows) + "\n", "utf-8")
         return path

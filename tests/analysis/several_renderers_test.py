@@ -1,4 +1,4 @@
-"""Any renderers: each against the first, against a calculation of its own; names are text.
+"""Any renderers, each compared with the first: numbers against an independent computation; names are escaped.
 
 Usage: several_renderers_test.py PALPATE
 """
@@ -26,12 +26,12 @@ def quoted(text):
     return '"%s"' % text.replace('"', '""')
 
 
-def study(people, renderers, repetitions=5, seed=7, keep=lambda who, renderer, shape: True,
+def study(participants, renderers, repetitions=5, seed=7, keep=lambda who, renderer, shape: True,
           shapes=SHAPES, wrong=0.05):
-    """Rows as tuples; each person has the renderers in an order of their own, rotated."""
+    """Rows as tuples; the order of renderers is rotated by participant."""
     draw = random.Random(seed)
     rows = []
-    for p, who in enumerate(people):
+    for p, who in enumerate(participants):
         own, number = draw.gauss(0, 0.3), 0
         slope = {renderer: draw.gauss(0, 0.12) for renderer in renderers}
         turn = p % len(renderers)
@@ -50,7 +50,7 @@ def study(people, renderers, repetitions=5, seed=7, keep=lambda who, renderer, s
 
 
 def student_p(t, df):
-    """Two-sided, by Simpson's rule over the density."""
+    """Two-sided p of Student's t, by Simpson's rule."""
     n = 20000
     c = math.exp(math.lgamma((df + 1) / 2) - math.lgamma(df / 2)) / math.sqrt(df * math.pi)
     h = abs(t) / n
@@ -59,7 +59,7 @@ def student_p(t, df):
 
 
 def holm(p):
-    """By key."""
+    """Holm-adjusted p values by key."""
     out, largest = {}, 0
     for i, key in enumerate(sorted(p, key=p.get)):
         largest = max(largest, (len(p) - i) * p[key])
@@ -68,17 +68,17 @@ def holm(p):
 
 
 def comparisons_of(rows, reference, others):
-    """{(renderer, shape): figures} from the rows alone."""
+    """{(renderer, shape): results} computed from the rows."""
     logs, times = {}, {}
     for who, _, _, _, renderer, shape, _, right, time in rows:
         if right and time >= 0.2:
             logs.setdefault((who, renderer, shape), []).append(math.log(time))
             times.setdefault((who, renderer, shape), []).append(time)
-    people = sorted({row[0] for row in rows})
+    participants = sorted({row[0] for row in rows})
     out = {}
     for renderer in others:
         for shape in sorted({row[5] for row in rows}):
-            both = [who for who in people
+            both = [who for who in participants
                     if (who, renderer, shape) in logs and (who, reference, shape) in logs]
             d = [statistics.fmean(logs[who, renderer, shape]) -
                  statistics.fmean(logs[who, reference, shape]) for who in both]
@@ -153,10 +153,10 @@ class SeveralRenderers(unittest.TestCase):
             self.assertAlmostEqual(test["p_holm"], want["p_holm"], places=8)
 
     def test_three_and_five_renderers_agree_with_an_own_calculation(self):
-        people = [f"P{i:02}" for i in range(12)]
+        participants = [f"P{i:02}" for i in range(12)]
         for others in (["ray", "tube"], ["ray", "tube", "glove", "pen"]):
             with self.subTest(others=others):
-                rows = study(people, ["point"] + others)
+                rows = study(participants, ["point"] + others)
                 expected = comparisons_of(rows, "point", others)
                 found, text = self.analyze(rows)
                 self.assertNotIn("paired_by_shape_of", found)
@@ -207,7 +207,7 @@ class SeveralRenderers(unittest.TestCase):
         self.assertIsNotNone(components["participant_intercept_sd"])
 
     def check_figures(self, renderers):
-        """Each renderer has a colour and a symbol of its own; each comparison a panel."""
+        """Renderers have different colours and symbols; each comparison has a panel."""
         means = xml.fromstring(self.figures["figure15"])
         looks = {}
         for group in means.iter(SVG + "g"):
@@ -246,7 +246,7 @@ class SeveralRenderers(unittest.TestCase):
             for word in ("with the ray", "the point", "Ho et al", "Ho, Basdogan & Srinivasan 2000",
                          "paper: "):
                 self.assertFalse(word in out, word)
-        # The same rows under the names of the paper's renderers: the same figures.
+        # The same rows with the names of the paper's renderers: the same numbers.
         named, _ = self.analyze([row[:4] + ({"tip1": "point", "tip2": "ray"}[row[4]],) + row[5:]
                                  for row in rows])
         self.assertEqual(named["paired_by_shape"], found["paired_by_shape"])
@@ -262,8 +262,8 @@ class SeveralRenderers(unittest.TestCase):
         self.assertNotIn("point", text.replace("percentage point", ""))
 
     def test_who_lacks_a_renderer_is_named_and_left_out_there_alone(self):
-        people = [f"P{i}" for i in range(6)]
-        rows = study(people, ["point", "ray", "tube"],
+        participants = [f"P{i}" for i in range(6)]
+        rows = study(participants, ["point", "ray", "tube"],
                      keep=lambda who, renderer, shape: (who, renderer) != ("P3", "tube") and
                      (who, renderer, shape) != ("P4", "point", "cone"))
         found, text = self.analyze(rows)

@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 #include "runner/commands/accuracy/measure.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"

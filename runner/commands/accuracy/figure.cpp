@@ -50,7 +50,7 @@ void add_methods(analysis::Panel& panel, const AccuracyReport& report, std::stri
       line.x.push_back(std::log10(row.ns_per_tick));
       line.y.push_back(std::log10(error(row)));
       panel.marks.push_back(analysis::symbol(
-          look->role, analysis::Shape::circle, line.x.back(), line.y.back(), ours ? 3.5 : 2.5,
+          look->role, analysis::MarkerShape::circle, line.x.back(), line.y.back(), ours ? 3.5 : 2.5,
           row.method + ", " + thousands(row.triangles) +
               " triangles: " + significant(row.ns_per_tick) + " ns a tick, error " +
               significant(error(row)) + " m"));
@@ -111,11 +111,11 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
       "Error over time for each method of finding contact. One panel for each shape, both axes "
       "logarithmic. Top: error of depth against the analytic shape. Bottom: against the exact "
       "polyhedron.";
-  figure.room = 1e6;  // all shapes side by side
+  figure.max_row_width = 1e6;  // all shapes side by side
   for (const MethodLook& look : kLooks) {
     if (std::ranges::find(report.rows, look.method, &rendering::AccuracyRow::method) !=
         report.rows.end()) {
-      figure.legend.push_back({std::string(look.method), look.role, analysis::Shape::circle});
+      figure.legend.push_back({std::string(look.method), look.role, analysis::MarkerShape::circle});
     }
   }
   add_row(figure, report, of_shape, kHand.position, "rms error against the shape (m)");

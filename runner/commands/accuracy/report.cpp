@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 #include "rendering/accuracy/peers.h"
 

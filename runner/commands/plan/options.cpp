@@ -174,7 +174,7 @@ analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options
   put("intercept-sd", options.intercept_sd, 0, kMostSd, model.intercept_sd);
   put("correlation", options.correlation, -1, 1, model.correlation);
   put("residual-sd", options.residual_sd, 0, kMostSd, model.residual_sd);
-  put("share-used", options.share_used, 0.01, 1, model.share_used);
+  put("share-used", options.share_used, 0.01, 1, model.proportion_used);
   if (model.gain_sd == 0 && model.shape_gain_sd == 0 && model.residual_sd == 0) {
     throw UsageError(
         "expected some variation: --gain-sd, --shape-gain-sd or --residual-sd above 0");
@@ -202,8 +202,9 @@ analysis::PlanSettings settings_of(const PlanOptions& options, const po::variabl
   analysis::PlanSettings out;
   const auto ends = split(options.participants, '-');
   if (ends.size() > 2) throw UsageError("--participants: expected a range such as 4-40");
-  out.least = whole_number("participants", ends.front(), 2, kMostParticipants);
-  out.most = whole_number("participants", ends.back(), out.least, kMostParticipants);
+  out.min_participants = whole_number("participants", ends.front(), 2, kMostParticipants);
+  out.max_participants =
+      whole_number("participants", ends.back(), out.min_participants, kMostParticipants);
   for (const std::string& trials : split(options.trials, ',')) {
     out.trials.push_back(whole_number("trials", trials, 1, kMostTrials));
   }

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 #include "analysis/report/plan_report.h"
 #include "runner/commands/plan/options.h"
 #include "runner/commands/shared/command.h"

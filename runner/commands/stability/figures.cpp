@@ -25,7 +25,7 @@ void add_name(analysis::Panel& panel, const std::string& name, analysis::Role ro
               std::size_t row) {
   const double dy = 18 + 15 * static_cast<double>(row);
   analysis::Mark dot =
-      analysis::symbol(role, analysis::Shape::circle, panel.x.low, panel.y.high, 3.5);
+      analysis::symbol(role, analysis::MarkerShape::circle, panel.x.low, panel.y.high, 3.5);
   dot.dx = 12;
   dot.dy = dy - 4;
   panel.marks.push_back(std::move(dot));
@@ -48,11 +48,11 @@ void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, analysis::Rol
     const std::string text = curve.name + ", " + significant(point.stiffness) + " N/m: ";
     if (point.measured > 0) {
       panel.marks.push_back(
-          analysis::symbol(role, analysis::Shape::circle, x,
+          analysis::symbol(role, analysis::MarkerShape::circle, x,
                            std::clamp(std::log10(point.measured), panel.y.low, panel.y.high), 3.5,
                            text + significant(point.measured) + " N s/m"));
     } else {
-      panel.marks.push_back(analysis::symbol(role, analysis::Shape::down, x, panel.y.low, 3.5,
+      panel.marks.push_back(analysis::symbol(role, analysis::MarkerShape::down, x, panel.y.low, 3.5,
                                              text + "stable without any damping"));
       panel.marks.back().dy = -4;
     }
@@ -73,7 +73,7 @@ analysis::Figure stability_figure(const StabilityReport& report) {
       "Stability boundaries: damping over stiffness. Each panel asks one question; logarithmic "
       "both ways. Lines: b = K (T/2 + t_d) + |B|. Dots: the least damping with which the simulated "
       "loop comes to rest.";
-  figure.room = kRoom;
+  figure.max_row_width = kRoom;
   std::size_t row = 0;
   for (const BoundaryCurve& curve : report.curves) {
     if (figure.panels.empty() || figure.panels.back().title != curve.panel) {
@@ -103,9 +103,9 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   figure.subtitle = "Dots: 1, 4, 16, ... 1024 steps a tick; what blows up is not drawn.";
   figure.description =
       "Error over run time of integrators. A panel for each oscillator, logarithmic both ways.";
-  figure.room = kRoom;
+  figure.max_row_width = kRoom;
   for (std::size_t m = 0; m < kMethods.size(); ++m) {
-    figure.legend.push_back({kMethods[m], analysis::line_role(m), analysis::Shape::circle});
+    figure.legend.push_back({kMethods[m], analysis::line_role(m), analysis::MarkerShape::circle});
   }
   for (const IntegratorRow& row : report.integrators) {
     if (!figure.panels.empty() && figure.panels.back().title == row.oscillator) continue;
@@ -127,7 +127,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
         line.y.push_back(
             std::clamp(std::log10(std::max(row.error, kLeastError)), panel.y.low, panel.y.high));
         panel.marks.push_back(analysis::symbol(
-            analysis::line_role(m), analysis::Shape::circle, line.x.back(), line.y.back(),
+            analysis::line_role(m), analysis::MarkerShape::circle, line.x.back(), line.y.back(),
             m == 3 ? 5 : 3.5,
             row.method + ", " + std::to_string(row.steps) + " steps a tick: " +
                 significant(row.ns_per_tick) + " ns, error " + significant(row.error) + " m"));

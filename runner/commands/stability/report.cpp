@@ -4,8 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/report_page.h"
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
 

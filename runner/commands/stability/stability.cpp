@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"

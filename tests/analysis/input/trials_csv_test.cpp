@@ -1,4 +1,4 @@
-// The CSV reader: what it takes, and that every fault is named with its place.
+// The CSV reader: accepted forms, and faults with their location.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -36,7 +36,7 @@ class TrialsCsv : public ::testing::Test {
     ADD_FAILURE() << "no fault found in " << text.substr(0, 300);
     return {};
   }
-  /// Exactly one fault, at this place, with this in its words.
+  /// Expects exactly one fault at this location, whose message contains `words`.
   void expect_fault(const std::string& text, const std::string& place, const std::string& words) {
     const auto found = faults(text);
     ASSERT_EQ(found.size(), 1U) << text.substr(0, 300);
@@ -116,17 +116,17 @@ TEST_F(TrialsCsv, NamesOfRenderersAreChecked) {
 }
 
 TEST_F(TrialsCsv, RenderersAndCellsHaveALimit) {
-  const auto with = [](int renderers, int people, int stimuli) {
+  const auto with = [](int renderers, int participants, int stimuli) {
     std::string text = kHeader;
     int trial = 0;
-    const auto add = [&](int renderer, int person, int stimulus) {
+    const auto add = [&](int renderer, int participant, int stimulus) {
       const std::string shape = "s" + std::to_string(stimulus);
-      text += "P" + std::to_string(person) + ",1,1," + std::to_string(++trial) + ",r" +
+      text += "P" + std::to_string(participant) + ",1,1," + std::to_string(++trial) + ",r" +
               std::to_string(renderer) + "," + shape + "," + shape + ",1,2\n";
     };
     for (int r = 0; r < renderers; ++r) add(r, 0, 0);
     for (int s = 0; s < stimuli; ++s) add(0, 0, s);
-    for (int p = 0; p < people; ++p) add(0, p, 0);
+    for (int p = 0; p < participants; ++p) add(0, p, 0);
     return text;
   };
   EXPECT_EQ(read(with(20, 1, 1)).renderers.size(), 20U);
@@ -206,7 +206,7 @@ TEST_F(TrialsCsv, BadTimes) {
     expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,1," + time + "\n",
                  "line 2, column response_time", "a time in s");
   }
-  // A decimal comma is one field more.
+  // A decimal comma adds a field.
   expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,1,1,5\n", "line 2", "expected 9 fields");
 }
 

@@ -1,4 +1,4 @@
-// Trials from a database mean the same as from a file.
+// Trials read from a database equal those read from its export.
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -40,18 +40,18 @@ class TrialsStore : public ::testing::Test {
   }
   void study(const std::vector<data::TrialRecord>& records) {
     data::Store store = data::Store::open(path_, data::Store::Mode::write_or_create);
-    // Own stimuli stand in the protocol's order, not in that of their appearance.
+    // Stimuli are in the order of the protocol, not of their first appearance.
     const std::string text =
         R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})";
     const data::ProtocolInfo protocol{"test", text, data::checksum_hex(text)};
-    const data::Participant person = store.enrol(protocol, "S1", 1, true, 7);
+    const data::Participant participant = store.enrol(protocol, "S1", 1, true, 7);
     data::RunInfo info;
     info.program_version = "9.9.9";
     info.build = "test";
     info.device = "simulated";
     info.response_device = "simulated";
     info.observer_sha256 = std::string(64, 'b');
-    const palpate::data::Run run = store.begin_run(person, info);
+    const palpate::data::Run run = store.begin_run(participant, info);
     store.record_simulated(run, records);
     store.end_run(run, data::RunEnd::done, 1'000'000'000'000LL);
   }

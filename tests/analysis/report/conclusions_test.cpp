@@ -1,4 +1,6 @@
-// What a reader concludes from: warnings, the answer, who is left out, and what a plan counts.
+// Warnings, the conclusion, excluded participants, and the tests that a plan simulates.
+
+#include "analysis/statistics/conclusions.h"
 
 #include <gtest/gtest.h>
 
@@ -13,18 +15,17 @@
 #include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/power.h"
-#include "analysis/statistics/wording.h"
 
 namespace palpate::analysis {
 namespace {
 
-/// Changes a right answer after 5 s, or leaves the trial out by returning false.
-using Change = std::function<bool(int person, int repetition, RawTrial& trial)>;
+/// Modifies a trial, by default a correct answer after 5 s; returns false to leave it out.
+using Change = std::function<bool(int participant, int repetition, RawTrial& trial)>;
 
-/// Sphere and cone with both renderers, point first, spheres and cones in turn.
-Analysis analysis_with(int people, int repetitions, const Change& change) {
+/// Sphere and cone with both renderers, point first, shapes alternating.
+Analysis analysis_with(int participants, int repetitions, const Change& change) {
   TrialTableBuilder builder;
-  for (int p = 0; p < people; ++p) {
+  for (int p = 0; p < participants; ++p) {
     int number = 0;
     for (const std::string renderer : {"point", "ray"}) {
       for (int i = 0; i < repetitions; ++i) {
@@ -60,7 +61,7 @@ TEST(Exclusions, AreCountedByTheirReason) {
   const Analysis analysis = analysis_with(2, 10, [](int, int i, RawTrial& trial) {
     if (trial.renderer == "point" || trial.shape == "sphere") return true;
     if (i < 2) answer_wrongly(trial);
-    if (i == 1 || i == 2) trial.response_time = 0.1;  // a wrong one and a right one
+    if (i == 1 || i == 2) trial.response_time = 0.1;  // a wrong and a correct one
     if (i >= 7) {
       trial.response = "";
       trial.timed_out = true;
@@ -102,14 +103,14 @@ TEST(Exclusions, ThatDifferAreWarnedOfWhicheverHasMore) {
     });
     EXPECT_TRUE(warns(analysis, "Exclusions differ between renderers")) << more;
   }
-  const Analysis alike = analysis_with(2, 20, [&](int, int i, RawTrial& trial) {
+  const Analysis equal = analysis_with(2, 20, [&](int, int i, RawTrial& trial) {
     if (i < 2) answer_wrongly(trial);
     return true;
   });
-  EXPECT_FALSE(warns(alike, "Exclusions differ"));
+  EXPECT_FALSE(warns(equal, "Exclusions differ"));
 }
 
-TEST(Dropped, AreNamedWithTheRendererThatIsMissing) {
+TEST(DroppedParticipant, AreNamedWithTheRendererThatIsMissing) {
   const Analysis analysis = analysis_with(4, 3, [](int p, int, RawTrial& trial) {
     return (p != 1 || trial.renderer == "ray") && (p != 2 || trial.renderer == "point");
   });
@@ -123,7 +124,7 @@ TEST(Dropped, AreNamedWithTheRendererThatIsMissing) {
 }
 
 TEST(Anova, IsUndefinedWhereEveryEffectIs) {
-  // Everybody gains alike and shapes differ alike; people differ. F would divide by 0.
+  // Effects are equal in all participants: the denominator of F is 0.
   const Analysis flat = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
     trial.response_time = std::exp(1 + 0.3 * p + (trial.renderer == "ray" ? -0.2 : 0) +
                                    (trial.shape == "cone" ? 0.5 : 0));
@@ -134,7 +135,7 @@ TEST(Anova, IsUndefinedWhereEveryEffectIs) {
     EXPECT_NE(effect.undefined, "") << effect.name;
     EXPECT_FALSE(effect.generalized_eta_squared.has_value()) << effect.name;
   }
-  // One effect alone that does not vary leaves the others as they are.
+  // A single effect without variance does not affect the others.
   const Analysis one = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
     trial.response_time =
         std::exp(1 + (trial.renderer == "ray" ? -0.2 : 0) + (trial.shape == "cone" ? 0.1 * p : 0));
@@ -146,7 +147,7 @@ TEST(Anova, IsUndefinedWhereEveryEffectIs) {
   EXPECT_EQ(one.rm_anova.effects[1].undefined, "");
 }
 
-/// Point cones take 40 s and more, and end at 60 s: how many, by participant.
+/// Cones with the point take 40 s and more, with time-outs at 60 s: their number by participant.
 Analysis with_time_outs(const std::vector<int>& timed_out) {
   return analysis_with(static_cast<int>(timed_out.size()), 20, [&](int p, int i, RawTrial& trial) {
     trial.response_time = std::exp(2 + 0.05 * p + 0.3 * std::sin(3.7 * i + p) +
@@ -169,12 +170,12 @@ TEST(TimeOuts, AreSaidOfTheCellThatHasThem) {
   const TimeOutCell& cone = analysis.time_outs.cells[0][1];
   EXPECT_EQ(cone.n_trials, 80U);
   EXPECT_EQ(cone.n_timeouts, 7U);
-  EXPECT_EQ(cone.most_in, 2U);
-  EXPECT_DOUBLE_EQ(cone.largest_share, 0.3);
+  EXPECT_EQ(cone.most_affected, 2U);
+  EXPECT_DOUBLE_EQ(cone.largest_proportion, 0.3);
   EXPECT_EQ(cone.lowest_limit, 60);
   EXPECT_EQ(cone.highest_limit, 60);
   EXPECT_EQ(analysis.time_outs.cells[0][0].n_timeouts, 0U);
-  // 7 of 160 trials with the point, 4.4 %: over all shapes nobody would look up.
+  // 7 of 160 trials with the point, 4.4 %: too few over all shapes for a warning.
   EXPECT_FALSE(warns(analysis, "are not in the times"));
   EXPECT_TRUE(warns(analysis, "cone 8.8 % with the point (30.0 % in P2) and 0.0 % with the ray"));
   EXPECT_FALSE(warns(analysis, "sphere 0.0 %"));
@@ -184,7 +185,7 @@ TEST(TimeOuts, AreSaidOfTheCellThatHasThem) {
             *analysis.comparisons[0].shapes[1].mean_log_ratio);
   EXPECT_NEAR(*analysis.comparisons[0].censored[0].log_ratio,
               *analysis.comparisons[0].shapes[0].mean_log_ratio, 1e-9)
-      << "nobody timed out with a sphere";
+      << "no time-outs with a sphere";
   EXPECT_TRUE(with_time_outs({0, 0, 0, 0}).comparisons[0].censored.empty());
   EXPECT_FALSE(warns(with_time_outs({1, 0, 0, 0}), "Time-outs")) << "1.3 % in one cell";
 }
@@ -201,9 +202,9 @@ TEST(Answer, GoesByHolmsP) {
     shape.t_test.p = 0.03;
     shape.t_test.p_holm = 0.06;
   }
-  EXPECT_EQ(answer(analysis), "No clear difference between ray and point for sphere and cone.");
+  EXPECT_EQ(conclusion(analysis), "No clear difference between ray and point for sphere and cone.");
   comparison.shapes[1].t_test.p_holm = 0.04;
-  EXPECT_EQ(answer(analysis),
+  EXPECT_EQ(conclusion(analysis),
             "The ray is faster than the point for cone (18 %); no clear difference for sphere.");
 }
 
@@ -223,14 +224,14 @@ TEST(Answer, HasASentenceForEachComparison) {
   };
   add({"point", "ray", 0, 1}, -0.2, 0.01);
   add({"point", "tube", 0, 2}, 0.1, 0.02);
-  EXPECT_EQ(answer(analysis),
+  EXPECT_EQ(conclusion(analysis),
             "The ray is faster than the point for sphere (18 %) and cone (18 %). tube is slower "
             "than the point for sphere (11 %) and cone (11 %).");
   EXPECT_EQ(with_renderer(analysis, "than with"), "than with the point");
   EXPECT_TRUE(compares_as_paper(analysis));
   analysis.comparisons.erase(analysis.comparisons.begin());
   analysis.comparisons[0].pair = {"tip1", "tip2", 0, 1};
-  EXPECT_EQ(answer(analysis), "tip2 is slower than tip1 for sphere (11 %) and cone (11 %).");
+  EXPECT_EQ(conclusion(analysis), "tip2 is slower than tip1 for sphere (11 %) and cone (11 %).");
   EXPECT_EQ(with_renderer(analysis, "than with"), "with tip2 than with tip1");
   EXPECT_EQ(paper_reduction(analysis.comparisons[0].pair, "cone"), "");
   EXPECT_FALSE(compares_as_paper(analysis));
@@ -256,8 +257,8 @@ TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
   });
   EXPECT_NEAR(*analysis.practice.pairs[0].mean_slope_difference, -3, 1e-9);
   EXPECT_NEAR(*analysis.practice.pairs[0].slope_difference.sd, 1, 1e-9);
-  // The first of 8 bins holds trials 0 to 3 of each person, 14 before the middle of either shape;
-  // persons' slopes have an sd of 0.01.
+  // The first of 8 bins holds trials 0 to 3 of each participant, 14 before the middle of either
+  // shape; persons' slopes have an sd of 0.01.
   EXPECT_NEAR(*analysis.practice.learning[1].bins[0].se_mean_log, 0.14 / std::sqrt(3.0), 1e-9);
 }
 
@@ -283,7 +284,7 @@ TEST(SingularFit, IsNamedByWhatDoesNotVary) {
   const auto singular = [](const Change& change) {
     return analysis_with(4, 4, change).mixed_model.singular;
   };
-  // Alternating noise that is the same for everybody: participants vary less than chance allows.
+  // The same alternating noise for all: participants vary less than by chance.
   const auto noise = [](int i) { return i % 2 == 0 ? 0.3 : -0.3; };
   EXPECT_EQ(singular([&](int, int i, RawTrial& trial) {
               trial.response_time = std::exp(2 + noise(i));
@@ -311,7 +312,7 @@ TEST(Power, CountsOnlyWhatIsFoundTheRightWayRound) {
   model.residual_sd = 0.3;
   PowerSettings settings;
   const Power power = simulate_power(model, {8, 10}, settings);
-  EXPECT_NEAR(power.share(power.found[0]), 0.025, 0.006) << "half of alpha";
+  EXPECT_NEAR(power.proportion(power.found[0]), 0.025, 0.006) << "half of alpha";
 }
 
 TEST(Power, OfAllShapesIsLessThanOfAny) {
@@ -324,8 +325,8 @@ TEST(Power, OfAllShapesIsLessThanOfAny) {
   for (const std::vector<double>& effects : {std::vector{-1.0, -1e-9}, std::vector{-1e-9, -1.0}}) {
     model.log_ratios = effects;
     const Power power = simulate_power(model, {8, 10}, settings);
-    EXPECT_GT(power.share(power.any), 0.99);
-    EXPECT_LT(power.share(power.all), 0.1);
+    EXPECT_GT(power.proportion(power.any), 0.99);
+    EXPECT_LT(power.proportion(power.all), 0.1);
   }
 }
 
@@ -340,7 +341,7 @@ TEST(Power, OfTheModelWithoutParticipantsVarianceIsThatOfTheTrials) {
   // The standard error is 0.4 sqrt(2 / 160), the effect 2.91 of them: a z-test finds 0.829. Times
   // that vary more within a cell than their model says would leave much less of it.
   const Power power = simulate_power(model, {40, 4}, settings);
-  EXPECT_NEAR(power.share(power.found[0]), 0.81, 0.05);
+  EXPECT_NEAR(power.proportion(power.found[0]), 0.81, 0.05);
 }
 
 TEST(Plan, AsksForTheGoalThatIsSet) {
@@ -361,7 +362,7 @@ TEST(Pilot, LeavesOutOfTheShareWhatIsTooFast) {
   });
   const Pilot pilot = read_pilot(analysis);
   ASSERT_EQ(pilot.undefined, "");
-  EXPECT_EQ(pilot.model.share_used, 7.0 / 8);
+  EXPECT_EQ(pilot.model.proportion_used, 7.0 / 8);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What the tables of inference say is what was inferred.
+// Tables of inferential statistics print the values of the analysis.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,8 @@
 namespace palpate::analysis {
 namespace {
 
-/// Twelve people whose intercepts and gains vary, by as much with each renderer as its place says.
+/// Twelve participants with random intercepts and gains; the sd of gains is proportional to the
+/// index of the renderer.
 Analysis varied_study(const std::vector<std::string>& renderers) {
   TrialTableBuilder builder;
   stimuli::Random random(23);
@@ -54,7 +55,7 @@ TEST(MixedModelTable, TellsEveryStandardDeviationOfTheFit) {
     });
     ASSERT_NE(note, table.notes.end());
     std::string rest = *note;
-    // In this order, each beside what it is of.
+    // In this order, each after its name.
     const auto take = [&](const std::string& words, double value, int digits) {
       const std::string expected = words + " " + fixed(value, digits);
       const std::size_t at = rest.find(expected);

@@ -17,7 +17,7 @@ PALPATE, QUICK, FIXTURES = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(
 SVG = "{http://www.w3.org/2000/svg}"
 TITLE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 FIGURES = ["figure15", "speedup", "times", "confusion", "speed-accuracy", "learning", "order", "exclusions"]
-# Of the two drawings of a figure, for wide and narrow screens, the one that is seen.
+# The visible one of the two drawings of a figure, for wide and narrow screens.
 DRAWN = "[...document.querySelectorAll('.drawing svg')].filter(s => s.getClientRects().length)"
 
 
@@ -63,7 +63,7 @@ class Report(unittest.TestCase):
                               **(more if kind == "keyDown" else {}))
 
     def shown(self):
-        """Of each figure that is seen: section, width, height, number of drawn things."""
+        """Of each visible figure: section, width, height, number of elements."""
         return self.browser.run(DRAWN + ".map(s => { const b = s.getBoundingClientRect(); return "
                                 "[s.closest('section').id, b.width, b.height, "
                                 "s.querySelectorAll('path, line, circle, rect, polygon, text').length]; })")
@@ -147,7 +147,7 @@ class Report(unittest.TestCase):
                 while not path.exists() and time.monotonic() < deadline:
                     self.browser.run("new Promise(r => setTimeout(r, 20))")
                 self.assertTrue(path.exists(), path.name)
-                # Chromium drops what would be an eleventh download within a second; no hand is that fast.
+                # Chromium drops the eleventh download within a second.
                 self.browser.run("new Promise(r => setTimeout(r, 120))")
             saved = (out / f"{name}.svg").read_text("utf-8")
             self.assertNotIn("var(", saved)
@@ -203,7 +203,7 @@ class Report(unittest.TestCase):
         self.assertLessEqual(self.browser.run("document.documentElement.scrollWidth"), 390)
         for name, width, _, _ in self.shown():
             self.assertLessEqual(width, 362, name)
-        # Texts keep a size that can be read.
+        # Texts stay legible.
         sizes = self.browser.run(f"({DRAWN}).map(s => s.getBoundingClientRect().width / s.viewBox.baseVal.width)")
         self.assertGreater(min(sizes), 0.8)
 
@@ -228,7 +228,7 @@ class Report(unittest.TestCase):
 
     def test_a_participant_can_be_picked_out(self):
         self.open()
-        # In the drawing for wide screens: lines that stand out, marks that step back.
+        # In the drawing for wide screens: highlighted lines and faded marks.
         seen = ("(() => { const all = [...document.querySelectorAll('#figure15 .wide-screen [data-person]')]; return ["
                 "all.filter(g => g.querySelector('polyline') && getComputedStyle(g.querySelector('polyline')).strokeWidth === "
                 "'2.5px').map(g => g.dataset.person), all.filter(g => getComputedStyle(g).opacity < 0.5)"
@@ -240,7 +240,7 @@ class Report(unittest.TestCase):
         self.assertEqual(bold, [who] * 4)  # one for each shape
         self.assertEqual(len(set(faint)), 3)
         self.assertNotIn(who, faint)
-        # Pointing at another picks that one out until the pointer leaves.
+        # Hovering highlights another participant until the pointer leaves.
         other, x, y = self.browser.run(
             "(() => { const g = document.querySelector('#figure15 .wide-screen [data-person] circle'); "
             "g.scrollIntoView({block: 'center', behavior: 'instant'}); const b = g.getBoundingClientRect(); "
@@ -260,7 +260,7 @@ class Report(unittest.TestCase):
         finally:
             self.browser.call("Emulation.setScriptExecutionDisabled", value=False)
         self.assertEqual([figure[0] for figure in self.shown()], FIGURES)
-        # Title and notes stand once: the page's, not the drawing's own as well.
+        # Title and notes are visible once: in the page, not in the drawing as well.
         seen = ("[...document.querySelectorAll('#%s h2, #%s figcaption, #%s .drawing text')]"
                 ".filter(e => e.getClientRects().length).map(e => [e.tagName, e.textContent])")
         for name in FIGURES:

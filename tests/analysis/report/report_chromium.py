@@ -1,4 +1,4 @@
-"""A headless Chromium under the DevTools protocol, over a pipe: nothing but the standard library."""
+"""Controls a headless Chromium with the DevTools protocol over a pipe; standard library only."""
 
 import base64
 import json
@@ -20,15 +20,15 @@ def find():
 
 
 class Browser:
-    """One browser with one page. `events` holds everything that it reported."""
+    """A browser with one page. `events` is the list of all events received."""
 
-    PATIENCE = 120  # s for an answer, then the browser has hung
+    PATIENCE = 120  # s until a missing reply counts as a hang
 
     def __init__(self, path):
         self.profile = tempfile.mkdtemp(prefix="palpate-chromium-")
         to_browser, self.write_end = os.pipe()
         self.read_end, from_browser = os.pipe()
-        # Chromium reads from 3 and writes to 4. No word of its own to the network.
+        # Chromium reads from descriptor 3 and writes to 4. Options switch its own network traffic off.
         self.process = subprocess.Popen(
             ["bash", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "bash", path, "--headless=new",
              "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe",
@@ -76,7 +76,7 @@ class Browser:
                 self.events.append((answer["method"], answer["params"]))
 
     def open(self, path):
-        """Loads a file; returns when it is loaded."""
+        """Loads a file and waits until it is loaded."""
         self.events.clear()
         self.call("Page.navigate", url=pathlib.Path(path).resolve().as_uri())
         while not any(name == "Page.loadEventFired" for name, _ in self.events):
@@ -85,7 +85,7 @@ class Browser:
                 self.events.append((message["method"], message["params"]))
 
     def run(self, script):
-        """The value of an expression in the page; promises are awaited."""
+        """Evaluates an expression in the page; awaits promises."""
         answer = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True,
                            userGesture=True)
         if "exceptionDetails" in answer:
@@ -106,7 +106,7 @@ class Browser:
         return found
 
     def requests(self):
-        """Addresses that the page asked for, its own and what it carries inside left out."""
+        """URLs requested by the page, without its own and data: URLs."""
         return [params["request"]["url"] for name, params in self.events
                 if name == "Network.requestWillBeSent" and params["type"] != "Document"
                 and not params["request"]["url"].startswith(("data:", "blob:"))]

@@ -1,4 +1,4 @@
-// What the reports say and how.
+// Texts and form of the reports.
 
 #include <gtest/gtest.h>
 
@@ -9,14 +9,14 @@
 #include <string>
 #include <vector>
 
+#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
-#include "analysis/figures/figures_svg.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 #include "stimuli/random.h"
 
@@ -24,28 +24,28 @@ namespace palpate::analysis {
 namespace {
 
 struct Study {
-  std::vector<std::string> people{"A", "B", "C", "D", "E"};
+  std::vector<std::string> participants{"A", "B", "C", "D", "E"};
   std::vector<std::string> renderers{"point", "ray"};
   std::vector<std::string> shapes{"sphere", "cone", "cylinder", "cube"};
   int repetitions = 6;
   Simulated simulated = Simulated::no;
   double cone_ratio = 0.6;   ///< of ray to point times
-  double lost_with_ray = 0;  ///< share of time-outs
+  double lost_with_ray = 0;  ///< proportion of time-outs
 };
 
 Analysis analysis_of_study(const Study& study) {
   TrialTableBuilder builder;
   stimuli::Random random(11);
-  for (std::size_t p = 0; p < study.people.size(); ++p) {
+  for (std::size_t p = 0; p < study.participants.size(); ++p) {
     int number = 0;
     for (const auto& renderer : study.renderers) {
       for (const auto& shape : study.shapes) {
         for (int i = 0; i < study.repetitions; ++i) {
           RawTrial raw;
-          raw.participant = study.people[p];
+          raw.participant = study.participants[p];
           raw.renderer = renderer;
           raw.shape = shape;
-          // Half of the people have the ray first.
+          // Half of the participants have the ray first.
           raw.trial = ++number + (renderer == "point" && p % 2 == 1 ? 100000 : 0);
           raw.timed_out = renderer == "ray" && random.unit() < study.lost_with_ray;
           if (!raw.timed_out) raw.response = shape;
@@ -76,27 +76,27 @@ bool holds(const std::string& text, const std::string& part) {
 
 TEST(Answer, NamesWhatIsFasterSlowerAndNeither) {
   Study study;
-  EXPECT_TRUE(
-      answer(analysis_of_study(study)).starts_with("The ray is faster than the point for cone (4"))
-      << answer(analysis_of_study(study));
-  EXPECT_TRUE(
-      holds(answer(analysis_of_study(study)), "no clear difference for sphere, cylinder and cube"));
+  EXPECT_TRUE(conclusion(analysis_of_study(study))
+                  .starts_with("The ray is faster than the point for cone (4"))
+      << conclusion(analysis_of_study(study));
+  EXPECT_TRUE(holds(conclusion(analysis_of_study(study)),
+                    "no clear difference for sphere, cylinder and cube"));
   study.cone_ratio = 1.6;
-  EXPECT_TRUE(
-      answer(analysis_of_study(study)).starts_with("The ray is slower than the point for cone (5"))
-      << answer(analysis_of_study(study));
+  EXPECT_TRUE(conclusion(analysis_of_study(study))
+                  .starts_with("The ray is slower than the point for cone (5"))
+      << conclusion(analysis_of_study(study));
   study.cone_ratio = 1;
-  EXPECT_EQ(answer(analysis_of_study(study)),
+  EXPECT_EQ(conclusion(analysis_of_study(study)),
             "No clear difference between ray and point for sphere, cone, cylinder and cube.");
 }
 
 TEST(Answer, SaysWhyNothingCanBeSaid) {
   Study study;
-  study.people = {"A"};
-  EXPECT_TRUE(holds(answer(analysis_of_study(study)), "cannot say"));
-  study.people = {"A", "B", "C"};
+  study.participants = {"A"};
+  EXPECT_TRUE(holds(conclusion(analysis_of_study(study)), "cannot say"));
+  study.participants = {"A", "B", "C"};
   study.renderers = {"ray"};
-  EXPECT_TRUE(holds(answer(analysis_of_study(study)), "cannot say"));
+  EXPECT_TRUE(holds(conclusion(analysis_of_study(study)), "cannot say"));
 }
 
 TEST(Reports, SaySimulatedWhereverAFigureStands) {
@@ -117,7 +117,7 @@ TEST(Reports, SaySimulatedWhereverAFigureStands) {
 
 TEST(Text, StaysWithinAHundredColumns) {
   Study study;
-  study.people = {std::string(200, 'p'), "B", "C"};
+  study.participants = {std::string(200, 'p'), "B", "C"};
   study.repetitions = 2;
   for (int i = 0; i < 40; ++i) study.shapes.push_back(std::string(60, 'x') + std::to_string(i));
   study.shapes.push_back("Würfel mit sehr langem Namen und Umlauten äöü");
@@ -171,10 +171,11 @@ TEST(Reports, SayTimeOutsByCellAndLeaveThemOutWhereThereAreNone) {
   EXPECT_FALSE(without["paired_by_shape"]["cone"].contains("censored"));
   std::size_t counted = 0;
   for (const auto& shape : with["time_outs"]["ray"]) {
-    std::size_t people = 0;
-    for (const auto& one : shape["participants"]) people += one["n_timeouts"].get<std::size_t>();
-    EXPECT_EQ(people, shape["n_timeouts"].get<std::size_t>());
-    counted += people;
+    std::size_t participants = 0;
+    for (const auto& one : shape["participants"])
+      participants += one["n_timeouts"].get<std::size_t>();
+    EXPECT_EQ(participants, shape["n_timeouts"].get<std::size_t>());
+    counted += participants;
   }
   EXPECT_EQ(counted, with["counts"]["n_timeouts"].get<std::size_t>());
   EXPECT_EQ(with["paired_by_shape"]["cone"]["censored"]["status"], "ok");
@@ -202,8 +203,8 @@ TEST(Figures, EndAViolinAtTheLimitAndSayHowManyEndedThere) {
 }
 
 /// A study with a servo record: `bins` of the longest periods that trials had.
-ReportRecord servo_record(const std::vector<std::size_t>& bins) {
-  ReportRecord record;
+StudyRecord servo_record(const std::vector<std::size_t>& bins) {
+  StudyRecord record;
   for (const char* renderer : {"point", "ray"}) {
     ServoQuality& servo = record.servo.emplace_back();
     servo.renderer = renderer;
@@ -218,7 +219,7 @@ TEST(Figures, OfTheServoAreLeftOutWhereEveryTrialIsAlike) {
   Study study;
   study.simulated = Simulated::yes;
   const Analysis analysis = analysis_of_study(study);
-  const auto drawn = [&](const ReportRecord& record) {
+  const auto drawn = [&](const StudyRecord& record) {
     return std::ranges::count(figures_of(analysis, record), "servo", &Figure::id);
   };
   EXPECT_EQ(drawn(servo_record({20, 20, 20})), 0);
@@ -248,7 +249,7 @@ TEST(Paper, IsSilentWhereNothingMatchesIt) {
     const std::string text = write(analysis_of_study(study));
     for (const char* word :
          {"paper", "Ho et al", "Basdogan", "fig. 15", "figure 15", "Figure 15", "n.s."}) {
-      // The page's style names a colour, and what prints, "paper".
+      // The style sheet has "paper" as name of a colour.
       const std::size_t from = write == page ? text.find("<body>") : 0;
       const std::size_t to = std::min(text.find("<script"), text.size());
       EXPECT_FALSE(holds(text.substr(from, to - from).substr(0, std::string::npos), word) &&
@@ -259,14 +260,14 @@ TEST(Paper, IsSilentWhereNothingMatchesIt) {
   }
   study.shapes[0] = "sphere";
   EXPECT_TRUE(holds(report_text(analysis_of_study(study)), "fig. 15"));
-  study.renderers = {"ray"};  // nothing to compare, and so nothing to compare with
+  study.renderers = {"ray"};  // a single renderer: no comparison
   EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "fig. 15"));
   EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "with time-outs"));
   EXPECT_TRUE(holds(report_text(analysis_of_study(study)), "Time-outs: trials that ended"));
 }
 
 TEST(Reports, NeverPrintNanOrInfinity) {
-  for (std::size_t people = 1; people <= 3; ++people) {
+  for (std::size_t participants = 1; participants <= 3; ++participants) {
     for (const auto& renderers : {std::vector<std::string>{"point"},
                                   {"ray"},
                                   {"point", "ray"},
@@ -274,14 +275,14 @@ TEST(Reports, NeverPrintNanOrInfinity) {
                                   {"ray", "tip"},
                                   {"point", "ray", "a", "b", "c", "d", "e"}}) {
       Study study;
-      study.people.resize(people);
+      study.participants.resize(participants);
       study.renderers = renderers;
       study.lost_with_ray = 1;
       const Analysis analysis = analysis_of_study(study);
       for (const auto& write : {report_text, drawings, report_json}) {
         const std::string text = write(analysis);
         for (const char* bad : {"nan", "NaN", "inf ", "inf\"", "inf%", "Infinity"}) {
-          EXPECT_FALSE(holds(text, bad)) << bad << " with " << people;
+          EXPECT_FALSE(holds(text, bad)) << bad << " with " << participants;
         }
       }
     }
@@ -302,7 +303,7 @@ TEST(Escaping, NothingFromAFileIsMarkup) {
   EXPECT_EQ(escaped("<a href=\"x\">&'\x01\xFF"),
             "&lt;a href=&quot;x&quot;&gt;&amp;&#39;\\u0001\\xff");
   Study study;
-  study.people = {"<script>alert(1)</script>", "B", "C"};
+  study.participants = {"<script>alert(1)</script>", "B", "C"};
   study.shapes = {"cone", "<script>"};
   study.renderers = {"point", "ray"};
   study.shapes = {"cone", "<script>", "</script>"};
@@ -311,7 +312,7 @@ TEST(Escaping, NothingFromAFileIsMarkup) {
     EXPECT_FALSE(holds(text, "<script>alert"));
     EXPECT_TRUE(holds(text, "&lt;script&gt;"));
   }
-  // Two scripts, each with its end: colours and ours.
+  // Two script elements: the palette and the program.
   const std::string text = page(analysis_of_study(study));
   std::size_t begins = 0, ends = 0;
   for (std::size_t at = 0; (at = text.find("<script", at)) != std::string::npos; ++at) ++begins;

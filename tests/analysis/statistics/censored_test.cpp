@@ -1,5 +1,5 @@
-// Time-outs as censored times: against R's survreg, against the likelihood written out, and whether
-// the interval holds what it promises.
+// Time-outs as censored times: against R's survreg, against the likelihood maximised directly, and
+// the coverage of the interval.
 
 #include "analysis/statistics/censored.h"
 
@@ -25,11 +25,11 @@ using Json = nlohmann::json;
 
 const std::string kCensoredFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
-/// One estimate from rows of its own, whether somebody timed out or not.
+/// The estimate from the rows, also without time-outs.
 CensoredEstimate estimate_all(const TrialTable& table) {
   const Description description = describe(table, 0.2);
   TimeOuts outs = time_outs(table, description);
-  // A time-out of somebody else: the estimate is asked for.
+  // A time-out of another participant, so that there is an estimate.
   outs.cells[0].emplace_back().n_timeouts = 1;
   return censored_by_shape(description, outs, {"point", "ray", 0, 1})[0];
 }
@@ -75,7 +75,7 @@ TEST(Censored, AgreesWithSurvreg) {
   }
 }
 
-/// Trials by hand.
+/// Makes trials one by one.
 struct Row {
   std::string participant, renderer;
   double time;
@@ -103,11 +103,11 @@ TrialTable table_of(const std::vector<Row>& rows) {
   return builder.finish({});
 }
 
-/// A study with its own gain for everybody; times past the limit are time-outs.
-std::vector<Row> simulated(stimuli::Random& random, int people, int trials, double gain,
+/// A simulated study with random gains; times beyond the limit are time-outs.
+std::vector<Row> simulated(stimuli::Random& random, int participants, int trials, double gain,
                            double gain_sd, double limit, double residual_sd = 0.5) {
   std::vector<Row> rows;
-  for (int p = 0; p < people; ++p) {
+  for (int p = 0; p < participants; ++p) {
     const double own = 3.0 + 0.3 * random.normal(), own_gain = gain + gain_sd * random.normal();
     for (const char* renderer : {"point", "ray"}) {
       for (int i = 0; i < trials; ++i) {
@@ -128,7 +128,7 @@ TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
     const CensoredEstimate found = estimate_all(table_of(rows));
     ASSERT_EQ(found.undefined, "");
     ASSERT_GT(found.n_censored, 3U);
-    // The intercepts are found anew for each slope and sd, by thirds: the likelihood has one top.
+    // Profile likelihood: intercepts by ternary search for each slope and sd (unimodal).
     const auto log_likelihood = [&](double slope, double sd) {
       const boost::math::normal normal;
       double sum = 0;
@@ -192,8 +192,7 @@ TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
 }
 
 TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
-  // 7 participants who gain 0.4 with a spread of 0.1; with the point a fifth of the trials time
-  // out.
+  // 7 participants, gain 0.4 with sd 0.1; a fifth of the trials with the point are time-outs.
   constexpr double kGain = -0.4;
   constexpr int kStudies = 1000;
   for (const std::uint64_t seed : {21, 22}) {

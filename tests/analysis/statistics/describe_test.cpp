@@ -1,4 +1,4 @@
-// The definitions at their edges; everything else is held against R in oracle_test.
+// Edge cases of the definitions; all other values are compared with R in oracle_test.
 
 #include "analysis/statistics/describe.h"
 

@@ -1,4 +1,4 @@
-// The mixed model against its definition, written out trial by trial with the whole of V.
+// The mixed model against its definition with the dense covariance matrix V of all trials.
 
 #include <gtest/gtest.h>
 
@@ -21,31 +21,32 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kRenderers = 2;
 
-/// Trials of a study and their model's matrices; X is treatment coding.
+/// Trials of a study and the matrices of the model; X has treatment coding.
 struct DenseStudy {
   std::vector<std::string> shapes;
-  People people;
-  MatrixXd x, intercepts, slopes;  // same participant; same participant and both with the ray
-  MatrixXd either;                 // same participant and one with the ray, twice if both
+  ParticipantCells participants;
+  MatrixXd x, intercepts,
+      slopes;       // indicators: same participant; same participant and both with the ray
+  MatrixXd either;  // same participant and one with the ray, twice if both
   VectorXd y;
 };
 
 /// \param trials of (participant, renderer, shape)
 DenseStudy dense_study(
-    std::size_t n_people, std::size_t n_shapes,
+    std::size_t n_participants, std::size_t n_shapes,
     const std::function<std::size_t(std::size_t, std::size_t, std::size_t)>& trials,
     std::uint64_t seed) {
   stimuli::Random random(seed);
   DenseStudy out;
   for (std::size_t s = 0; s < n_shapes; ++s) out.shapes.push_back("s" + std::to_string(s));
-  out.people.assign(kRenderers, {n_shapes, std::vector<ParticipantCell>(n_people)});
+  out.participants.assign(kRenderers, {n_shapes, std::vector<ParticipantCell>(n_participants)});
   std::vector<std::array<std::size_t, 3>> rows;
   std::vector<double> y;
-  for (std::size_t p = 0; p < n_people; ++p) {
+  for (std::size_t p = 0; p < n_participants; ++p) {
     const double intercept = 0.4 * random.normal(), slope = 0.4 * random.normal();
     for (std::size_t r = 0; r < kRenderers; ++r) {
       for (std::size_t s = 0; s < n_shapes; ++s) {
-        ParticipantCell& cell = out.people[r][s][p];
+        ParticipantCell& cell = out.participants[r][s][p];
         cell.n_used = trials(p, r, s);
         const std::size_t first = y.size();
         for (std::size_t i = 0; i < cell.n_used; ++i) {
@@ -55,7 +56,7 @@ DenseStudy dense_study(
           cell.mean_log += y.back() / static_cast<double>(cell.n_used);
         }
         for (std::size_t i = first; i < y.size(); ++i) {
-          cell.squares_log += (y[i] - cell.mean_log) * (y[i] - cell.mean_log);
+          cell.sum_of_squares_log += (y[i] - cell.mean_log) * (y[i] - cell.mean_log);
         }
       }
     }
@@ -135,8 +136,8 @@ Variances gradient(const std::function<double(const Variances&)>& f, const Varia
   return out;
 }
 
-/// Satterthwaite's degrees of freedom of weights' beta by differences. They do not depend on the
-/// parameters, so variances do for theta and sigma.
+/// Satterthwaite's degrees of freedom of weights' beta by finite differences. They do not depend on
+/// the parametrisation: variances are used instead of theta and sigma.
 double satterthwaite(const DenseStudy& study, const Variances& at, const VectorXd& weights) {
   constexpr double kStep = 1e-4;
   const auto variance = [&](const Variances& v) {
@@ -155,7 +156,7 @@ double satterthwaite(const DenseStudy& study, const Variances& at, const VectorX
 }
 
 void expect_by_definition(const DenseStudy& study) {
-  const MixedModel model = mixed_model(study.people, {"point", "ray"}, study.shapes);
+  const MixedModel model = mixed_model(study.participants, {"point", "ray"}, study.shapes);
   ASSERT_EQ(model.undefined, "");
   ASSERT_EQ(model.singular, "");
   EXPECT_EQ(model.n_observations, static_cast<std::size_t>(study.y.size()));

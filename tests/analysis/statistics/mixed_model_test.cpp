@@ -25,28 +25,28 @@ ParticipantCell cell_of(const std::vector<double>& logs) {
   if (logs.empty()) return cell;
   cell.mean_log = mean(logs);
   for (const double log : logs) {
-    cell.squares_log += (log - cell.mean_log) * (log - cell.mean_log);
+    cell.sum_of_squares_log += (log - cell.mean_log) * (log - cell.mean_log);
     cell.mean += std::exp(log) / static_cast<double>(logs.size());
   }
   return cell;
 }
 
 /// Log times of two renderers and two shapes with the sds given.
-People people_of(std::size_t n, std::size_t repetitions, double intercept, double slope,
-                 double residual, std::uint64_t seed) {
+ParticipantCells participant_cells_of(std::size_t n, std::size_t repetitions, double intercept,
+                                      double slope, double residual, std::uint64_t seed) {
   stimuli::Random random(seed);
-  People people(2, {2, std::vector<ParticipantCell>(n)});
+  ParticipantCells participants(2, {2, std::vector<ParticipantCell>(n)});
   for (std::size_t p = 0; p < n; ++p) {
     const double a = intercept * random.normal(), b = slope * random.normal();
     for (std::size_t r = 0; r < 2; ++r) {
       for (std::size_t s = 0; s < 2; ++s) {
         std::vector<double> logs(repetitions);
         for (double& log : logs) log = 2 + a + (r == 1 ? b - 0.2 : 0) + residual * random.normal();
-        people[r][s][p] = cell_of(logs);
+        participants[r][s][p] = cell_of(logs);
       }
     }
   }
-  return people;
+  return participants;
 }
 
 void expect_estimate(const Json& expected, const ModelEstimate& found, const std::string& place) {
@@ -69,7 +69,7 @@ TEST(ThreeRenderers, AgreesWithR) {
   const std::vector<std::string> shapes{"sphere", "cone", "cylinder"};
   const Json all = Json::parse(
       std::ifstream(PALPATE_SOURCE_DIR "/tests/analysis/fixtures/three_renderers.json"));
-  People people(3, {3, std::vector<ParticipantCell>(10)});
+  ParticipantCells participants(3, {3, std::vector<ParticipantCell>(10)});
   for (std::size_t p = 0; p < 10; ++p) {
     const std::string name = p == 9 ? "D10" : "D0" + std::to_string(p + 1);
     for (std::size_t r = 0; r < 3; ++r) {
@@ -77,13 +77,13 @@ TEST(ThreeRenderers, AgreesWithR) {
         std::string key = name;
         key += "." + shapes[s] + "." + renderers[r];
         const Json& logs = all["trials"][key];
-        people[r][s][p] = cell_of(logs.is_array() ? logs.get<std::vector<double>>()
-                                                  : std::vector<double>{logs.get<double>()});
+        participants[r][s][p] = cell_of(logs.is_array() ? logs.get<std::vector<double>>()
+                                                        : std::vector<double>{logs.get<double>()});
       }
     }
   }
 
-  const RmAnova anova = rm_anova(people);
+  const RmAnova anova = rm_anova(participants);
   for (const AnovaEffect& effect : anova.effects) {
     const Json& expected = all["rm_anova"]["effects"][effect.name];
     EXPECT_NEAR(*effect.f, expected["F"].get<double>(), 1e-8 * *effect.f) << effect.name;
@@ -95,7 +95,7 @@ TEST(ThreeRenderers, AgreesWithR) {
                 1e-8);
   }
 
-  const MixedModel model = mixed_model(people, renderers, shapes);
+  const MixedModel model = mixed_model(participants, renderers, shapes);
   const Json& expected = all["mixed_model"];
   EXPECT_EQ(model.undefined, "");
   EXPECT_EQ(model.singular, "");
@@ -126,8 +126,8 @@ TEST(MixedModel, ConvergesWhereverTheVariancesLie) {
       for (const double residual : {1e-3, 0.4, 50.0}) {
         for (std::uint64_t seed = 1; seed <= 5; ++seed) {
           const std::size_t n = 2 + seed * seed;
-          const MixedModel model =
-              mixed_model(people_of(n, seed, intercept, slope, residual, seed), kTwo, kShapes);
+          const MixedModel model = mixed_model(
+              participant_cells_of(n, seed, intercept, slope, residual, seed), kTwo, kShapes);
           EXPECT_EQ(model.undefined, "")
               << intercept << " " << slope << " " << residual << " " << seed;
           for (const FixedEffect& effect : model.fixed_effects) {
@@ -142,16 +142,16 @@ TEST(MixedModel, ConvergesWhereverTheVariancesLie) {
 
 TEST(MixedModel, RefusesWhatWouldTakeHours) {
   const auto reason = [](std::size_t n_renderers, std::size_t n_shapes) {
-    People people(n_renderers, {n_shapes, std::vector<ParticipantCell>(3)});
+    ParticipantCells participants(n_renderers, {n_shapes, std::vector<ParticipantCell>(3)});
     std::vector<std::string> renderers, shapes;
     for (std::size_t r = 0; r < n_renderers; ++r) {
       renderers.push_back("r" + std::to_string(r));
-      for (auto& shape : people[r]) {
+      for (auto& shape : participants[r]) {
         for (ParticipantCell& cell : shape) cell = cell_of({1.0, 2.0});
       }
     }
     for (std::size_t s = 0; s < n_shapes; ++s) shapes.push_back("s" + std::to_string(s));
-    return mixed_model(people, renderers, shapes).undefined;
+    return mixed_model(participants, renderers, shapes).undefined;
   };
   EXPECT_EQ(reason(9, 2), "too many renderers and shapes for this model");
   EXPECT_EQ(reason(5, 200), "too many renderers and shapes for this model");
@@ -159,14 +159,14 @@ TEST(MixedModel, RefusesWhatWouldTakeHours) {
 }
 
 TEST(MixedModel, DoesNotDependOnTheUnitOfTime) {
-  People people = people_of(8, 4, 0.3, 0.2, 0.4, 3);
-  const MixedModel before = mixed_model(people, kTwo, kShapes);
-  for (auto& renderer : people) {
+  ParticipantCells participants = participant_cells_of(8, 4, 0.3, 0.2, 0.4, 3);
+  const MixedModel before = mixed_model(participants, kTwo, kShapes);
+  for (auto& renderer : participants) {
     for (auto& shape : renderer) {
       for (ParticipantCell& cell : shape) cell.mean_log += std::log(1000.0);
     }
   }
-  const MixedModel after = mixed_model(people, kTwo, kShapes);
+  const MixedModel after = mixed_model(participants, kTwo, kShapes);
   EXPECT_NEAR(*after.log_likelihood_reml, *before.log_likelihood_reml, 1e-9);
   for (std::size_t s = 0; s < 2; ++s) {
     EXPECT_NEAR(*after.contrasts[0][s].estimate, *before.contrasts[0][s].estimate, 1e-10);
@@ -175,30 +175,30 @@ TEST(MixedModel, DoesNotDependOnTheUnitOfTime) {
 }
 
 TEST(MixedModel, NamesWhatLiesOnTheBoundary) {
-  const MixedModel flat = mixed_model(people_of(30, 6, 0.3, 0, 0.4, 2), kTwo, kShapes);
+  const MixedModel flat = mixed_model(participant_cells_of(30, 6, 0.3, 0, 0.4, 2), kTwo, kShapes);
   ASSERT_EQ(flat.undefined, "");
   EXPECT_NE(flat.singular, "");
-  const MixedModel full = mixed_model(people_of(30, 6, 0.3, 0.3, 0.4, 2), kTwo, kShapes);
+  const MixedModel full = mixed_model(participant_cells_of(30, 6, 0.3, 0.3, 0.4, 2), kTwo, kShapes);
   EXPECT_EQ(full.singular, "");
 }
 
 TEST(MixedModel, SaysWhyThereIsNoFit) {
-  const auto reason = [](const People& people) {
-    return mixed_model(people, kTwo, kShapes).undefined;
+  const auto reason = [](const ParticipantCells& participants) {
+    return mixed_model(participants, kTwo, kShapes).undefined;
   };
-  EXPECT_EQ(reason(people_of(1, 5, 0.3, 0.2, 0.4, 1)),
+  EXPECT_EQ(reason(participant_cells_of(1, 5, 0.3, 0.2, 0.4, 1)),
             "one participant cannot tell chance from effect");
-  EXPECT_EQ(reason(people_of(5, 3, 0, 0, 0, 1)),
+  EXPECT_EQ(reason(participant_cells_of(5, 3, 0, 0, 0, 1)),
             "no residual variance: participants and shapes explain every time");
-  People apart = people_of(4, 3, 0.3, 0.2, 0.4, 1);
+  ParticipantCells apart = participant_cells_of(4, 3, 0.3, 0.2, 0.4, 1);
   for (std::size_t p = 0; p < 4; ++p) {
     for (ParticipantCell* cell : {&apart[p % 2][0][p], &apart[p % 2][1][p]}) *cell = {};
   }
   EXPECT_EQ(reason(apart), "no participant has times for both renderers");
-  const People nobody(2, {2, std::vector<ParticipantCell>(3)});
-  EXPECT_EQ(reason(nobody), "no trial can be used for times");
-  EXPECT_EQ(mixed_model(nobody, kTwo, kShapes).contrasts.size(), 1U);
-  People one_renderer = people_of(4, 3, 0.3, 0.2, 0.4, 1);
+  const ParticipantCells empty(2, {2, std::vector<ParticipantCell>(3)});
+  EXPECT_EQ(reason(empty), "no trial can be used for times");
+  EXPECT_EQ(mixed_model(empty, kTwo, kShapes).contrasts.size(), 1U);
+  ParticipantCells one_renderer = participant_cells_of(4, 3, 0.3, 0.2, 0.4, 1);
   one_renderer.pop_back();
   EXPECT_EQ(mixed_model(one_renderer, {"point"}, kShapes).undefined,
             "only one renderer in the data");

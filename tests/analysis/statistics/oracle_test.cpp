@@ -1,4 +1,4 @@
-// Every figure of the analysis against R (fixtures/make_fixtures.R).
+// All numbers of the analysis against R (fixtures/make_fixtures.R).
 
 #include <gtest/gtest.h>
 
@@ -22,8 +22,8 @@ Json load(const std::string& name) {
   return Json::parse(std::ifstream(kFixtures + name + ".json"));
 }
 
-/// How far a figure may be from R's. Closed forms: rounding. The mixed model: R's own optimum and
-/// its derivatives are found by numbers, the degrees of freedom by differences of differences.
+/// Largest difference from R. Closed forms: rounding. Mixed model: R's optimum and derivatives are
+/// numerical, its degrees of freedom second differences.
 double tolerance(const std::string& place, double expected) {
   const auto ends = [&](const char* end) { return place.ends_with(end); };
   const double size = std::fabs(expected);
@@ -41,7 +41,7 @@ double tolerance(const std::string& place, double expected) {
   return 1e-5 * std::max(size, 1e-3);
 }
 
-/// Whatever the oracle names must be there and agree; what it leaves out is not looked at.
+/// Every value of the oracle must be present and agree; other values are ignored.
 void expect_agrees(const Json& expected, const Json& actual, const std::string& place) {
   if (expected.is_object()) {
     ASSERT_TRUE(actual.is_object()) << place;

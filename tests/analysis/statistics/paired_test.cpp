@@ -1,4 +1,4 @@
-// Where a figure is not defined, and properties that hold whatever the data.
+// Undefined values, and properties that hold for all data.
 
 #include "analysis/statistics/paired.h"
 
@@ -56,12 +56,12 @@ TEST(Undefined, TwoPairsHaveADzButNoHedgesG) {
 }
 
 TEST(Undefined, NoVarianceUpToRounding) {
-  const std::vector<double> alike{-0.7, -0.7 - 1e-16, -0.7 + 2e-16, -0.7};
-  EXPECT_FALSE(t_test(alike).t.has_value());
-  EXPECT_TRUE(t_test(alike).sd.has_value());
-  EXPECT_FALSE(effect_size(alike).dz.has_value());
-  EXPECT_FALSE(bootstrap(alike).log_ratio_ci95.has_value());
-  const Wilcoxon ranks = wilcoxon(alike);
+  const std::vector<double> equal{-0.7, -0.7 - 1e-16, -0.7 + 2e-16, -0.7};
+  EXPECT_FALSE(t_test(equal).t.has_value());
+  EXPECT_TRUE(t_test(equal).sd.has_value());
+  EXPECT_FALSE(effect_size(equal).dz.has_value());
+  EXPECT_FALSE(bootstrap(equal).log_ratio_ci95.has_value());
+  const Wilcoxon ranks = wilcoxon(equal);
   EXPECT_TRUE(ranks.undefined.empty());
   EXPECT_EQ(ranks.positive_rank_sum, 0.0);
   EXPECT_EQ(ranks.p, 2.0 / 16) << "all four negative: 1 of 16 sign patterns on each side";
@@ -114,7 +114,7 @@ TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
   std::vector<double> d;
   while (d.size() < kExactWilcoxon) d.push_back(random.normal() + 0.1);
   const Wilcoxon exact = wilcoxon(d);
-  d.push_back(1e-6);  // the lowest rank: moves V by next to nothing
+  d.push_back(1e-6);  // the lowest rank: changes V least
   const Wilcoxon approximate = wilcoxon(d);
   EXPECT_TRUE(exact.exact);
   EXPECT_FALSE(approximate.exact);
@@ -122,7 +122,7 @@ TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
 }
 
 TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
-  // What is said against R's count (fixtures/bca_coverage.R), and against this program's own.
+  // The tabulated coverage against R's (fixtures/bca_coverage.R), and against a simulation.
   const auto counted = nlohmann::json::parse(std::ifstream(kPairedFixtures + "bca_coverage.json"));
   for (const auto& [pairs, shares] : counted.items()) {
     const auto n = static_cast<std::size_t>(std::stoi(pairs));

@@ -1,4 +1,4 @@
-// Power against R's noncentral t; the search; the pilot.
+// Power against R's noncentral t; search for the number of participants; estimates from a pilot.
 
 #include "analysis/statistics/plan.h"
 
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
@@ -46,18 +46,18 @@ TEST(Power, OfOneShapeIsThatOfTheTTest) {
   // shape_gain_sd^2 + 2 residual_sd^2 / trials.
   const Power first =
       simulate_power(model_of(0.15, 0.1, 0.4, {-0.25}), {10, 20}, settings_of(20'000));
-  EXPECT_NEAR(first.share(first.found[0]), 0.890255, 0.01);
+  EXPECT_NEAR(first.proportion(first.found[0]), 0.890255, 0.01);
   EXPECT_EQ(first.all, first.found[0]);
   EXPECT_EQ(first.any, first.found[0]);
   const Power second = simulate_power(model_of(0.2, 0, 0.5, {0.12}), {6, 76}, settings_of(20'000));
-  EXPECT_NEAR(second.share(second.found[0]), 0.199626, 0.01);
+  EXPECT_NEAR(second.proportion(second.found[0]), 0.199626, 0.01);
 }
 
 TEST(Power, WithoutEffectsTheFamilyErrsAsOftenAsAlphaSays) {
   const Power power =
       simulate_power(model_of(0, 0.2, 0.4, {0, 0, 0, 0}), {8, 10}, settings_of(20'000));
   double sum = 0;
-  for (const std::size_t found : power.found) sum += power.share(found);
+  for (const std::size_t found : power.found) sum += power.proportion(found);
   EXPECT_LT(sum, 0.06);
   EXPECT_GT(sum, 0.04);
   EXPECT_EQ(power.all, 0U);
@@ -67,11 +67,11 @@ TEST(Power, WithoutEffectsTheFamilyErrsAsOftenAsAlphaSays) {
 TEST(Power, TrialsWithoutATimeCountAsIfTheyWereNotThere) {
   StudyModel model = model_of(0, 0, 0.4, {-0.1});
   const Power half = simulate_power(model, {10, 40}, settings_of(20'000));
-  model.share_used = 0.5;
+  model.proportion_used = 0.5;
   const Power used = simulate_power(model, {10, 80}, settings_of(20'000));
-  EXPECT_NEAR(used.share(used.any), half.share(half.any), 0.02);
-  EXPECT_GT(half.share(half.any), 0.3);
-  EXPECT_LT(half.share(half.any), 0.9);
+  EXPECT_NEAR(used.proportion(used.any), half.proportion(half.any), 0.02);
+  EXPECT_GT(half.proportion(half.any), 0.3);
+  EXPECT_LT(half.proportion(half.any), 0.9);
 }
 
 TEST(Power, IsTheSameWhateverTheJobs) {
@@ -95,9 +95,9 @@ TEST(Power, OfTheModelIsThatOfThePairedTestsWhereItsVariancesAreAll) {
   const Power paired = simulate_power(model, {12, 20}, settings);
   settings.test = StudyTest::model;
   const Power fitted = simulate_power(model, {12, 20}, settings);
-  // The model pools the residual, so it finds somewhat more.
-  EXPECT_GT(fitted.share(fitted.any), paired.share(paired.any) - 0.05);
-  EXPECT_LT(fitted.share(fitted.any), paired.share(paired.any) + 0.2);
+  // The model pools residual variance over shapes: somewhat more power.
+  EXPECT_GT(fitted.proportion(fitted.any), paired.proportion(paired.any) - 0.05);
+  EXPECT_LT(fitted.proportion(fitted.any), paired.proportion(paired.any) + 0.2);
 }
 
 TEST(Power, TwoParticipantsWithoutVarianceFindNothing) {
@@ -108,8 +108,8 @@ TEST(Power, TwoParticipantsWithoutVarianceFindNothing) {
 TEST(Plan, FindsTheFewestParticipants) {
   PlanSettings settings;
   settings.trials = {5, 40};
-  settings.least = 2;
-  settings.most = 60;
+  settings.min_participants = 2;
+  settings.max_participants = 60;
   settings.simulation = settings_of(1000);
   const Plan plan = make_plan(model_of(0.15, 0.05, 0.4, {-0.2, -0.15}), settings, {}, {});
   ASSERT_EQ(plan.curves.size(), 2U);
@@ -145,7 +145,7 @@ TEST(Plan, FindsTheFewestParticipants) {
 TEST(Plan, SaysWhereTheRangeIsTooSmall) {
   PlanSettings settings;
   settings.trials = {2};
-  settings.least = settings.most = 2;
+  settings.min_participants = settings.max_participants = 2;
   settings.simulation = settings_of(200);
   const Plan plan = make_plan(model_of(0.3, 0, 0.4, {-0.01}), settings, {}, {});
   EXPECT_FALSE(plan.curves[0].smallest);
@@ -156,7 +156,7 @@ TEST(Plan, SaysWhereTheRangeIsTooSmall) {
   EXPECT_EQ(figure_svg(plan_figure(plan), light_palette()).find("nan"), std::string::npos);
 }
 
-/// A study of 60 people with the sds given.
+/// A study of 60 participants with the sds given.
 Analysis pilot_study(double gain_sd, double shape_gain_sd, double residual_sd, std::uint64_t seed) {
   TrialTableBuilder builder;
   stimuli::Random random(seed);
@@ -194,7 +194,7 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
     gain += pilot.model.gain_sd * pilot.model.gain_sd / kPilots;
     shape_gain += pilot.model.shape_gain_sd * pilot.model.shape_gain_sd / kPilots;
     EXPECT_NEAR(pilot.model.residual_sd, 0.3, 0.02);
-    EXPECT_NEAR(pilot.model.share_used, 14.0 / 15, 1e-12);
+    EXPECT_NEAR(pilot.model.proportion_used, 14.0 / 15, 1e-12);
     const Pilot plain = read_pilot(pilot_study(0.2, 0, 0.3, seed));
     EXPECT_LT(plain.model.shape_gain_sd, 0.06);
     plain_gain += plain.model.gain_sd * plain.model.gain_sd / kPilots;
@@ -204,8 +204,8 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
   EXPECT_NEAR(std::sqrt(plain_gain), 0.2, 0.02);
 }
 
-/// Eight people with gains of their own for each shape, and the same spread in every cell; with
-/// `one_more`, a ninth one whose times of one cell are all missing.
+/// Eight participants with participant x shape gains and equal residuals in all cells; with
+/// `one_more` a ninth without times in one cell.
 Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
   TrialTableBuilder builder;
   stimuli::Random random(17);
@@ -235,7 +235,7 @@ Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
   return analyze(builder.finish({}), {}, "test");
 }
 
-// Who lacks a cell has no gain for that shape: the others say alone how much gains vary.
+// A participant without a cell has no gain for that shape and does not enter the variance of gains.
 TEST(Pilot, TheGainsOfShapesAreThoseOfParticipantsWithEveryCell) {
   const Pilot complete = read_pilot(uneven_pilot(false));
   ASSERT_EQ(complete.undefined, "");

@@ -16,33 +16,33 @@
 namespace palpate::analysis {
 namespace {
 
-/// A person who does `first` and then the other renderer, a trial after the other, shapes in turn.
-struct Person {
+/// A participant with all trials of `first` before those of the other renderer, shapes alternating.
+struct Participant {
   std::string name, first;
   double gain = 0;         ///< log ray - log point
   double learning = 0;     ///< of log time per 100 trials with a renderer
-  int wrong_with_ray = 0;  ///< of the first trials
-  bool mixed = false;      ///< trials of the two renderers in turn
+  int wrong_with_ray = 0;  ///< number of wrong answers, in the first trials
+  bool mixed = false;      ///< trials of the two renderers alternate
 };
 
 constexpr int kTrials = 40;  // with each renderer
 
-Analysis analysis_of(const std::vector<Person>& people) {
+Analysis analysis_of(const std::vector<Participant>& participants) {
   TrialTableBuilder builder;
-  for (const Person& person : people) {
+  for (const Participant& participant : participants) {
     for (const std::string renderer : {"point", "ray"}) {
       for (int i = 0; i < kTrials; ++i) {
         RawTrial raw;
-        raw.participant = person.name;
+        raw.participant = participant.name;
         raw.renderer = renderer;
         raw.shape = i % 2 == 0 ? "cone" : "cube";
-        raw.trial = person.mixed ? 2 * i + (renderer == person.first ? 0 : 1)
-                                 : i + (renderer == person.first ? 0 : kTrials);
+        raw.trial = participant.mixed ? 2 * i + (renderer == participant.first ? 0 : 1)
+                                      : i + (renderer == participant.first ? 0 : kTrials);
         raw.response = raw.shape;
-        if (renderer == "ray" && i < person.wrong_with_ray) raw.response = "sphere";
+        if (renderer == "ray" && i < participant.wrong_with_ray) raw.response = "sphere";
         raw.correct = raw.response == raw.shape;
-        raw.response_time = std::exp(2 + (renderer == "ray" ? person.gain : 0) +
-                                     (i % 2 == 0 ? 0.5 : 0) + person.learning * i / 100);
+        raw.response_time = std::exp(2 + (renderer == "ray" ? participant.gain : 0) +
+                                     (i % 2 == 0 ? 0.5 : 0) + participant.learning * i / 100);
         builder.add(raw);
       }
     }
@@ -60,31 +60,31 @@ TEST(Learning, SlopesAreThoseOfTheTimesWithinShapes) {
     EXPECT_NEAR(*learning.mean_slope, -0.2, 1e-12);
     EXPECT_NEAR(*learning.slope.t, -0.2 / (0.1 / std::sqrt(3.0)), 1e-9);
     EXPECT_EQ(*learning.slope.df, 2);
-    // Bins: 5 trials each, centred on trial 2 of 39; the mean of all stands at trial 19.5.
+    // Bins of 5 trials, the first centred on trial 2; the mean of all is at trial 19.5.
     for (std::size_t b = 0; b < kLearningBins; ++b) {
       EXPECT_EQ(learning.bins[b].n_participants, 3U);
       EXPECT_EQ(learning.bins[b].n_trials, 15U);
     }
-    // Cones stand at even trials, cubes at odd ones: each relative to its own mean trial.
+    // Cones have even trials, cubes odd ones: each relative to the mean of its shape.
     const double first = (3 * (2 - 19.0) + 2 * (2 - 20.0)) / 5;
     const double last = (2 * (37 - 19.0) + 3 * (37 - 20.0)) / 5;
     EXPECT_NEAR(*learning.bins[7].mean_log - *learning.bins[0].mean_log,
                 -0.2 * (last - first) / 100, 1e-12);
   }
   EXPECT_NEAR(*practice.pairs[0].mean_slope_difference, 0, 1e-12);
-  EXPECT_NE(practice.pairs[0].slope_difference.undefined, "");  // all alike
+  EXPECT_NE(practice.pairs[0].slope_difference.undefined, "");  // no variance
 }
 
 // With as many trials in every bin, the bins' mean is the mean over all participants.
 TEST(Learning, BinsAverageToTheMeanOfAllParticipants) {
-  const std::vector<Person> people{
+  const std::vector<Participant> participants{
       {"A", "point", -0.6, -0.3}, {"B", "ray", 0.2, -0.1}, {"C", "point", 0.7, 0.5}};
   double gains = 0, learning = 0;
-  for (const Person& person : people) {
-    gains += person.gain / 3;
-    learning += person.learning / 3;
+  for (const Participant& participant : participants) {
+    gains += participant.gain / 3;
+    learning += participant.learning / 3;
   }
-  const Analysis analysis = analysis_of(people);
+  const Analysis analysis = analysis_of(participants);
   for (std::size_t r = 0; r < 2; ++r) {
     double sum = 0;
     for (const LearningBin& bin : analysis.practice.learning[r].bins) sum += *bin.mean_log;
@@ -120,8 +120,8 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
     EXPECT_NEAR(effect.balanced_ci95->low, -0.2 - half, 1e-10);
     EXPECT_NEAR(effect.balanced_ci95->high, -0.2 + half, 1e-10);
   }
-  // One of several tests of practice at 5 %: the warning goes by the adjusted p.
-  EXPECT_EQ(analysis.practice.n_tests, 3U) << "two shapes, all shapes; nobody's slope varies";
+  // The warning depends on the p that is adjusted over all tests of practice.
+  EXPECT_EQ(analysis.practice.n_tests, 3U) << "two shapes, all shapes; the slopes have no variance";
   EXPECT_NEAR(*practice.all_shapes.test.p_holm, 3 * 0.0321194160504168, 1e-10);
   const auto warned = [](const Analysis& of) {
     return report_text(of).find("depends on which renderer came first") != std::string::npos;
@@ -134,7 +134,7 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
                                   {"E", "ray", 0.05}})));
 }
 
-/// Participants who cannot learn, of noise alone.
+/// Participants without learning: noise only.
 Analysis study_without_learning(stimuli::Random& random) {
   TrialTableBuilder builder;
   for (int p = 0; p < 7; ++p) {
@@ -217,8 +217,8 @@ TEST(Learning, SaysNothingOfFewTrials) {
 }
 
 TEST(RendererOrder, SaysWhyItCannotBeTold) {
-  const auto undefined = [](const std::vector<Person>& people) {
-    return analysis_of(people).practice.pairs[0].all_shapes.test.undefined;
+  const auto undefined = [](const std::vector<Participant>& participants) {
+    return analysis_of(participants).practice.pairs[0].all_shapes.test.undefined;
   };
   EXPECT_EQ(undefined({{"A", "point", 0.1}, {"B", "point", 0.2}}),
             "all participants had the point first");
@@ -235,9 +235,9 @@ TEST(RendererOrder, SaysWhyItCannotBeTold) {
 }
 
 TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
-  const Analysis bought = analysis_of(
+  const Analysis trade_off = analysis_of(
       {{"A", "point", -0.3, 0, 4}, {"B", "ray", -0.2, 0, 8}, {"C", "ray", -0.1, 0, 12}});
-  for (const SpeedAccuracy& shape : bought.comparisons[0].speed_accuracy) {
+  for (const SpeedAccuracy& shape : trade_off.comparisons[0].speed_accuracy) {
     EXPECT_EQ(shape.reading, "trade-off possible");
     EXPECT_NEAR(*shape.percent_change_time, 100 * std::expm1(-0.2), 1e-9);
     EXPECT_NEAR(*shape.accuracy_reference, 1, 1e-15);
@@ -256,7 +256,7 @@ TEST(SpeedAccuracy, SaysWhereSpeedMayBeBoughtWithErrors) {
 }
 
 TEST(Learning, LevelIsTheMeanOfAllParticipants) {
-  // Without learning, every part has the mean log time: 2, half of the shapes 0.5 longer, the gain.
+  // Without learning every bin has the mean log time: 2, half of the shapes 0.5 longer, the gain.
   const Analysis analysis =
       analysis_of({{"A", "point", 0.9}, {"B", "ray", 0.0}, {"C", "point", -0.3}});
   for (const LearningBin& bin : analysis.practice.learning[1].bins) {

@@ -1,35 +1,35 @@
-#include "analysis/report/report_cards.h"
+#include "analysis/report/reduction_cards.h"
 
 #include <algorithm>
 #include <cstddef>
 
-#include "analysis/report/report_page.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/report/html_elements.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-constexpr double kAlpha = 0.05;
+constexpr double kSignificanceLevel = 0.05;
 constexpr std::size_t kMostCards = 12, kMostRowsOfCards = 4;
 
-/// What the tests say: by themselves and among all, where these differ.
+/// Outcome of the t-test at alpha 0.05: Holm-adjusted, and unadjusted where the two differ.
 std::string verdict(const TTest& test, std::size_t tests) {
   if (!test.p_holm) return "not testable";
   const auto p_is = [](double p) { return std::string(p < 0.001 ? "p " : "p = ") + p_text(p); };
   const std::string adjusted = "adjusted " + p_is(*test.p_holm);
-  if (*test.p_holm < kAlpha) return "clear, " + adjusted;
-  if (*test.p >= kAlpha) return "no clear difference, " + adjusted;
+  if (*test.p_holm < kSignificanceLevel) return "clear, " + adjusted;
+  if (*test.p >= kSignificanceLevel) return "no clear difference, " + adjusted;
   return "no clear difference among " + std::to_string(tests) + " tests, " + adjusted +
          " (by itself " + p_is(*test.p) + ")";
 }
 
-/// \param censored none: nobody timed out. \param tests that p is adjusted for
+/// \param censored null: no time-outs \param tests number of tests that p is adjusted for
 void put_card(std::string& out, const PairedShape& shape, const CensoredEstimate* censored,
               const std::string& name, const std::string& paper, std::size_t tests) {
   const auto& p = shape.t_test.p_holm;
-  const bool clear = p && *p < kAlpha;
+  const bool clear = p && *p < kSignificanceLevel;
   const bool slower = shape.mean_log_ratio && *shape.mean_log_ratio > 0;
   out += "<li";
   if (clear) out += slower ? " class=\"slower\"" : " class=\"clear\"";
@@ -62,7 +62,7 @@ void put_card(std::string& out, const PairedShape& shape, const CensoredEstimate
 
 }  // namespace
 
-void put_cards(std::string& out, const Analysis& analysis) {
+void put_reduction_cards(std::string& out, const Analysis& analysis) {
   const std::vector<Comparison>& all = analysis.comparisons;
   const std::size_t rows = std::min(all.size(), kMostRowsOfCards);
   const std::size_t n = std::min(analysis.table.shapes.size(), kMostCards);
@@ -74,7 +74,8 @@ void put_cards(std::string& out, const Analysis& analysis) {
   for (std::size_t c = 0; c < rows; ++c) {
     std::string compared = with_renderer(analysis, "against");
     if (all.size() > 1) {
-      compared = "with " + the(stimuli::printable(all[c].pair.renderer, 80)) + " " + compared;
+      compared =
+          "with " + with_article(stimuli::printable(all[c].pair.renderer, 80)) + " " + compared;
       out += "<p class=\"study\">" + escaped(compared) + "</p>\n";
     }
     out += "<ul class=\"cards\" aria-label=\"Reduction of the time " + escaped(compared) +

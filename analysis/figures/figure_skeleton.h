@@ -1,5 +1,7 @@
 #pragma once
-// Pieces that the figures are made of. Internal to analysis/figures*.
+// What all figures of an analysis have in common: title and label, style and legend of renderers,
+// how many shapes, renderers and comparisons are drawn, empty panels, and the functions that make
+// each figure. Internal to analysis/figures/.
 
 #include <cstddef>
 #include <string>
@@ -12,33 +14,36 @@
 
 namespace palpate::analysis {
 
-/// Width of a panel that stands alone, and of one of several comparisons, px.
-constexpr double kWide = 850, kHalfWide = 370;
+/// px: width of the only panel of a row, and of the panel of one comparison among several.
+constexpr double kFullPanelWidth = 850, kComparisonPanelWidth = 370;
 
-/// Everything that figures have in common: label, subtitle.
+/// A figure without panels: id, title, "SIMULATED" label where it applies, numbers of participants
+/// and trials.
 Figure new_figure(const Analysis& analysis, std::string id, std::string title);
 
-/// How a renderer is drawn: told apart by colour and without.
-struct Look {
+/// Colour and symbol of a renderer.
+struct RendererStyle {
   Role role = Role::ink;
-  Shape shape = Shape::circle;
+  MarkerShape shape = MarkerShape::circle;
 };
-/// Point and ray have their own; others, in their order, what these leave.
-Look look_of(const Analysis& analysis, std::string_view renderer);
-/// A renderer's name where there is little room.
+/// Point and ray have fixed styles; the others take the free ones in the order of
+/// TrialTable::renderers.
+RendererStyle style_of(const Analysis& analysis, std::string_view renderer);
+/// A renderer's name, cut to 40 bytes.
 std::string short_name(const std::string& renderer);
-/// Renderers in a legend, the first `shown`.
+/// Adds the first `shown` renderers to the legend.
 void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown);
 
-/// Shapes, renderers and comparisons that are drawn, and a note where there are more.
+/// How many shapes, renderers and comparisons are drawn; adds a note to the figure where there are
+/// more.
 std::size_t shown_shapes(const Analysis& analysis, Figure& figure);
 std::size_t shown_renderers(const Analysis& analysis, Figure& figure);
 std::size_t shown_comparisons(const Analysis& analysis, Figure& figure);
 
-/// A panel for one of the comparisons, `slot` px for each shape: named where there are several.
+/// An empty panel for a comparison, titled where there are several. \param slot px for each shape
 Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::size_t shapes,
                        double slot);
-/// Title of an axis for what a comparison gains or changes: "less time with the ray (%)".
+/// Axis title such as "less time with the ray (%)". \param joint as for with_renderer()
 std::string gain_title(const Analysis& analysis, const std::string& what, const std::string& joint);
 
 /// "1.25 s"
@@ -50,6 +55,6 @@ Figure speed_accuracy_of(const Analysis& analysis);
 Figure exclusions_of(const Analysis& analysis);
 Figure learning_of(const Analysis& analysis);
 Figure order_of(const Analysis& analysis);
-Figure servo_of(const Analysis& analysis, const ReportRecord& record);
+Figure servo_of(const Analysis& analysis, const StudyRecord& record);
 
 }  // namespace palpate::analysis

@@ -1,5 +1,5 @@
-// Mean times, as in the paper's figure 15, and the speed-up, with time-outs as censored times and
-// the paper's figures beside it.
+// Figures of mean response times (as fig. 15 of Ho, Basdogan & Srinivasan 2000) and of their
+// percent reduction, the latter with the censored estimate and the paper's percentages.
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
@@ -7,15 +7,16 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/figures_parts.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/figures/figure_skeleton.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-/// t interval of the mean of participant means; none below two participants.
+/// 95 % t interval of the mean of participants' means (s): mean +- t(0.975, n - 1) sd / sqrt(n);
+/// none for n < 2.
 std::optional<Interval> interval_of(const TimesCell& cell) {
   if (!cell.sd_of_participant_means) return std::nullopt;
   const double n = static_cast<double>(cell.n_participants);
@@ -24,59 +25,63 @@ std::optional<Interval> interval_of(const TimesCell& cell) {
   return Interval{*cell.mean_of_participant_means - half, *cell.mean_of_participant_means + half};
 }
 
-/// Where a renderer's figures stand within a slot of 1.
-double place(std::size_t renderer, std::size_t renderers, double spread) {
+/// Position of a renderer's marks within a shape's slot, 0 to 1, at most `spread` from its middle.
+double slot_position(std::size_t renderer, std::size_t renderers, double spread) {
   if (renderers < 2) return 0.5;
   return 0.5 +
          spread * (2 * static_cast<double>(renderer) / static_cast<double>(renderers - 1) - 1);
 }
 
-/// Of a renderer's mean, and of its participants' marks: apart from each other. Two renderers have
-/// the participants between them.
-double mean_place(std::size_t renderer, std::size_t renderers) {
-  return renderers <= 2 ? place(renderer, renderers, 0.27) : place(renderer, renderers, 0.3) + 0.03;
+/// Positions of a renderer's mean and of its participants' marks, which do not overlap. With two
+/// renderers the participants' marks are between the means.
+double mean_position(std::size_t renderer, std::size_t renderers) {
+  return renderers <= 2 ? slot_position(renderer, renderers, 0.27)
+                        : slot_position(renderer, renderers, 0.3) + 0.03;
 }
-double people_place(std::size_t renderer, std::size_t renderers) {
-  return renderers <= 2 ? place(renderer, renderers, 0.15) : place(renderer, renderers, 0.3) - 0.03;
+double participant_position(std::size_t renderer, std::size_t renderers) {
+  return renderers <= 2 ? slot_position(renderer, renderers, 0.15)
+                        : slot_position(renderer, renderers, 0.3) - 0.03;
 }
 
-void add_people(Panel& panel, const Analysis& analysis, std::size_t renderers, std::size_t shape) {
+void add_participants(Panel& panel, const Analysis& analysis, std::size_t renderers,
+                      std::size_t shape) {
   const auto& table = analysis.table;
-  const std::size_t n = std::min(table.participants.size(), kShownPeople);
+  const std::size_t n = std::min(table.participants.size(), kShownParticipants);
   const double opacity = n <= 10 ? 0.6 : n <= 40 ? 0.4 : 0.2;
   for (std::size_t p = 0; p < n; ++p) {
-    const std::string person = stimuli::printable(table.participants[p], 40);
+    const std::string participant = stimuli::printable(table.participants[p], 40);
     Mark line = line_mark(Role::soft, {}, {}, 1);
     line.opacity = opacity;
-    line.person = person;
-    line.text = person + ", " + stimuli::printable(table.shapes[shape], 40) + ":";
+    line.participant = participant;
+    line.text = participant + ", " + stimuli::printable(table.shapes[shape], 40) + ":";
     std::vector<Mark> dots;
     for (std::size_t r = 0; r < renderers; ++r) {
-      const ParticipantCell& cell = analysis.description.people[r][shape][p];
+      const ParticipantCell& cell = analysis.description.participant_cells[r][shape][p];
       if (cell.n_used == 0) continue;
-      line.x.push_back(static_cast<double>(shape) + people_place(r, renderers));
+      line.x.push_back(static_cast<double>(shape) + participant_position(r, renderers));
       line.y.push_back(cell.mean);
       line.text += " " + short_name(table.renderers[r]) + " " + seconds_text(cell.mean);
-      const Look look = look_of(analysis, table.renderers[r]);
-      dots.push_back(symbol(look.role, look.shape, line.x.back(), cell.mean, 2.4));
+      const RendererStyle style = style_of(analysis, table.renderers[r]);
+      dots.push_back(symbol(style.role, style.shape, line.x.back(), cell.mean, 2.4));
     }
     for (Mark& dot : dots) {
       dot.opacity = opacity;
       dot.text = line.text;
-      dot.person = person;
+      dot.participant = participant;
       panel.marks.push_back(std::move(dot));
     }
     if (line.x.size() > 1) panel.marks.push_back(std::move(line));
   }
 }
 
-/// 1.5 times the largest participant's mean cuts intervals: two people's may be ten times as long.
+/// Upper end of the time axis, s. Intervals are cut at 1.5 times the largest participant's mean:
+/// those of two participants may be ten times as long.
 double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
   double largest = 0, largest_end = 0;
   for (std::size_t r = 0; r < renderers; ++r) {
     for (std::size_t s = 0; s < shapes; ++s) {
-      for (const ParticipantCell& person : analysis.description.people[r][s]) {
-        if (person.n_used > 0) largest = std::max(largest, person.mean);
+      for (const ParticipantCell& participant : analysis.description.participant_cells[r][s]) {
+        if (participant.n_used > 0) largest = std::max(largest, participant.mean);
       }
       if (const auto ends = interval_of(analysis.description.times[r][s])) {
         largest_end = std::max(largest_end, ends->high);
@@ -87,17 +92,16 @@ double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t
   return highest > 0 ? highest : 1;
 }
 
-/// The estimate with time-outs as censored times; none where the shape has no time-out, or no
-/// estimate.
+/// The estimate with time-outs as censored times; null without time-outs or without an estimate.
 const CensoredEstimate* shown_censored(const Comparison& comparison, std::size_t shape) {
   if (comparison.censored.empty()) return nullptr;
   const CensoredEstimate& censored = comparison.censored[shape];
   return censored.n_censored > 0 && censored.log_ratio ? &censored : nullptr;
 }
 
-/// One for all comparisons.
+/// The percent axis that the panels of all comparisons have.
 FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std::size_t shapes) {
-  double low = 0, high = compares_as_paper(analysis) ? 25 : 10;  // the paper's largest stays inside
+  double low = 0, high = compares_as_paper(analysis) ? 25 : 10;  // the paper's largest is 22 %
   const auto include = [&](const Interval& log_ratio) {
     const Interval ends = percent_reduction(log_ratio);
     low = std::min(low, ends.low);
@@ -116,8 +120,9 @@ FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std
       if (shape.t_test.log_ratio_ci95) include(*shape.t_test.log_ratio_ci95);
     }
   }
-  if (comparisons > 1) high += 0.12 * (high - std::max(low, -150.0));  // room for each p
-  // A slowing-down has no end: it is cut.
+  if (comparisons > 1)
+    high += 0.12 * (high - std::max(low, -150.0));  // space for the p values below the top
+  // 100 (1 - exp m) has no lower bound: the axis is cut at -150 %.
   return linear_axis(std::max(low, -150.0), high, gain_title(analysis, "less time", "than with"));
 }
 
@@ -129,7 +134,7 @@ void add_paper(Panel& panel, const RendererPair& pair, const std::string& shape,
   const PaperEffect* effect = paper_effect(pair, shape);
   if (!effect) return;
   if (const auto& value = effect->percent_reduction) {
-    panel.marks.push_back(symbol(Role::paper, Shape::diamond, x, *value, 7,
+    panel.marks.push_back(symbol(Role::paper, MarkerShape::diamond, x, *value, 7,
                                  shape + ", Ho et al. 2000: " + fixed(*value, 0) + " %"));
   } else {
     Mark mark = text_mark(Role::paper, x, 0, "n.s.", 12);
@@ -147,12 +152,12 @@ void add_censored(Panel& panel, const CensoredEstimate& censored, double x, std:
     own += ", 95 % interval " + interval_text(ends);
     add_interval(panel, Role::amber, x, ends.low, ends.high, own);
   }
-  panel.marks.push_back(symbol(Role::amber, Shape::square, x,
+  panel.marks.push_back(symbol(Role::amber, MarkerShape::square, x,
                                std::clamp(value, panel.y.low, panel.y.high), 5.8, own));
   text += "; " + own;
 }
 
-/// One comparison's shapes. \return false where none can be shown
+/// Adds a comparison's reductions, shape by shape. \return false where none is defined
 bool add_reductions(Panel& panel, const Comparison& comparison,
                     const std::vector<std::string>& names, std::size_t shapes,
                     std::string& description) {
@@ -174,7 +179,7 @@ bool add_reductions(Panel& panel, const Comparison& comparison,
     }
     if (shape.percent_reduction_geometric) {
       panel.marks.push_back(symbol(
-          Role::ink, Shape::circle, left,
+          Role::ink, MarkerShape::circle, left,
           std::clamp(*shape.percent_reduction_geometric, panel.y.low, panel.y.high), 6.5, text));
       any = true;
     }
@@ -205,31 +210,31 @@ Figure figure15_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
   panel.y = linear_axis(0, highest_time(analysis, renderers, shapes), "time (s)");
-  panel.width = std::max(
-      kWide, std::max(70.0, 26.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
+  panel.width = std::max(kFullPanelWidth, std::max(70.0, 26.0 * static_cast<double>(renderers)) *
+                                              static_cast<double>(shapes));
   panel.height = 380;
   for (std::size_t s = 0; s < shapes; ++s) {
-    add_people(panel, analysis, renderers, s);
+    add_participants(panel, analysis, renderers, s);
     for (std::size_t r = 0; r < renderers; ++r) {
       const TimesCell& cell = analysis.description.times[r][s];
       if (!cell.mean_of_participant_means) continue;
-      const Look look = look_of(analysis, table.renderers[r]);
-      const double x = static_cast<double>(s) + mean_place(r, renderers);
+      const RendererStyle style = style_of(analysis, table.renderers[r]);
+      const double x = static_cast<double>(s) + mean_position(r, renderers);
       std::string text = stimuli::printable(table.shapes[s], 40) + ", " +
                          short_name(table.renderers[r]) + ": mean " +
                          seconds_text(*cell.mean_of_participant_means);
       if (const auto ends = interval_of(cell)) {
         text += ", 95 % interval " + fixed(ends->low, 2) + " to " + fixed(ends->high, 2) + " s";
-        add_interval(panel, look.role, x, ends->low, ends->high, text);
+        add_interval(panel, style.role, x, ends->low, ends->high, text);
       }
       figure.description += text + ". ";
-      panel.marks.push_back(symbol(look.role, look.shape, x, *cell.mean_of_participant_means,
-                                   look.shape == Shape::square ? 5.8 : 6.5, text));
+      panel.marks.push_back(symbol(style.role, style.shape, x, *cell.mean_of_participant_means,
+                                   style.shape == MarkerShape::square ? 5.8 : 6.5, text));
     }
   }
   figure.panels.push_back(std::move(panel));
   add_renderers(figure, analysis, renderers);
-  figure.legend.push_back({"one participant", Role::soft, Shape::dash});
+  figure.legend.push_back({"one participant", Role::soft, MarkerShape::dash});
   figure.notes.insert(
       figure.notes.begin(),
       "Correct answers only. Large marks: mean over participants of each one’s mean time; bars: 95 "
@@ -237,8 +242,8 @@ Figure figure15_of(const Analysis& analysis) {
           std::string(compares_as_paper(analysis)
                           ? " Compare with fig. 15 of Ho, Basdogan & Srinivasan (2000)."
                           : ""));
-  if (table.participants.size() > kShownPeople) {
-    figure.notes.push_back("Lines of the first " + std::to_string(kShownPeople) + " of " +
+  if (table.participants.size() > kShownParticipants) {
+    figure.notes.push_back("Lines of the first " + std::to_string(kShownParticipants) + " of " +
                            std::to_string(table.participants.size()) +
                            " participants; means and intervals are of all.");
   }
@@ -276,16 +281,17 @@ Figure speedup_of(const Analysis& analysis) {
   const bool with_censored = shown([](const Comparison& comparison, std::size_t s) {
     return shown_censored(comparison, s) != nullptr;
   });
-  figure.legend = {{"this data", Role::ink, Shape::circle}};
-  if (with_censored) figure.legend.push_back({"time-outs as censored", Role::amber, Shape::square});
-  if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, Shape::diamond});
+  figure.legend = {{"this data", Role::ink, MarkerShape::circle}};
+  if (with_censored)
+    figure.legend.push_back({"time-outs as censored", Role::amber, MarkerShape::square});
+  if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, MarkerShape::diamond});
   const RendererPair& first = analysis.comparisons.front().pair;
   const bool many = analysis.comparisons.size() > 1;
   figure.notes.insert(
       figure.notes.begin(),
       "Above 0 " +
-          (many ? "it is faster than with " + the(short_name(first.reference))
-                : the(short_name(first.renderer)) + " is faster") +
+          (many ? "it is faster than with " + with_article(short_name(first.reference))
+                : with_article(short_name(first.renderer)) + " is faster") +
           ". Geometric reduction over participants with both renderers; bars: 95 % interval of the "
           "paired t-test on log times, not adjusted; p adjusted over " +
           (many ? "all shapes and comparisons" : "the shapes") + " after Holm, bold below 0.05." +

@@ -1,4 +1,4 @@
-#include "analysis/report/tables.h"
+// Tables of reductions, times, accuracy, confusion, tests, exclusions and provenance.
 
 #include <algorithm>
 #include <iterator>
@@ -6,7 +6,8 @@
 #include <utility>
 
 #include "analysis/report/table_cells.h"
-#include "analysis/statistics/wording.h"
+#include "analysis/report/tables.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -37,14 +38,15 @@ Table reduction_table(const Analysis& analysis) {
     }
   }
   const RendererPair& first = analysis.comparisons.front().pair;
-  const std::string renderer = several(analysis) ? "renderer" : first.renderer;
+  const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
   table.notes = {
       "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
       " − mean log " + first.reference +
       "; interval (not adjusted) and p from the paired t-test on m, p adjusted over " +
-      (several(analysis) ? "all shapes and comparisons" : "the shapes") + " (Holm). Positive: " +
-      (several(analysis) ? "faster than with " + the(first.reference)
-                         : the(first.renderer) + " is faster") +
+      (has_several_comparisons(analysis) ? "all shapes and comparisons" : "the shapes") +
+      " (Holm). Positive: " +
+      (has_several_comparisons(analysis) ? "faster than with " + with_article(first.reference)
+                                         : with_article(first.renderer) + " is faster") +
       ". Arithmetic: from mean times" + (paper_too ? ", which the paper may have used." : ".")};
   if (paper_too) {
     table.notes.emplace_back(
@@ -58,8 +60,8 @@ Table times_table(const Analysis& analysis) {
   Table table;
   table.caption = caption(analysis, "Response times in s, correct trials");
   table.n_names = 2;
-  table.header = {"shape",  "renderer",       "mean",   "sd",
-                  "median", "geometric mean", "people", "trials"};
+  table.header = {"shape",  "renderer",       "mean",         "sd",
+                  "median", "geometric mean", "participants", "trials"};
   for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
     for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
       const TimesCell& cell = analysis.description.times[r][s];
@@ -81,17 +83,16 @@ Table accuracy_table(const Analysis& analysis) {
   Table table;
   table.caption = caption(analysis, "Accuracy, all trials");
   table.n_names = 2;
-  table.header = {"shape",          "renderer", "accuracy",  "of answered",
-                  "mean of people", "correct",  "no answer", "trials"};
+  table.header = {"shape",   "renderer",  "accuracy", "of answered", "mean of participants",
+                  "correct", "no answer", "trials"};
   for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
     for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
       const AccuracyCell& cell = analysis.description.accuracy[r][s];
-      table.rows.push_back({analysis.table.shapes[s], analysis.table.renderers[r],
-                            percent(hundredfold(cell.accuracy)),
-                            percent(hundredfold(cell.accuracy_answered)),
-                            percent(hundredfold(cell.mean_of_participant_accuracies)),
-                            std::to_string(cell.n_correct), std::to_string(cell.n_timeouts),
-                            std::to_string(cell.n_trials)});
+      table.rows.push_back(
+          {analysis.table.shapes[s], analysis.table.renderers[r],
+           percent(to_percent(cell.accuracy)), percent(to_percent(cell.accuracy_answered)),
+           percent(to_percent(cell.mean_of_participant_accuracies)), std::to_string(cell.n_correct),
+           std::to_string(cell.n_timeouts), std::to_string(cell.n_trials)});
     }
   }
   table.notes = {"A time-out counts as wrong; “of answered” leaves time-outs out."};
@@ -125,7 +126,8 @@ Table tests_table(const Analysis& analysis) {
   Table table = comparison_table(
       analysis,
       "Tests of " +
-          (several(analysis) ? "each renderer − " + first.reference : difference_name(first)) +
+          (has_several_comparisons(analysis) ? "each renderer − " + first.reference
+                                             : difference_name(first)) +
           " on log times, over participants",
       {"t", "df", "p", "p (Holm)", "dz", "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"});
   Reasons reasons;
@@ -148,10 +150,10 @@ Table tests_table(const Analysis& analysis) {
   }
   table.notes = {
       "t, dz and gz are negative when " +
-      (several(analysis) ? "it is faster than with " + the(first.reference)
-                         : the(first.renderer) + " is faster") +
+      (has_several_comparisons(analysis) ? "it is faster than with " + with_article(first.reference)
+                                         : with_article(first.renderer) + " is faster") +
       ". Primary: the paired t-test, Holm-adjusted" +
-      (several(analysis) ? " over all shapes and comparisons" : "") +
+      (has_several_comparisons(analysis) ? " over all shapes and comparisons" : "") +
       ". Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the "
       "percent reduction, " +
       std::to_string(kResamples) + " resamples, seed " + std::to_string(analysis.settings.seed) +
@@ -164,14 +166,14 @@ Table tests_table(const Analysis& analysis) {
 
 Table exclusions_table(const Analysis& analysis) {
   Table table;
-  table.caption = caption(analysis, "From trials to times");
+  table.caption = caption(analysis, "Trials excluded from the times");
   table.header = {"renderer", "trials", "wrong", "no response", "too fast", "used", "left out"};
   for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
     const Exclusions& lost = analysis.exclusions[r];
     table.rows.push_back({analysis.table.renderers[r], std::to_string(lost.n_trials),
                           std::to_string(lost.n_wrong), std::to_string(lost.n_timeouts),
                           std::to_string(lost.n_too_fast), std::to_string(lost.n_used),
-                          percent(100 * lost.share_excluded())});
+                          percent(100 * lost.proportion_excluded())});
   }
   table.notes = {"Too fast: correct answers before " + fixed(analysis.settings.too_fast, 3) +
                  " s. " + counted(analysis.table.n_practice, "practice trial", "practice trials") +
@@ -182,7 +184,7 @@ Table exclusions_table(const Analysis& analysis) {
 Table provenance_table(const Analysis& analysis) {
   const Provenance& from = analysis.table.provenance;
   Table table;
-  table.caption = "Where this comes from";
+  table.caption = "Provenance";
   table.n_names = 2;
   table.header = {"what", "value"};
   const auto add = [&](const char* what, const std::string& value) {

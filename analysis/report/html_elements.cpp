@@ -1,4 +1,4 @@
-#include "analysis/report/report_page.h"
+#include "analysis/report/html_elements.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -67,7 +67,8 @@ void put_table(std::string& out, const Table& table) {
   for (const std::string& text : table.notes) note(text);
 }
 
-void put_folded(std::string& out, std::string_view summary, const std::vector<Table>& tables) {
+void put_collapsible_tables(std::string& out, std::string_view summary,
+                            const std::vector<Table>& tables) {
   out += "<details>\n<summary>" + escaped(summary) + "</summary>\n";
   for (const Table& table : tables) put_table(out, table);
   out += "</details>\n";
@@ -77,7 +78,7 @@ std::string script_hash(std::string_view script) {
   constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   const std::string hex = protocols::sha256_hex(script);
   std::string out = "sha256-";
-  for (std::size_t at = 0; at < hex.size(); at += 6) {  // three bytes make four digits
+  for (std::size_t at = 0; at < hex.size(); at += 6) {  // 3 bytes are 4 base64 digits
     std::uint32_t bits = 0;
     const std::size_t n = std::min<std::size_t>(6, hex.size() - at);
     for (std::size_t i = 0; i < 6; ++i) {

@@ -1,4 +1,4 @@
-// Learning over trials, and which renderer came first.
+// Figures of practice: learning curves over trials, and the gain by order of renderers.
 
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
@@ -6,23 +6,24 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/figure_skeleton.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-constexpr double kLongestBar = 0.7;  // natural log: two people's bars leave the axis
+constexpr double kLongestBar =
+    0.7;  // natural log; intervals, such as those of two participants, are cut beyond
 
-/// Half of a part's 95 % interval over participants (t), natural log of s; none below two.
+/// Half width of a bin's 95 % t interval over participants, natural log of s; none for n < 2.
 std::optional<double> half_interval(const LearningBin& bin) {
   if (!bin.se_mean_log) return std::nullopt;
   const boost::math::students_t distribution(static_cast<double>(bin.n_participants) - 1);
   return quantile(distribution, 0.975) * *bin.se_mean_log;
 }
 
-/// One comparison's shapes. \return false where none can be shown
+/// Adds a comparison's gains by order, shape by shape. \return false where none is defined
 bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, std::size_t shapes,
                 std::string& description) {
   const RendererPair& pair = analysis.comparisons[comparison].pair;
@@ -37,11 +38,11 @@ bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, 
       if (!group.mean_log_ratio) return;
       any = true;
       const double value = percent_reduction(*group.mean_log_ratio);
-      const Look look = look_of(analysis, renderer);
+      const RendererStyle style = style_of(analysis, renderer);
       const std::string text = name + ", " + short_name(renderer) + " first: " + fixed(value, 1) +
                                " %, " +
                                counted(group.n_participants, "participant", "participants");
-      panel.marks.push_back(symbol(look.role, look.shape, at,
+      panel.marks.push_back(symbol(style.role, style.shape, at,
                                    std::clamp(value, panel.y.low, panel.y.high), 5.5, text));
       description += text + ". ";
     };
@@ -55,7 +56,7 @@ bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, 
       text += ", 95 % interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) + " %";
       add_interval(panel, Role::ink, x, ends.low, ends.high, text);
     }
-    panel.marks.push_back(symbol(Role::ink, Shape::diamond, x,
+    panel.marks.push_back(symbol(Role::ink, MarkerShape::diamond, x,
                                  std::clamp(value, panel.y.low, panel.y.high), 6, text));
     description += text + ". ";
   }
@@ -96,13 +97,13 @@ Figure learning_of(const Analysis& analysis) {
       if (at >= panel.y.low && at <= panel.y.high) panel.y.ticks.push_back({at, tick.label});
     }
   }
-  panel.width = kWide;
+  panel.width = kFullPanelWidth;
   panel.height = 300;
   add_renderers(figure, analysis, renderers);
   std::string slopes;
   for (std::size_t r = 0; r < renderers; ++r) {
     const std::string renderer = short_name(analysis.table.renderers[r]);
-    const auto [role, shape] = look_of(analysis, analysis.table.renderers[r]);
+    const auto [role, shape] = style_of(analysis, analysis.table.renderers[r]);
     const double shift = 0.12 * static_cast<double>(r) - 0.06 * static_cast<double>(renderers - 1);
     Mark line = line_mark(role, {}, {}, 2);
     for (std::size_t b = 0; b < kLearningBins; ++b) {
@@ -166,8 +167,9 @@ Figure order_of(const Analysis& analysis) {
   }
   const RendererPair& first = analysis.comparisons.front().pair;
   const auto add_entry = [&](const std::string& renderer) {
-    const Look look = look_of(analysis, renderer);
-    figure.legend.push_back({stimuli::printable(renderer, 200) + " first", look.role, look.shape});
+    const RendererStyle style = style_of(analysis, renderer);
+    figure.legend.push_back(
+        {stimuli::printable(renderer, 200) + " first", style.role, style.shape});
   };
   for (std::size_t c = 0; c < comparisons; ++c) {
     const RendererPair& pair = analysis.comparisons[c].pair;
@@ -182,12 +184,12 @@ Figure order_of(const Analysis& analysis) {
     figure.panels.push_back(std::move(panel));
   }
   if (figure.panels.empty()) return figure;
-  figure.legend.push_back({"orders balanced", Role::ink, Shape::diamond});
+  figure.legend.push_back({"orders balanced", Role::ink, MarkerShape::diamond});
   figure.notes.insert(
       figure.notes.begin(),
       "Practice makes whichever renderer comes second look faster: the gain of those "
       "who began with " +
-          the(short_name(first.reference)) +
+          with_article(short_name(first.reference)) +
           " is then too large, that of the others too small. "
           "The mean of both groups is free of it (two-period crossover); bars: 95 % "
           "interval.");

@@ -1,11 +1,11 @@
-#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/figure_skeleton.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -21,19 +21,20 @@ Figure new_figure(const Analysis& analysis, std::string id, std::string title) {
   return figure;
 }
 
-Look look_of(const Analysis& analysis, std::string_view renderer) {
-  constexpr std::array<Look, kShownRenderers> kLooks{{{Role::point, Shape::circle},
-                                                      {Role::ray, Shape::square},
-                                                      {Role::third, Shape::right},
-                                                      {Role::fourth, Shape::cross},
-                                                      {Role::fifth, Shape::left},
-                                                      {Role::sixth, Shape::saltire}}};
+RendererStyle style_of(const Analysis& analysis, std::string_view renderer) {
+  constexpr std::array<RendererStyle, kShownRenderers> kStyles{
+      {{Role::point, MarkerShape::circle},
+       {Role::ray, MarkerShape::square},
+       {Role::third, MarkerShape::right},
+       {Role::fourth, MarkerShape::cross},
+       {Role::fifth, MarkerShape::left},
+       {Role::sixth, MarkerShape::saltire}}};
   const auto own = [](std::string_view name) {
     return name == "point" ? 0U : name == "ray" ? 1U : kShownRenderers;
   };
-  if (own(renderer) < kShownRenderers) return kLooks[own(renderer)];
+  if (own(renderer) < kShownRenderers) return kStyles[own(renderer)];
   std::array<bool, kShownRenderers> taken{};
-  std::size_t before = 0;  // others that choose first
+  std::size_t before = 0;  // renderers without a fixed style that precede this one
   for (const std::string& name : analysis.table.renderers) {
     if (name == renderer) break;
     if (own(name) < kShownRenderers) {
@@ -43,9 +44,9 @@ Look look_of(const Analysis& analysis, std::string_view renderer) {
     }
   }
   for (std::size_t i = 0; i < kShownRenderers; ++i) {
-    if (!taken[i] && before-- == 0) return kLooks[i];
+    if (!taken[i] && before-- == 0) return kStyles[i];
   }
-  return kLooks.back();
+  return kStyles.back();
 }
 
 std::string short_name(const std::string& renderer) { return stimuli::printable(renderer, 40); }
@@ -53,8 +54,8 @@ std::string short_name(const std::string& renderer) { return stimuli::printable(
 void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown) {
   for (std::size_t r = 0; r < shown; ++r) {
     const std::string& renderer = analysis.table.renderers[r];
-    const Look look = look_of(analysis, renderer);
-    figure.legend.push_back({stimuli::printable(renderer, 200), look.role, look.shape});
+    const RendererStyle style = style_of(analysis, renderer);
+    figure.legend.push_back({stimuli::printable(renderer, 200), style.role, style.shape});
   }
 }
 
@@ -83,12 +84,13 @@ Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::
                        double slot) {
   const bool alone = analysis.comparisons.size() == 1;
   Panel panel;
-  constexpr std::size_t kLongest = 24;  // bytes: two names above a narrow panel
+  constexpr std::size_t kLongest = 24;  // bytes of each name, so that two fit above a narrow panel
   if (!alone) {
     panel.title = stimuli::printable(pair.renderer, kLongest) + " − " +
                   stimuli::printable(pair.reference, kLongest);
   }
-  panel.width = std::max(alone ? kWide : kHalfWide, slot * static_cast<double>(shapes));
+  panel.width =
+      std::max(alone ? kFullPanelWidth : kComparisonPanelWidth, slot * static_cast<double>(shapes));
   return panel;
 }
 
@@ -99,7 +101,7 @@ std::string gain_title(const Analysis& analysis, const std::string& what,
 
 std::string seconds_text(double seconds) { return fixed(seconds, seconds < 10 ? 2 : 1) + " s"; }
 
-std::vector<Figure> figures_of(const Analysis& analysis, const ReportRecord& record) {
+std::vector<Figure> figures_of(const Analysis& analysis, const StudyRecord& record) {
   std::vector<Figure> figures{
       figure15_of(analysis),  speedup_of(analysis),        times_of(analysis),
       confusion_of(analysis), speed_accuracy_of(analysis), learning_of(analysis),

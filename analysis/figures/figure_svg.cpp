@@ -1,4 +1,4 @@
-#include "analysis/figures/figures_svg.h"
+#include "analysis/figures/figure_svg.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -14,16 +14,16 @@ namespace palpate::analysis {
 namespace {
 
 constexpr double kGap = 30, kLeastWidth = 560;  // px
-constexpr double kNarrow = 380;                 // px: a phone's page
+constexpr double kNarrow = 380;                 // px: width of a drawing for narrow screens
 constexpr std::size_t kLongestEntry = 40;       // characters of a legend's entry
 
 class Drawing {
  public:
-  Drawing(const Figure& figure, const Palette& palette, Stands stands)
+  Drawing(const Figure& figure, const Palette& palette, FigurePlacement placement)
       : figure_(figure),
         palette_(palette),
-        in_page_(stands != Stands::alone),
-        narrow_(stands == Stands::in_narrow_page),
+        in_page_(placement != FigurePlacement::standalone),
+        narrow_(placement == FigurePlacement::in_narrow_page),
         margin_(narrow_ ? 4 : 26) {}
 
   std::string document() {
@@ -36,7 +36,7 @@ class Drawing {
     const double drawn = y + 8;
     y = draw_notes(y + 16) + margin_ - 10;
     std::optional<Svg::Part> shown;
-    // A page has margins of its own.
+    // The HTML page has margins: only the part within ours is shown.
     if (in_page_)
       shown = Svg::Part{margin_ - 2, std::min(total_, total_ - margin_ + 14), below_title_, drawn};
     Svg page;
@@ -50,21 +50,22 @@ class Drawing {
  private:
   const std::string& colour(Role role) const { return palette_[static_cast<std::size_t>(role)]; }
 
-  /// px; names of categories need their room.
+  /// px. On a narrow page at least kLeastSlot for each category.
   double width_of(const Panel& panel) const {
     if (!narrow_) return panel.width;
     constexpr double kLeast = 220, kLeastSlot = 26;
     const double least =
         std::min(panel.width, panel.x.names ? std::max(kLeast, kLeastSlot * panel.x.high) : kLeast);
-    return std::min(panel.width,
-                    std::max(least, kNarrow - 2 * margin_ - left_room(panel) - kRightOfNarrow));
+    return std::min(panel.width, std::max(least, kNarrow - 2 * margin_ - left_axis_width(panel) -
+                                                     kRightOfNarrow));
   }
 
-  /// Right end of the panels [first, last] in one row.
+  /// px: right end of a row with the panels first to last, margin included.
   double right_of(std::size_t first, std::size_t last) const {
     double x = margin_;
     for (std::size_t p = first; p <= last; ++p) {
-      x += left_room(figure_.panels[p]) + width_of(figure_.panels[p]) + (p < last ? kGap : margin_);
+      x += left_axis_width(figure_.panels[p]) + width_of(figure_.panels[p]) +
+           (p < last ? kGap : margin_);
     }
     return x + (narrow_ ? kRightOfNarrow : 0);
   }
@@ -79,27 +80,27 @@ class Drawing {
   }
 
   void measure() {
-    const double room = narrow_ ? kNarrow : figure_.room;
+    const double available = narrow_ ? kNarrow : figure_.max_row_width;
     total_ = narrow_ ? kNarrow : kLeastWidth;
     std::size_t first = 0;
     for (std::size_t p = 0; p < figure_.panels.size(); ++p) {
       if (figure_.panels[p].starts_row) first = p;
       total_ = std::max(total_, right_of(p, p));
       const double row = right_of(first, p);
-      if (row <= room) total_ = std::max(total_, row);
+      if (row <= available) total_ = std::max(total_, row);
     }
   }
 
-  /// \return where the panels begin
+  /// Title, label, subtitle and legend. \return y (px) where the panels begin
   double heading() {
     double y = margin_ + 18;
-    if (in_page_) svg_.begin_alone();
+    if (in_page_) svg_.begin_standalone();
     for (const std::string& line : lines_of(figure_.title, total_ - 2 * margin_, 19, true)) {
       svg_.text(margin_, y, line, {19, colour(Role::ink), Svg::Anchor::start, true});
       y += 25;
     }
     if (in_page_) svg_.end_group();
-    below_title_ = y - 20;  // the label's frame begins there
+    below_title_ = y - 20;  // top of the label's frame
     y = subtitle(y);
     return figure_.legend.empty() ? y - 8 : legend(y) + 14;
   }
@@ -125,7 +126,7 @@ class Drawing {
     return y + 14;
   }
 
-  /// \return the last row's base line
+  /// \return y (px) of the last row's base line
   double legend(double y) {
     double x = margin_;
     for (const LegendEntry& entry : figure_.legend) {
@@ -136,7 +137,7 @@ class Drawing {
         y += 22;
       }
       draw_symbol(svg_, palette_, entry.shape, entry.role, x + 9, y - 4.5,
-                  entry.shape == Shape::dash ? 9 : 6);
+                  entry.shape == MarkerShape::dash ? 9 : 6);
       svg_.text(x + 24, y, label, {13, colour(Role::ink)});
       x += width;
     }
@@ -153,7 +154,7 @@ class Drawing {
     const double top = y + (titled ? 44 : 26);
     for (std::size_t p = first; p < last; ++p) {
       const Panel& panel = figure_.panels[p];
-      x += left_room(panel);
+      x += left_axis_width(panel);
       const PlacedPanel placed{&panel, x, top, width_of(panel)};
       if (!panel.title.empty()) {
         svg_.text(x, top - 14, fitting(panel.title, placed.width + kGap, 14),
@@ -167,7 +168,7 @@ class Drawing {
   }
 
   double draw_notes(double y) {
-    if (in_page_) svg_.begin_alone();
+    if (in_page_) svg_.begin_standalone();
     for (const std::string& note : figure_.notes) {
       for (const std::string& line : lines_of(note, total_ - 2 * margin_, 12)) {
         svg_.text(margin_, y, line, {12, colour(Role::soft)});
@@ -178,7 +179,7 @@ class Drawing {
     return y;
   }
 
-  static constexpr double kRightOfNarrow = 12;  // px, for what stands out of a panel
+  static constexpr double kRightOfNarrow = 12;  // px, for marks that extend beyond the panel
 
   const Figure& figure_;
   const Palette& palette_;
@@ -190,8 +191,8 @@ class Drawing {
 
 }  // namespace
 
-std::string figure_svg(const Figure& figure, const Palette& palette, Stands stands) {
-  return Drawing(figure, palette, stands).document();
+std::string figure_svg(const Figure& figure, const Palette& palette, FigurePlacement placement) {
+  return Drawing(figure, palette, placement).document();
 }
 
 }  // namespace palpate::analysis

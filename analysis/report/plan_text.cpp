@@ -1,5 +1,3 @@
-#include "analysis/report/plan_report.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -7,13 +5,14 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/report/plan_report.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-std::string percent(double share) { return fixed(100 * share, 1) + " %"; }
+std::string percent(double proportion) { return fixed(100 * proportion, 1) + " %"; }
 
 std::string test_name(StudyTest test) {
   return test == StudyTest::paired ? "paired t-tests" : "the mixed model's contrasts";
@@ -28,25 +27,25 @@ void put_line(std::string& out, const std::string& text, const std::string& inde
   }
 }
 
-constexpr std::size_t kNameColumns = 14, kFigureColumns = 12, kWidestShape = 24;
+constexpr std::size_t kNameColumns = 14, kNumberColumns = 12, kWidestShape = 24;
 
 std::string column_name(const Plan& plan, std::size_t shape) {
   return "  " + pad_left(shortened(stimuli::printable(plan.model.shapes[shape]), kWidestShape),
-                         kFigureColumns - 2);
+                         kNumberColumns - 2);
 }
 
-/// The columns of these shapes.
+/// Appends the table of a curve, restricted to the columns of these shapes.
 void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
                  std::span<const std::size_t> shapes) {
-  out += "  " + pad_right("participants", kNameColumns) + pad_left("goal", kFigureColumns);
+  out += "  " + pad_right("participants", kNameColumns) + pad_left("goal", kNumberColumns);
   for (const std::size_t s : shapes) out += column_name(plan, s);
   out += "\n";
   for (const PlanPoint& point : curve.points) {
     std::string line = "  " + pad_right(std::to_string(point.design.participants), kNameColumns) +
-                       pad_left(percent(goal_power(plan, point.power)), kFigureColumns);
+                       pad_left(percent(goal_power(plan, point.power)), kNumberColumns);
     for (const std::size_t s : shapes) {
-      line +=
-          pad_left(percent(point.power.share(point.power.found[s])), width(column_name(plan, s)));
+      line += pad_left(percent(point.power.proportion(point.power.found[s])),
+                       width(column_name(plan, s)));
     }
     if (curve.smallest && curve.smallest->design.participants == point.design.participants) {
       line += "  <- enough";
@@ -55,9 +54,10 @@ void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
   }
 }
 
-/// All shapes, those with an effect first.
+/// Appends the table of a curve: shapes with an effect first, split where it is too wide.
 void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
-  constexpr std::size_t kRoom = 87 - 2 - kNameColumns - kFigureColumns;  // then "<- enough"
+  constexpr std::size_t kShapeColumns =
+      87 - 2 - kNameColumns - kNumberColumns;  // columns, without those of "<- enough"
   out += "\n";
   put_line(out, "Power with " + counted(curve.trials, "trial", "trials") +
                     " of each shape with each renderer (" +
@@ -71,7 +71,7 @@ void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
     std::size_t used = 0;
     for (; last < shapes.size(); ++last) {
       used += width(column_name(plan, shapes[last]));
-      if (last > first && used > kRoom) break;
+      if (last > first && used > kShapeColumns) break;
     }
     if (first > 0) out += "  (continued)\n";
     put_columns(out, plan, curve, std::span(shapes).subspan(first, last - first));
@@ -101,7 +101,7 @@ std::string plan_text(const Plan& plan) {
                "  ");
     } else {
       put_line(out,
-               "with " + trials + " " + std::to_string(settings.most) +
+               "with " + trials + " " + std::to_string(settings.max_participants) +
                    " participants are not enough: power " +
                    percent(goal_power(plan, curve.points.back().power)) + ".",
                "  ");
@@ -112,12 +112,12 @@ std::string plan_text(const Plan& plan) {
   put_line(out, "Log times are drawn with standard deviations: participants' gains " +
                     fixed(model.gain_sd, 3) + ", their gains for single shapes beyond that " +
                     fixed(model.shape_gain_sd, 3) + ", single trials " +
-                    fixed(model.residual_sd, 3) + "; " + percent(model.share_used) +
+                    fixed(model.residual_sd, 3) + "; " + percent(model.proportion_used) +
                     " of the trials give a time. " + std::to_string(settings.simulation.studies) +
-                    " studies for each figure (standard error of a power at most " +
+                    " studies for each power (standard error of a power at most " +
                     percent(0.5 / std::sqrt(static_cast<double>(settings.simulation.studies))) +
                     "), seed " + std::to_string(settings.simulation.seed) +
-                    ". A shape without an effect shows how often it is taken for one.");
+                    ". For a shape without an effect the number is the rate of false positives.");
   for (const std::string& note : plan.notes) put_line(out, "Note: " + note);
   return out;
 }

@@ -1,11 +1,13 @@
-// Distributions of times, binned: a million trials take no more room than a thousand.
+// Figure of the distributions of response times: violins (kernel density on log10 s) by shape and
+// renderer, with median, quartiles and time-outs. Densities are binned, so that the size of the
+// file does not grow with the trials.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
-#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/figure_skeleton.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -13,7 +15,7 @@ namespace palpate::analysis {
 namespace {
 
 constexpr std::size_t kBins = 80;
-constexpr std::size_t kFewTimes = 12;  // below it each time is drawn: a curve would pretend
+constexpr std::size_t kFewTimes = 12;  // with fewer, single times are drawn instead of a density
 using Bins = std::array<double, kBins>;
 
 /// log10 of s, sorted, of the trials that the times use. [renderer][shape]
@@ -33,8 +35,8 @@ Times used_times(const Analysis& analysis) {
   return times;
 }
 
-double quantile_of(const std::vector<float>& sorted, double share) {
-  const double at = share * static_cast<double>(sorted.size() - 1);
+double quantile_of(const std::vector<float>& sorted, double p) {
+  const double at = p * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(at);
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
   const double part = at - static_cast<double>(below);
@@ -42,7 +44,8 @@ double quantile_of(const std::vector<float>& sorted, double share) {
          part * static_cast<double>(sorted[above]);
 }
 
-/// Gaussian kernel of Silverman's (1986) width on bins from low to high; sums to 1.
+/// Gaussian kernel density on kBins bins from low to high, summing to 1; bandwidth 0.9 (IQR / 1.34)
+/// n^-1/5 (Silverman 1986, eq. 3.31 without the sd), at least 0.6 bins.
 Bins density(const std::vector<float>& sorted, double low, double high) {
   const double step = (high - low) / kBins;
   Bins counts{}, smooth{};
@@ -65,71 +68,73 @@ Bins density(const std::vector<float>& sorted, double low, double high) {
   return smooth;
 }
 
-/// Where a cell is drawn: a half of a violin on one side of x, or both halves around it.
-struct Stand {
+/// Where a cell is drawn: half a violin on one side of x, or a whole one around x.
+struct ViolinPosition {
   double x = 0;
-  double side = 0;  ///< -1 or 1: the half there; 0: both
-  double scale = 1;
+  double side = 0;   ///< -1: left half, 1: right half, 0: both
+  double scale = 1;  ///< half width in slots for each unit of density
 };
 
-/// A violin, or its half that bulges to one side. \param limit log10 of s, where it ends at the
-/// latest
-void add_violin(Panel& panel, Role role, const Bins& share, const Stand& stand, double limit,
-                const std::string& text) {
+/// A violin or half of one. \param limit log10 of s, its upper end: times beyond a limit do not
+/// exist
+void add_violin(Panel& panel, Role role, const Bins& bins, const ViolinPosition& position,
+                double limit, const std::string& text) {
   const double step = (panel.y.high - panel.y.low) / kBins;
   Mark area = line_mark(role, {}, {}, 1.2);
   area.kind = Mark::Kind::area;
   area.opacity = 0.4;
   area.text = text;
   const auto corner = [&](double offset, double bin) {
-    area.x.push_back(stand.x + offset);
+    area.x.push_back(position.x + offset);
     area.y.push_back(std::min(panel.y.low + (bin + 0.5) * step, limit));
   };
   std::size_t first = 0, last = kBins - 1;
-  const double least = 0.004 / stand.scale;
-  while (first < last && share[first] < least) ++first;
-  while (last > first && share[last] < least) --last;
-  // Smoothing spreads times beyond the limit, where there can be none.
+  const double least = 0.004 / position.scale;
+  while (first < last && bins[first] < least) ++first;
+  while (last > first && bins[last] < least) --last;
+  // The kernel extends beyond the limit, where no time can be.
   while (last > first && panel.y.low + (static_cast<double>(last) - 0.5) * step > limit) --last;
-  if (stand.side != 0) {
-    const auto beside = [&](double width) { return stand.side * (0.02 + width); };
+  if (position.side != 0) {
+    const auto beside = [&](double width) { return position.side * (0.02 + width); };
     corner(beside(0), static_cast<double>(first));
     for (std::size_t b = first; b <= last; ++b) {
-      corner(beside(stand.scale * share[b]), static_cast<double>(b));
+      corner(beside(position.scale * bins[b]), static_cast<double>(b));
     }
     corner(beside(0), static_cast<double>(last));
   } else {
     for (std::size_t b = first; b <= last; ++b) {
-      corner(stand.scale * share[b], static_cast<double>(b));
+      corner(position.scale * bins[b], static_cast<double>(b));
     }
     for (std::size_t b = last + 1; b-- > first;) {
-      corner(-stand.scale * share[b], static_cast<double>(b));
+      corner(-position.scale * bins[b], static_cast<double>(b));
     }
   }
   panel.marks.push_back(std::move(area));
 }
 
-void add_cell(Panel& panel, const Look& look, const std::vector<float>& times, const Bins& share,
-              const Stand& stand, double limit, const std::string& text) {
+void add_cell(Panel& panel, const RendererStyle& style, const std::vector<float>& times,
+              const Bins& bins, const ViolinPosition& position, double limit,
+              const std::string& text) {
   if (times.size() < kFewTimes) {
     for (const float time : times) {
-      panel.marks.push_back(symbol(look.role, look.shape, stand.x + stand.side * 0.12,
+      panel.marks.push_back(symbol(style.role, style.shape, position.x + position.side * 0.12,
                                    static_cast<double>(time), 3, text));
     }
     return;
   }
-  add_violin(panel, look.role, share, stand, limit, text);
-  const double at = stand.x + stand.side * 0.055;
+  add_violin(panel, style.role, bins, position, limit, text);
+  const double at = position.x + position.side * 0.055;
   panel.marks.push_back(
-      line_mark(look.role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
+      line_mark(style.role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
   const double median = quantile_of(times, 0.5);
-  panel.marks.push_back(symbol(look.role, look.shape, at, median, 5.2, text));
-  panel.marks.push_back(symbol(Role::page, look.shape, at, median, 3, text));
+  panel.marks.push_back(symbol(style.role, style.shape, at, median, 5.2, text));
+  panel.marks.push_back(symbol(Role::page, style.shape, at, median, 3, text));
 }
 
-/// Two renderers share a place, back to back; more stand side by side.
-Stand stand_of(const Analysis& analysis, std::size_t renderer, std::size_t renderers,
-               std::size_t shape, double widest) {
+/// Two renderers: half violins back to back; more: whole violins side by side. \param widest
+/// largest density of all cells
+ViolinPosition violin_position(const Analysis& analysis, std::size_t renderer,
+                               std::size_t renderers, std::size_t shape, double widest) {
   const double slot = static_cast<double>(shape) + 0.5, scale = 0.4 / std::max(widest, 1e-9);
   if (renderers <= 2) {
     const bool right = analysis.table.renderers[renderer] == "ray" || renderer == 1;
@@ -139,28 +144,30 @@ Stand stand_of(const Analysis& analysis, std::size_t renderer, std::size_t rende
   return {slot - 0.45 + 0.9 * (static_cast<double>(renderer) + 0.5) / n, 0, scale / n};
 }
 
-/// A cell's time-outs above the middle of its violin, or of its half. \param room for the text,
-/// in slots
-void add_time_outs(Panel& panel, const TimeOutCell& cell, const Look& look, const Stand& stand,
-                   double room, const std::string& name) {
+/// Number and percentage of a cell's time-outs, above its violin. \param max_width of the text, in
+/// slots
+void add_time_outs(Panel& panel, const TimeOutCell& cell, const RendererStyle& style,
+                   const ViolinPosition& position, double max_width, const std::string& name) {
   if (cell.n_timeouts == 0) return;
-  const std::string share = fixed(100 * cell.share(), cell.share() < 0.0995 ? 1 : 0) + " %";
-  const double x = stand.x + 0.25 * stand.side;
-  Mark mark = text_mark(look.role, x, panel.y.high,
-                        std::to_string(cell.n_timeouts) + " (" + share + ")", 11.5);
+  const std::string percent =
+      fixed(100 * cell.proportion(), cell.proportion() < 0.0995 ? 1 : 0) + " %";
+  const double x = position.x + 0.25 * position.side;
+  Mark mark = text_mark(style.role, x, panel.y.high,
+                        std::to_string(cell.n_timeouts) + " (" + percent + ")", 11.5);
   mark.bold = true;
   mark.dy = 16;
-  mark.room = room;
-  mark.shorter = share;
+  mark.max_width = max_width;
+  mark.shorter = percent;
   panel.marks.push_back(std::move(mark));
-  panel.marks.push_back(symbol(look.role, Shape::up, x, std::log10(*cell.highest_limit), 4,
+  panel.marks.push_back(symbol(style.role, MarkerShape::up, x, std::log10(*cell.highest_limit), 4,
                                name + ": " + counted(cell.n_timeouts, "time-out", "time-outs") +
                                    " of " + counted(cell.n_trials, "trial", "trials") + " (" +
-                                   share + "), longer than the limit"));
+                                   percent + "), longer than the limit"));
   panel.marks.back().dy = -6;
 }
 
-/// The limits of all time-outs that are drawn, log10 of s, and a few lines at most.
+/// The different limits of the time-outs that are drawn, log10 of s, ascending; of more than three
+/// the first and last.
 std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
   std::vector<double> limits;
   for (std::size_t r = 0; r < renderers; ++r) {
@@ -179,9 +186,9 @@ std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, s
   return limits;
 }
 
-/// A line for each limit, named where the axis has its ticks; those close by give way.
+/// A line for each limit with a tick of its own on the y axis; ticks close to it are left out.
 void add_limits(Panel& panel, const std::vector<double>& limits) {
-  constexpr double kApart = 0.07;  // log10 of s: a line of text
+  constexpr double kApart = 0.07;  // log10 of s: height of a line of text
   for (const double limit : limits) {
     const std::string seconds = fixed(std::pow(10, limit), limit < 1 ? 2 : 0) + " s";
     Mark line = line_mark(Role::amber, {panel.x.low, panel.x.high}, {limit, limit}, 1.4);
@@ -212,32 +219,32 @@ Figure times_of(const Analysis& analysis) {
   }
   if (low > high) return figure;
   const std::vector<double> limits = limits_of(analysis, renderers, shapes);
-  // Above the highest limit there is room for what ended there.
+  // Space above the highest limit for the counts of time-outs.
   const double top = limits.empty() ? high + 0.08 : std::max(high, limits.back()) + 0.17;
   Panel panel;
   panel.x = names_axis(table.shapes, shapes, "");
   panel.y = log_axis(low - 0.08, top, "time (s, logarithmic)");
-  panel.width = std::max(
-      kWide, std::max(70.0, 35.0 * static_cast<double>(renderers)) * static_cast<double>(shapes));
+  panel.width = std::max(kFullPanelWidth, std::max(70.0, 35.0 * static_cast<double>(renderers)) *
+                                              static_cast<double>(shapes));
   panel.height = 360;
-  std::vector<std::vector<Bins>> shares(times.size(), std::vector<Bins>(shapes));
+  std::vector<std::vector<Bins>> densities(times.size(), std::vector<Bins>(shapes));
   double widest = 0;
   for (std::size_t r = 0; r < times.size(); ++r) {
     for (std::size_t s = 0; s < shapes; ++s) {
       if (times[r][s].size() < kFewTimes) continue;
-      shares[r][s] = density(times[r][s], panel.y.low, panel.y.high);
-      widest = std::max(widest, *std::ranges::max_element(shares[r][s]));
+      densities[r][s] = density(times[r][s], panel.y.low, panel.y.high);
+      widest = std::max(widest, *std::ranges::max_element(densities[r][s]));
     }
   }
-  const double room = 0.85 / static_cast<double>(renderers);
+  const double max_width = 0.85 / static_cast<double>(renderers);
   for (std::size_t s = 0; s < shapes; ++s) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       const TimeOutCell& outs = analysis.time_outs.cells[r][s];
       const std::string name =
           stimuli::printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
-      const Look look = look_of(analysis, table.renderers[r]);
-      const Stand stand = stand_of(analysis, r, renderers, s, widest);
-      if (outs.highest_limit) add_time_outs(panel, outs, look, stand, room, name);
+      const RendererStyle style = style_of(analysis, table.renderers[r]);
+      const ViolinPosition position = violin_position(analysis, r, renderers, s, widest);
+      if (outs.highest_limit) add_time_outs(panel, outs, style, position, max_width, name);
       if (outs.n_timeouts > 0) {
         figure.description += name + ": " + counted(outs.n_timeouts, "time-out", "time-outs") +
                               " of " + counted(outs.n_trials, "trial", "trials") + ". ";
@@ -248,7 +255,7 @@ Figure times_of(const Analysis& analysis) {
                          ", middle half " + fixed(std::pow(10, quantile_of(times[r][s], 0.25)), 2) +
                          " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
                          counted(times[r][s].size(), "time", "times");
-      add_cell(panel, look, times[r][s], shares[r][s], stand,
+      add_cell(panel, style, times[r][s], densities[r][s], position,
                std::max(limits.empty()       ? panel.y.high
                         : outs.highest_limit ? std::log10(*outs.highest_limit)
                                              : limits.back(),
@@ -265,8 +272,8 @@ Figure times_of(const Analysis& analysis) {
       "All correct answers of all participants" +
           std::string(limits.empty() ? ""
                                      : "; above the limit: trials that ended there, which have no "
-                                       "time (share of the cell’s trials)") +
-          ". Width: share of the trials "
+                                       "time (percent of the cell’s trials)") +
+          ". Width: density of the trials "
           "(smoothed); mark: median; bar: the middle half of the trials. Cells of fewer "
           "than " +
           std::to_string(kFewTimes) + " times show each one.");

@@ -1,4 +1,4 @@
-#include "analysis/statistics/wording.h"
+#include "analysis/statistics/conclusions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSignificant = 0.05;
 constexpr std::size_t kLongestInPhrase = 40;            // bytes of a renderer's name
-constexpr std::size_t kNamed = 6, kNamedAmongMany = 3;  // beyond it names answer nothing
+constexpr std::size_t kNamed = 6, kNamedAmongMany = 3;  // of more shapes only the number is given
 constexpr std::size_t kFewComparisons = 2, kMostComparisons = 6;
 
 std::string with_reduction(const std::string& name, const PairedShape& shape) {
@@ -20,11 +20,11 @@ std::string with_reduction(const std::string& name, const PairedShape& shape) {
 }
 
 std::string sentence_start(std::string text, const RendererPair& pair) {
-  if (the(pair.renderer) != pair.renderer) text.front() = 'T';
+  if (with_article(pair.renderer) != pair.renderer) text.front() = 'T';
   return text;
 }
 
-/// One comparison. \param most names of shapes in a list
+/// Sentence for one comparison. \param most largest number of shapes listed by name
 std::string comparison_answer(const Comparison& comparison, const std::vector<std::string>& shapes,
                               std::size_t most) {
   const RendererPair& pair = comparison.pair;
@@ -48,8 +48,8 @@ std::string comparison_answer(const Comparison& comparison, const std::vector<st
     return std::to_string(names.size()) + " of " + std::to_string(shapes.size()) + " shapes";
   };
   const auto differs = [&](const char* how) {
-    return sentence_start(the(pair.renderer), pair) + " is " + how + " than " +
-           the(pair.reference) + " for ";
+    return sentence_start(with_article(pair.renderer), pair) + " is " + how + " than " +
+           with_article(pair.reference) + " for ";
   };
   std::vector<std::string> parts;
   if (!faster.empty()) parts.push_back(differs("faster") + list(faster));
@@ -73,7 +73,7 @@ std::string comparison_answer(const Comparison& comparison, const std::vector<st
 
 }  // namespace
 
-std::string answer(const Analysis& analysis) {
+std::string conclusion(const Analysis& analysis) {
   const std::vector<Comparison>& all = analysis.comparisons;
   const std::size_t shown = std::min(all.size(), kMostComparisons);
   std::string text;
@@ -91,9 +91,10 @@ std::string answer(const Analysis& analysis) {
 
 std::string with_renderer(const Analysis& analysis, const std::string& joint) {
   const RendererPair& pair = analysis.comparisons.front().pair;
-  const std::string reference = the(stimuli::printable(pair.reference, kLongestInPhrase));
+  const std::string reference = with_article(stimuli::printable(pair.reference, kLongestInPhrase));
   if (analysis.comparisons.size() > 1) return joint + " " + reference;
-  const std::string with = "with " + the(stimuli::printable(pair.renderer, kLongestInPhrase));
+  const std::string with =
+      "with " + with_article(stimuli::printable(pair.renderer, kLongestInPhrase));
   return pair.is_ray_minus_point() ? with : with + " " + joint + " " + reference;
 }
 

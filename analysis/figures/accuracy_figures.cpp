@@ -1,4 +1,4 @@
-// What was answered: confusion, accuracy beside speed, and what is lost on the way to the times.
+// Figures of answers: confusion matrix, speed-accuracy change, and excluded trials by reason.
 
 #include <algorithm>
 #include <cmath>
@@ -6,15 +6,15 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/figure_skeleton.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-constexpr double kMuchLost = 10;       // percent of the trials
-constexpr double kWidestChange = 150;  // percent of the time; what is longer leaves the axis
+constexpr double kManyExcluded = 10;   // percent of the trials; the amber line
+constexpr double kWidestChange = 150;  // percent of the time; intervals are cut beyond
 
 std::string percent_text(std::size_t part, std::size_t of) {
   const double percent = of ? 100 * static_cast<double>(part) / static_cast<double>(of) : 0;
@@ -32,7 +32,7 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
   panel.title = name;
   panel.x = names_axis(answers, answers.size(), "answered");
   panel.y = names_axis(table.shapes, shapes, "shown");
-  for (Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;  // the first on top
+  for (Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;  // first shape at the top
   panel.width = std::max(340.0, 62.0 * static_cast<double>(answers.size()));
   panel.height = 56.0 * static_cast<double>(shapes);
   for (std::size_t s = 0; s < shapes; ++s) {
@@ -40,17 +40,17 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
     const std::size_t total = std::accumulate(row.begin(), row.end(), std::size_t{0});
     for (std::size_t a = 0; a < answers.size(); ++a) {
       const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
-      const double share = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
+      const double proportion = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
       const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
       const std::string text = name + ": " + stimuli::printable(table.shapes[s], 40) +
                                " answered as " + stimuli::printable(answers[a], 40) + " " +
                                counted(n, "time", "times") + " of " + std::to_string(total) + " (" +
                                percent_text(n, total) + ")";
       panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
-                                      n ? 0.08 + 0.9 * share : 0.03, text));
+                                      n ? 0.08 + 0.9 * proportion : 0.03, text));
       if (n == 0) continue;
-      // On the dark cells of a light page, and the light ones of a dark page, the page's colour.
-      Mark mark = text_mark(share > 0.5 ? Role::page : Role::ink, x + 0.5, y + 0.5,
+      // Contrast: text on a strongly coloured cell has the colour of the page.
+      Mark mark = text_mark(proportion > 0.5 ? Role::page : Role::ink, x + 0.5, y + 0.5,
                             percent_text(n, total), 12);
       mark.bold = analysis.table.answers.size() > a && answers[a] == table.shapes[s];
       mark.dy = 4;
@@ -60,14 +60,15 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
   return panel;
 }
 
-/// Of the time in percent, negative where it is less.
+/// Interval of the change of time in percent; negative: less time.
 std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio) {
   if (!log_ratio) return std::nullopt;
   const Interval reduction = percent_reduction(*log_ratio);
   return Interval{-reduction.high, -reduction.low};
 }
 
-/// One comparison's shapes. \return false where none can be shown
+/// Adds a comparison's shapes: change of accuracy over change of time. \return false where none is
+/// defined
 bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
                  std::size_t shapes, std::string& description) {
   panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
@@ -96,7 +97,7 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
     if (const auto& ends = both.test.log_ratio_ci95) {
       add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
     }
-    panel.marks.push_back(symbol(Role::ink, Shape::circle, x, y, 6, text));
+    panel.marks.push_back(symbol(Role::ink, MarkerShape::circle, x, y, 6, text));
     Mark label = text_mark(Role::ink, x, y, name, 13);
     label.kind = Mark::Kind::label;
     label.bold = true;
@@ -124,7 +125,7 @@ Figure confusion_of(const Analysis& analysis) {
   }
   figure.notes.insert(
       figure.notes.begin(),
-      "Share of the trials of a row; bold: the right answer. None: no answer in time.");
+      "Percent of the trials of a row; bold: the right answer. None: no answer in time.");
   return figure;
 }
 
@@ -169,19 +170,18 @@ Figure speed_accuracy_of(const Analysis& analysis) {
   figure.notes.insert(figure.notes.begin(),
                       std::string(paper ? "Ray minus point" : "Renderer minus reference") +
                           ", means over participants; bars: 95 % intervals of the change of time "
-                          "and of accuracy, not adjusted. Shaded: speed may have been bought with "
-                          "errors, or accuracy "
-                          "with time.");
+                          "and of accuracy, not adjusted. Shaded: possible speed-accuracy "
+                          "trade-offs.");
   return figure;
 }
 
 Figure exclusions_of(const Analysis& analysis) {
-  Figure figure = new_figure(analysis, "exclusions", "From trials to times");
+  Figure figure = new_figure(analysis, "exclusions", "Trials excluded from the times");
   const std::size_t n = shown_renderers(analysis, figure);
   if (n == 0) return figure;
   double highest = 10;
   for (const Exclusions& lost : analysis.exclusions) {
-    highest = std::max(highest, 100 * lost.share_excluded());
+    highest = std::max(highest, 100 * lost.proportion_excluded());
   }
   struct Reason {
     const char* name;
@@ -197,16 +197,17 @@ Figure exclusions_of(const Analysis& analysis) {
   Panel panel;
   panel.x = names_axis(names, kGroups, "");
   panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
-  panel.width = kWide;
+  panel.width = kFullPanelWidth;
   panel.height = 260;
-  panel.marks.push_back(line_mark(Role::amber, {0, panel.x.high}, {kMuchLost, kMuchLost}, 1.4));
+  panel.marks.push_back(
+      line_mark(Role::amber, {0, panel.x.high}, {kManyExcluded, kManyExcluded}, 1.4));
   const double group = n < 4 ? 0.6 : 0.88, width = group / static_cast<double>(n);
   for (std::size_t r = 0; r < n; ++r) {
     const Exclusions& lost = analysis.exclusions[r];
     const std::string renderer = short_name(analysis.table.renderers[r]);
-    const Role role = look_of(analysis, analysis.table.renderers[r]).role;
+    const Role role = style_of(analysis, analysis.table.renderers[r]).role;
     figure.legend.push_back(
-        {stimuli::printable(analysis.table.renderers[r], 200), role, Shape::square});
+        {stimuli::printable(analysis.table.renderers[r], 200), role, MarkerShape::square});
     for (std::size_t g = 0; g < kGroups; ++g) {
       const std::size_t count =
           kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;
@@ -218,8 +219,8 @@ Figure exclusions_of(const Analysis& analysis) {
                                std::to_string(lost.n_trials) + " (" + fixed(percent, 1) + " %)";
       panel.marks.push_back(rect_mark(role, x + 0.01, 0, x + width - 0.01, percent, 0.85, text));
       const double px = (panel.y.high - panel.y.low) / panel.height;
-      const bool crossed = percent < kMuchLost && percent + 18 * px > kMuchLost;
-      Mark mark = text_mark(Role::soft, x + width / 2, crossed ? kMuchLost : percent,
+      const bool crossed = percent < kManyExcluded && percent + 18 * px > kManyExcluded;
+      Mark mark = text_mark(Role::soft, x + width / 2, crossed ? kManyExcluded : percent,
                             fixed(percent, 1), 12);
       mark.dy = -5;
       panel.marks.push_back(std::move(mark));
@@ -228,8 +229,9 @@ Figure exclusions_of(const Analysis& analysis) {
   }
   figure.panels.push_back(std::move(panel));
   figure.notes.push_back(
-      "Amber line: 10 %; beyond it, or where renderers differ, the times are to be read with "
-      "care.");
+      "Amber line: 10 %; with more exclusions, or different ones for the renderers, interpret the "
+      "times "
+      "with caution.");
   return figure;
 }
 

@@ -1,4 +1,4 @@
-#include "analysis/statistics/reml_data.h"
+#include "analysis/statistics/reml_reduction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kNoDirection = 1e-13;  // of eigenvalues; the largest possible is 1
+constexpr double kNoDirection = 1e-13;  // eigenvalues below are 0; the largest possible is 1
 
 /// A participant's cells with one renderer.
 struct Level {
@@ -21,17 +21,18 @@ struct Level {
   double squares = 0;  ///< within the cells
 };
 
-Level level_of(const People& people, const ModelCells& cells, std::size_t r,
+Level level_of(const ParticipantCells& participant_cells, const ModelCells& cells, std::size_t r,
                std::size_t participant) {
   Level out;
   std::vector<double> counts, means;
   for (std::size_t s = 0; s < cells.shapes.size(); ++s) {
-    const ParticipantCell& cell = people[cells.renderers[r]][cells.shapes[s]][participant];
+    const ParticipantCell& cell =
+        participant_cells[cells.renderers[r]][cells.shapes[s]][participant];
     if (cell.n_used == 0) continue;
     out.cells.push_back(cells.column[r][s]);
     counts.push_back(static_cast<double>(cell.n_used));
     means.push_back(cell.mean_log);
-    out.squares += cell.squares_log;
+    out.squares += cell.sum_of_squares_log;
   }
   out.counts = Eigen::Map<const VectorXd>(counts.data(), static_cast<Index>(counts.size()));
   out.means = Eigen::Map<const VectorXd>(means.data(), static_cast<Index>(means.size()));
@@ -40,8 +41,9 @@ Level level_of(const People& people, const ModelCells& cells, std::size_t r,
 
 using Levels = std::vector<std::vector<Level>>;  // [participant][renderer]
 
-/// One renderer's: every participant's direction D^-1/2 counts / sqrt(trials) as a row. The
-/// eigenvectors of rows' rows are the columns, 1 - eigenvalue is what is left of X'X within.
+/// Basis for one renderer from rows with each participant's direction D^-1/2 counts / sqrt(trials):
+/// the eigenvectors of rows' rows with non-zero eigenvalues; X'X within participants is 1 -
+/// eigenvalue.
 CellDirections directions_of(const Levels& levels, std::size_t r, Index first_cell, Index n_cells,
                              const VectorXd& counts, VectorXd& within) {
   CellDirections out;
@@ -63,7 +65,7 @@ CellDirections directions_of(const Levels& levels, std::size_t r, Index first_ce
     ++row;
   }
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(rows.transpose() * rows);
-  const auto none = (eigen.eigenvalues().array() <= kNoDirection).count();  // smallest first
+  const auto none = (eigen.eigenvalues().array() <= kNoDirection).count();  // ascending
   out.directions = eigen.eigenvectors().rightCols(n_cells - none);
   within = eigen.eigenvalues().tail(n_cells - none).unaryExpr([](double e) {
     return 1 - e > kNoDirection ? 1 - e : 0.0;
@@ -73,14 +75,14 @@ CellDirections directions_of(const Levels& levels, std::size_t r, Index first_ce
 
 }  // namespace
 
-ModelCells model_cells(const People& people) {
-  const std::size_t n_shapes = people.empty() ? 0 : people[0].size();
+ModelCells model_cells(const ParticipantCells& participant_cells) {
+  const std::size_t n_shapes = participant_cells.empty() ? 0 : participant_cells[0].size();
   const auto used = [&](std::size_t r, std::size_t s) {
-    return std::any_of(people[r][s].begin(), people[r][s].end(),
+    return std::any_of(participant_cells[r][s].begin(), participant_cells[r][s].end(),
                        [](const ParticipantCell& cell) { return cell.n_used > 0; });
   };
   ModelCells out;
-  for (std::size_t r = 0; r < people.size(); ++r) {
+  for (std::size_t r = 0; r < participant_cells.size(); ++r) {
     for (std::size_t s = 0; s < n_shapes; ++s) {
       if (!used(r, s)) continue;
       if (out.renderers.empty() || out.renderers.back() != r) out.renderers.push_back(r);
@@ -97,7 +99,7 @@ ModelCells model_cells(const People& people) {
   return out;
 }
 
-VectorXd ModelData::to_columns(const VectorXd& scaled) const {
+VectorXd ReducedModel::to_columns(const VectorXd& scaled) const {
   VectorXd out(data.within.size());
   for (const CellDirections& block : blocks_) {
     out.segment(block.first_column, block.directions.cols()) =
@@ -106,7 +108,7 @@ VectorXd ModelData::to_columns(const VectorXd& scaled) const {
   return out;
 }
 
-VectorXd ModelData::to_cells(const VectorXd& columns) const {
+VectorXd ReducedModel::to_cells(const VectorXd& columns) const {
   VectorXd out(counts_.size());
   for (const CellDirections& block : blocks_) {
     out.segment(block.first_cell, block.directions.rows()) =
@@ -115,11 +117,11 @@ VectorXd ModelData::to_cells(const VectorXd& columns) const {
   return out;
 }
 
-VectorXd ModelData::cell_means(const VectorXd& beta) const {
+VectorXd ReducedModel::cell_means(const VectorXd& beta) const {
   return centre_ + to_cells(beta).cwiseQuotient(counts_.cwiseSqrt());
 }
 
-ModelData::Loading ModelData::load(const VectorXd& weights) const {
+ReducedModel::Loading ReducedModel::load(const VectorXd& weights) const {
   const VectorXd scaled = weights.cwiseQuotient(counts_.cwiseSqrt());
   Loading out;
   out.inside = to_columns(scaled);
@@ -127,19 +129,19 @@ ModelData::Loading ModelData::load(const VectorXd& weights) const {
   return out;
 }
 
-ModelData::ModelData(const People& people, const ModelCells& cells) {
-  const std::size_t q = cells.renderers.size(), n_people = people[0][0].size();
+ReducedModel::ReducedModel(const ParticipantCells& participant_cells, const ModelCells& cells) {
+  const std::size_t q = cells.renderers.size(), n_participants = participant_cells[0][0].size();
   data.levels = static_cast<Index>(q);
 
-  Levels levels(n_people);
+  Levels levels(n_participants);
   VectorXd totals = VectorXd::Zero(cells.n);
   counts_ = totals;
   MatrixXd together = MatrixXd::Zero(data.levels, data.levels);
   Index n_levels = 0;
-  for (std::size_t i = 0; i < n_people; ++i) {
+  for (std::size_t i = 0; i < n_participants; ++i) {
     VectorXd has = VectorXd::Zero(data.levels);
     for (std::size_t r = 0; r < q; ++r) {
-      const Level& level = levels[i].emplace_back(level_of(people, cells, r, i));
+      const Level& level = levels[i].emplace_back(level_of(participant_cells, cells, r, i));
       if (level.cells.empty()) continue;
       has(static_cast<Index>(r)) = 1;
       ++n_levels;
@@ -151,7 +153,7 @@ ModelData::ModelData(const People& people, const ModelCells& cells) {
   }
   shared = (together.array() > 0).all();
   const double trials = counts_.sum();
-  data.freedom = trials - static_cast<double>(cells.n);
+  data.degrees_of_freedom = trials - static_cast<double>(cells.n);
 
   Index n_columns = 0;
   std::vector<VectorXd> within(q);
@@ -169,23 +171,23 @@ ModelData::ModelData(const People& people, const ModelCells& cells) {
     data.within.segment(blocks_[r].first_column, within[r].size()) = within[r];
   }
   const auto rank = cells.n - n_columns + (data.within.array() > 0).count();
-  freedom = trials - static_cast<double>(n_levels + rank);
+  degrees_of_freedom = trials - static_cast<double>(n_levels + rank);
 
-  // Centred at the fit with participants x renderers as fixed effects: what is left is of the size
-  // of the noise, so no digits are lost to the squares of the means. Twice: once to the cells'
-  // means, then to the rest of that fit.
+  // Centres y at the fit with participants x renderers as fixed effects, so that squares of means
+  // do not cancel digits of the residuals. Two passes: cell means first, then the remainder of that
+  // fit.
   const VectorXd roots = counts_.cwiseSqrt();
   centre_ = totals.cwiseQuotient(counts_);
   for (int pass = 0; pass < 2; ++pass) {
     data.yy = 0;
     data.groups.clear();
     VectorXd xy = VectorXd::Zero(cells.n);  // of deviations from the means, D^-1/2 X'y
-    for (const auto& person : levels) {
-      RemlGroup group;
+    for (const auto& participant : levels) {
+      RemlParticipant group;
       std::vector<const Level*> present;
       for (std::size_t r = 0; r < q; ++r) {
-        if (person[r].cells.empty()) continue;
-        present.push_back(&person[r]);
+        if (participant[r].cells.empty()) continue;
+        present.push_back(&participant[r]);
         group.levels.push_back(static_cast<Index>(r));
       }
       if (present.empty()) continue;
@@ -207,13 +209,14 @@ ModelData::ModelData(const People& people, const ModelCells& cells) {
             level.counts.cwiseProduct(rest).cwiseQuotient(VectorXd(roots(level.cells)));
         data.yy += level.squares + level.counts.dot(rest.cwiseAbs2());
         if (pass == 0) continue;
-        VectorXd share = VectorXd::Zero(block.directions.rows());
+        VectorXd direction = VectorXd::Zero(block.directions.rows());
         for (std::size_t c = 0; c < level.cells.size(); ++c) {
           const Index cell = level.cells[c];
-          share(cell - block.first_cell) = level.counts(static_cast<Index>(c)) / (n * roots(cell));
+          direction(cell - block.first_cell) =
+              level.counts(static_cast<Index>(c)) / (n * roots(cell));
         }
         group.x.block(row, block.first_column, 1, block.directions.cols()) =
-            share.transpose() * block.directions;
+            direction.transpose() * block.directions;
       }
       data.groups.push_back(std::move(group));
     }

@@ -1,10 +1,10 @@
-// How well the servo kept time.
+// Histogram of the longest servo period of each trial, by renderer.
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "analysis/figures/figures_parts.h"
+#include "analysis/figures/figure_skeleton.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -18,7 +18,7 @@ constexpr const char* kVirtualClock =
 
 }  // namespace
 
-Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
+Figure servo_of(const Analysis& analysis, const StudyRecord& record) {
   Figure figure = new_figure(analysis, "servo", "Longest servo period of each trial");
   int first = ServoQuality::kBins, last = -1;
   double highest = 0;
@@ -32,8 +32,8 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
           std::max(highest, 100 * static_cast<double>(n) / static_cast<double>(servo.n_trials));
     }
   }
-  if (last <= first) return figure;  // one bar is a sentence: servo_sentence()
-  // At least from 0.5 to 5 ms, so that a perfect record shows as what it is.
+  if (last <= first) return figure;  // a single bin: servo_sentence() says it
+  // The axis spans at least 0.5 to 5 ms, so that small differences are not magnified.
   constexpr int kHalf = ServoQuality::kBinsPerDecade;
   first = std::min(first, static_cast<int>(0.7 * kHalf));
   last = std::max(last, static_cast<int>(1.7 * kHalf));
@@ -41,13 +41,13 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
     return std::log10(1000 * ServoQuality::kLowest) +
            static_cast<double>(bin) / ServoQuality::kBinsPerDecade;
   };
-  const double room = std::max(highest, 1.0);
+  const double highest_shown = std::max(highest, 1.0);
   for (const ServoQuality& servo : record.servo) {
     Panel panel;
     panel.title = stimuli::printable(servo.renderer, 40);
     panel.x = log_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
     panel.x.grid = false;
-    panel.y = linear_axis(0, room, "trials (%)");
+    panel.y = linear_axis(0, highest_shown, "trials (%)");
     panel.width = 380;
     panel.height = 200;
     for (int b = first; b <= last; ++b) {
@@ -55,7 +55,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
       if (n == 0) continue;
       const double percent = 100 * static_cast<double>(n) / static_cast<double>(servo.n_trials);
       panel.marks.push_back(rect_mark(
-          look_of(analysis, servo.renderer).role, edge(b), 0, edge(b + 1), percent, 0.85,
+          style_of(analysis, servo.renderer).role, edge(b), 0, edge(b + 1), percent, 0.85,
           fixed(std::pow(10, edge(b)), 2) + " to " + fixed(std::pow(10, edge(b + 1)), 2) +
               " ms: " + counted(n, "trial", "trials") + " (" + fixed(percent, 1) + " %)"));
     }
@@ -72,7 +72,7 @@ Figure servo_of(const Analysis& analysis, const ReportRecord& record) {
   return figure;
 }
 
-std::string servo_sentence(const Analysis& analysis, const ReportRecord& record) {
+std::string servo_sentence(const Analysis& analysis, const StudyRecord& record) {
   if (record.servo.empty()) {
     return "This is on record in a study’s database only, not in a table of trials.";
   }

@@ -1,5 +1,3 @@
-#include "analysis/input/trials.h"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -10,6 +8,7 @@
 
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/text.h"
 #include "data/files/formula_guard.h"
 #include "protocols/parse.h"
@@ -42,20 +41,20 @@ constexpr std::array<std::string_view, n_columns> kColumns{
 constexpr int kNeeded = response_time + 1;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
-constexpr std::size_t kMaxName = 200;     // bytes; the contract's codes have at most 32
-constexpr std::size_t kMaxStimuli = 200;  // the confusion matrix grows with its square
-constexpr std::size_t kMaxPeople = 10000;
+constexpr std::size_t kMaxName = 200;     // bytes; codes of our own participants have at most 32
+constexpr std::size_t kMaxStimuli = 200;  // the confusion matrix has the square of it
+constexpr std::size_t kMaxParticipants = 10000;
 constexpr std::size_t kMaxRenderers = 20;
-constexpr std::size_t kMaxCells = 4'000'000;  // people x renderers x stimuli: some 500 MB
-constexpr std::string_view kNoResponse = "no_response";  // a key of the results
-constexpr double kMaxTime = 1e6;  // s; keeps every sum finite, and no trial lasts 11 days
+constexpr std::size_t kMaxCells = 4'000'000;  // participants x renderers x stimuli: some 500 MB
+constexpr std::string_view kNoResponse = "no_response";  // a key in the JSON results
+constexpr double kMaxTime = 1e6;                         // s, 11 days; bounds every sum of squares
 
-/// Collects faults: the first ones in full, the rest as a number.
+/// Collects faults: the first kMaxFaults in full, further ones as a number.
 class Faults {
  public:
   explicit Faults(std::string file) : file_(std::move(file)) {}
-  void add(const std::string& place, const std::string& expected) {
-    if (++count_ <= kMaxFaults) faults_.push_back({file_, place, expected});
+  void add(const std::string& location, const std::string& expected) {
+    if (++count_ <= kMaxFaults) faults_.push_back({file_, location, expected});
   }
   std::size_t count() const { return count_; }
   void throw_if_any() {
@@ -74,7 +73,7 @@ class Faults {
   std::size_t count_ = 0;
 };
 
-/// Reads the rows of one file.
+/// Parses one file into a TrialTable.
 class CsvTrials {
  public:
   explicit CsvTrials(const std::string& path) : path_(path), faults_(path) {}
@@ -89,7 +88,7 @@ class CsvTrials {
     }
     if (reader->next() && reader->fault().empty()) {
       read_header(*reader);
-      faults_.throw_if_any();  // without its columns no row means anything
+      faults_.throw_if_any();  // rows cannot be read without their columns
       while (reader->next()) read_row(*reader);
     }
     if (!reader->fault().empty()) faults_.add(line(*reader), reader->fault());
@@ -134,17 +133,17 @@ class CsvTrials {
 
   void fault(Column column, std::string_view expected) {
     ok_ = false;
-    // Formats only what will be listed: a million bad rows must not cost a million strings.
+    // Only faults that are listed are formatted: a file may have millions of bad rows.
     if (faults_.count() >= kMaxFaults) return faults_.add({}, {});
     faults_.add(line(*reader_) + ", column " + std::string(kColumns[column]),
                 "expected " + std::string(expected) + "; found '" +
                     stimuli::printable(field(column), 40) + "'");
   }
 
-  /// A name as it was before an export guarded it from spreadsheets.
+  /// A name; an apostrophe that an export put before it against spreadsheet formulas is removed.
   std::string_view name(Column column, const Interner& known) {
     const std::string_view text = data::unguarded(field(column));
-    if (known.holds(text)) return text;
+    if (known.contains(text)) return text;
     if (text.empty() || text.size() > kMaxName || !stimuli::is_plain_utf8(text)) {
       fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");
     }
@@ -165,7 +164,7 @@ class CsvTrials {
     return value;
   }
 
-  /// What R, pandas, BIDS and spreadsheets write where there is nothing.
+  /// How R, pandas, BIDS and spreadsheets write a missing value.
   static bool missing(std::string_view text) {
     for (const std::string_view nothing : {"", "NA", "n/a", "N/A", "NaN", "nan"}) {
       if (text == nothing) return true;
@@ -184,7 +183,7 @@ class CsvTrials {
     const std::string_view text = field(column);
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    // An underflow is a time of 0; from_chars does not say which way it left the range.
+    // from_chars reports underflow and overflow alike: both are faults.
     if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
         value < 0 || value > kMaxTime) {
       fault(column,
@@ -211,10 +210,10 @@ class CsvTrials {
     raw.trial = number(trial);
     raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
-    if (!missing(field(response)) || stimuli_.holds(field(response)))
+    if (!missing(field(response)) || stimuli_.contains(field(response)))
       raw.response = name(response, stimuli_);
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
-    // A time-out has neither a time nor a judgement of its own.
+    // Time and correctness of a time-out may be missing.
     raw.correct = !(raw.timed_out && missing(field(correct))) && truth(correct);
     raw.response_time =
         raw.timed_out && missing(field(response_time)) ? kNoTime : time(response_time);
@@ -226,22 +225,23 @@ class CsvTrials {
     renderers_.number(raw.renderer);
     stimuli_.number(raw.shape);
     if (!raw.response.empty()) stimuli_.number(raw.response);
-    if (!room_enough()) return;
+    if (!within_limits()) return;
     if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
     if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
   }
 
-  /// Whether all names so far are within the limits; the first time that they are not is a fault.
-  bool room_enough() {
-    const std::size_t people = names_.names().size(), renderers = renderers_.names().size(),
+  /// Whether the numbers of names are within the limits; exceeding them is one fault, after which
+  /// rows are ignored.
+  bool within_limits() {
+    const std::size_t participants = names_.names().size(), renderers = renderers_.names().size(),
                       stimuli = stimuli_.names().size();
-    if (people > kMaxPeople || stimuli > kMaxStimuli) {
-      fault(people > kMaxPeople ? participant_id : shape,
+    if (participants > kMaxParticipants || stimuli > kMaxStimuli) {
+      fault(participants > kMaxParticipants ? participant_id : shape,
             "at most 10000 different participants and 200 different stimuli");
     } else if (renderers > kMaxRenderers) {
       fault(renderer, "at most 20 different renderers");
-    } else if (people * renderers * stimuli > kMaxCells) {
+    } else if (participants * renderers * stimuli > kMaxCells) {
       fault(participant_id, "at most 4000000 cells (participants x renderers x stimuli)");
     } else {
       return true;
@@ -250,7 +250,7 @@ class CsvTrials {
     return false;
   }
 
-  /// Provenance is shown, not checked: an odd value is made printable, and a few are enough.
+  /// Values of provenance are displayed only: made printable, at most eight are kept.
   static void remember(std::string_view text, std::vector<std::string>& known) {
     if (text.empty() || (!known.empty() && known.back() == text)) return;
     const std::string shown = stimuli::printable(text, 80);
@@ -280,8 +280,8 @@ class CsvTrials {
   std::array<std::size_t, n_columns> at_{};
   std::size_t n_fields_ = 0, n_rows_ = 0;
   bool ok_ = true, too_many_ = false;
-  Interner names_, renderers_,
-      stimuli_;  ///< those seen in good rows, practice too: each is checked once
+  /// Names of valid rows, practice included: each is checked once.
+  Interner names_, renderers_, stimuli_;
   std::vector<std::string> protocols_, versions_;
   TrialTableBuilder builder_;
 };
