@@ -111,7 +111,7 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
 }  // namespace
 
 Figure confusion_of(const Analysis& analysis) {
-  Figure figure = new_figure(analysis, "confusion", "What was shown and what was answered");
+  Figure figure = new_figure(analysis, "confusion", "Confusion matrix: shape shown and answered");
   const std::size_t shapes = shown_shapes(analysis, figure);
   const std::size_t renderers = shown_renderers(analysis, figure);
   for (std::size_t r = 0; r < renderers; ++r) {
@@ -230,8 +230,7 @@ Figure exclusions_of(const Analysis& analysis) {
   figure.panels.push_back(std::move(panel));
   figure.notes.push_back(
       "Amber line: 10 %; with more exclusions, or different ones for the renderers, interpret the "
-      "times "
-      "with caution.");
+      "times with caution.");
   return figure;
 }
 

@@ -47,7 +47,7 @@ bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, 
       description += text + ". ";
     };
     add_group(order.reference_first, pair.reference, x - 0.2);
-    add_group(order.renderer_first, pair.renderer, x - 0.2 + 0.4);
+    add_group(order.renderer_first, pair.renderer, x + 0.2);
     if (!order.balanced_log_ratio) continue;
     const double value = percent_reduction(*order.balanced_log_ratio);
     std::string text = name + ", orders balanced: " + fixed(value, 1) + " %";
@@ -147,7 +147,7 @@ Figure learning_of(const Analysis& analysis) {
 }
 
 Figure order_of(const Analysis& analysis) {
-  Figure figure = new_figure(analysis, "order", "The gain by which renderer came first");
+  Figure figure = new_figure(analysis, "order", "Reduction by the order of the renderers");
   const std::size_t shapes = shown_shapes(analysis, figure);
   const std::size_t comparisons = shown_comparisons(analysis, figure);
   double low = 0, high = 10;

@@ -12,9 +12,7 @@ namespace palpate::analysis {
 namespace {
 
 constexpr const char* kVirtualClock =
-    " Simulated sessions run on a virtual clock: it keeps time by definition, and this says "
-    "nothing "
-    "about a machine.";
+    " Simulated sessions run on a virtual clock: their periods say nothing about a machine.";
 
 }  // namespace
 
@@ -74,11 +72,11 @@ Figure servo_of(const Analysis& analysis, const StudyRecord& record) {
 
 std::string servo_sentence(const Analysis& analysis, const StudyRecord& record) {
   if (record.servo.empty()) {
-    return "This is on record in a study’s database only, not in a table of trials.";
+    return "Only a study’s database records servo periods, a table of trials does not.";
   }
   double longest = 0;
   for (const ServoQuality& servo : record.servo) longest = std::max(longest, servo.longest_period);
-  std::string text = "The longest servo period was alike in all trials, up to " +
+  std::string text = "All trials have their longest servo period in the same bin, up to " +
                      fixed(1000 * longest, 3) + " ms: there is nothing to draw.";
   if (analysis.table.simulated != Simulated::no) text += kVirtualClock;
   return text;

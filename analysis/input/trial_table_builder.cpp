@@ -30,10 +30,6 @@ std::size_t renderer_rank(const std::string& name) {
   return name == "point" ? 0 : name == "ray" ? 1 : 2;
 }
 
-std::string plural(std::size_t n, const char* one, const char* many) {
-  return std::to_string(n) + " " + (n == 1 ? one : many);
-}
-
 }  // namespace
 
 std::uint32_t Interner::number(std::string_view name) {
@@ -98,7 +94,7 @@ std::string TrialTableBuilder::lines_of(
 }
 
 void TrialTableBuilder::check_repeated_trials(TrialTable& table) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> repeated, doubled;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> repeated, identical;
   const auto same_time = [](double x, double y) {
     return x == y || (std::isnan(x) && std::isnan(y));
   };
@@ -112,17 +108,16 @@ void TrialTableBuilder::check_repeated_trials(TrialTable& table) {
     const TrialRow &x = rows_[a.row], &y = rows_[b.row];
     if (x.renderer == y.renderer && x.shape == y.shape && x.answer == y.answer &&
         same_time(x.response_time, y.response_time)) {
-      doubled.emplace_back(a.row, b.row);
+      identical.emplace_back(a.row, b.row);
     }
   }
-  if (!doubled.empty()) {
+  if (!identical.empty()) {
     throw std::runtime_error(
-        plural(doubled.size(), "row stands", "rows stand") + " twice" + lines_of(doubled) +
-        ", with the same participant, session, block, trial and the same answer after the same "
-        "time: expected each trial once");
+        counted(identical.size(), "row appears", "rows appear") + " twice" + lines_of(identical) +
+        ": the same participant, session, block, trial, answer and time; expected each trial once");
   }
   if (!repeated.empty()) {
-    table.warnings.push_back(plural(repeated.size(), "row repeats", "rows repeat") +
+    table.warnings.push_back(counted(repeated.size(), "row repeats", "rows repeat") +
                              " the participant, session, block and trial of another row" +
                              lines_of(repeated) + ".");
   }
@@ -145,10 +140,11 @@ void TrialTableBuilder::fill_times(TrialTable& table) {
   for (TrialRow& row : rows_) {
     if (std::isnan(row.response_time)) row.response_time = taken;
   }
-  table.warnings.push_back(plural(unknown, "time-out has", "time-outs have") +
-                           " no time; the limit was taken as " + fixed(taken, 3) + " s, the " +
+  table.warnings.push_back(counted(unknown, "time-out has", "time-outs have") +
+                           " no time; their limit was assumed to be " + fixed(taken, 3) +
+                           " s, the " +
                            (limit > 0 ? "longest of the other time-outs."
-                                      : "longest time of all trials: it was that at least."));
+                                      : "longest time of all trials, a lower bound."));
 }
 
 TrialTable TrialTableBuilder::finish(Provenance provenance,
@@ -198,13 +194,12 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   table.rows = std::move(rows_);
 
   if (n_contradicting_ > 0) {
-    table.warnings.push_back(
-        "In " + plural(n_contradicting_, "row", "rows") +
-        " `correct` does not follow from shape and response; `correct` was taken as it stands.");
+    table.warnings.push_back("In " + counted(n_contradicting_, "row", "rows") +
+                             " `correct` contradicts shape and response; `correct` was used.");
   }
   if (n_late_answers_ > 0) {
-    table.warnings.push_back(plural(n_late_answers_, "time-out carries", "time-outs carry") +
-                             " an answer or counts as correct; time-outs were taken as wrong.");
+    table.warnings.push_back(counted(n_late_answers_, "time-out has", "time-outs have") +
+                             " an answer or is marked correct; time-outs count as wrong.");
   }
   return table;
 }

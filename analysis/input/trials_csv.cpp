@@ -114,7 +114,7 @@ class CsvTrials {
       auto& at = at_[static_cast<std::size_t>(found - kColumns.begin())];
       if (at != kAbsent) {
         faults_.add(line(reader) + ", column " + std::string(names[i]),
-                    "expected each column once; it is there as number " + std::to_string(at + 1) +
+                    "expected each column once; found as columns " + std::to_string(at + 1) +
                         " and " + std::to_string(i + 1));
       } else {
         at = i;

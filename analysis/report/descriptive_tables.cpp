@@ -177,7 +177,7 @@ Table exclusions_table(const Analysis& analysis) {
   }
   table.notes = {"Too fast: correct answers before " + fixed(analysis.settings.too_fast, 3) +
                  " s. " + counted(analysis.table.n_practice, "practice trial", "practice trials") +
-                 " set aside before."};
+                 " excluded beforehand."};
   return table;
 }
 

@@ -40,7 +40,7 @@ std::string saved_colours() {
 void put_choice(std::string& out, const std::vector<std::string>& participants) {
   out +=
       "<label hidden=\"hidden\">Highlight a participant <select id=\"person\"><option "
-      "value=\"\">nobody</option>";
+      "value=\"\">none</option>";
   for (const std::string& name : participants) {
     out += "<option value=\"" + escaped(name) + "\">" + escaped(name) + "</option>";
   }
@@ -113,9 +113,9 @@ std::string HtmlPage::html(std::string_view footer) const {
   std::string out = head();
   out += "<body>\n<a class=\"skip\" href=\"#content\">To the content</a>\n" + banner_ +
          "<header>\n" + above_title_ + "<h1>" + escaped_sentence(title_) + "</h1>\n" +
-         below_title_ + "</header>\n<nav aria-label=\"Parts of the report\"><ul>\n" + links_ +
+         below_title_ + "</header>\n<nav aria-label=\"Sections of the report\"><ul>\n" + links_ +
          "</ul></nav>\n<main id=\"content\">\n" + body_ + "</main>\n<footer><p>" + escaped(footer) +
-         " This page is complete in itself and asks the network for nothing.</p></footer>\n"
+         " This page is self-contained and loads nothing from the network.</p></footer>\n"
          "<script type=\"application/json\" id=\"saved-colours\">" +
          saved_colours() + "</script>\n<script>";
   out += report_script();

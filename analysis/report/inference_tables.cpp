@@ -203,7 +203,7 @@ Table learning_table(const Analysis& analysis) {
 Table renderer_order_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
   const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
-  Table table = comparison_table(analysis, "Does the order of renderers explain the gain?",
+  Table table = comparison_table(analysis, "Practice: reduction by the order of the renderers",
                                  {first.reference + " first", "n", renderer + " first", "n",
                                   "difference", "p (Holm)", "balanced", "95 % interval"});
   Reasons reasons;
@@ -246,8 +246,7 @@ Table renderer_order_table(const Analysis& analysis) {
       " first. Difference: ratio of " + renderer + " to " + first.reference + " times, " +
       first.reference + " first against " + renderer +
       " first; below 0 where practice helps; p adjusted over all tests of practice (slopes over "
-      "the trials "
-      "and orders, " +
+      "the trials and orders, " +
       std::to_string(analysis.practice.n_tests) +
       " in all). Balanced: both orders with equal weight."};
   table.notes.insert(table.notes.end(), interleaved.begin(), interleaved.end());

@@ -59,7 +59,7 @@ Json needed_json(const Plan& plan, const PlanCurve& curve) {
       {"participants", curve.smallest ? Json(curve.smallest->design.participants) : Json(nullptr)}};
   if (!curve.smallest) {
     out["status"] = "undefined";
-    out["reason"] = "more participants than were looked at";
+    out["reason"] = "the power is not reached within the range of participants";
   }
   return out;
 }

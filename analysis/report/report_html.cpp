@@ -115,7 +115,7 @@ class Report {
                       std::string_view missing) {
     begin(heading);
     if (!put_figure(heading.id)) page_.put_note(missing);
-    if (!tables.empty()) put_collapsible_tables(page_.body(), "The numbers as a table", tables);
+    if (!tables.empty()) put_collapsible_tables(page_.body(), "Table of the numbers", tables);
     page_.end_section();
   }
 
@@ -152,10 +152,10 @@ class Report {
                      {speed_accuracy_table(analysis_)},
                      "Time and accuracy cannot be compared: no participant has both renderers.");
     }
-    figure_section({"learning", "Does practice explain it? Learning over the trials", "Learning"},
+    figure_section({"learning", "Practice: learning over the trials", "Learning"},
                    {learning_table(analysis_)}, "Not enough trials for a learning curve.");
     if (both) {
-      figure_section({"order", "Does practice explain it? Which renderer came first", "Order"},
+      figure_section({"order", "Practice: order of the renderers", "Order"},
                      {renderer_order_table(analysis_)},
                      "The two orders of the renderers cannot be compared in these data.");
     }
@@ -180,8 +180,8 @@ class Report {
     Table table;
     table.caption = "Servo, by renderer" + (label_.empty() ? "" : " (" + label_ + ")");
     table.header = {
-        "renderer",           "trials",         "ticks",      "missed",       "of ticks",
-        "trials with missed", "longest period", "with fault", "began inside", "largest force"};
+        "renderer",           "trials",         "ticks",      "missed",         "of ticks",
+        "trials with missed", "longest period", "with fault", "started inside", "largest force"};
     for (const ServoQuality& servo : record_.servo) {
       const double percent_missed = servo.ticks
                                         ? 100 * static_cast<double>(servo.missed_ticks) /
@@ -196,7 +196,7 @@ class Report {
     }
     table.notes = {"Missed: whole periods that passed without a tick. " +
                    counted(record_.n_cut_off, "attempt was", "attempts were") +
-                   " cut off and shown again."};
+                   " interrupted and repeated."};
     return {table};
   }
 
@@ -206,7 +206,7 @@ class Report {
       for (const std::string& value : values) table.rows.push_back({what, value});
     };
     add("device", record_.devices);
-    add("answers from", record_.response_devices);
+    add("response device", record_.response_devices);
     add("recorded with build", record_.builds);
     for (const ProtocolText& protocol : record_.protocols) {
       if (!protocol.seed.empty()) table.rows.push_back({"protocol seed", protocol.seed});

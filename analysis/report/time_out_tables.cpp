@@ -29,8 +29,7 @@ std::string limit_of(const TimeOutCell& cell) {
 Table censored_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
   Table table = comparison_table(
-      analysis,
-      "The same with time-outs as times longer than the limit: reduction of response time",
+      analysis, "Time-outs as censored times: reduction of response time",
       {"answered only", "with time-outs", "95 % interval", "time-outs " + first.reference,
        has_several_comparisons(analysis) ? "own time-outs" : "time-outs " + first.renderer, "n"});
   Reasons reasons;
@@ -53,11 +52,10 @@ Table censored_table(const Analysis& analysis) {
   table.notes = {
       "A trial that ends at the limit would have taken longer: leaving it out biases the times of "
       "a slow condition downwards. Here log time ~ participant + renderer with normal residuals, "
-      "time-outs "
-      "censored at their limit, by maximum likelihood; interval by t from scores summed by "
+      "time-outs censored at their limit, by maximum likelihood; interval by t from scores summed "
+      "by "
       "participant. It assumes log-normal times beyond the limit and complements the paired "
-      "t-test; without time-outs and with equally many trials in all cells both are "
-      "equal."};
+      "t-test; without time-outs and with equally many trials in all cells both are equal."};
   reasons.put(table.notes);
   return table;
 }

@@ -102,14 +102,14 @@ void warn_of_time_outs(Analysis& analysis) {
       text += (i == 0 ? "" : "; ") + shapes[i];
     }
     if (shapes.size() > kMostNamed) {
-      text += "; and " + std::to_string(shapes.size() - kMostNamed) + " shapes more";
+      text += "; and " + std::to_string(shapes.size() - kMostNamed) + " more shapes";
     }
     analysis.warnings.push_back(
         "Time-outs are excluded from the times, which biases the times of slow "
         "conditions downwards: " +
         text + ".");
   };
-  std::size_t said = 0;
+  std::size_t n_warnings = 0;
   for (const Comparison& comparison : analysis.comparisons) {
     std::vector<std::string> shapes;
     for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
@@ -123,7 +123,7 @@ void warn_of_time_outs(Analysis& analysis) {
         if (!text.empty()) shapes.push_back(std::move(text));
       }
     }
-    if (!shapes.empty() && ++said > kMostNamed) return;
+    if (!shapes.empty() && ++n_warnings > kMostNamed) return;
     warn(shapes);
   }
 }

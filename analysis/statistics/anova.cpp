@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 constexpr double kNoVariance = 1e-10;  // relative to the mean, as for the paired tests
 constexpr double kRounding = 1e-10;    // relative, of epsilons and eigenvalues
 
-constexpr const char* kFlat = "no variance: the effect is alike in all participants";
+constexpr const char* kFlat = "the effect is equal in all participants (no variance)";
 
 /// Orthonormal Helmert contrasts of `levels`, one a row, each summing to 0.
 MatrixXd contrasts(Index levels) {
@@ -178,7 +178,7 @@ RmAnova rm_anova(const ParticipantCells& participant_cells) {
   };
   if (complete.size() < 2) {
     out.undefined = complete.empty() ? "no participant has a time in every cell"
-                                     : "one participant cannot tell chance from effect";
+                                     : "one participant, so no variance between participants";
     for (std::size_t i = 0; i < kNames.size(); ++i) refuse(i, out.undefined);
     return out;
   }

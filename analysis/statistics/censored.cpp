@@ -217,12 +217,12 @@ void put_errors(const Parameters& at, const Evaluation& maximum, CensoredEstimat
   }
   out.df = n - 1;
   if (n < 2) {
-    out.undefined = "one participant cannot tell chance from effect";
+    out.undefined = "one participant, so no variance between participants";
     return;
   }
   out.se_log_ratio = std::sqrt(squares * n / (n - 1));
   if (*out.se_log_ratio <= 1e-10 * std::max(1.0, std::fabs(*out.log_ratio))) {
-    out.undefined = "no variance: all participants gain alike";
+    out.undefined = "all participants have the same gain (no variance)";
     return;
   }
   const double half = quantile(boost::math::students_t(n - 1), 0.975) * *out.se_log_ratio;

@@ -83,8 +83,8 @@ std::string conclusion(const Analysis& analysis) {
                               all.size() <= kFewComparisons ? kNamed : kNamedAmongMany);
   }
   if (shown < all.size()) {
-    text +=
-        " The tables have " + counted(all.size() - shown, "comparison", "comparisons") + " more.";
+    text += " The tables have " +
+            counted(all.size() - shown, "more comparison", "more comparisons") + ".";
   }
   return text;
 }

@@ -217,7 +217,7 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
     return refuse(reason);
   const ReducedModel prepared(participant_cells, cells);
   out.n_participants = prepared.data.groups.size();
-  if (out.n_participants < 2) return refuse("one participant cannot tell chance from effect");
+  if (out.n_participants < 2) return refuse("one participant, so no variance between participants");
   if (!prepared.shared) {
     return refuse(participant_cells.size() == 2
                       ? "no participant has times for both renderers"

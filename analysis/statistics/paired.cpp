@@ -16,9 +16,9 @@ namespace {
 
 constexpr std::size_t kManyPairs =
     1000;  // pairs from which bootstraps run in parallel: they outweigh the start of a thread
-constexpr const char* kOnePair = "one participant cannot tell chance from effect";
+constexpr const char* kOnePair = "one participant, so no variance between participants";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
-constexpr const char* kAllAlike = "no variance: all differences are alike";
+constexpr const char* kAllEqual = "all differences are equal (no variance)";
 
 /// Why inference from these differences is impossible; empty: possible.
 std::string no_inference(const std::vector<double>& differences) {
@@ -48,7 +48,7 @@ TTest t_test(const std::vector<double>& differences) {
   test.se = *test.sd / std::sqrt(n);
   test.df = n - 1;
   if (no_variance(*test.sd, m)) {
-    test.undefined = kAllAlike;
+    test.undefined = kAllEqual;
     return test;
   }
   const boost::math::students_t distribution(n - 1);
@@ -65,7 +65,7 @@ EffectSize effect_size(const std::vector<double>& differences) {
   if (!effect.undefined.empty()) return effect;
   const double sd = *standard_deviation(differences), m = mean(differences);
   if (no_variance(sd, m)) {
-    effect.undefined = kAllAlike;
+    effect.undefined = kAllEqual;
     return effect;
   }
   effect.dz = m / sd;

@@ -170,7 +170,7 @@ OrderEffect order_effect(const RendererPair& pair, const std::vector<double>& re
   const auto n1 = static_cast<double>(reference_first.size()),
              n2 = static_cast<double>(renderer_first.size());
   if (n1 + n2 < 3) {
-    out.test.undefined = "one participant in each order cannot tell chance from effect";
+    out.test.undefined = "one participant in each order, so no variance within the orders";
     return out;
   }
   const double df = n1 + n2 - 2;
@@ -180,7 +180,7 @@ OrderEffect order_effect(const RendererPair& pair, const std::vector<double>& re
   out.test.se = se;
   out.test.df = df;
   if (sd <= 1e-10 * std::max({1.0, std::fabs(a), std::fabs(b)})) {
-    out.test.undefined = "no variance: all differences are alike";
+    out.test.undefined = "all differences are equal (no variance)";
     return out;
   }
   const boost::math::students_t distribution(df);

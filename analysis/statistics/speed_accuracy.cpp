@@ -12,9 +12,10 @@ constexpr double kNotableAccuracy = 0.01;  // proportion, smallest change of acc
 /// Compares the directions of the changes of time and accuracy; smaller changes than the thresholds
 /// have none.
 std::string read(double percent_change_time, double accuracy_change) {
-  const bool faster = percent_change_time<-kNotableTime, slower = percent_change_time> kNotableTime;
-  const bool worse = accuracy_change<-kNotableAccuracy, better = accuracy_change> kNotableAccuracy;
-  return (faster && worse) || (slower && better) ? "trade-off possible" : "no trade-off";
+  const bool notable = std::fabs(percent_change_time) > kNotableTime &&
+                       std::fabs(accuracy_change) > kNotableAccuracy;
+  const bool faster = percent_change_time < 0, less_accurate = accuracy_change < 0;
+  return notable && faster == less_accurate ? "trade-off possible" : "no trade-off";
 }
 
 }  // namespace

@@ -52,16 +52,15 @@ int analyze_command(const std::vector<std::string>& args) {
       "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR] "
       "[--force]";
   line.summary =
-      "Are shapes identified faster with the ray than with the point renderer, by how much,\n"
-      "and how certain is it? In data with other renderers each is compared with the first\n"
-      "(point if it is among them). The answer and its tables go to stdout. Existing files\n"
-      "are replaced only with --force.";
+      "Compares response times with the ray and the point renderer: percent reduction for each\n"
+      "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
+      "renderers each is compared with the first (point if it is among them). The conclusion\n"
+      "and the tables go to stdout. Existing files are replaced only with --force.";
   line.example =
       "  palpate analyze --db study.db\n"
-      "  palpate analyze --csv trials.csv --json analysis.json --report report.html   (other "
-      "people's\n"
-      "      data: participant_id, session, block, trial, renderer, shape, response, correct and\n"
-      "      response_time are enough)";
+      "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
+      "      (data of others: participant_id, session, block, trial, renderer, shape, response,\n"
+      "      correct and response_time suffice)";
   std::string database, csv, json, report, figures;
   analysis::AnalysisSettings settings;
   auto add = line.options.add_options();

@@ -111,11 +111,11 @@ class Plan(unittest.TestCase):
         done = self.run_palpate("--csv", self.six_shapes(), *QUICK)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         words = " ".join(done.stdout.split())
-        self.assertIn("No wanted effects were given", words)
+        self.assertIn("No effects were given", words)
         self.assertIn("11 % for every shape", words)
         self.assertIn("kugel, kugel-gross, platte, winkel, kegel, wuerfel-hart", words)
         done = self.run_palpate("--csv", FIXTURES / "balanced.csv", *QUICK)
-        self.assertIn("taken were the paper's", " ".join(done.stdout.split()))
+        self.assertIn("assumed: the paper's", " ".join(done.stdout.split()))
         self.refused("a shape of kugel, kugel-gross", "--csv", self.six_shapes(), "--effect", "0")
 
     def test_refuses_with_the_reason(self):

@@ -286,7 +286,7 @@ class SeveralRenderers(unittest.TestCase):
         names = [f"r{i:02}" for i in range(21)]
         found, text = self.analyze(study("ABCD", names[:20], repetitions=2))
         self.assertEqual(len(found["further_comparisons"]), 18)
-        self.assertIn("The tables have 13 comparisons more.", " ".join(text.split()))
+        self.assertIn("The tables have 13 more comparisons.", " ".join(text.split()))
         self.assertEqual(found["mixed_model"]["status"], "undefined")
         self.assertIn("The first 6 of 20 renderers", self.figures["figure15"])
         p = {(i, shape): test["t_test"]["p"] for i, by_shape in enumerate(

@@ -106,7 +106,7 @@ void put_effects(const std::string& text, analysis::StudyModel& model) {
 }
 
 /// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
-/// paper's effects. \return what was taken
+/// paper's effects. \return which effects were assumed
 std::string put_default_effects(analysis::StudyModel& model) {
   double smallest = 100;
   for (const analysis::PaperEffect& effect : analysis::kPaperEffects) {
@@ -119,14 +119,14 @@ std::string put_default_effects(analysis::StudyModel& model) {
     model.log_ratios[s] = std::log1p(-percent / 100);
     known = known || percent > 0;
   }
-  std::string taken = "the paper's";
+  std::string assumed = "the paper's";
   if (!known) {
     std::ranges::fill(model.log_ratios, std::log1p(-smallest / 100));
-    taken = analysis::fixed(smallest, 0) +
-            " % for every shape, the smaller of the paper's, whose shapes are "
-            "not among these";
+    assumed = analysis::fixed(smallest, 0) +
+              " % for every shape, the smaller of the paper's, whose shapes are "
+              "not among these";
   }
-  return "No wanted effects were given (--effect SHAPE=PERCENT,...): taken were " + taken +
+  return "No effects were given (--effect SHAPE=PERCENT,...); assumed: " + assumed +
          ". The shapes: " + shapes_of(model) + ".";
 }
 
@@ -155,9 +155,9 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
     throw UsageError(
         source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
   }
-  pilot.notes.insert(pilot.notes.begin(), "Standard deviations and share of used trials from " +
-                                              stimuli::printable(source, 200) +
-                                              ", the wanted effects not.");
+  pilot.notes.insert(pilot.notes.begin(),
+                     "Standard deviations and proportion of used trials are from " +
+                         stimuli::printable(source, 200) + "; the effects to find are not.");
   return pilot;
 }
 

@@ -20,11 +20,10 @@ int plan_command(const std::vector<std::string>& args) {
       "palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect "
       "SHAPE=PERCENT,...]";
   line.summary =
-      "How many participants and trials find a wanted effect with a wanted power? Studies are "
-      "drawn\n"
-      "from the mixed model that was fitted to a pilot, or from standard deviations that are "
-      "given,\n"
-      "and tested as analyze tests them. Standard deviations are of the natural log of the time.";
+      "Sample size planning: the number of participants and trials that find an effect with a\n"
+      "given power. Studies are simulated from the mixed model fitted to a pilot, or from given\n"
+      "standard deviations, and tested as analyze tests them. Standard deviations are of the\n"
+      "natural log of the time.";
   line.example =
       "  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9\n"
       "  palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \\\n"
@@ -42,7 +41,7 @@ int plan_command(const std::vector<std::string>& args) {
   add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),
       "find every shape with an effect, or at least one");
   add("participants", po::value(&options.participants)->default_value("2-100")->value_name("A-B"),
-      "numbers of participants to look at");
+      "range of the numbers of participants");
   add("trials", po::value(&options.trials)->default_value("10,20,40,76")->value_name("N,..."),
       "trials of each shape with each renderer; a power curve for each");
   add("test", po::value(&options.test)->default_value("paired")->value_name("paired|model"),
@@ -54,18 +53,18 @@ int plan_command(const std::vector<std::string>& args) {
   add("residual-sd", po::value(&options.residual_sd)->value_name("SD"),
       "of single trials; a pilot's unless given");
   add("intercept-sd", po::value(&options.intercept_sd)->value_name("SD"),
-      "of participants; a pilot's, or 0.3 (matters to --test model alone)");
+      "of participants; a pilot's, or 0.3 (used by --test model only)");
   add("correlation", po::value(&options.correlation)->value_name("R"),
       "of participants' intercepts and gains; a pilot's, or 0");
   add("share-used", po::value(&options.share_used)->value_name("SHARE"),
       "of trials that give a time; a pilot's, or 1");
   add("studies", po::value(&options.studies)->value_name("N"),
-      "simulated for each figure; default 10000, with --test model 1000");
+      "simulated for each power; default 10000, with --test model 1000");
   add("seed", po::value(&options.seed)->default_value(2000), "of the simulation");
   add("jobs", po::value(&options.jobs)->value_name("J"), "threads; default: one a core");
-  add("json", po::value(&options.json)->value_name("FILE"), "write the figures as JSON");
+  add("json", po::value(&options.json)->value_name("FILE"), "write every number as JSON");
   add("figure", po::value(&options.figure)->value_name("FILE.svg"), "write the power curve");
-  add("force", "replace files that are there");
+  add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;
   if (!options.database.empty() && !options.csv.empty()) {

@@ -263,7 +263,7 @@ TEST_F(TrialsCsv, ManyFaultsAreListedThenCounted) {
 
 TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
   const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
-  expect_fault(kHeader + row + "\n" + row, "file", "1 row stands twice (lines 2 and 4)");
+  expect_fault(kHeader + row + "\n" + row, "file", "1 row appears twice (lines 2 and 4)");
   const TrialTable repeated = read(kHeader + row + "P1,1,1,1,ray,cone,cone,1,2.5\n");
   ASSERT_EQ(repeated.warnings.size(), 1U);
   EXPECT_NE(repeated.warnings[0].find("(lines 2 and 3)"), std::string::npos);
@@ -282,7 +282,7 @@ TEST_F(TrialsCsv, TimeOutsNeedNoTime) {
     EXPECT_EQ(alone.rows[1].answer, -1);
     EXPECT_EQ(alone.rows[1].response_time, 2);
     ASSERT_EQ(alone.warnings.size(), 1U);
-    EXPECT_NE(alone.warnings[0].find("at least"), std::string::npos);
+    EXPECT_NE(alone.warnings[0].find("lower bound"), std::string::npos);
     const TrialTable two = read(kHeader + row + late + nothing + "\nP1,1,1,3,ray,cone,,0,60\n");
     EXPECT_EQ(two.rows[1].response_time, 60);
   }

@@ -74,6 +74,18 @@ bool holds(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
+/// Whether `word` occurs without a letter beside it.
+bool has_word(const std::string& text, const std::string& word) {
+  const auto letter = [](char c) { return (c | 0x20) >= 'a' && (c | 0x20) <= 'z'; };
+  for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; at += word.size()) {
+    const std::size_t end = at + word.size();
+    if ((at == 0 || !letter(text[at - 1])) && (end == text.size() || !letter(text[end]))) {
+      return true;
+    }
+  }
+  return false;
+}
+
 TEST(Answer, NamesWhatIsFasterSlowerAndNeither) {
   Study study;
   EXPECT_TRUE(conclusion(analysis_of_study(study))
@@ -225,7 +237,7 @@ TEST(Figures, OfTheServoAreLeftOutWhereEveryTrialIsAlike) {
   EXPECT_EQ(drawn(servo_record({20, 20, 20})), 0);
   EXPECT_EQ(drawn(servo_record({20, 20, 23})), 1);
   const std::string text = report_html(analysis, servo_record({20, 20, 20}));
-  EXPECT_TRUE(holds(text, "alike in all trials"));
+  EXPECT_TRUE(holds(text, "in the same bin"));
   EXPECT_TRUE(holds(text, "virtual clock"));
 }
 
@@ -281,8 +293,8 @@ TEST(Reports, NeverPrintNanOrInfinity) {
       const Analysis analysis = analysis_of_study(study);
       for (const auto& write : {report_text, drawings, report_json}) {
         const std::string text = write(analysis);
-        for (const char* bad : {"nan", "NaN", "inf ", "inf\"", "inf%", "Infinity"}) {
-          EXPECT_FALSE(holds(text, bad)) << bad << " with " << participants;
+        for (const char* bad : {"nan", "NaN", "inf", "Infinity"}) {
+          EXPECT_FALSE(has_word(text, bad)) << bad << " with " << participants;
         }
       }
     }

@@ -243,7 +243,7 @@ TEST(Censored, SaysWhatCannotBeKnown) {
             "no time with the point: how much longer than the limit its trials take is not known");
   EXPECT_EQ(
       undefined({{"A", "point", 9}, {"A", "point", 8}, {"A", "ray", 60, true}, {"A", "ray", 7}}),
-      "one participant cannot tell chance from effect");
+      "one participant, so no variance between participants");
   EXPECT_EQ(undefined({{"A", "point", 9}, {"B", "ray", 8}}),
             "no participant has trials with both renderers and a time");
   EXPECT_NE(undefined({{"A", "point", 8}, {"A", "ray", 4}, {"B", "point", 6}, {"B", "ray", 3}}), "")

@@ -187,7 +187,7 @@ TEST(MixedModel, SaysWhyThereIsNoFit) {
     return mixed_model(participants, kTwo, kShapes).undefined;
   };
   EXPECT_EQ(reason(participant_cells_of(1, 5, 0.3, 0.2, 0.4, 1)),
-            "one participant cannot tell chance from effect");
+            "one participant, so no variance between participants");
   EXPECT_EQ(reason(participant_cells_of(5, 3, 0, 0, 0, 1)),
             "no residual variance: participants and shapes explain every time");
   ParticipantCells apart = participant_cells_of(4, 3, 0.3, 0.2, 0.4, 1);

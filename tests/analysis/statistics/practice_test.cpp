@@ -226,9 +226,9 @@ TEST(RendererOrder, SaysWhyItCannotBeTold) {
   EXPECT_EQ(undefined({{"A", "ray", 0.1, 0, 0, true}}),
             "no participant did one renderer after the other");
   EXPECT_EQ(undefined({{"A", "ray", 0.1}, {"B", "point", 0.2}}),
-            "one participant in each order cannot tell chance from effect");
+            "one participant in each order, so no variance within the orders");
   EXPECT_EQ(undefined({{"A", "ray", 0.1}, {"B", "point", 0.2}, {"C", "ray", 0.1}}),
-            "no variance: all differences are alike");
+            "all differences are equal (no variance)");
   EXPECT_NE(report_text(analysis_of({{"A", "ray", 0.1}, {"B", "ray", 0.2}}))
                 .find("All participants had the ray first"),
             std::string::npos);
