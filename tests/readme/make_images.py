@@ -33,7 +33,8 @@ class LiveSession:
     """`palpate run protocols/quick.json --device mouse`, answered and felt with an emulated hand."""
 
     def __init__(self, palpate, folder):
-        self.database = folder / "try.db"
+        # Of its own: a session that was disturbed leaves files beside its database.
+        self.database = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "try.db"
         self.screen = VirtualScreen("1600x900")  # one monitor: both windows side by side
         self.program = subprocess.Popen(
             [palpate, "run", PROTOCOLS / "quick.json", "--db", self.database, "--participant", "T1", "--new-participant",
@@ -58,8 +59,8 @@ class LiveSession:
         return self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'")[0][0]
 
     def check(self):
-        if self.rows("SELECT 1 FROM attempts WHERE state = 'cut_off'"):
-            raise Disturbed
+        if reasons := self.rows("SELECT cut_off_reason FROM attempts WHERE state = 'cut_off'"):
+            raise Disturbed(reasons[0][0])
         return True
 
     def wait_for_trial(self):
@@ -112,15 +113,14 @@ def live_session(palpate, folder):
                         f"PNG8:{IMAGES / 'live-session.png'}"], env=session.screen.environment, check=True)
     finally:
         session.close()
-        session.database.unlink()
 
 
 def undisturbed(what, *arguments):
     for _ in range(5):
         try:
             return what(*arguments)
-        except Disturbed:
-            print("once more: this machine was busy", file=sys.stderr)
+        except Disturbed as reason:
+            print(f"once more, a trial was cut off: {reason}", file=sys.stderr)
     raise SystemExit("this machine is too busy for a session at 1 kHz")
 
 
