@@ -20,6 +20,9 @@ struct PolygonSoup {
   /// m; error of each coordinate (from the digits of a text file, or single precision). 0: double
   /// precision. Tolerances are never smaller.
   double coordinate_error = 0;
+  /// Names of a file's groups of faces, and of each face the number of its group. Empty: none.
+  std::vector<std::string> group_names = {};
+  std::vector<std::uint32_t> group_of = {};
 };
 
 /// Why a polygon soup is not a convex mesh: one message for each fault (the first few of each

@@ -149,7 +149,7 @@ void report_pieces(const HalfEdges& mesh, std::vector<Index>& parent, MeshFaults
   }
 }
 
-void link_twins(HalfEdges& mesh, MeshFaults& faults) {
+void link_twins(HalfEdges& mesh, MeshFaults& faults, Pieces pieces) {
   mesh.twin.assign(mesh.count(), HalfEdges::kNone);
   std::vector<Index> parent(mesh.face_count());
   std::iota(parent.begin(), parent.end(), Index{0});
@@ -184,7 +184,7 @@ void link_twins(HalfEdges& mesh, MeshFaults& faults) {
       return mesh.name_edge(h) + " has no face on its other side; expected a closed surface";
     });
   }
-  report_pieces(mesh, parent, faults);
+  if (pieces == Pieces::one) report_pieces(mesh, parent, faults);
 }
 
 // Two bodies that touch in one corner share the vertex but not the fan of faces round it.
@@ -225,13 +225,13 @@ std::string HalfEdges::name_edge(Index h) const {
          std::to_string(soup_vertex[origin[next(h)]]) + " of " + name_face(face[h]);
 }
 
-HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults) {
+HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pieces) {
   check_numbers(soup);
   HalfEdges mesh;
   std::vector<Index> point_of;
   const std::size_t moved = take_points(soup, mesh, point_of);
   take_faces(soup, point_of, mesh, faults);
-  link_twins(mesh, faults);
+  link_twins(mesh, faults, pieces);
   if (moved > 0 && !faults.empty()) {
     faults.add("crowded", [&] {
       char error[32];

@@ -1,7 +1,10 @@
-// Wavefront .obj: v and f statements; the others do not describe the solid.
+// Wavefront .obj: v, f, g and o statements; the others do not describe the solid.
 
 #include <charconv>
 #include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "stimuli/mesh_text.h"
 
@@ -22,8 +25,16 @@ class ObjReader {
         add_vertex(words);
       } else if (words[0] == "f") {
         add_face(words);
+      } else if (words[0] == "o") {
+        ++object_;
+        object_name_ = rest_of(words);
+        group_name_.clear();
+      } else if (words[0] == "g") {
+        group_name_ = rest_of(words);
       }
     }
+    if (soup_.group_names.size() == 1) soup_.group_names.clear();
+    if (soup_.group_names.empty()) soup_.group_of.clear();
     for (std::size_t f = 0; f < soup_.faces.size(); ++f) {
       for (const Index v : soup_.faces[f]) check_known(v, face_lines_[f]);
     }
@@ -94,7 +105,25 @@ class ObjReader {
       face.push_back(static_cast<Index>(number - 1));
     }
     soup_.faces.push_back(std::move(face));
+    soup_.group_of.push_back(group());
     face_lines_.push_back(line_number_);
+  }
+
+  static std::string rest_of(const std::vector<std::string_view>& words) {
+    std::string text;
+    for (std::size_t i = 1; i < words.size(); ++i) text.append(i > 1 ? " " : "").append(words[i]);
+    return text;
+  }
+
+  // An o statement begins an object, g a group within it, or goes on with an earlier one.
+  Index group() {
+    const auto [at, is_new] = groups_.try_emplace(std::pair(object_, group_name_),
+                                                  static_cast<Index>(soup_.group_names.size()));
+    if (is_new) {
+      const bool both = !object_name_.empty() && !group_name_.empty();
+      soup_.group_names.push_back(object_name_ + (both ? "/" : "") + group_name_);
+    }
+    return at->second;
   }
 
   void check_known(Index vertex, std::size_t line) {
@@ -111,6 +140,9 @@ class ObjReader {
   std::size_t at_ = 0, line_number_ = 1, lines_taken_ = 0;
   PolygonSoup soup_;
   std::vector<std::size_t> face_lines_;
+  int object_ = 0;
+  std::string object_name_, group_name_;
+  std::map<std::pair<int, std::string>, Index> groups_;
   NumberPrecision precision_;
 };
 

@@ -1,0 +1,30 @@
+#pragma once
+// Any closed solid as convex parts: what the renderers need.
+
+#include <vector>
+
+#include "stimuli/convex_mesh.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::stimuli {
+
+/// The convex parts of a primitive or mesh file in its local frame: one of a convex shape, the very
+/// mesh that ConvexMesh makes of it. Groups of a file that are closed by themselves are parts; they
+/// may overlap. What is not convex is cut (cut_into_convex_parts).
+/// \throws MeshError naming the group where there are several; std::runtime_error for an unreadable
+/// file; std::invalid_argument for a compound.
+std::vector<ConvexMesh> convex_parts(const ObjectSpec& spec);
+
+/// The same of polygons.
+std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
+
+/// Cuts a closed solid, which may have holes, voids and several pieces, at its concave edges into
+/// convex parts with disjoint interiors. Before it returns, the parts are held against the surface:
+/// their volumes must add up to its volume (divergence theorem) within 1e-9 and the error of the
+/// coordinates times the area, and of 256 points each must lie in as many parts as the surface winds
+/// round it, 0 or 1.
+/// \throws MeshError: not closed, turned or crossed faces, a surface that passes through itself, too
+/// many concave edges (kMostConcaveEdges) or parts (kMostParts), parts that do not add up
+std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
+
+}  // namespace palpate::stimuli

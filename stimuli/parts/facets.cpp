@@ -1,0 +1,121 @@
+#include "stimuli/parts/facets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "stimuli/coplanar.h"
+#include "stimuli/parts/triangulate.h"
+
+namespace palpate::stimuli {
+namespace {
+
+using Index = HalfEdges::Index;
+
+struct Region {
+  Vec3 normal;  // of length area
+  double area = 0;
+  std::vector<Vec3> corners;
+  PlaneSide on;
+};
+
+std::vector<Region> regions_of(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                               const std::vector<Index>& region_of, Index count) {
+  std::vector<Region> regions(count);
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    Region& region = regions[region_of[f]];
+    if (!shapes[f].thin) region.normal += shapes[f].area * shapes[f].normal;
+    region.area += shapes[f].area;
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h)
+      region.corners.push_back(mesh.from(h));
+  }
+  return regions;
+}
+
+// Midway between the corners that stand out most and least, as in a ConvexMesh.
+Plane plane_through(const Region& region) {
+  Plane plane{glm::normalize(region.normal), 0};
+  double low = plane.height(region.corners[0]), high = low;
+  for (const Vec3& corner : region.corners) {
+    low = std::min(low, plane.height(corner));
+    high = std::max(high, plane.height(corner));
+  }
+  plane.offset = (low + high) / 2;
+  return plane;
+}
+
+// The largest first: their planes are known best.
+void number_planes(std::vector<Region>& regions, PlaneTable& planes) {
+  std::vector<Index> order(regions.size());
+  std::iota(order.begin(), order.end(), Index{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return regions[a].area > regions[b].area; });
+  for (const Index r : order) {
+    regions[r].on = planes.number(plane_through(regions[r]), regions[r].corners);
+  }
+}
+
+bool is_concave(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h,
+                const Vec3& left, const Vec3& right) {
+  const Index f = mesh.face[h], g = mesh.face[mesh.twin[h]];
+  if (!shapes[f].thin && !shapes[g].thin) return plane_deviation_at(mesh, shapes, h) < -kCoplanar;
+  // A degenerate face stands for a facet whose plane is known from its other faces.
+  const Vec3 along = glm::normalize(mesh.to(h) - mesh.from(h));
+  return glm::dot(glm::cross(left, right), along) < -1e-6;
+}
+
+}  // namespace
+
+FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults& faults) {
+  const std::vector<FaceShape> shapes = shapes_of(mesh);
+  check_flatness(mesh, shapes, faults);
+  FacetedSolid solid;
+  solid.points = mesh.points;
+  solid.size = mesh.size;
+  solid.error = mesh.error;
+  Index count = 0;
+  const std::vector<Index> region_of = coplanar_regions(mesh, shapes, count);
+  if (count == 0) faults.add("flat", [] { return "expected a solid, found lines only"; });
+  if (!faults.empty()) return solid;
+  std::vector<Region> regions = regions_of(mesh, shapes, region_of, count);
+  number_planes(regions, planes);
+
+  std::vector<Vec3> corners;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    corners.clear();
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
+    const Region& region = regions[region_of[f]];
+    const auto triangles =
+        triangulate(corners, shapes[f].thin ? region.normal : shapes[f].normal);
+    if (triangles.empty()) {
+      faults.add("crossed face", [&] {
+        return mesh.name_face(f) + ": expected a simple polygon, found one that crosses itself";
+      });
+    }
+    solid.triangles.insert(solid.triangles.end(), triangles.begin(), triangles.end());
+    if (shapes[f].thin) continue;
+    if (is_convex_polygon(corners, shapes[f].normal)) {
+      solid.surface.push_back({corners, region.on});
+    } else {
+      for (const auto& t : triangles) solid.surface.push_back({{t[0], t[1], t[2]}, region.on});
+    }
+  }
+  for (Index h = 0; h < mesh.count(); ++h) {
+    const Index twin = mesh.twin[h];
+    if (twin == HalfEdges::kNone || twin < h) continue;
+    const Index f = region_of[mesh.face[h]], g = region_of[mesh.face[twin]];
+    if (f == g) continue;
+    const Vec3 left = glm::normalize(regions[f].normal), right = glm::normalize(regions[g].normal);
+    if (!is_concave(mesh, shapes, h, left, right)) continue;
+    solid.concave.push_back({mesh.from(h),
+                             mesh.to(h),
+                             left,
+                             right,
+                             {regions[f].on, regions[g].on},
+                             {mesh.origin[h], mesh.origin[mesh.next(h)]}});
+  }
+  return solid;
+}
+
+}  // namespace palpate::stimuli
