@@ -1,7 +1,6 @@
 #include "protocols/parse_object.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <iterator>
 #include <optional>
@@ -38,13 +37,11 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   const json* const value = reader.member("file", Presence::required);
   if (value == nullptr || !value->is_string()) return;
   const std::filesystem::path path = std::filesystem::path(files.folder) / name;
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   std::error_code error;
-  if (extension != ".obj" && extension != ".stl") {
-    reader.faults().add(reader.pointer("file"),
-                        "expected a file .obj or .stl" + found_text(*value));
+  if (!stimuli::is_mesh_file_name(path.string())) {
+    reader.faults().add(
+        reader.pointer("file"),
+        std::string("expected a file ") + stimuli::kMeshExtensions + found_text(*value));
   } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
     spec.file_bytes = std::make_shared<const std::string>(stored->second);
   } else if (!std::filesystem::is_regular_file(path, error)) {

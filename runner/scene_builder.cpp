@@ -4,7 +4,7 @@
 #include <charconv>
 #include <glm/geometric.hpp>
 
-#include "stimuli/primitives.h"
+#include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner {
 namespace {
@@ -32,11 +32,14 @@ const rendering::Renderer& renderer_for(protocols::RendererKind kind) {
                                               : rendering::point_renderer();
 }
 
-SceneBuilder::Prepared SceneBuilder::prepare(const stimuli::ObjectSpec& spec, bool side_contact) {
-  Prepared& prepared = prepared_[shape_key(spec, side_contact)];
-  if (!prepared.mesh) {
-    prepared.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::polygons_of(spec));
-    prepared.trees = std::make_shared<const rendering::ContactTrees>(*prepared.mesh, side_contact);
+const std::vector<SceneBuilder::Prepared>& SceneBuilder::prepare(const stimuli::ObjectSpec& spec,
+                                                                 bool side_contact) {
+  std::vector<Prepared>& prepared = prepared_[shape_key(spec, side_contact)];
+  if (!prepared.empty()) return prepared;
+  for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec)) {
+    auto mesh = std::make_shared<const stimuli::ConvexMesh>(std::move(part));
+    auto trees = std::make_shared<const rendering::ContactTrees>(*mesh, side_contact);
+    prepared.push_back({std::move(mesh), std::move(trees)});
   }
   return prepared;
 }
@@ -48,8 +51,8 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, in
     for (const stimuli::ObjectSpec& part : spec.parts) place(part, pose, object, side_contact, out);
     return;
   }
-  const Prepared prepared = prepare(spec, side_contact);
-  out.push_back({prepared.mesh, pose, spec.material, object, prepared.trees});
+  for (const Prepared& part : prepare(spec, side_contact))
+    out.push_back({part.mesh, pose, spec.material, object, part.trees});
 }
 
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,

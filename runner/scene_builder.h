@@ -18,7 +18,7 @@ const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 /// Builds a scene of the convex parts of objects; equal shapes share one mesh and its search trees.
 class SceneBuilder {
  public:
-  /// \throws MeshError where a shape is no convex mesh, with the place as a JSON pointer.
+  /// \throws MeshError where a shape is no solid that falls into convex parts, with the place as a JSON pointer.
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact);
 
  private:
@@ -26,11 +26,11 @@ class SceneBuilder {
     std::shared_ptr<const stimuli::ConvexMesh> mesh;
     std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  Prepared prepare(const stimuli::ObjectSpec& spec, bool side_contact);
+  const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, bool side_contact);
   void place(const stimuli::ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
              std::vector<rendering::SceneObject>& out);
 
-  std::map<std::string, Prepared> prepared_;
+  std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };
 
 /// The stimuli of a protocol, built once, and the scene of each trial. Threads may share it.

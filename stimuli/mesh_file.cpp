@@ -1,5 +1,6 @@
 #include "stimuli/mesh_file.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
@@ -37,21 +38,37 @@ std::string contents(const std::string& path, FileFaults& faults) {
   return bytes;
 }
 
-/// Or .stl.
-bool is_obj_file(const std::string& path, FileFaults& faults) {
+enum class MeshFormat { obj, stl, gltf, none };
+
+MeshFormat format_of(const std::string& path, FileFaults& faults) {
   const std::string extension = lower_extension(path);
-  const bool is_obj = extension == ".obj";
-  if (!is_obj && extension != ".stl") {
-    faults.add("", "a name that ends in .obj or .stl", in_quotes(extension));
+  if (extension == ".obj") return MeshFormat::obj;
+  if (extension == ".stl") return MeshFormat::stl;
+  if (extension == ".gltf" || extension == ".glb") return MeshFormat::gltf;
+  faults.add("", std::string("a name that ends in ") + kMeshExtensions, in_quotes(extension));
+  return MeshFormat::none;
+}
+
+/// What a .gltf names, from the folder that it lies in.
+std::string beside(const std::string& path, const std::string& name, FileFaults& faults) {
+  const std::filesystem::path relative(name);
+  const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
+  if (relative.is_absolute() || leaves || name.find(':') != std::string::npos) {
+    faults.add("", "buffers in files of the same folder", in_quotes(name));
+    return {};
   }
-  return is_obj;
+  const std::filesystem::path file = std::filesystem::path(path).parent_path() / relative;
+  FileFaults own(file.string());
+  std::string bytes = contents(file.string(), own);
+  own.throw_if_any();
+  return bytes;
 }
 
 }  // namespace
 
 PolygonSoup read_mesh_file(const std::string& path) {
   FileFaults faults(path);
-  is_obj_file(path, faults);  // before it is read
+  format_of(path, faults);  // before it is read
   faults.throw_if_any();
   return read_mesh(path, mesh_file_bytes(path));
 }
@@ -60,18 +77,30 @@ std::string mesh_file_bytes(const std::string& path) {
   FileFaults faults(path);
   std::string bytes = contents(path, faults);
   faults.throw_if_any();
+  if (lower_extension(path) == ".gltf") {
+    bytes = with_buffers(bytes, [&](const std::string& name) { return beside(path, name, faults); });
+    faults.throw_if_any();
+  }
   return bytes;
+}
+
+bool is_mesh_file_name(const std::string& path) {
+  FileFaults faults(path);
+  return format_of(path, faults) != MeshFormat::none;
 }
 
 PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
   FileFaults faults(path);
-  const bool is_obj = is_obj_file(path, faults);
+  const MeshFormat format = format_of(path, faults);
   faults.throw_if_any();
   std::string_view text = bytes;
   // Some editors begin a text so. A binary file has no text to begin.
-  if (text.starts_with("\xEF\xBB\xBF") && (is_obj || text.substr(3, 5) == "solid"))
+  if (text.starts_with("\xEF\xBB\xBF") &&
+      (format != MeshFormat::stl || text.substr(3, 5) == "solid"))
     text.remove_prefix(3);
-  PolygonSoup soup = is_obj ? read_obj(text, faults) : read_stl(text, faults);
+  PolygonSoup soup = format == MeshFormat::obj   ? read_obj(text, faults)
+                     : format == MeshFormat::stl ? read_stl(text, faults)
+                                                 : read_gltf(text, faults);
   faults.throw_if_any();
   return soup;
 }

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,5 +58,11 @@ class NumberPrecision {
 
 PolygonSoup read_obj(std::string_view text, FileFaults& faults);
 PolygonSoup read_stl(std::string_view bytes, FileFaults& faults);
+PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults);
+
+/// The bytes of a .gltf with its external buffers inside, as it stands where it has none.
+/// \param contents_of  of a buffer's file, by the name that the .gltf gives it
+std::string with_buffers(const std::string& bytes,
+                         const std::function<std::string(const std::string&)>& contents_of);
 
 }  // namespace palpate::stimuli

@@ -11,8 +11,7 @@
 #include "runner/devices/simulated.h"
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/convex_mesh.h"
-#include "stimuli/primitives.h"
+#include "stimuli/parts/convex_parts.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -31,7 +30,7 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   }
   const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
   try {
-    const stimuli::ConvexMesh mesh(stimuli::polygons_of(object));
+    stimuli::convex_parts(object);
   } catch (const stimuli::MeshError& error) {
     for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
   } catch (const std::runtime_error& error) {

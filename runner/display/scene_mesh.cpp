@@ -3,6 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "stimuli/parts/triangulate.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner {
@@ -11,18 +12,17 @@ namespace {
 constexpr int kSides = 24;
 
 void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
-  const auto placed = [&](std::uint32_t corner) {
-    return pose.orientation * soup.vertices[corner] + pose.position;
-  };
+  std::vector<Vec3> corners;
   for (const auto& face : soup.faces) {
-    const Vec3 a = placed(face[0]);
-    for (std::size_t i = 2; i < face.size(); ++i) {
-      const Vec3 b = placed(face[i - 1]), c = placed(face[i]);
-      const Vec3 across = glm::cross(b - a, c - a);
+    corners.clear();
+    for (const std::uint32_t corner : face)
+      corners.push_back(pose.orientation * soup.vertices[corner] + pose.position);
+    for (const auto& triangle : stimuli::triangulate(corners)) {
+      const Vec3 across = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
       const double area = glm::length(across);
       if (!(area > 0)) continue;
       const glm::vec3 normal(across / area);
-      for (const Vec3& corner : {a, b, c}) out.push_back({glm::vec3(corner), normal});
+      for (const Vec3& corner : triangle) out.push_back({glm::vec3(corner), normal});
     }
   }
 }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "stimuli/polygon.h"
+
 namespace palpate::stimuli {
 namespace {
 
@@ -91,12 +93,17 @@ bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal) {
 }
 
 TriangleSurface triangulate(std::span<const Vec3> corners, const Vec3& normal) {
-  if (corners.size() > 3 && !is_convex_polygon(corners, glm::normalize(normal)))
+  if (corners.size() > 3 && glm::length(normal) > 0 &&
+      !is_convex_polygon(corners, glm::normalize(normal)))
     return EarCutter(corners, normal).run();
   TriangleSurface triangles;
   for (std::size_t k = 2; k < corners.size(); ++k)
     triangles.push_back({corners[0], corners[k - 1], corners[k]});
   return triangles;
+}
+
+TriangleSurface triangulate(std::span<const Vec3> corners) {
+  return triangulate(corners, plane_of(corners).normal);
 }
 
 }  // namespace palpate::stimuli

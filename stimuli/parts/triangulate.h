@@ -15,4 +15,7 @@ bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal);
 /// corners where it is convex.
 TriangleSurface triangulate(std::span<const Vec3> corners, const Vec3& normal);
 
+/// The same, about the polygon's own normal.
+TriangleSurface triangulate(std::span<const Vec3> corners);
+
 }  // namespace palpate::stimuli

@@ -103,7 +103,6 @@ inline Outline random_outline(Random& random, int corners) {
 /// A polygonal torus about z: `around` sections of `corners` corners each.
 inline Solid torus(double ring, double tube, int around, int corners) {
   Solid solid;
-  double section = 0;
   for (int i = 0; i < around; ++i) {
     const double u = 2 * std::numbers::pi * i / around;
     for (int j = 0; j < corners; ++j) {
@@ -119,11 +118,9 @@ inline Solid torus(double ring, double tube, int around, int corners) {
     for (int j = 0; j < corners; ++j)
       solid.soup.faces.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)});
   }
-  section = corners / 2.0 * tube * tube * std::sin(2 * std::numbers::pi / corners);
-  // The sections are mirror images about the ring, so the middle of area of each is on it.
-  const double step = 2 * ring * std::sin(std::numbers::pi / around);
-  solid.volume = around * section * step * std::cos(std::numbers::pi / around);
-  // Between two sections areas grow linearly out from the axis: Pappus with a chord.
+  // Between half planes at an angle through the axis, cut off by the chord: Pappus.
+  const double section = corners / 2.0 * tube * tube * std::sin(2 * std::numbers::pi / corners);
+  solid.volume = around * section * ring * std::sin(2 * std::numbers::pi / around);
   return solid;
 }
 
@@ -136,15 +133,6 @@ struct Blocks {
   bool is_filled(int x, int y, int z) const { return filled.count({x, y, z}) != 0; }
 
   bool simple() const {
-    const auto count = [&](int x, int y, int z, const std::array<int, 3>& span, int& mask) {
-      mask = 0;
-      for (int k = 0; k < 8; ++k) {
-        const int a = x - (span[0] && (k & 1)), b = y - (span[1] && (k & 2)) * 1,
-                  c = z - (span[2] && (k & 4)) * 1;
-        if (is_filled(a, b, c)) mask |= 1 << k;
-      }
-    };
-    (void)count;
     const int nx = static_cast<int>(lines[0].size()), ny = static_cast<int>(lines[1].size()),
               nz = static_cast<int>(lines[2].size());
     for (int x = 0; x < nx; ++x) {

@@ -279,7 +279,7 @@ TEST_F(MeshFile, ABinaryStlMustHaveTheSizeThatItClaims) {
 }
 
 TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
-  expect_fault("a.ply", "ply", ".obj or .stl");
+  expect_fault("a.ply", "ply", ".obj, .stl, .gltf or .glb");
   EXPECT_THROW(read_mesh_file((folder_ / "none.obj").string()), MeshError);
   std::filesystem::create_directory(folder_ / "folder.stl");
   EXPECT_THROW(read_mesh_file((folder_ / "folder.stl").string()), MeshError);
