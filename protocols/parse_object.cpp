@@ -39,9 +39,8 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   const std::filesystem::path path = std::filesystem::path(files.folder) / name;
   std::error_code error;
   if (!stimuli::is_mesh_file_name(path.string())) {
-    reader.faults().add(
-        reader.pointer("file"),
-        std::string("expected a file ") + stimuli::kMeshExtensions + found_text(*value));
+    reader.faults().add(reader.pointer("file"), std::string("expected a file ") +
+                                                    stimuli::kMeshExtensions + found_text(*value));
   } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
     spec.file_bytes = std::make_shared<const std::string>(stored->second);
   } else if (!std::filesystem::is_regular_file(path, error)) {

@@ -18,7 +18,8 @@ const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 /// Builds a scene of the convex parts of objects; equal shapes share one mesh and its search trees.
 class SceneBuilder {
  public:
-  /// \throws MeshError where a shape is no solid that falls into convex parts, with the place as a JSON pointer.
+  /// \throws MeshError where a shape is no solid that falls into convex parts, with the place as a
+  /// JSON pointer.
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact);
 
  private:

@@ -40,9 +40,8 @@ enum class Pieces { one, any };
 
 /// Welds, drops faces that welding has collapsed (their two sides cancel, so the surface stays
 /// closed) and links twins. Reports open edges, edges of three faces, faces turned against their
-/// neighbours, separate pieces where one is expected. \throws MeshError at once where indices or coordinates are
-/// unusable.
-HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults,
-                          Pieces pieces = Pieces::one);
+/// neighbours, separate pieces where one is expected. \throws MeshError at once where indices or
+/// coordinates are unusable.
+HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pieces = Pieces::one);
 
 }  // namespace palpate::stimuli

@@ -78,7 +78,8 @@ std::string mesh_file_bytes(const std::string& path) {
   std::string bytes = contents(path, faults);
   faults.throw_if_any();
   if (lower_extension(path) == ".gltf") {
-    bytes = with_buffers(bytes, [&](const std::string& name) { return beside(path, name, faults); });
+    bytes =
+        with_buffers(bytes, [&](const std::string& name) { return beside(path, name, faults); });
     faults.throw_if_any();
   }
   return bytes;

@@ -44,7 +44,8 @@ class GltfReader {
     check_version();
     read_buffers();
     if (root_.contains("scenes") && !root_["scenes"].empty()) {
-      for (const json& node : member(entry("scenes", root_.value("scene", std::size_t{0})), "nodes"))
+      for (const json& node :
+           member(entry("scenes", root_.value("scene", std::size_t{0})), "nodes"))
         read_node(node.get<std::size_t>(), Matrix(1), 0);
     } else {
       read_roots();
@@ -63,14 +64,15 @@ class GltfReader {
   // A .glb is a header and chunks; a .gltf is its JSON alone.
   std::string_view take_chunks() {
     if (bytes_.size() < 20 || word_at(bytes_, 0) != kMagic) return bytes_;
-    if (word_at(bytes_, 4) != 2) throw Refused{"glTF version 2", std::to_string(word_at(bytes_, 4))};
+    if (word_at(bytes_, 4) != 2)
+      throw Refused{"glTF version 2", std::to_string(word_at(bytes_, 4))};
     std::string_view text;
     for (std::size_t at = 12; at + 8 <= bytes_.size();) {
       const std::size_t length = word_at(bytes_, at);
       if (length > bytes_.size() - at - 8) {
-        throw Refused{"a chunk of " + std::to_string(length) + " bytes at byte " +
-                          std::to_string(at),
-                      std::to_string(bytes_.size() - at - 8)};
+        throw Refused{
+            "a chunk of " + std::to_string(length) + " bytes at byte " + std::to_string(at),
+            std::to_string(bytes_.size() - at - 8)};
       }
       const std::string_view chunk = bytes_.substr(at + 8, length);
       if (word_at(bytes_, at + 4) == kJsonChunk && text.empty()) text = chunk;
@@ -127,7 +129,8 @@ class GltfReader {
     const std::size_t count = member(root_, "nodes").size();
     std::vector<char> child(count, 0);
     for (std::size_t i = 0; i < count; ++i) {
-      for (const json& c : member(entry("nodes", i), "children")) child.at(c.get<std::size_t>()) = 1;
+      for (const json& c : member(entry("nodes", i), "children"))
+        child.at(c.get<std::size_t>()) = 1;
     }
     for (std::size_t i = 0; i < count; ++i) {
       if (child[i] == 0) read_node(i, Matrix(1), 0);
@@ -140,7 +143,8 @@ class GltfReader {
   static Matrix matrix_of(const json& node) {
     Matrix matrix(1);
     if (node.contains("matrix")) {
-      for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = node["matrix"].at(static_cast<std::size_t>(i));
+      for (int i = 0; i < 16; ++i)
+        matrix[i / 4][i % 4] = node["matrix"].at(static_cast<std::size_t>(i));
       return matrix;
     }
     const auto number = [&](const char* key, std::size_t i, double otherwise) -> double {
@@ -175,8 +179,7 @@ class GltfReader {
       const json& primitive = primitives[i];
       if (primitive.value("mode", 4) != 4)
         throw Refused{"triangles (mode 4)", std::to_string(primitive.value("mode", 4))};
-      soup_.group_names.push_back(primitives.size() == 1 ? name
-                                                         : name + "/" + std::to_string(i));
+      soup_.group_names.push_back(primitives.size() == 1 ? name : name + "/" + std::to_string(i));
       add_triangles(primitive, world);
     }
   }
@@ -228,7 +231,8 @@ class GltfReader {
                       (count == 0 || (length - offset >= bytes_each &&
                                       (count - 1) <= (length - offset - bytes_each) / stride));
     if (!fits)
-      throw Refused{"room for " + std::to_string(count) + " values", std::to_string(length) + " bytes"};
+      throw Refused{"room for " + std::to_string(count) + " values",
+                    std::to_string(length) + " bytes"};
     return {std::string_view(buffer).substr(start + offset, length - offset), count, stride};
   }
 

@@ -99,8 +99,7 @@ class Cutter {
       const bool rises = from < -tolerance_ && to > tolerance_;
       const bool falls = from > tolerance_ && to < -tolerance_;
       if (!rises && !falls) continue;
-      const Vec3 point =
-          rises ? crossing(here, from, there, to) : crossing(there, to, here, from);
+      const Vec3 point = rises ? crossing(here, from, there, to) : crossing(there, to, here, from);
       lower.corners.push_back(point);
       upper.corners.push_back(point);
       if (with_rim) rim_.push_back(point);
@@ -129,8 +128,8 @@ CellBulk bulk_of(const std::vector<CellPolygon>& faces) {
       bulk.middle += face.corners[k] - origin;
       ++corners;
       if (k < 2) continue;
-      twice_area += glm::cross(face.corners[k - 1] - face.corners[0],
-                               face.corners[k] - face.corners[0]);
+      twice_area +=
+          glm::cross(face.corners[k - 1] - face.corners[0], face.corners[k] - face.corners[0]);
     }
     bulk.area += glm::length(twice_area) / 2;
     bulk.volume += glm::dot(twice_area, face.corners[0] - origin) / 6;

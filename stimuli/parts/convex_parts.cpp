@@ -139,8 +139,9 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
   } catch (const MeshError&) {
     // Not convex, or broken: what follows says so.
   }
-  const auto groups = soup.group_names.size() > 1 ? closed_groups(soup)
-                                                  : std::vector<std::pair<std::string, PolygonSoup>>();
+  const auto groups = soup.group_names.size() > 1
+                          ? closed_groups(soup)
+                          : std::vector<std::pair<std::string, PolygonSoup>>();
   if (groups.empty()) return cut_into_convex_parts(soup);
   std::vector<std::string> faults;
   for (const auto& [name, group] : groups) {

@@ -21,10 +21,10 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
 /// Cuts a closed solid, which may have holes, voids and several pieces, at its concave edges into
 /// convex parts with disjoint interiors. Before it returns, the parts are held against the surface:
 /// their volumes must add up to its volume (divergence theorem) within 1e-9 and the error of the
-/// coordinates times the area, and of 256 points each must lie in as many parts as the surface winds
-/// round it, 0 or 1.
-/// \throws MeshError: not closed, turned or crossed faces, a surface that passes through itself, too
-/// many concave edges (kMostConcaveEdges) or parts (kMostParts), parts that do not add up
+/// coordinates times the area, and of 256 points each must lie in as many parts as the surface
+/// winds round it, 0 or 1. \throws MeshError: not closed, turned or crossed faces, a surface that
+/// passes through itself, too many concave edges (kMostConcaveEdges) or parts (kMostParts), parts
+/// that do not add up
 std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 
 }  // namespace palpate::stimuli

@@ -82,10 +82,11 @@ void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& pa
     if (doubtful || std::abs(winding - in) < 0.01) continue;
     faults.add("not covered", [&] {
       char text[200];
-      std::snprintf(text, sizeof text,
-                    "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
-                    "winds round it %.2f times",
-                    point.x, point.y, point.z, in, winding);
+      std::snprintf(
+          text, sizeof text,
+          "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
+          "winds round it %.2f times",
+          point.x, point.y, point.z, in, winding);
       return std::string(text);
     });
   }

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "stimuli/mesh_faults.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/mesh_faults.h"
 #include "stimuli/parts/solid.h"
 
 namespace palpate::stimuli {

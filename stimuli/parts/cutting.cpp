@@ -178,8 +178,7 @@ class SolidCutter {
 }  // namespace
 
 std::vector<std::vector<CellPolygon>> cut_at_concave_edges(const FacetedSolid& solid,
-                                                           PlaneTable& planes,
-                                                           MeshFaults& faults) {
+                                                           PlaneTable& planes, MeshFaults& faults) {
   if (solid.concave.size() > kMostConcaveEdges) {
     faults.add("too many concave edges", [&] {
       return "expected at most " + std::to_string(kMostConcaveEdges) + ", found " +

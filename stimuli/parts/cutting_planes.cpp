@@ -9,12 +9,12 @@
 namespace palpate::stimuli {
 namespace {
 
-constexpr std::size_t kAllPairs = 96;     // concave edges, up to which every two are tried together
-constexpr std::size_t kTriedEdges = 48;   // of a cell, whose planes are tried
-constexpr double kRounding = 1e-9;        // of a sine
-constexpr double kThin = 0.03;            // rad; a part with a sharper edge is a last resort
-constexpr double kTorn = 0.5;             // what a torn edge costs, in edges that are cut apart
-constexpr double kTornPolygon = 1e-3;     // and a torn polygon
+constexpr std::size_t kAllPairs = 96;    // concave edges, up to which every two are tried together
+constexpr std::size_t kTriedEdges = 48;  // of a cell, whose planes are tried
+constexpr double kRounding = 1e-9;       // of a sine
+constexpr double kThin = 0.03;           // rad; a part with a sharper edge is a last resort
+constexpr double kTorn = 0.5;            // what a torn edge costs, in edges that are cut apart
+constexpr double kTornPolygon = 1e-3;    // and a torn polygon
 
 Vec3 along(const ConcaveEdge& edge) { return glm::normalize(edge.to - edge.from); }
 

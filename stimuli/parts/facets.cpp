@@ -86,8 +86,7 @@ FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults
     corners.clear();
     for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
     const Region& region = regions[region_of[f]];
-    const auto triangles =
-        triangulate(corners, shapes[f].thin ? region.normal : shapes[f].normal);
+    const auto triangles = triangulate(corners, shapes[f].thin ? region.normal : shapes[f].normal);
     if (triangles.empty()) {
       faults.add("crossed face", [&] {
         return mesh.name_face(f) + ": expected a simple polygon, found one that crosses itself";

@@ -9,9 +9,9 @@
 namespace palpate::stimuli {
 
 struct ConcaveEdge {
-  Vec3 from, to;      ///< m
-  Vec3 left, right;   ///< unit outward normals of its two facets
-  PlaneSide on[2];    ///< their planes
+  Vec3 from, to;          ///< m
+  Vec3 left, right;       ///< unit outward normals of its two facets
+  PlaneSide on[2];        ///< their planes
   std::uint32_t ends[2];  ///< numbers of its ends
 };
 

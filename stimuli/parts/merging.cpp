@@ -147,13 +147,11 @@ class Merger {
   void add(std::uint32_t part) {
     boxes_.resize(parts_.size());
     boxes_[part] = box_of(parts_[part]);
-    for (const CellPolygon& face : parts_[part])
-      at_[{face.on.plane, face.on.flipped}].insert(part);
+    for (const CellPolygon& face : parts_[part]) at_[{face.on.plane, face.on.flipped}].insert(part);
   }
 
   void remove(std::uint32_t part) {
-    for (const CellPolygon& face : parts_[part])
-      at_[{face.on.plane, face.on.flipped}].erase(part);
+    for (const CellPolygon& face : parts_[part]) at_[{face.on.plane, face.on.flipped}].erase(part);
   }
 
   // A part with one of its neighbours, of which the lower number becomes both.
@@ -175,8 +173,7 @@ class Merger {
       return false;
     std::optional<Faces> both = Union(parts_[part], parts_[other], plane, planes_).faces();
     if (!both) return false;
-    const CellBulk one = bulk_of(parts_[part]), two = bulk_of(parts_[other]),
-                   all = bulk_of(*both);
+    const CellBulk one = bulk_of(parts_[part]), two = bulk_of(parts_[other]), all = bulk_of(*both);
     if (std::abs(all.volume - one.volume - two.volume) > planes_.tolerance() * all.area)
       return false;
     remove(part);

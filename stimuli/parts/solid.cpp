@@ -22,8 +22,8 @@ double winding_number(const TriangleSurface& surface, const Vec3& point) {
   for (const auto& triangle : surface) {
     const Vec3 a = triangle[0] - point, b = triangle[1] - point, c = triangle[2] - point;
     const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-    const double over = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la +
-                        glm::dot(c, a) * lb;
+    const double over =
+        la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
     angle += std::atan2(glm::dot(a, glm::cross(b, c)), over);
   }
   return angle / (2 * std::numbers::pi);

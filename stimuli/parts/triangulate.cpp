@@ -56,8 +56,7 @@ class EarCutter {
       const Vec3 &a = at(k, -1), &b = left_[k], &c = at(k, 1);
       const double sine = sine_at(a, b, c, normal_);
       if (sine < -kStraight) continue;
-      const double shape =
-          std::min({sine, sine_at(b, c, a, normal_), sine_at(c, a, b, normal_)});
+      const double shape = std::min({sine, sine_at(b, c, a, normal_), sine_at(c, a, b, normal_)});
       if (shape <= widest || (sine > kStraight && occupied(k))) continue;
       widest = shape;
       best = k;
@@ -70,8 +69,7 @@ class EarCutter {
     for (std::size_t i = 0; i < left_.size(); ++i) {
       const Vec3& p = left_[i];
       if (p == a || p == b || p == c) continue;
-      if (turn(a, b, p, normal_) >= 0 && turn(b, c, p, normal_) >= 0 &&
-          turn(c, a, p, normal_) >= 0)
+      if (turn(a, b, p, normal_) >= 0 && turn(b, c, p, normal_) >= 0 && turn(c, a, p, normal_) >= 0)
         return true;
     }
     return false;

@@ -20,8 +20,8 @@ namespace palpate::stimuli::solids {
 
 struct Solid {
   PolygonSoup soup;
-  double volume = 0;                             ///< m^3
-  std::function<bool(const Vec3&)> holds;        ///< whether a point is inside; may be empty
+  double volume = 0;                       ///< m^3
+  std::function<bool(const Vec3&)> holds;  ///< whether a point is inside; may be empty
 };
 
 using Outline = std::vector<std::array<double, 2>>;  // counter-clockwise
@@ -71,13 +71,29 @@ inline Solid l_shape() {
   return prism({{0, 0}, {0.06, 0}, {0.06, 0.02}, {0.02, 0.02}, {0.02, 0.06}, {0, 0.06}}, 0.03);
 }
 inline Solid u_shape() {
-  return prism({{0, 0}, {0.06, 0}, {0.06, 0.05}, {0.04, 0.05}, {0.04, 0.02}, {0.02, 0.02},
-                {0.02, 0.05}, {0, 0.05}},
+  return prism({{0, 0},
+                {0.06, 0},
+                {0.06, 0.05},
+                {0.04, 0.05},
+                {0.04, 0.02},
+                {0.02, 0.02},
+                {0.02, 0.05},
+                {0, 0.05}},
                0.03);
 }
 inline Solid plus_shape() {
-  return prism({{-1, -3}, {1, -3}, {1, -1}, {3, -1}, {3, 1}, {1, 1}, {1, 3}, {-1, 3}, {-1, 1},
-                {-3, 1}, {-3, -1}, {-1, -1}},
+  return prism({{-1, -3},
+                {1, -3},
+                {1, -1},
+                {3, -1},
+                {3, 1},
+                {1, 1},
+                {1, 3},
+                {-1, 3},
+                {-1, 1},
+                {-3, 1},
+                {-3, -1},
+                {-1, -1}},
                2);
 }
 inline Solid stair(int steps) {
@@ -173,8 +189,8 @@ struct Blocks {
       if (is_new) {
         Vec3 place;
         for (int axis = 0; axis < 3; ++axis)
-          place[axis] = lines[static_cast<std::size_t>(axis)][static_cast<std::size_t>(
-              c[static_cast<std::size_t>(axis)])];
+          place[axis] = lines[static_cast<std::size_t>(axis)]
+                             [static_cast<std::size_t>(c[static_cast<std::size_t>(axis)])];
         out.soup.vertices.push_back(place);
       }
       return at->second;

@@ -277,7 +277,8 @@ std::string boxes_text(const std::vector<Vec3>& at, const char* statement, int l
     }
     for (std::size_t f = b == 0 ? static_cast<std::size_t>(left_out) : 0; f < 6; ++f) {
       text += "f";
-      for (const std::uint32_t corner : box.faces[f]) text += " " + std::to_string(8 * b + corner + 1);
+      for (const std::uint32_t corner : box.faces[f])
+        text += " " + std::to_string(8 * b + corner + 1);
       text += "\n";
     }
   }
@@ -298,8 +299,7 @@ TEST(ConvexParts, ClosedGroupsOfAFileAreParts) {
 }
 
 TEST(ConvexParts, AnOpenGroupBesideClosedOnesIsNamed) {
-  const PolygonSoup soup =
-      read_mesh("boxes.obj", boxes_text({Vec3(0), Vec3(0.03, 0, 0)}, "g", 2));
+  const PolygonSoup soup = read_mesh("boxes.obj", boxes_text({Vec3(0), Vec3(0.03, 0, 0)}, "g", 2));
   const std::string text = refusal(soup);
   EXPECT_NE(text.find("not closed by themselves: open: edge"), std::string::npos) << text;
 }

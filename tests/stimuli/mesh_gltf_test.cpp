@@ -153,8 +153,9 @@ TEST(MeshGltf, FaultsNameTheirPlace) {
   };
   const std::pair<std::string, std::string> good{"\"count\": 8", "\"count\": 8"};
   EXPECT_EQ(changed(good.first, good.second), "taken");
-  EXPECT_EQ(changed("\"count\": 8", "\"count\": 9").rfind("a.gltf: /bufferViews/0: expected room", 0),
-            0U);
+  EXPECT_EQ(
+      changed("\"count\": 8", "\"count\": 9").rfind("a.gltf: /bufferViews/0: expected room", 0),
+      0U);
   EXPECT_EQ(changed("5123", "5120"),
             "a.gltf: /accessors/1: expected unsigned indices (5121, 5123, 5125), found 5120");
   EXPECT_EQ(changed("\"indices\": 1", "\"indices\": 1, \"mode\": 5"),
@@ -163,10 +164,16 @@ TEST(MeshGltf, FaultsNameTheirPlace) {
                 .rfind("a.gltf: /nodes/0: expected nodes within at most 100", 0),
             0U);
   for (const auto& [from, to] :
-       {std::pair("\"2.0\"", "\"1.0\""), {"\"VEC3\"", "\"VEC4\""}, {"\"POSITION\": 0", "\"POSITION\": 7"},
-        {"\"POSITION\": 0", "\"POSITION\": \"x\""}, {"\"buffer\": 0", "\"buffer\": -1"},
-        {"[{\"mesh\": 0}]", "[{\"mesh\": 4}]"}, {"\"nodes\": [0]", "\"nodes\": [3]"},
-        {"\"count\": 36", "\"count\": 35"}, {"base64,", "base64,%"}, {"{\"asset\"", "{asset"},
+       {std::pair("\"2.0\"", "\"1.0\""),
+        {"\"VEC3\"", "\"VEC4\""},
+        {"\"POSITION\": 0", "\"POSITION\": 7"},
+        {"\"POSITION\": 0", "\"POSITION\": \"x\""},
+        {"\"buffer\": 0", "\"buffer\": -1"},
+        {"[{\"mesh\": 0}]", "[{\"mesh\": 4}]"},
+        {"\"nodes\": [0]", "\"nodes\": [3]"},
+        {"\"count\": 36", "\"count\": 35"},
+        {"base64,", "base64,%"},
+        {"{\"asset\"", "{asset"},
         {"\"scene\": 0", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"]"}}) {
     EXPECT_EQ(changed(from, to).rfind("a.gltf: ", 0), 0U) << from << " -> " << to;
   }
