@@ -79,7 +79,7 @@ WalkResult detect_contact(const ScenePart& part, PartState& state, const LinePro
   FirstContact first;
   bool decided = false;
   if (before && !state.started_inside) {
-    from = Probe::to_local(part, translated(*before, state.sibling_correction));
+    from = Probe::to_local(part, *before);
     const ContactFeature near = nearby_feature<Probe>(part, state.nearby, from);
     if (near.kind != Kind::none) {
       const WalkResult was = Probe::walk(mesh, near, from.tip, from.tail - from.tip);

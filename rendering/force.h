@@ -23,30 +23,18 @@ struct LoadedContact {
   double force = 0;        ///< N, along the normal, on the hand; never negative (set by load)
   Vec3 tangential_offset;  ///< m, of the ideal probe along the surface (set by apply_friction)
   Vec3 shift;              ///< m, from the virtual to the ideal probe, with tangential_offset
-  int object = -1;         ///< parts of one compound share it
+  int object = -1;         ///< index of the object in the scene
   std::uint32_t part = 0;  ///< index of the part in the scene
 };
-
-/// Sets normal_displacement: the whole depth where the object has one contact; contacts with
-/// several parts of one object get their parts of the shortest translation that satisfies them all,
-/// so that a seam between two parts neither doubles the force nor lets it drop. Contacts of one
-/// object stand side by side.
-void distribute_depths(std::span<LoadedContact> contacts);
 
 /// Sets the displacement and the spring force of each contact (Hooke).
 template <std::size_t kCount>
 void load(std::span<LoadedContact, kCount> contacts) {
-  if constexpr (kCount == 1) {
-    contacts[0].normal_displacement = contacts[0].contact.depth;
-  } else {
-    distribute_depths(contacts);
+  for (auto& c : contacts) {
+    c.normal_displacement = c.contact.depth;
+    c.force = c.stiffness * c.normal_displacement;
   }
-  for (auto& c : contacts) c.force = c.stiffness * c.normal_displacement;
 }
-
-/// N; the force of a material with layers at `depth` m below its surface: the sum of each layer's
-/// stiffness times the length of the penetration that lies in it.
-double layered_force(const stimuli::Material& material, double depth);
 
 /// What friction remembers of a contact from tick to tick.
 struct FrictionState {

@@ -17,12 +17,53 @@ double distance_to_segment(const Vec3& p, const LineProbe& probe) {
   return glm::length(p - (probe.tip + t * d));
 }
 
+/// Parts of one surface or layer stand side by side; the order in which they come first stays.
+void bring_together(std::vector<SceneObject>& objects) {
+  const auto key = [](const SceneObject& o) { return std::pair(o.object, o.layer); };
+  std::vector<std::pair<int, int>> seen;
+  bool apart = false;
+  for (const SceneObject& object : objects) {
+    const auto found = std::find(seen.begin(), seen.end(), key(object));
+    apart |= found != seen.end() && *found != seen.back();
+    if (found == seen.end()) seen.push_back(key(object));
+    else if (apart) break;
+  }
+  if (!apart) return;
+  std::stable_sort(
+      objects.begin(), objects.end(),
+      [&](const SceneObject& a, const SceneObject& b) { return key(a) < key(b); });
+}
+
+/// The margin by which the law sees a part larger.
+void add_margin(ScenePart& part) {
+  // Above what rounding can do to a plane here, and below 1e-6 of the size, however thin the part.
+  constexpr double kOfSize = 1e-12, kRoundings = 64, kMostScale = 1e-6;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  Vec3 sum(0);
+  for (const Vec3& vertex : mesh.vertices()) sum += vertex;
+  part.inside = sum / static_cast<double>(mesh.vertices().size());
+  double thinnest = HUGE_VAL, farthest = 0;
+  for (const stimuli::Facet& facet : mesh.facets())
+    thinnest = std::min(thinnest, facet.offset - glm::dot(facet.normal, part.inside));
+  for (const Vec3& vertex : mesh.vertices())
+    farthest = std::max(farthest, glm::length(vertex - part.inside));
+  const double wanted = kOfSize * mesh.size() + kRoundings *
+                                                    std::numeric_limits<double>::epsilon() *
+                                                    (mesh.size() + glm::length(part.sphere_centre));
+  const double scale = thinnest > 0 ? std::min(wanted / thinnest, kMostScale) : kMostScale;
+  part.shrink = 1 / (1 + scale);
+  part.margin = scale * farthest;
+}
+
 }  // namespace
 
 Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
     : tool_(std::move(tool)) {
   if (tool_.segments.size() > Tool::kMostSegments)
     throw std::invalid_argument("a tool has 1 to 16 segments");
+  for (const ToolSegment& segment : tool_.segments)
+    tool_reach_ = std::max({tool_reach_, glm::length(segment.from), glm::length(segment.to)});
+  bring_together(objects);
   TickFeatures features;
   parts_.reserve(objects.size());
   for (auto& object : objects) {
@@ -40,14 +81,49 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
     part.material = object.material;
     features.damping |= part.material.damping != 0;
     features.friction |= part.material.has_friction();
-    features.layers |= !part.material.layers.empty();
     part.object = object.object;
     part.layer = object.layer;
     part.break_force = object.break_force;
     parts_.push_back(std::move(part));
   }
-  features.several_parts = parts_.size() != 1;
+  group_parts();
+  features.unions = std::any_of(groups_.begin(), groups_.end(),
+                                [](const PartGroup& group) { return group.by_law; });
+  features.several_parts = parts_.size() != 1 || features.unions;
   features_index_ = features.index();
+}
+
+void Scene::group_parts() {
+  constexpr double kSkin = 1e-9;  // of the size of the largest part
+  std::vector<int> objects;
+  for (std::uint32_t i = 0; i < parts_.size(); ++i) {
+    const ScenePart& part = parts_[i];
+    if (i == 0 || part.object != parts_[i - 1].object || part.layer != parts_[i - 1].layer) {
+      const auto known = std::find(objects.begin(), objects.end(), part.object);
+      PartGroup group;
+      group.first_part = i;
+      group.first_pair = i * static_cast<std::uint32_t>(segments());
+      group.object = part.object;
+      group.object_state = static_cast<std::uint32_t>(known - objects.begin());
+      group.break_force = part.break_force;
+      if (known == objects.end()) objects.push_back(part.object);
+      groups_.push_back(group);
+    }
+    ++groups_.back().part_count;
+    parts_[i].group = static_cast<std::uint32_t>(groups_.size() - 1);
+  }
+  object_states_ = objects.size();
+  std::vector<std::uint32_t> parts_of_object(object_states_);
+  for (const PartGroup& group : groups_) parts_of_object[group.object_state] += group.part_count;
+  for (PartGroup& group : groups_) {
+    group.by_law = tool() != nullptr || parts_of_object[group.object_state] > 1;
+    if (!group.by_law) continue;
+    for (std::uint32_t k = 0; k < group.part_count; ++k) {
+      ScenePart& part = parts_[group.first_part + k];
+      add_margin(part);
+      group.skin = std::max({group.skin, 3 * part.margin, kSkin * part.mesh->size()});
+    }
+  }
 }
 
 RenderState Scene::initial_state() const {
@@ -56,7 +132,62 @@ RenderState Scene::initial_state() const {
   state.near_parts.reserve(parts_.size());
   if (!features().several_parts) state.near_parts.push_back(0);  // a single part is always near
   state.contacts.reserve(parts_.size());
+  if (features().unions) {
+    std::size_t most_pairs = 0, contacts = 0;
+    for (const PartGroup& group : groups_) {
+      most_pairs = std::max(most_pairs, group.part_count * segments());
+      contacts += group.by_law ? kMostPlanes : 1;
+    }
+    state.unions.pairs.resize(parts_.size() * segments());
+    state.unions.groups.resize(groups_.size());
+    state.unions.objects.resize(object_states_);
+    state.unions.near.reserve(most_pairs);
+    state.unions.contacts.reserve(contacts);
+    state.unions.rubbed.reserve(contacts);
+  }
   return state;
+}
+
+void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe,
+                       const ToolPose& tool, bool sides) {
+  if (state.clearance == std::numeric_limits<double>::infinity()) return;
+  UnionMemory& memory = state.unions;
+  const Tool* const carried = sides ? scene.tool() : nullptr;
+  // The tool moves no farther than its tip and what its size makes of the turn of its frame.
+  const auto moved = [&](const ToolPose& a, const ToolPose& b) {
+    double out = glm::length(a.tip - b.tip);
+    if (carried == nullptr) return std::max(out, glm::length(a.tip + a.d - b.tip - b.d));
+    double turned2 = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 apart = a.frame[k] - b.frame[k];
+      turned2 += glm::dot(apart, apart);
+    }
+    return out + scene.tool_reach() * std::sqrt(turned2);
+  };
+  const double step = state.has_last ? moved(tool, memory.last) : 0;
+  const double slack = memory.reach + step;
+  if (state.clearance > 0 && moved(tool, memory.near_pose) + slack < state.clearance) return;
+  state.near_parts.clear();
+  state.near_parts_pose = probe;
+  memory.near_pose = tool;
+  state.clearance = std::numeric_limits<double>::infinity();
+  const PlacedTool placed = place(carried, sides, tool);
+  for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
+    const ScenePart& part = scene.parts()[i];
+    double gap = HUGE_VAL;
+    for (std::size_t j = 0; j < placed.count; ++j) {
+      const Vec3 from = tool.tip + placed.segments[j].from;
+      gap = std::min(gap, distance_to_segment(part.sphere_centre,
+                                              {from, from + placed.segments[j].along}));
+    }
+    gap -= part.sphere_radius;
+    const bool in_contact = state.parts[i].feature.kind != ContactFeature::Kind::none;
+    if (in_contact || in_reach(part, gap, step + slack)) {
+      state.near_parts.push_back(i);
+    } else {
+      state.clearance = std::min(state.clearance, gap);
+    }
+  }
 }
 
 void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {

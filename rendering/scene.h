@@ -15,6 +15,7 @@
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 #include "rendering/tool.h"
+#include "rendering/union_state.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/object_spec.h"
 
@@ -44,8 +45,17 @@ struct ScenePart {
   double tolerance = 0;      ///< m; shorter is rounding, at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
+
   int layer = 0;
-  double break_force = std::numeric_limits<double>::infinity();  ///< N
+  double break_force = std::numeric_limits<double>::infinity();  ///< N; of its layer
+  std::uint32_t group = 0;  ///< index in Scene::groups()
+
+  // For unions and tools (union_contact.h): the law sees the part larger by a margin, far above
+  // rounding and far below what is felt, so that parts that abut leave no crack. Instead of the
+  // part the probe is scaled, about a point inside.
+  Vec3 inside;        ///< mesh frame, m
+  double shrink = 1;  ///< of the probe; 1 / (1 + margin)
+  double margin = 0;  ///< m, of the vertex that it moves most
 
   // Inlined: a tick turns three to five vectors, at ten instructions each.
   [[gnu::always_inline]] Vec3 local_point(const Vec3& world) const {
@@ -66,7 +76,7 @@ struct TickFeatures {
   bool several_parts = false;  ///< broad phase, a list of contacts, sums over it
   bool damping = false;        ///< some material has it; so the others
   bool friction = false;
-  bool layers = false;
+  bool unions = false;  ///< objects of several parts, layers, or a tool: the law of union_contact.h
 
   static constexpr std::size_t kCount = 16;  ///< combinations
   static constexpr TickFeatures of(std::size_t index) {
@@ -74,9 +84,9 @@ struct TickFeatures {
   }
   constexpr std::size_t index() const {
     return std::size_t{several_parts} | std::size_t{damping} << 1 | std::size_t{friction} << 2 |
-           std::size_t{layers} << 3;
+           std::size_t{unions} << 3;
   }
-  constexpr bool plain_springs() const { return !damping && !friction && !layers; }
+  constexpr bool plain_springs() const { return !damping && !friction; }
 };
 
 /// What is remembered of one part from tick to tick.
@@ -86,10 +96,6 @@ struct PartState {
   ContactFeature nearby;      ///< not in contact: the feature of a recent separating plane, if any
   std::uint32_t support = 0;  ///< vertex that the last search for a separating plane ended on
   bool started_inside = false;  ///< the trial began inside: no force until the probe has left once
-  /// m, what this part adds to the displacement of the ideal probe, where parts share one
-  Vec3 displacement;
-  /// m, how far the other parts of the same object displaced the ideal probe at the last tick
-  Vec3 sibling_correction;
   FrictionState friction;  ///< where the material has friction
 };
 
@@ -104,6 +110,7 @@ struct RenderState {
   /// Of the tool, world frame, where the caller senses it: written before a tick. Its part at right
   /// angles to the stylus is +x. Zero: +x is carried along by the smallest rotation.
   Vec3 measured_side;
+  UnionMemory unions;  ///< empty where the scene has none
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
 };
 
@@ -118,11 +125,22 @@ class Scene {
   /// Selects the tick that a renderer runs.
   TickFeatures features() const { return TickFeatures::of(features_index_); }
   std::size_t features_index() const { return features_index_; }
-  const Tool& tool() const { return tool_; }
+  /// Parts of one group stand side by side.
+  const std::vector<PartGroup>& groups() const { return groups_; }
+  /// What the stylus carries; null: nothing but itself.
+  const Tool* tool() const { return tool_.segments.empty() ? nullptr : &tool_; }
+  /// m, from the tip to the farthest point of the tool.
+  double tool_reach() const { return tool_reach_; }
+  std::size_t segments() const { return tool_.segments.empty() ? 1 : tool_.segments.size(); }
   RenderState initial_state() const;
 
  private:
+  void group_parts();
+
   std::vector<ScenePart> parts_;
+  std::vector<PartGroup> groups_;
+  std::size_t object_states_ = 0;
+  double tool_reach_ = 0;
   Tool tool_;
   std::size_t features_index_ = 0;
 };
@@ -134,6 +152,11 @@ inline bool in_reach(const ScenePart& part, double gap, double step) {
   // The margin, a quarter of the radius, is room to move before the list must be rebuilt.
   return gap - step <= 0.25 * part.sphere_radius;
 }
+
+/// The same for a tool, whose ideal one may be up to `reach` away from it.
+/// \param tool  the virtual tool at this tick
+void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe,
+                       const ToolPose& tool, bool sides);
 
 /// Lists the parts that the probe can reach soon (bounding spheres). No allocation.
 void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe);

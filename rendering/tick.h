@@ -10,11 +10,12 @@
 #include <glm/geometric.hpp>
 #include <span>
 
-#include "rendering/compound.h"
 #include "rendering/contact_detection.h"
 #include "rendering/force.h"
 #include "rendering/material_forces.h"
+#include "rendering/release.h"
 #include "rendering/renderer.h"
+#include "rendering/union_contact.h"
 
 namespace palpate::rendering::tick {
 
@@ -74,56 +75,31 @@ struct Tick {
 
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
-  WalkResult track_part(std::uint32_t index, const LineProbe* before, const LineProbe& local) {
-    return track<Probe>(scene.parts()[index], state.parts[index], before, local.tip,
-                        local.tail - local.tip, faults);
-  }
-
   /// Contact of one part. True when it is in contact; then `c` is filled in.
-  /// \tparam kHasSiblings  whether the other parts of the same object move the ideal probe
-  /// \param correction     m, world: by how much they do
-  template <bool kHasSiblings>
-  [[gnu::always_inline]] bool contact_of(std::uint32_t index, const Vec3& correction,
-                                         LoadedContact& c) {
+  [[gnu::always_inline]] bool contact_of(std::uint32_t index, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
-    const Vec3 tip = part.local_point(kHasSiblings ? probe.tip + correction : probe.tip);
+    const Vec3 tip = part.local_point(probe.tip);
     const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
     const WalkResult hit = track<Probe>(part, memory, last(), tip, d, faults);
-    if constexpr (kHasSiblings) memory.sibling_correction = correction;
     if (memory.started_inside) faults |= render_fault::kStartedInside;
     if (hit.feature.kind == ContactFeature::Kind::none) return false;
     c.part = index;
     Probe::classify(*part.mesh, hit, tip, d, length, c);
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth;
-    if constexpr (kHasSiblings) c.contact.depth += glm::dot(c.contact.normal, correction);
     c.stiffness = part.material.stiffness;
     c.object = part.object;
     return true;
   }
 
-  /// Adds the contact of one part, if there is one, to the tick's.
-  template <bool kHasSiblings>
-  void add_contact_of(std::uint32_t index, const Vec3& correction) {
-    LoadedContact found;
-    // There is room for a contact of every part (Scene::initial_state): nothing is allocated.
-    if (contact_of<kHasSiblings>(index, correction, found)) state.contacts.push_back(found);
-  }
-
   /// Adds the contacts of all parts that are near.
   void add_contacts() {
     state.contacts.clear();
-    const std::span<const std::uint32_t> near(state.near_parts);
-    for (std::size_t begin = 0, end = 0; begin < near.size(); begin = end) {
-      const int object = scene.parts()[near[begin]].object;
-      for (end = begin + 1; end < near.size() && scene.parts()[near[end]].object == object;) ++end;
-      if (end - begin == 1) {
-        state.parts[near[begin]].sibling_correction = Vec3(0);
-        add_contact_of<false>(near[begin], Vec3(0));
-      } else {
-        Compound<Tick>{*this, near.subspan(begin, end - begin)}.add_contacts();
-      }
+    for (const std::uint32_t index : state.near_parts) {
+      LoadedContact found;
+      // There is room for a contact of every part (Scene::initial_state): nothing is allocated.
+      if (contact_of(index, found)) state.contacts.push_back(found);
     }
   }
 
@@ -173,19 +149,10 @@ template <class Probe>
 template <class Probe, bool kFriction>
 Rendering sum_contacts(const Tick<Probe>& tick, std::span<LoadedContact> contacts) {
   std::size_t deepest = 0;
-  Vec3 deepest_shift(0), object_shift(0);
+  Vec3 deepest_shift(0);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    // The contacts of one object stand side by side, and together they move its ideal probe.
-    const int object = contacts[i].object;
-    if (i == 0 || object != contacts[i - 1].object) {
-      object_shift = Vec3(0);
-      for (std::size_t k = i; k < contacts.size() && contacts[k].object == object; ++k)
-        object_shift += contacts[k].normal_displacement * contacts[k].contact.normal;
-    }
-    Vec3 shift = object_shift;
-    tick.state.parts[contacts[i].part].displacement =
-        contacts[i].normal_displacement * contacts[i].contact.normal;
-    shift = tick.template place_on_ideal_probe<kFriction>(contacts[i], shift);
+    const Vec3 shift = tick.template place_on_ideal_probe<kFriction>(
+        contacts[i], contacts[i].normal_displacement * contacts[i].contact.normal);
     if (i == 0 || contacts[i].contact.depth > contacts[deepest].contact.depth) {
       deepest = i;
       deepest_shift = shift;
@@ -207,6 +174,64 @@ template <class Probe, bool kFriction>
   return make_result(tick, loads, contact, shift, 1);
 }
 
+/// The contacts of a scene of which some objects are unions or the stylus carries a tool.
+template <class Probe, TickFeatures kFeatures>
+void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
+  const Scene& scene = tick.scene;
+  RenderState& state = tick.state;
+  UnionMemory& all = state.unions;
+  all.contacts.clear();
+  all.reach = 0;
+  for (std::size_t k = 0; k < state.near_parts.size(); ++k) {
+    const std::uint32_t index = state.near_parts[k];
+    const std::uint32_t group = scene.parts()[index].group;
+    const PartGroup& of = scene.groups()[group];
+    if (of.by_law) {
+      const bool first = k == 0 || scene.parts()[state.near_parts[k - 1]].group != group;
+      if (first && !is_off(tick, of)) follow_ideal_tool(tick, group);
+      continue;
+    }
+    PlacedContact found;
+    if (!plain.contact_of(index, found.loaded)) continue;
+    found.group = group;
+    load(std::span<LoadedContact, 1>(&found.loaded, 1));
+    found.shift = found.loaded.normal_displacement * found.loaded.contact.normal;
+    found.place = plain.probe.tip + found.loaded.probe_fraction * (plain.probe.tail - plain.probe.tip) +
+                  found.shift;
+    const LineProbe& last = state.has_last ? state.last : plain.probe;
+    found.motion = (1 - found.loaded.probe_fraction) * (plain.probe.tip - last.tip) +
+                   found.loaded.probe_fraction * (plain.probe.tail - last.tail);
+    all.contacts.push_back(found);
+  }
+}
+
+/// A tick by the law of unions (union_contact.h).
+template <class Probe, TickFeatures kFeatures>
+Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe& probe,
+                        double dt) noexcept {
+  UnionMemory& all = state.unions;
+  ToolPose tool{probe.tip, probe.tail - probe.tip};
+  if (scene.tool() != nullptr) {
+    if (!within_range(state.measured_side))
+      return no_contact(state.last, render_fault::kNonFinite);
+    tool.frame = tool_frame(tool.d, state.has_last ? &all.last.frame : nullptr, state.measured_side);
+  }
+  update_near_parts(scene, state, probe, tool, Probe::kSegment);
+  Tick<Probe> plain{scene, state, probe, Probe::kSegment ? glm::length(tool.d) : 0};
+  UnionTick tick{scene, state, tool, Probe::kSegment, dt};
+  update_objects(tick);
+  add_placed_contacts<Probe, kFeatures>(tick, plain);
+  const std::span<PlacedContact> contacts(all.contacts);
+  if constexpr (!kFeatures.plain_springs())
+    apply_material_forces<kFeatures>(scene, state, contacts, dt > 0 ? 1 / dt : 0);
+  fade_forces(tick);
+  state.last = probe;
+  state.has_last = true;
+  all.last = tool;
+  tick.faults |= plain.faults;
+  return sum_unions(tick, probe);
+}
+
 /// One tick that does what kFeatures says and no more.
 /// \param dt  s since the last tick; only damping needs it
 template <class Probe, TickFeatures kFeatures>
@@ -214,6 +239,7 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
                       double dt) noexcept {
   if (!within_range(probe.tip) || !within_range(probe.tail))
     return no_contact(state.last, render_fault::kNonFinite);
+  if constexpr (kFeatures.unions) return render_unions<Probe, kFeatures>(scene, state, probe, dt);
   Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
   const auto finish = [&](std::span<LoadedContact> contacts) {
     if constexpr (!kFeatures.plain_springs())
@@ -230,7 +256,7 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
     if (!contacts.empty()) return sum_contacts<Probe, kFeatures.friction>(tick, contacts);
   } else {
     LoadedContact contact;
-    if (tick.template contact_of<false>(0, Vec3(0), contact)) {
+    if (tick.contact_of(0, contact)) {
       const std::span<LoadedContact, 1> contacts(&contact, 1);
       load(contacts);
       finish(contacts);

@@ -76,13 +76,6 @@ std::size_t out_of_reach(const Scene& scene) {
       }));
 }
 
-bool has_compound(const Scene& scene) {
-  const auto& parts = scene.parts();
-  return std::adjacent_find(parts.begin(), parts.end(), [](const ScenePart& a, const ScenePart& b) {
-           return a.object == b.object;
-         }) != parts.end();
-}
-
 void add_parts(const Scene& scene, std::vector<TickStage>& stages) {
   const std::size_t parts = scene.parts().size();
   const bool several = scene.features().several_parts;
@@ -100,7 +93,6 @@ void add_materials(const TickFeatures& features, std::vector<TickStage>& stages)
   const auto add = [&](const char* name, bool runs, const char* what) {
     stages.push_back({name, StageTime::contact, runs, runs ? what : "no material asks for it"});
   };
-  add("layers", features.layers, "the sum over the layers that the probe is in");
   add("damping", features.damping, "against the normal speed, never pulling");
   add("friction", features.friction, "Coulomb's, by the ideal probe's tangential offset");
 }
@@ -141,10 +133,11 @@ std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer) {
                     sides ? "the walk crosses silhouette edges too (its cost is counted there); "
                             "equation (2) places the contact"
                           : "only the tip touches"});
-  const bool compound = has_compound(scene);
-  stages.push_back({"parts of one object", StageTime::contact, compound,
-                    compound ? "they share the shortest displacement, so that seams are not felt"
-                             : "no object has several"});
+  const bool unions = scene.features().unions;
+  stages.push_back({"unions and tools", StageTime::contact, unions,
+                    unions ? "one ideal tool for all parts of a surface: turn, push out, cast, "
+                             "active planes"
+                           : "no object has several parts or layers, and the stylus has no tool"});
   stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
   add_materials(scene.features(), stages);
   stages.push_back({"torque and second device", StageTime::contact, sides,

@@ -230,7 +230,6 @@ class StageTimings {
   }
 
   void add_materials() {
-    if (scene_.features().layers) add_material<TickFeatures{.layers = true}>("layers");
     if (scene_.features().damping) add_material<TickFeatures{.damping = true}>("damping");
     if (scene_.features().friction) add_material<TickFeatures{.friction = true}>("friction");
   }

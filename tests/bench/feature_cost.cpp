@@ -118,11 +118,10 @@ std::vector<rendering::LineProbe> path_over(const rendering::Scene& scene, bool 
   return poses;
 }
 
-stimuli::Material with(double damping, double friction, bool layers) {
+stimuli::Material with(double damping, double friction) {
   stimuli::Material material;
   material.damping = damping;
   material.friction_static = material.friction_dynamic = friction;
-  if (layers) material.layers = {{0.0005, 400}, {0.001, 1200}};
   return material;
 }
 
@@ -155,32 +154,21 @@ std::vector<Case> cases() {
     add("near-without-broad-phase", near,
         pick(&without_broad_phase<SegmentProbe>, &without_broad_phase<PointProbe>));
     add("far", far);
-    World damped = plain, rough = plain, layered = plain;
-    damped.material = with(2, 0, false);
-    rough.material = with(0, 0.3, false);
-    layered.material = with(0, 0, true);
+    World damped = plain, rough = plain;
+    damped.material = with(2, 0);
+    rough.material = with(0, 0.3);
     add("damping", damped);
     add("friction", rough);
-    add("layers", layered);
-    // All but one, and a tick in which the one is not even compiled.
-    constexpr rendering::TickFeatures kNoDamping{.friction = true, .layers = true},
-        kNoFriction{.damping = true, .layers = true}, kNoLayers{.damping = true, .friction = true};
-    World no_damping = plain, no_friction = plain, no_layers = plain;
-    no_damping.material = with(0, 0.3, true);
-    no_friction.material = with(2, 0, true);
-    no_layers.material = with(2, 0.3, false);
-    add("all-but-damping", no_damping);
-    add("all-but-damping-least", no_damping,
+    // The other, and a tick in which this one is not even compiled.
+    constexpr rendering::TickFeatures kNoDamping{.friction = true}, kNoFriction{.damping = true};
+    add("all-but-damping", rough);
+    add("all-but-damping-least", rough,
         pick(&rendering::tick::render_tick<SegmentProbe, kNoDamping>,
              &rendering::tick::render_tick<PointProbe, kNoDamping>));
-    add("all-but-friction", no_friction);
-    add("all-but-friction-least", no_friction,
+    add("all-but-friction", damped);
+    add("all-but-friction-least", damped,
         pick(&rendering::tick::render_tick<SegmentProbe, kNoFriction>,
              &rendering::tick::render_tick<PointProbe, kNoFriction>));
-    add("all-but-layers", no_layers);
-    add("all-but-layers-least", no_layers,
-        pick(&rendering::tick::render_tick<SegmentProbe, kNoLayers>,
-             &rendering::tick::render_tick<PointProbe, kNoLayers>));
   }
   return all;
 }

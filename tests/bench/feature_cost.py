@@ -40,7 +40,7 @@ ROWS = [
     ("trees for small meshes", "ray-plain", ["ray-plain-least", "ray-plain-alone"], "ray-forced-trees", "ray-plain"),
 ]
 for probe in ("point", "ray"):
-    for material in ("friction", "damping", "layers"):
+    for material in ("friction", "damping"):
         ROWS.append((material, f"{probe}-all-but-{material}", [f"{probe}-all-but-{material}-least"],
                      f"{probe}-{material}", f"{probe}-plain"))
     ROWS.append(("several objects", f"{probe}-plain", [f"{probe}-plain-least", f"{probe}-plain-alone"], f"{probe}-near", f"{probe}-plain"))

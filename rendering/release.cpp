@@ -1,0 +1,139 @@
+#include "rendering/release.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rendering/render_fault.h"
+
+namespace palpate::rendering {
+namespace {
+
+/// Forgets what the group's ideal tool rested on: from now on it is the virtual one.
+void forget_contacts(UnionTick& tick, std::uint32_t index) {
+  const PartGroup& group = tick.scene.groups()[index];
+  UnionMemory& all = tick.state.unions;
+  all.groups[index].touching = false;
+  all.groups[index].lag = 0;
+  const std::size_t segments = tick.scene.segments();
+  for (std::size_t i = 0; i < group.part_count * segments; ++i) {
+    PairState& pair = all.pairs[group.first_pair + i];
+    pair.carries = false;
+    pair.plane.valid = false;
+    pair.friction = {};
+  }
+}
+
+/// Whether the virtual tool is outside of the surface and all layers of an object.
+bool left(UnionTick& tick, std::uint32_t object) {
+  for (std::uint32_t i = 0; i < tick.scene.groups().size(); ++i) {
+    const PartGroup& group = tick.scene.groups()[i];
+    if (group.by_law && group.object_state == object && inside_group(tick, i)) return false;
+  }
+  return true;
+}
+
+void restore_layers(UnionTick& tick, std::uint32_t object) {
+  for (std::uint32_t i = 0; i < tick.scene.groups().size(); ++i) {
+    if (tick.scene.groups()[i].object_state != object) continue;
+    tick.state.unions.groups[i].giving_way = false;
+    tick.state.unions.groups[i].strength = 1;
+  }
+}
+
+void switch_off(UnionTick& tick, std::uint32_t object) {
+  tick.state.unions.objects[object].off = true;
+  for (std::uint32_t i = 0; i < tick.scene.groups().size(); ++i) {
+    if (tick.scene.groups()[i].object_state == object) forget_contacts(tick, i);
+  }
+}
+
+/// s; a clock that does not run counts as one of a kilohertz.
+double step_of(const UnionTick& tick) { return tick.dt > 0 ? tick.dt : 1e-3; }
+
+void release_hooked(UnionTick& tick) {
+  UnionMemory& all = tick.state.unions;
+  for (ObjectState& object : all.objects) object.lag = 0;
+  for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
+    double& lag = all.objects[tick.scene.groups()[g].object_state].lag;
+    lag = std::max(lag, all.groups[g].lag);
+  }
+  for (ObjectState& object : all.objects) {
+    object.lagging = object.lag > kMostLag ? object.lagging + step_of(tick) : 0;
+    if (object.lagging > kMostLagTime) object.releasing = true;
+    if (!object.releasing) continue;
+    tick.faults |= render_fault::kReleased;
+    object.strength = std::max(0.0, object.strength - step_of(tick) / kFadeTime);
+  }
+}
+
+/// Layers whose force exceeds what they bear begin to give way.
+void break_layers(UnionTick& tick) {
+  UnionMemory& all = tick.state.unions;
+  for (std::size_t i = 0, end = 0; i < all.contacts.size(); i = end) {
+    const std::uint32_t group = all.contacts[i].group;
+    Vec3 force(0);
+    for (end = i; end < all.contacts.size() && all.contacts[end].group == group; ++end)
+      force += all.contacts[end].loaded.force * all.contacts[end].loaded.contact.normal;
+    const double most = tick.scene.groups()[group].break_force;
+    if (glm::dot(force, force) > most * most) {
+      all.groups[group].giving_way = true;
+      all.exceptions = true;
+    }
+  }
+  if (!all.exceptions) return;
+  for (GroupState& group : all.groups) {
+    if (group.giving_way)
+      group.strength = std::max(0.0, group.strength - step_of(tick) / kFadeTime);
+  }
+}
+
+}  // namespace
+
+bool is_off(const UnionTick& tick, const PartGroup& group) {
+  return tick.state.unions.objects[group.object_state].off;
+}
+
+void update_objects(UnionTick& tick) {
+  UnionMemory& all = tick.state.unions;
+  if (!all.exceptions && tick.state.has_last) return;
+  all.exceptions = false;
+  for (std::uint32_t i = 0; i < all.objects.size(); ++i) {
+    ObjectState& object = all.objects[i];
+    if (!tick.state.has_last && !left(tick, i)) {
+      object.started_inside = true;
+      switch_off(tick, i);
+    } else if (object.off && left(tick, i)) {
+      object = {};
+      restore_layers(tick, i);
+    }
+    if (object.off)
+      tick.faults |= object.started_inside ? render_fault::kStartedInside : render_fault::kReleased;
+    all.exceptions |= object.off || object.releasing || object.lagging > 0;
+  }
+  for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
+    const std::uint32_t object = tick.scene.groups()[g].object_state;
+    if (!all.groups[g].giving_way) continue;
+    if (!all.objects[object].off && left(tick, object)) restore_layers(tick, object);
+    all.exceptions |= all.groups[g].giving_way;
+  }
+}
+
+void fade_forces(UnionTick& tick) {
+  UnionMemory& all = tick.state.unions;
+  break_layers(tick);
+  if (!all.exceptions) return;
+  release_hooked(tick);
+  for (PlacedContact& c : all.contacts) {
+    const std::uint32_t object = tick.scene.groups()[c.group].object_state;
+    const double strength = all.objects[object].strength * all.groups[c.group].strength;
+    c.loaded.force *= strength;
+    c.loaded.stiffness *= strength;  // of friction
+  }
+  for (std::uint32_t i = 0; i < all.objects.size(); ++i) {
+    ObjectState& object = all.objects[i];
+    if (object.releasing && object.strength == 0 && !object.off) switch_off(tick, i);
+  }
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,86 @@
+#include "rendering/tool_pose.h"
+
+#include <algorithm>
+#include <glm/gtc/quaternion.hpp>
+
+namespace palpate::rendering {
+namespace {
+
+/// The world axis least along `axis`.
+Vec3 least_along(const Vec3& axis) {
+  int least = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (std::abs(axis[k]) < std::abs(axis[least])) least = k;
+  }
+  Vec3 out(0);
+  out[least] = 1;
+  return out;
+}
+
+/// `v` turned by the smallest rotation that turns the unit vector `from` into `to`.
+Vec3 carried(const Vec3& v, const Vec3& from, const Vec3& to) {
+  constexpr double kOpposite = 1e-9;
+  const double cosine = glm::dot(from, to);
+  if (!(1 + cosine > kOpposite)) return v;  // any half turn is the smallest: about v itself
+  const Vec3 axis = glm::cross(from, to);
+  return v + glm::cross(axis, v) + glm::cross(axis, glm::cross(axis, v)) / (1 + cosine);
+}
+
+/// The unit part of `v` at right angles to `axis`; false where there is next to none.
+bool perpendicular(const Vec3& v, const Vec3& axis, Vec3& out) {
+  constexpr double kAlong = 1e-6;
+  const Vec3 part = v - glm::dot(v, axis) * axis;
+  const double length2 = glm::dot(part, part);
+  if (!(length2 > kAlong * kAlong * glm::dot(v, v))) return false;
+  out = part / std::sqrt(length2);
+  return true;
+}
+
+}  // namespace
+
+Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured) {
+  const double length = glm::length(d);
+  const Vec3 axis = length > 0 ? d / length : before != nullptr ? (*before)[2] : Vec3(0, 0, 1);
+  Vec3 side;
+  const bool sensed = perpendicular(measured, axis, side);
+  if (!sensed && !(before != nullptr &&
+                   perpendicular(carried((*before)[0], (*before)[2], axis), axis, side)))
+    perpendicular(least_along(axis), axis, side);
+  return {side, glm::cross(axis, side), axis};
+}
+
+PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose) {
+  PlacedTool out;
+  if (tool == nullptr || !sides) {
+    out.segments[0] = {Vec3(0), sides ? pose.d : Vec3(0)};
+    out.count = 1;
+    return out;
+  }
+  for (const ToolSegment& segment : tool->segments)
+    out.segments[out.count++] = {pose.frame * segment.from,
+                                 pose.frame * (segment.to - segment.from)};
+  return out;
+}
+
+ToolPose between(const ToolPose& from, const ToolPose& to, double fraction) {
+  const Quat a = glm::quat_cast(from.frame), b = glm::quat_cast(to.frame);
+  return {from.tip + fraction * (to.tip - from.tip), from.d + fraction * (to.d - from.d),
+          glm::mat3_cast(glm::normalize(glm::slerp(a, b, fraction)))};
+}
+
+double angle_between(const Tool* tool, const ToolPose& a, const ToolPose& b) {
+  if (tool == nullptr) {
+    return std::atan2(glm::length(glm::cross(a.d, b.d)), glm::dot(a.d, b.d));
+  }
+  double trace = 0, chord2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    trace += glm::dot(a.frame[k], b.frame[k]);
+    const Vec3 moved = a.frame[k] - b.frame[k];
+    chord2 += glm::dot(moved, moved);
+  }
+  // |A - B|^2 = 4 (1 - cos), which is exact for small angles, where acos is not.
+  return trace > 0 ? 2 * std::asin(std::min(1.0, std::sqrt(chord2 / 8)))
+                   : std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0));
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,51 @@
+#pragma once
+// Where a tool is: the stylus that carries it, with its roll. World frame, m.
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+
+#include "rendering/probe.h"
+#include "rendering/tool.h"
+
+namespace palpate::rendering {
+
+/// The stylus and the frame of what it carries.
+struct ToolPose {
+  Vec3 tip;
+  Vec3 d;               ///< tail - tip
+  Mat3 frame = Mat3(1);  ///< columns: +x (the side), +y, +z (tip to tail); without a tool unused
+};
+
+/// A segment of the tool as it stands: from tip + from to tip + from + along.
+struct PlacedSegment {
+  Vec3 from, along;
+};
+
+/// The segments of an oriented tool, relative to the tip.
+struct PlacedTool {
+  std::array<PlacedSegment, Tool::kMostSegments> segments;
+  std::size_t count = 0;
+};
+
+/// The frame of a tool whose stylus points along `d`.
+/// \param d         tail - tip, m; zero keeps the direction of `before`
+/// \param before    the frame at the last tick; null at first
+/// \param measured  +x as the device senses it, any length; only what is at right angles to the
+/// stylus counts; zero: +x is carried along by the smallest rotation, and at first it is the world
+/// axis least along the stylus
+Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured);
+
+/// \param tool   its segments; null: the stylus itself
+/// \param sides  false: the tip alone touches
+PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose);
+
+/// A pose between two: the tip and, without a tool, d move linearly; a tool turns about one axis.
+/// \param fraction  0: `from`, 1: `to`
+ToolPose between(const ToolPose& from, const ToolPose& to, double fraction);
+
+/// rad, between the orientations of two poses, with the roll for a tool.
+double angle_between(const Tool* tool, const ToolPose& a, const ToolPose& b);
+
+}  // namespace palpate::rendering

@@ -1,0 +1,49 @@
+#pragma once
+// The contact law for unions: any tool of straight segments against an object of convex parts, by
+// one god-object, the ideal tool.
+//
+// For a fixed orientation of the tool, the translations that bring segment S_j into touch with part
+// C_i are the boundary of M_ij = C_i (+) (-S_j), and those of the whole tool with the object are
+// the boundary of the union of all M_ij. So the ideal tool is one point, its translation, against a
+// union of convex sets. Each tick it turns as the virtual tool did, moves as near to it as planes
+// and straight casts allow, and is never inside of any part.
+//
+// Zilles & Salisbury 1995 (god-object, active planes), Ortega, Redon & Coquillart 2007 (6-DoF
+// god-object). Departs: the constraints are facets of Minkowski sums, so no contact points are
+// sampled, and casts against them are exact.
+//
+// World frame, SI units. Nothing here throws, allocates, locks or does I/O.
+
+#include <cstdint>
+
+#include "rendering/renderer.h"
+
+namespace palpate::rendering {
+
+/// An ideal tool that is farther behind the stylus in turning (5 degrees, in rad) for longer than
+/// this (s) is hooked, and is let go of. Less is a wedge that is passed or a rattle; more would be a
+/// tool that shows another direction than the hand feels.
+inline constexpr double kMostLag = 0.0872664625997165;
+inline constexpr double kMostLagTime = 0.01;
+
+/// What a tick asks of the law.
+struct UnionTick {
+  const Scene& scene;
+  RenderState& state;
+  const ToolPose& tool;  ///< the virtual tool
+  bool sides;            ///< false: the tip alone touches
+  double dt;             ///< s since the last tick
+  std::uint32_t faults = 0;
+};
+
+/// The wrench of all placed contacts, its split on two devices, and the ideal tool of the deepest.
+Rendering sum_unions(const UnionTick& tick, const LineProbe& probe);
+
+/// Follows the ideal tool of one group and appends its contacts, with spring forces, to
+/// state.unions.contacts.
+void follow_ideal_tool(UnionTick& tick, std::uint32_t group);
+
+/// Whether the virtual tool is inside of a part of the group.
+bool inside_group(UnionTick& tick, std::uint32_t group);
+
+}  // namespace palpate::rendering
