@@ -14,10 +14,10 @@ constexpr double kParallelTriple = 1e-12;
 /// The conditions of Karush, Kuhn and Tucker, tried on one set of planes after the other.
 class Candidates {
  public:
-  Candidates(std::span<const HalfSpace> half_spaces, double tolerance)
+  Candidates(std::span<const PlaneBound> half_spaces, double tolerance)
       : spaces_(half_spaces), tolerance_(tolerance) {}
 
-  NearestPoint nearest() {
+  ConstrainedPoint nearest() {
     const std::size_t count = spaces_.size();
     if (accepts(Vec3(0))) return result_;
     for (std::size_t a = 0; a < count; ++a) {
@@ -40,7 +40,7 @@ class Candidates {
 
  private:
   bool accepts(const Vec3& point) {
-    for (const HalfSpace& space : spaces_) {
+    for (const PlaneBound& space : spaces_) {
       if (!(glm::dot(space.normal, point) >= space.bound - tolerance_)) return false;
     }
     result_.point = point;
@@ -49,14 +49,14 @@ class Candidates {
   }
 
   bool try_face(std::size_t a) {
-    const HalfSpace& space = spaces_[a];
+    const PlaneBound& space = spaces_[a];
     if (!(space.bound >= 0) || !accepts(space.bound * space.normal)) return false;
     result_.multipliers[a] = space.bound;
     return true;
   }
 
   bool try_edge(std::size_t a, std::size_t b) {
-    const HalfSpace &p = spaces_[a], &q = spaces_[b];
+    const PlaneBound &p = spaces_[a], &q = spaces_[b];
     const Vec3 along = glm::cross(p.normal, q.normal);
     const double sine2 = glm::dot(along, along);
     if (!(sine2 > kParallelPair)) return false;
@@ -70,7 +70,7 @@ class Candidates {
   }
 
   bool try_vertex(std::size_t a, std::size_t b, std::size_t c) {
-    const HalfSpace &p = spaces_[a], &q = spaces_[b], &r = spaces_[c];
+    const PlaneBound &p = spaces_[a], &q = spaces_[b], &r = spaces_[c];
     const Vec3 qr = glm::cross(q.normal, r.normal), rp = glm::cross(r.normal, p.normal),
                pq = glm::cross(p.normal, q.normal);
     const double triple = glm::dot(p.normal, qr);
@@ -85,14 +85,14 @@ class Candidates {
     return true;
   }
 
-  std::span<const HalfSpace> spaces_;
+  std::span<const PlaneBound> spaces_;
   double tolerance_;
-  NearestPoint result_;
+  ConstrainedPoint result_;
 };
 
 }  // namespace
 
-NearestPoint nearest_point(std::span<const HalfSpace> half_spaces, double tolerance) {
+ConstrainedPoint constrained_point(std::span<const PlaneBound> half_spaces, double tolerance) {
   return Candidates(half_spaces.first(std::min(half_spaces.size(), kMostPlanes)), tolerance)
       .nearest();
 }

@@ -11,7 +11,7 @@
 namespace palpate::rendering {
 
 /// What the points with dot(normal, p) >= bound belong to.
-struct HalfSpace {
+struct PlaneBound {
   Vec3 normal;       ///< unit, out of the obstacle
   double bound = 0;  ///< m
 };
@@ -21,7 +21,7 @@ inline constexpr std::size_t kMostPlanes = 8;
 
 /// The point nearest to the origin, as the sum of multiplier * normal over the half-spaces, with
 /// multipliers >= 0 of which at most three are positive.
-struct NearestPoint {
+struct ConstrainedPoint {
   Vec3 point;
   std::array<double, kMostPlanes> multipliers{};  ///< m
   bool found = false;                             ///< the half-spaces have points in common
@@ -31,6 +31,6 @@ struct NearestPoint {
 /// planes that agree within the tolerance the fewest carry.
 /// \param half_spaces  up to kMostPlanes
 /// \param tolerance    m; a half-space that is violated by no more than this is satisfied
-NearestPoint nearest_point(std::span<const HalfSpace> half_spaces, double tolerance);
+ConstrainedPoint constrained_point(std::span<const PlaneBound> half_spaces, double tolerance);
 
 }  // namespace palpate::rendering

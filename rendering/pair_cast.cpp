@@ -21,6 +21,13 @@ bool is_point(const stimuli::ConvexMesh& mesh, const Vec3& d) {
   return glm::dot(d, d) <= least * least;
 }
 
+/// A feature that the segment was at, for the point that it has shrunk to: no edge.
+template <bool kSegment>
+ContactFeature usable(const stimuli::ConvexMesh& mesh, ContactFeature feature) {
+  if (kSegment || feature.kind != Kind::edge) return feature;
+  return {Kind::facet, false, mesh.edges()[feature.index].left};
+}
+
 ContactFeature feature_of(const Measured& at) {
   return {at.edge ? Kind::edge : Kind::facet, at.left_ahead, at.index};
 }
@@ -32,9 +39,7 @@ Measured measured(const stimuli::ConvexMesh& mesh, ContactFeature feature, const
   if (kSegment && feature.kind == Kind::edge &&
       measure_edge(mesh, feature.index, feature.left_ahead, tip, d, at))
     return at;
-  const std::uint32_t facet =
-      feature.kind == Kind::edge ? mesh.edges()[feature.index].left : feature.index;
-  return measure_facet<kSegment>(mesh, facet, tip, d);
+  return measure_facet<kSegment>(mesh, usable<false>(mesh, feature).index, tip, d);
 }
 
 /// A vertex far along `direction`.
@@ -202,6 +207,7 @@ WalkResult scanned(const CastMesh& part, const Vec3& tip, const Vec3& d) {
 
 template <bool kSegment>
 WalkResult located(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d) {
+  start = usable<kSegment>(part.mesh, start);
   if (start.kind != Kind::none) {
     const WalkResult same = kSegment ? same_feature_segment(part.mesh, start, tip, d)
                                      : same_feature_point(part.mesh, start, tip);
@@ -279,7 +285,7 @@ double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, con
 
 WalkResult measure(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,
                    const Vec3& d) {
-  return is_point(mesh, d) ? same_feature_point(mesh, feature, tip)
+  return is_point(mesh, d) ? same_feature_point(mesh, usable<false>(mesh, feature), tip)
                            : same_feature_segment(mesh, feature, tip, d);
 }
 

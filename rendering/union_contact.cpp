@@ -54,7 +54,7 @@ class Planes {
 
   /// The point nearest to `origin` at least `skin` above all planes; sets the multipliers.
   bool nearest(const Vec3& origin, double skin, double tolerance, Vec3& point) {
-    std::array<HalfSpace, kMostPlanes> spaces;
+    std::array<PlaneBound, kMostPlanes> spaces;
     for (std::size_t i = 0; i < count_; ++i)
       spaces[i] = {planes_[i].normal,
                    planes_[i].depth + skin - glm::dot(planes_[i].normal, origin)};
@@ -64,7 +64,7 @@ class Planes {
   /// The same to the virtual tool, from `at`, which is allowed: no plane asks for more than is
   /// there.
   bool nearest_from(const Vec3& at, double skin, double tolerance, Vec3& point) {
-    std::array<HalfSpace, kMostPlanes> spaces;
+    std::array<PlaneBound, kMostPlanes> spaces;
     for (std::size_t i = 0; i < count_; ++i)
       spaces[i] = {planes_[i].normal,
                    std::min(planes_[i].depth + skin, glm::dot(planes_[i].normal, at))};
@@ -72,10 +72,10 @@ class Planes {
   }
 
  private:
-  bool solve(const std::array<HalfSpace, kMostPlanes>& spaces, double tolerance,
+  bool solve(const std::array<PlaneBound, kMostPlanes>& spaces, double tolerance,
              const Vec3& origin, Vec3& point) {
-    const NearestPoint nearest =
-        nearest_point(std::span<const HalfSpace>(spaces.data(), count_), tolerance);
+    const ConstrainedPoint nearest =
+        constrained_point(std::span<const PlaneBound>(spaces.data(), count_), tolerance);
     if (!nearest.found) return false;
     for (std::size_t i = 0; i < count_; ++i) planes_[i].multiplier = nearest.multipliers[i];
     point = origin + nearest.point;

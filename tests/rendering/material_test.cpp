@@ -1,4 +1,4 @@
-// What materials add to plain springs: damping, friction, layers.
+// What materials add to plain springs: damping, friction.
 
 #include <gtest/gtest.h>
 
@@ -65,16 +65,6 @@ TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
   EXPECT_EQ(block.tick(0.0004).force.z, 0);  // 0.8 m/s out: 0.32 N of spring, 1.6 N of damping
 }
 
-TEST(Material, LayersAddUpTheirSpringsAndForceIsContinuousAcrossThem) {
-  stimuli::Material material;
-  material.stiffness = 200;
-  material.layers = {{0.001, 1000}, {0.002, 50}};
-  Block block(material);
-  EXPECT_NEAR(block.tick(0.0005).force.z, 0.1, 1e-12);
-  EXPECT_NEAR(block.tick(0.001).force.z, 0.2, 1e-12);
-  EXPECT_NEAR(block.tick(0.0015).force.z, 0.7, 1e-12);
-  EXPECT_NEAR(block.tick(0.004).force.z, 0.2 + 1 + 0.1, 1e-12);
-}
 
 TEST(Friction, SticksBelowTheStaticAndSlidesAtTheDynamicCoefficient) {
   Block block(frictional(0.5, 0.3));

@@ -67,14 +67,12 @@ class Explain : public ::testing::TestWithParam<const Renderer*> {};
 
 TEST_P(Explain, EachMaterialPropertyIsALineOfItsOwn) {
   const Renderer& renderer = *GetParam();
-  stimuli::Material damped, rough, layered, soft;
+  stimuli::Material damped, rough, soft;
   damped.damping = 2;
   rough.friction_static = rough.friction_dynamic = 0.4;
-  layered.layers = {{0.001, 200}};
   soft.stiffness = 100;
   EXPECT_EQ(changed_by_material(damped, renderer), Names{"damping"});
   EXPECT_EQ(changed_by_material(rough, renderer), Names{"friction"});
-  EXPECT_EQ(changed_by_material(layered, renderer), Names{"layers"});
   EXPECT_EQ(changed_by_material(soft, renderer), Names{});
 }
 
@@ -89,7 +87,7 @@ TEST_P(Explain, SeveralPartsAndCompoundsAndFarObjects) {
   };
   const auto one = explain(scene_of({here}, renderer), renderer);
   EXPECT_EQ(changed(one, with(1, 0.05)), Names{"several parts"});
-  EXPECT_EQ(changed(with(1, 0.05), with(0, 0.05)), Names{"parts of one object"});
+  EXPECT_EQ(changed(with(1, 0.05), with(0, 0.05)), Names{"unions and tools"});
   const auto near = with(1, 0.05), far = with(1, 5);
   ASSERT_EQ(near.size(), far.size());
   for (std::size_t i = 0; i < near.size(); ++i) {
@@ -128,7 +126,6 @@ TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
     if (all) {
       object.material.damping = 2;
       object.material.friction_static = object.material.friction_dynamic = 0.3;
-      object.material.layers = {{0.001, 200}};
     }
     const Scene scene = all ? scene_of({object, other}, renderer) : scene_of({object}, renderer);
     std::map<std::string, bool> runs{{kTickInContact, true}, {kTickInFreeSpace, true}};
