@@ -169,7 +169,8 @@ bool outward_facet(const CastMesh& part, ContactFeature start, const Vec3& tip, 
   for (std::size_t step = 0; step < most; ++step) {
     const double rate = glm::dot(at.normal, way);
     if (!(rate > 0)) return false;
-    const double earlier = step == 0 ? time + at.depth / rate : std::min(time, time + at.depth / rate);
+    const double earlier =
+        step == 0 ? time + at.depth / rate : std::min(time, time + at.depth / rate);
     if (earlier < 1 && step > 0 && !(earlier < time) && ++stalled > kStalledSteps) return false;
     time = earlier;
     if (time < 1) {
@@ -224,7 +225,8 @@ WalkResult located(const CastMesh& part, ContactFeature start, const Vec3& tip, 
   // Inside: the facet on whose side it was holds it.
   WalkResult at =
       walked<kSegment>(part.mesh, start.kind != Kind::none ? start : feature_of(outward), tip, d);
-  if (at.not_converged || at.capped) [[unlikely]] at = scanned<kSegment>(part, tip, d);
+  if (at.not_converged || at.capped) [[unlikely]]
+    at = scanned<kSegment>(part, tip, d);
   return at;
 }
 
@@ -278,8 +280,8 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
 double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,
                     const Vec3& d) {
   if (is_point(mesh, d))
-    return minkowski::distance_off<false>(
-        mesh, measured<false>(mesh, feature, tip, Vec3(0)), tip, Vec3(0));
+    return minkowski::distance_off<false>(mesh, measured<false>(mesh, feature, tip, Vec3(0)), tip,
+                                          Vec3(0));
   return minkowski::distance_off<true>(mesh, measured<true>(mesh, feature, tip, d), tip, d);
 }
 

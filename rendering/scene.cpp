@@ -25,13 +25,14 @@ void bring_together(std::vector<SceneObject>& objects) {
   for (const SceneObject& object : objects) {
     const auto found = std::find(seen.begin(), seen.end(), key(object));
     apart |= found != seen.end() && *found != seen.back();
-    if (found == seen.end()) seen.push_back(key(object));
-    else if (apart) break;
+    if (found == seen.end())
+      seen.push_back(key(object));
+    else if (apart)
+      break;
   }
   if (!apart) return;
-  std::stable_sort(
-      objects.begin(), objects.end(),
-      [&](const SceneObject& a, const SceneObject& b) { return key(a) < key(b); });
+  std::stable_sort(objects.begin(), objects.end(),
+                   [&](const SceneObject& a, const SceneObject& b) { return key(a) < key(b); });
 }
 
 /// The margin by which the law sees a part larger.
@@ -177,8 +178,8 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
     double gap = HUGE_VAL;
     for (std::size_t j = 0; j < placed.count; ++j) {
       const Vec3 from = tool.tip + placed.segments[j].from;
-      gap = std::min(gap, distance_to_segment(part.sphere_centre,
-                                              {from, from + placed.segments[j].along}));
+      gap = std::min(
+          gap, distance_to_segment(part.sphere_centre, {from, from + placed.segments[j].along}));
     }
     gap -= part.sphere_radius;
     const bool in_contact = state.parts[i].feature.kind != ContactFeature::Kind::none;

@@ -48,7 +48,7 @@ struct ScenePart {
 
   int layer = 0;
   double break_force = std::numeric_limits<double>::infinity();  ///< N; of its layer
-  std::uint32_t group = 0;  ///< index in Scene::groups()
+  std::uint32_t group = 0;                                       ///< index in Scene::groups()
 
   // For unions and tools (union_contact.h): the law sees the part larger by a margin, far above
   // rounding and far below what is felt, so that parts that abut leave no crack. Instead of the
@@ -96,7 +96,7 @@ struct PartState {
   ContactFeature nearby;      ///< not in contact: the feature of a recent separating plane, if any
   std::uint32_t support = 0;  ///< vertex that the last search for a separating plane ended on
   bool started_inside = false;  ///< the trial began inside: no force until the probe has left once
-  FrictionState friction;  ///< where the material has friction
+  FrictionState friction;       ///< where the material has friction
 };
 
 /// A renderer's whole memory between ticks. Copy it to replay from here.
@@ -110,7 +110,7 @@ struct RenderState {
   /// Of the tool, world frame, where the caller senses it: written before a tick. Its part at right
   /// angles to the stylus is +x. Zero: +x is carried along by the smallest rotation.
   Vec3 measured_side;
-  UnionMemory unions;  ///< empty where the scene has none
+  UnionMemory unions;                   ///< empty where the scene has none
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
 };
 

@@ -196,8 +196,8 @@ void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
     found.group = group;
     load(std::span<LoadedContact, 1>(&found.loaded, 1));
     found.shift = found.loaded.normal_displacement * found.loaded.contact.normal;
-    found.place = plain.probe.tip + found.loaded.probe_fraction * (plain.probe.tail - plain.probe.tip) +
-                  found.shift;
+    found.place = plain.probe.tip +
+                  found.loaded.probe_fraction * (plain.probe.tail - plain.probe.tip) + found.shift;
     const LineProbe& last = state.has_last ? state.last : plain.probe;
     found.motion = (1 - found.loaded.probe_fraction) * (plain.probe.tip - last.tip) +
                    found.loaded.probe_fraction * (plain.probe.tail - last.tail);
@@ -212,9 +212,9 @@ Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe&
   UnionMemory& all = state.unions;
   ToolPose tool{probe.tip, probe.tail - probe.tip};
   if (scene.tool() != nullptr) {
-    if (!within_range(state.measured_side))
-      return no_contact(state.last, render_fault::kNonFinite);
-    tool.frame = tool_frame(tool.d, state.has_last ? &all.last.frame : nullptr, state.measured_side);
+    if (!within_range(state.measured_side)) return no_contact(state.last, render_fault::kNonFinite);
+    tool.frame =
+        tool_frame(tool.d, state.has_last ? &all.last.frame : nullptr, state.measured_side);
   }
   update_near_parts(scene, state, probe, tool, Probe::kSegment);
   Tick<Probe> plain{scene, state, probe, Probe::kSegment ? glm::length(tool.d) : 0};

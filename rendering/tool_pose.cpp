@@ -43,8 +43,8 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured) {
   const Vec3 axis = length > 0 ? d / length : before != nullptr ? (*before)[2] : Vec3(0, 0, 1);
   Vec3 side;
   const bool sensed = perpendicular(measured, axis, side);
-  if (!sensed && !(before != nullptr &&
-                   perpendicular(carried((*before)[0], (*before)[2], axis), axis, side)))
+  if (!sensed &&
+      !(before != nullptr && perpendicular(carried((*before)[0], (*before)[2], axis), axis, side)))
     perpendicular(least_along(axis), axis, side);
   return {side, glm::cross(axis, side), axis};
 }

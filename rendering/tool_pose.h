@@ -14,7 +14,7 @@ namespace palpate::rendering {
 /// The stylus and the frame of what it carries.
 struct ToolPose {
   Vec3 tip;
-  Vec3 d;               ///< tail - tip
+  Vec3 d;                ///< tail - tip
   Mat3 frame = Mat3(1);  ///< columns: +x (the side), +y, +z (tip to tail); without a tool unused
 };
 

@@ -135,8 +135,8 @@ class IdealTool {
 
   template <class Visit>
   void visit_near_parts(const Visit& visit) const;
-  bool separated(const NearPair& near, const ToolPose& a, const PlacedTool& at_a,
-                 const ToolPose& b, const PlacedTool& at_b, double by);
+  bool separated(const NearPair& near, const ToolPose& a, const PlacedTool& at_a, const ToolPose& b,
+                 const PlacedTool& at_b, double by);
   void collect(const ToolPose& from, const PlacedTool& placed_from, double motion, double reach);
   void orient(const PlacedTool& oriented);
   Vec3 local(const NearPair& near, const Vec3& y) const {
@@ -297,9 +297,8 @@ ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   Entry first;
   const NearPair* at = nullptr;
   for (NearPair& near : all_.near) {
-    const Entry entry =
-        sweep(near, shrunk(near, from.tip, before.segments[near.segment]),
-              shrunk(near, tick_.tool.tip, after.segments[near.segment]));
+    const Entry entry = sweep(near, shrunk(near, from.tip, before.segments[near.segment]),
+                              shrunk(near, tick_.tool.tip, after.segments[near.segment]));
     if (!entry.entered) continue;
     state_of(near).feature = entry.feature;
     if (entry.time >= first.time) continue;
@@ -315,8 +314,8 @@ ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   const WalkResult contact =
       measure(*part_of(*at).mesh, first.feature, local.tip, local.tail - local.tip);
   const Vec3 grasp = segment.from + contact.probe_fraction * segment.along;
-  memory_.grasp = carried_ != nullptr ? glm::transpose(pose.frame) * grasp
-                                      : Vec3(0, 0, contact.probe_fraction);
+  memory_.grasp =
+      carried_ != nullptr ? glm::transpose(pose.frame) * grasp : Vec3(0, 0, contact.probe_fraction);
   return pose;
 }
 
@@ -359,7 +358,8 @@ void IdealTool::turn(const ToolPose& from) {
                        glm::length(start + after.segments[j].along - before.segments[j].along)});
   }
   const double far = kFarPush * motion + 4 * group_.skin;
-  const double reach = glm::length(from.tip - tick_.tool.tip) + glm::length(shift) + 2 * motion + far;
+  const double reach =
+      glm::length(from.tip - tick_.tool.tip) + glm::length(shift) + 2 * motion + far;
   collect(from, before, reach, reach);
   if (motion == 0) {
     pose_ = tick_.tool;
@@ -500,8 +500,7 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   const Vec3 way = goal - at_;
   const double rate = glm::dot(plane.normal, way);
   const double height = glm::dot(plane.normal, at_) - plane.depth;
-  const double time =
-      rate < 0 ? std::clamp((height - group_.skin) / -rate, 0.0, hit.time) : 0.0;
+  const double time = rate < 0 ? std::clamp((height - group_.skin) / -rate, 0.0, hit.time) : 0.0;
   at_ += time * way;
   if (time * glm::length(way) > kSamePlace * group_.skin) let_go_of_planes();
   NearPair& near = all_.near[index];
@@ -510,11 +509,12 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   plane.stays = near.parted > 0 && glm::dot(apart, apart) <= same * same;
   near.carries = true;
   state_of(near).feature = plane.feature;
-  if (planes_.full()) planes_.remove_if([&](const Plane& old) {
-    if (old.multiplier > 0) return false;
-    all_.near[old.near].carries = false;
-    return true;
-  });
+  if (planes_.full())
+    planes_.remove_if([&](const Plane& old) {
+      if (old.multiplier > 0) return false;
+      all_.near[old.near].carries = false;
+      return true;
+    });
   if (planes_.full()) {
     near.carries = false;
     stuck_ = true;
@@ -573,8 +573,9 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   const auto point_of = [&](const PlacedTool& tool) {
     return tool.segments[near.segment].from + c.probe_fraction * tool.segments[near.segment].along;
   };
-  out.motion = tick_.state.has_last ? tick_.tool.tip - all_.last.tip + point_of(now) - point_of(before)
-                                    : Vec3(0);
+  out.motion = tick_.state.has_last
+                   ? tick_.tool.tip - all_.last.tip + point_of(now) - point_of(before)
+                   : Vec3(0);
   out.group = index_;
   out.pair = near.pair;
   out.segment = static_cast<int>(near.segment);
@@ -618,8 +619,7 @@ void IdealTool::remember(std::size_t first_contact) {
     const ScenePart& part = part_of(near);
     const Vec3 tip = near.true_tip + part.local_vector(at_);
     const WalkResult at = measure(*part.mesh, state.feature, tip, near.true_d);
-    const double lower =
-        std::min(glm::dot(at.normal, tip), glm::dot(at.normal, tip + near.true_d));
+    const double lower = std::min(glm::dot(at.normal, tip), glm::dot(at.normal, tip + near.true_d));
     state.plane = {at.normal, lower + at.depth, at.depth < 0};
   }
   const double angle = angle_between(carried_, pose_, tick_.tool);
@@ -636,8 +636,9 @@ void IdealTool::remember(std::size_t first_contact) {
     const PlacedContact& c = all_.contacts[i];
     const double share = c.loaded.normal_displacement;
     weight += share;
-    grasp += share * (carried_ != nullptr ? glm::transpose(pose_.frame) * (c.place - c.shift - tick_.tool.tip)
-                                          : Vec3(0, 0, c.loaded.probe_fraction));
+    grasp += share * (carried_ != nullptr
+                          ? glm::transpose(pose_.frame) * (c.place - c.shift - tick_.tool.tip)
+                          : Vec3(0, 0, c.loaded.probe_fraction));
   }
   if (weight > 0) memory_.grasp = grasp / weight;
 }
@@ -663,10 +664,8 @@ bool IdealTool::virtual_inside() {
   collect(tick_.tool, now, 0, 0);
   orient(now);
   for (NearPair& near : all_.near) {
-    const WalkResult at =
-        locate(mesh_of(near), state_of(near).feature, near.true_tip, near.true_d);
-    state_of(near).feature =
-        at.feature.kind != Kind::none ? at.feature : at.separating_feature;
+    const WalkResult at = locate(mesh_of(near), state_of(near).feature, near.true_tip, near.true_d);
+    state_of(near).feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;
     if (at.feature.kind != Kind::none && at.depth > part_of(near).tolerance) return true;
   }
   return false;

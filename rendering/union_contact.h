@@ -21,8 +21,8 @@
 namespace palpate::rendering {
 
 /// An ideal tool that is farther behind the stylus in turning (5 degrees, in rad) for longer than
-/// this (s) is hooked, and is let go of. Less is a wedge that is passed or a rattle; more would be a
-/// tool that shows another direction than the hand feels.
+/// this (s) is hooked, and is let go of. Less is a wedge that is passed or a rattle; more would be
+/// a tool that shows another direction than the hand feels.
 inline constexpr double kMostLag = 0.0872664625997165;
 inline constexpr double kMostLagTime = 0.01;
 

@@ -7,10 +7,10 @@
 namespace palpate::rendering {
 namespace {
 
-/// The force for the device at the tail, where contacts may be off the stylus' axis: with u the unit
-/// vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion about
-/// u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's lever along
-/// u, which is r_i may be negative or beyond L.
+/// The force for the device at the tail, where contacts may be off the stylus' axis: with u the
+/// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion
+/// about u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's
+/// lever along u, which is r_i may be negative or beyond L.
 Vec3 tail_force(const Vec3& torque, double along, const Vec3& d) {
   const double length = glm::length(d);
   if (!(length > 0)) return Vec3(0);
@@ -30,8 +30,8 @@ Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
   const double length = glm::length(tick.tool.d);
   double along = 0;  // N m, sum of each contact's lever times its force along the stylus
   for (const PlacedContact& c : all.contacts) {
-    const Vec3 force = c.loaded.force * c.loaded.contact.normal +
-                       c.loaded.stiffness * c.loaded.tangential_offset;
+    const Vec3 force =
+        c.loaded.force * c.loaded.contact.normal + c.loaded.stiffness * c.loaded.tangential_offset;
     out.force += force;
     if (tick.sides) {
       const Vec3 lever = c.place + c.loaded.tangential_offset - probe.tip;

@@ -23,8 +23,8 @@ struct PartGroup {
   std::uint32_t first_pair = 0;  ///< of part k and segment j: first_pair + k * segments + j
   std::uint32_t object_state = 0;
   int object = 0;
-  bool by_law = false;     ///< else a single part without a tool, which the walk alone renders
-  double skin = 0;         ///< m; the ideal tool keeps this distance from what it rests on
+  bool by_law = false;  ///< else a single part without a tool, which the walk alone renders
+  double skin = 0;      ///< m; the ideal tool keeps this distance from what it rests on
   double break_force = std::numeric_limits<double>::infinity();  ///< N
 };
 
@@ -38,8 +38,8 @@ struct PairState {
 
 /// One ideal tool.
 struct GroupState {
-  ToolPose ideal;           ///< where `touching`; else the ideal tool is the virtual one
-  Vec3 grasp;               ///< m, mean contact place in the tool's frame; about it the tool turns
+  ToolPose ideal;  ///< where `touching`; else the ideal tool is the virtual one
+  Vec3 grasp;      ///< m, mean contact place in the tool's frame; about it the tool turns
   bool touching = false;
   double lag = 0;           ///< rad, by which it is behind the virtual tool in turning
   bool giving_way = false;  ///< a layer that broke: its force falls, until the object is left
@@ -91,14 +91,14 @@ struct UnionMemory {
   std::vector<PairState> pairs;
   std::vector<GroupState> groups;
   std::vector<ObjectState> objects;
-  std::vector<NearPair> near;            ///< of the group in hand
-  std::vector<PlacedContact> contacts;   ///< of the last tick
-  std::vector<RubbedPair> rubbed;        ///< at the last tick
-  ToolPose last;                         ///< the virtual tool at the last tick
-  ToolPose near_pose;                    ///< the same when the list of near parts was rebuilt
-  bool exceptions = false;               ///< some object is off or behind, or some layer broken
-  double reach = 0;                      ///< m, from the virtual tool to the farthest ideal tool
-  std::uint64_t full_scans = 0;          ///< looks at all facets of a part, for rounding
+  std::vector<NearPair> near;           ///< of the group in hand
+  std::vector<PlacedContact> contacts;  ///< of the last tick
+  std::vector<RubbedPair> rubbed;       ///< at the last tick
+  ToolPose last;                        ///< the virtual tool at the last tick
+  ToolPose near_pose;                   ///< the same when the list of near parts was rebuilt
+  bool exceptions = false;              ///< some object is off or behind, or some layer broken
+  double reach = 0;                     ///< m, from the virtual tool to the farthest ideal tool
+  std::uint64_t full_scans = 0;         ///< looks at all facets of a part, for rounding
 };
 
 }  // namespace palpate::rendering

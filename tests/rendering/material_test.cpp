@@ -65,7 +65,6 @@ TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
   EXPECT_EQ(block.tick(0.0004).force.z, 0);  // 0.8 m/s out: 0.32 N of spring, 1.6 N of damping
 }
 
-
 TEST(Friction, SticksBelowTheStaticAndSlidesAtTheDynamicCoefficient) {
   Block block(frictional(0.5, 0.3));
   const double depth = 0.002, normal = 800 * depth;

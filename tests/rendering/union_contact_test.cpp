@@ -32,13 +32,15 @@ LineProbe upright(const Vec3& tip) { return {tip, tip + Vec3(0, 0, 0.1)}; }
 template <class Tick>
 Rendering press(const Vec3& tip, double from_height, const Tick& tick) {
   Rendering r;
-  for (double above = from_height; above > 0; above -= 1e-4) r = tick(upright(tip + Vec3(0, 0, above)));
+  for (double above = from_height; above > 0; above -= 1e-4)
+    r = tick(upright(tip + Vec3(0, 0, above)));
   return tick(upright(tip));
 }
 
 /// Two slopes of 30 degrees that abut exactly under the valley.
 std::vector<stimuli::PolygonSoup> valley() {
-  const double run = 0.06 * std::cos(std::numbers::pi / 6), rise = 0.06 * std::sin(std::numbers::pi / 6);
+  const double run = 0.06 * std::cos(std::numbers::pi / 6),
+               rise = 0.06 * std::sin(std::numbers::pi / 6);
   std::vector<stimuli::PolygonSoup> out;
   for (const double side : {-1.0, 1.0}) {
     stimuli::PolygonSoup block = box_soup({0, -0.1, -0.03}, {run, 0.1, 0});
@@ -92,9 +94,9 @@ TEST_P(UnionContact, GroovesOfAnyOpeningHoldTheTipInTheirApex) {
 }
 
 TEST_P(UnionContact, AStickInThePlaneOfAWallIsHeldByTheFloorAlone) {
-  const Scene scene(object_of({box_soup({-0.06, -0.1, -0.03}, {0.03, 0.1, 0}),
-                               box_soup({0, -0.1, 0}, {0.03, 0.1, 0.06})},
-                              {}, kSpring));
+  const Scene scene(object_of(
+      {box_soup({-0.06, -0.1, -0.03}, {0.03, 0.1, 0}), box_soup({0, -0.1, 0}, {0.03, 0.1, 0.06})},
+      {}, kSpring));
   RenderState state = scene.initial_state();
   Rendering r;
   for (double z = 0.02; z > -0.002; z -= 5e-5) {
@@ -145,8 +147,8 @@ TEST_P(UnionContact, CuttingAPartInTwoChangesNothing) {
       in_contact += a.contacts > 0;
       ++compared;
       ASSERT_LE(glm::length(a.force - b.force), 1e-12 * 0.06 * kSpring)
-          << "seed " << seed << ": " << a.force.x << " " << a.force.y << " " << a.force.z << ", cut "
-          << b.force.x << " " << b.force.y << " " << b.force.z;
+          << "seed " << seed << ": " << a.force.x << " " << a.force.y << " " << a.force.z
+          << ", cut " << b.force.x << " " << b.force.y << " " << b.force.z;
       if (a.deepest.type != ContactType::segment_face) {
         ASSERT_LE(glm::length(a.torque - b.torque), 1e-10) << "seed " << seed;
       }
@@ -163,16 +165,16 @@ std::vector<SceneObject> cluster(stimuli::Random& random, const Pose& pose = {},
     const auto edge = [&] { return 0.01 + 0.03 * random.unit(); };
     Vec3 half = 0.5 * Vec3(edge(), edge(), edge());
     if (random.below(4) == 0) half.z = 5e-4;  // a thin plate
-    stimuli::PolygonSoup soup = random.below(4) == 0
-                                    ? testing::random_polyhedron(random, 12, Vec3(0.02, 0.015, 0.01))
-                                    : box_soup(-half, half);
+    stimuli::PolygonSoup soup =
+        random.below(4) == 0 ? testing::random_polyhedron(random, 12, Vec3(0.02, 0.015, 0.01))
+                             : box_soup(-half, half);
     for (Vec3& v : soup.vertices) v *= scale;
     const Pose at{0.02 * scale * Vec3(random.normal(), random.normal(), random.normal()),
                   stimuli::uniform_rotation(random)};
     parts.push_back(testing::placed_object(
         testing::mesh_of(soup),
-        {pose.orientation * at.position + pose.position, pose.orientation * at.orientation}, kSpring,
-        0));
+        {pose.orientation * at.position + pose.position, pose.orientation * at.orientation},
+        kSpring, 0));
   }
   return parts;
 }
@@ -181,8 +183,8 @@ Tool random_tool(stimuli::Random& random, std::size_t segments, double scale = 1
   Tool tool;
   for (std::size_t j = 0; j < segments; ++j) {
     const Vec3 from = j == 0 ? Vec3(0) : tool.segments.back().to;
-    const Vec3 along = j == 0 ? Vec3(0, 0, 0.05)
-                              : 0.02 * Vec3(random.normal(), random.normal(), random.normal());
+    const Vec3 along =
+        j == 0 ? Vec3(0, 0, 0.05) : 0.02 * Vec3(random.normal(), random.normal(), random.normal());
     tool.segments.push_back({from, from + scale * along});
   }
   return tool;
@@ -292,7 +294,8 @@ TEST_P(UnionContact, AFastToolIsStoppedByAThinPlate) {
                                 pose, kSpring),
                       sides, random_tool(random, segments));
     RenderState state = scene.initial_state();
-    const Vec3 drift(0.004 * (random.unit() - 0.5), 0.004 * (random.unit() - 0.5), -0.005);  // m a tick
+    const Vec3 drift(0.004 * (random.unit() - 0.5), 0.004 * (random.unit() - 0.5),
+                     -0.005);  // m a tick
     Vec3 tip(0, 0, 0.16 + 0.005 * random.unit());
     Rendering r;
     for (int k = 0; k < 50; ++k, tip += drift) {
@@ -339,9 +342,9 @@ TEST_P(UnionContact, NothingIsAllocatedAndNoNaNGetsThrough) {
 }
 
 TEST_P(UnionContact, WhatBeginsInsideIsFeltOnceItHasBeenLeft) {
-  const Scene scene(object_of({box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}),
-                               box_soup({0, -0.05, -0.04}, {0.05, 0.05, 0})},
-                              {}, kSpring));
+  const Scene scene(object_of(
+      {box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}), box_soup({0, -0.05, -0.04}, {0.05, 0.05, 0})},
+      {}, kSpring));
   RenderState state = scene.initial_state();
   for (const double x : {-0.01, 0.01}) {  // in one part, then in the other
     const Rendering r = tick(scene, state, upright({x, 0, -0.01}));

@@ -76,9 +76,9 @@ inline std::vector<stimuli::PolygonSoup> cut_in_two(const stimuli::PolygonSoup& 
 }
 
 /// One object of these parts.
-inline std::vector<rendering::SceneObject> object_of(
-    const std::vector<stimuli::PolygonSoup>& parts, const Pose& pose = {}, double stiffness = 800,
-    int object = 0) {
+inline std::vector<rendering::SceneObject> object_of(const std::vector<stimuli::PolygonSoup>& parts,
+                                                     const Pose& pose = {}, double stiffness = 800,
+                                                     int object = 0) {
   std::vector<rendering::SceneObject> out;
   for (const auto& part : parts)
     out.push_back(placed_object(mesh_of(part), pose, stiffness, object));
