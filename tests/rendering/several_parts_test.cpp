@@ -3,22 +3,16 @@
 #include <gtest/gtest.h>
 
 #include "runner/bench/allocation_count.h"
-#include "tests/shared/random_mesh.h"
-#include "tests/shared/render_checks.h"
+#include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
 namespace {
 
+using testing::box;
 using testing::kTick;
 using testing::placed_object;
 
 constexpr double kSpring = 800;  // N/m
-
-std::shared_ptr<const stimuli::ConvexMesh> box(const Vec3& low, const Vec3& high) {
-  stimuli::PolygonSoup soup = stimuli::cube(1);
-  for (Vec3& v : soup.vertices) v = 0.5 * (low + high) + v * (high - low);
-  return std::make_shared<const stimuli::ConvexMesh>(soup);
-}
 
 /// A slab with its top at z = 0, from x = -50 to 50 mm, cut at these places, one object.
 Scene slab_cut_at(const std::vector<double>& cuts, double overlap = 0) {

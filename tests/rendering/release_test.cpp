@@ -1,0 +1,203 @@
+// Layers under a surface, layers that break, and hooks: what an object lets go of
+// (rendering/release.h).
+
+#include "rendering/release.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/shared/union_scenes.h"
+
+namespace palpate::rendering {
+namespace {
+
+using testing::box;
+using testing::box_soup;
+using testing::kTick;
+
+constexpr double kHalf = 0.03;  // m, of a cube
+
+/// A cube and the same cube moved inwards by each layer's depth.
+std::vector<SceneObject> layered_cube(double surface, const std::vector<stimuli::Layer>& layers,
+                                      bool in_two_parts) {
+  std::vector<SceneObject> parts;
+  const auto add = [&](int layer, double depth, double stiffness, double damping,
+                       std::optional<double> breaks) {
+    const double half = kHalf - depth;
+    std::vector<stimuli::PolygonSoup> solids{box_soup(Vec3(-half), Vec3(half))};
+    if (in_two_parts) solids = testing::cut_in_two(solids[0], Vec3(1, 0, 0), Vec3(0.001, 0, 0));
+    for (const auto& solid : solids) {
+      SceneObject part = testing::placed_object(testing::mesh_of(solid), {}, stiffness, 0);
+      part.layer = layer;
+      part.material.damping = damping;
+      if (breaks) part.break_force = *breaks;
+      parts.push_back(part);
+    }
+  };
+  add(0, 0, surface, 0, std::nullopt);
+  for (std::size_t i = 0; i < layers.size(); ++i)
+    add(static_cast<int>(i) + 1, layers[i].depth, layers[i].stiffness, layers[i].damping,
+        layers[i].break_force);
+  return parts;
+}
+
+LineProbe at_depth(double depth) {
+  return {{0.004, 0.003, kHalf - depth}, {0.004, 0.003, kHalf - depth + 0.1}};
+}
+
+class Layers : public ::testing::TestWithParam<bool> {};
+
+TEST_P(Layers, EachAddsItsSpringFromItsDepthOn) {
+  const std::vector<stimuli::Layer> layers{{0.001, 1000, 0, {}}, {0.002, 50, 0, {}}};
+  for (const double surface : {200.0, 0.0}) {
+    const Scene scene(layered_cube(surface, layers, GetParam()));
+    for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
+      RenderState state = scene.initial_state();
+      renderer->tick(scene, state, at_depth(-0.01), kTick);
+      for (double depth = 0; depth < 0.006; depth += 1e-4) {
+        const Rendering r = renderer->tick(scene, state, at_depth(depth), kTick);
+        double force = surface * depth;
+        for (const stimuli::Layer& layer : layers)
+          force += layer.stiffness * std::max(0.0, depth - layer.depth);
+        EXPECT_LE(glm::length(r.force - Vec3(0, 0, force)), 1e-9) << depth;
+        EXPECT_LE(glm::length(r.device1 + r.device2 - r.force), 1e-12);
+        if (depth > 1e-6) {
+          EXPECT_EQ(r.object, 0);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Layers, ALayersDampingActsInIt) {
+  const Scene scene(layered_cube(100, {{0.001, 500, 4, {}}}, GetParam()));
+  RenderState state = scene.initial_state();
+  ray_renderer().tick(scene, state, at_depth(-0.001), kTick);
+  ray_renderer().tick(scene, state, at_depth(0.0005), kTick);
+  EXPECT_NEAR(ray_renderer().tick(scene, state, at_depth(0.0006), kTick).force.z, 0.06, 1e-9);
+  ray_renderer().tick(scene, state, at_depth(0.002), kTick);
+  const double in = ray_renderer().tick(scene, state, at_depth(0.0021), kTick).force.z;
+  EXPECT_NEAR(in, 100 * 0.0021 + 500 * 0.0011 + 4 * 0.1, 1e-9);
+}
+
+TEST_P(Layers, ABrokenLayerFadesAndComesBackWhenTheObjectHasBeenLeft) {
+  constexpr double kBreaks = 1;  // N: 2 mm into the layer
+  const Scene scene(layered_cube(100, {{0.001, 500, 0, kBreaks}}, GetParam()));
+  RenderState state = scene.initial_state();
+  const auto tick = [&](double depth) {
+    return ray_renderer().tick(scene, state, at_depth(depth), kTick).force.z;
+  };
+  for (int round = 0; round < 2; ++round) {
+    tick(-0.005);
+    double last = 0, depth = 0;
+    for (; depth < 0.00299; depth += 1e-5) {
+      last = tick(depth);
+      ASSERT_NEAR(last, 100 * depth + 500 * std::max(0.0, depth - 0.001), 1e-9);
+    }
+    depth = 0.0031;
+    int ticks = 0;
+    for (; ticks < 60; ++ticks) {
+      const double force = tick(depth);
+      ASSERT_LE(std::abs(force - last), 0.06 + 1e-9) << ticks;  // 1.05 N in 20 ticks, and the step in depth
+      last = force;
+      if (std::abs(force - 100 * depth) < 1e-9) break;
+    }
+    EXPECT_GE(ticks * kTick, kFadeTime - 2 * kTick);
+    EXPECT_LE(ticks * kTick, kFadeTime + kTick);
+    // Out of the layer and in again, but not out of the object: still broken.
+    for (const double again : {0.002, 0.0005, 0.002, 0.004}) EXPECT_NEAR(tick(again), 100 * again, 1e-9);
+    EXPECT_EQ(tick(-0.001), 0);
+    EXPECT_NEAR(tick(0.002), 100 * 0.002 + 500 * 0.001, 1e-9);
+  }
+}
+
+TEST_P(Layers, WhoBeginsBetweenSurfaceAndLayerFeelsNeitherUntilTheObjectHasBeenLeft) {
+  const Scene scene(layered_cube(100, {{0.005, 500, 0, {}}}, GetParam()));
+  RenderState state = scene.initial_state();
+  for (const double depth : {0.002, 0.006, 0.008, 0.001}) {
+    const Rendering r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
+    EXPECT_EQ(r.force, Vec3(0));
+    EXPECT_EQ(r.faults, render_fault::kStartedInside);
+  }
+  ray_renderer().tick(scene, state, at_depth(-0.001), kTick);
+  const Rendering r = ray_renderer().tick(scene, state, at_depth(0.006), kTick);
+  EXPECT_NEAR(r.force.z, 100 * 0.006 + 500 * 0.001, 1e-9);
+  EXPECT_EQ(r.faults, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfOneAndOfTwoParts, Layers, ::testing::Bool(), [](const auto& parameter) {
+  return std::string(parameter.param ? "two" : "one");
+});
+
+/// A bar across the tip of a stylus, in a slot of 2 mm between two slabs, 30 mm deep.
+class Hook : public ::testing::Test {
+ protected:
+  static constexpr double kSlot = 0.001, kIn = 0.03, kSpring = 500;  // m, m, N/m
+
+  Hook()
+      : scene_({testing::placed_object(box({kSlot, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kSpring, 0),
+                testing::placed_object(box({-0.05, -0.05, -0.04}, {-kSlot, 0.05, 0}), {}, kSpring, 0)},
+               true, Tool{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, -0.01, 0}, {0, 0.01, 0}}}}),
+        state_(scene_.initial_state()) {}
+
+  /// Upright, the tip at x and a height over the slot, rolled about the stylus by an angle, rad.
+  Rendering tick(double x, double height, double roll) {
+    state_.measured_side = Vec3(std::cos(roll), std::sin(roll), 0);
+    return ray_renderer().tick(scene_, state_, {{x, 0, height}, {x, 0, height + 0.12}}, kTick);
+  }
+
+  void go_in() {
+    for (double height = 0.05; height > -kIn; height -= 5e-4) tick(0, height, 0);
+    for (double x = 0; x < kPulled; x += 1e-4) tick(x, -kIn, 0);
+  }
+
+  static constexpr double kPulled = 0.004;  // m
+  Scene scene_;
+  RenderState state_;
+};
+
+TEST_F(Hook, ATurnThatThePartsLockIsBoundedAndLetGoOfSmoothly) {
+  go_in();
+  Rendering r = tick(kPulled, -kIn, 0);
+  const double held = kSpring * (kPulled - kSlot);
+  EXPECT_NEAR(r.force.x, -held, 1e-9);
+  constexpr double kTurn = 2e-3;  // rad a tick
+  Vec3 last = r.force;
+  double worst_lag = 0;
+  int fading = 0;
+  for (double roll = 0; roll < 0.5; roll += kTurn) {
+    r = tick(kPulled, -kIn, roll);
+    ASSERT_LE(glm::length(r.force - last), 2 * held * kTick / kFadeTime) << "at " << roll;
+    last = r.force;
+    worst_lag = std::max(worst_lag, state_.unions.groups[0].lag);
+    fading += (r.faults & render_fault::kReleased) != 0 && r.contacts > 0;
+    EXPECT_TRUE((r.faults & ~render_fault::kReleased) == 0);
+  }
+  EXPECT_NEAR(fading * kTick, kFadeTime, 2 * kTick);
+  EXPECT_EQ(r.faults, render_fault::kReleased);
+  EXPECT_EQ(r.force, Vec3(0));
+  // The slot lets it turn by 0.1 rad; then it is behind by the largest lag for as long as it may
+  // be, and while the force fades.
+  EXPECT_GT(worst_lag, kMostLag);
+  EXPECT_LE(worst_lag, kMostLag + (kMostLagTime + kFadeTime + 3 * kTick) / kTick * kTurn);
+  // Once out of the object it is felt again.
+  tick(0, 0.05, 0.5);
+  EXPECT_EQ(tick(0, 0.05, 0).faults, 0u);
+  go_in();
+  r = tick(kPulled, -kIn, 0);
+  EXPECT_NEAR(r.force.x, -held, 1e-9);
+  EXPECT_EQ(r.faults, 0u);
+}
+
+TEST_F(Hook, WhatIsHeldStillBehindByLessIsNotLetGo) {
+  go_in();
+  const double roll = 0.1 + 0.8 * kMostLag;
+  for (double turned = 0; turned < roll; turned += 2e-3) tick(kPulled, -kIn, turned);
+  Rendering r;
+  for (int i = 0; i < 2000; ++i) r = tick(kPulled, -kIn, roll);
+  EXPECT_EQ(r.faults, 0u);
+  EXPECT_GT(state_.unions.groups[0].lag, 0.5 * kMostLag);
+  EXPECT_GT(glm::length(r.force), 1);
+}
+
+}  // namespace
+}  // namespace palpate::rendering
