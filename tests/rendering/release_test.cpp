@@ -97,14 +97,16 @@ TEST_P(Layers, ABrokenLayerFadesAndComesBackWhenTheObjectHasBeenLeft) {
     int ticks = 0;
     for (; ticks < 60; ++ticks) {
       const double force = tick(depth);
-      ASSERT_LE(std::abs(force - last), 0.06 + 1e-9) << ticks;  // 1.05 N in 20 ticks, and the step in depth
+      ASSERT_LE(std::abs(force - last), 0.06 + 1e-9)
+          << ticks;  // 1.05 N in 20 ticks, and the step in depth
       last = force;
       if (std::abs(force - 100 * depth) < 1e-9) break;
     }
     EXPECT_GE(ticks * kTick, kFadeTime - 2 * kTick);
     EXPECT_LE(ticks * kTick, kFadeTime + kTick);
     // Out of the layer and in again, but not out of the object: still broken.
-    for (const double again : {0.002, 0.0005, 0.002, 0.004}) EXPECT_NEAR(tick(again), 100 * again, 1e-9);
+    for (const double again : {0.002, 0.0005, 0.002, 0.004})
+      EXPECT_NEAR(tick(again), 100 * again, 1e-9);
     EXPECT_EQ(tick(-0.001), 0);
     EXPECT_NEAR(tick(0.002), 100 * 0.002 + 500 * 0.001, 1e-9);
   }
@@ -134,9 +136,10 @@ class Hook : public ::testing::Test {
   static constexpr double kSlot = 0.001, kIn = 0.03, kSpring = 500;  // m, m, N/m
 
   Hook()
-      : scene_({testing::placed_object(box({kSlot, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kSpring, 0),
-                testing::placed_object(box({-0.05, -0.05, -0.04}, {-kSlot, 0.05, 0}), {}, kSpring, 0)},
-               true, Tool{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, -0.01, 0}, {0, 0.01, 0}}}}),
+      : scene_(
+            {testing::placed_object(box({kSlot, -0.05, -0.04}, {0.05, 0.05, 0}), {}, kSpring, 0),
+             testing::placed_object(box({-0.05, -0.05, -0.04}, {-kSlot, 0.05, 0}), {}, kSpring, 0)},
+            true, Tool{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, -0.01, 0}, {0, 0.01, 0}}}}),
         state_(scene_.initial_state()) {}
 
   /// Upright, the tip at x and a height over the slot, rolled about the stylus by an angle, rad.
