@@ -23,6 +23,7 @@ namespace po = boost::program_options;
 
 struct SimulateSettings {
   std::string protocol, database;
+  int version = kDefaultParticipantVersion;
   std::string patch;  ///< file of a JSON merge patch on the simulated participant; empty: none
   StudyPlan plan;
 };
@@ -56,14 +57,21 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
        "of the participants; the order of trials follows the protocol's own seed")  //
       ("jobs", po::value(&plan.jobs)->default_value(plan.jobs)->value_name("J"),
        "sessions simulated at a time")  //
+      ("participant-version",
+       po::value(&settings.version)->default_value(settings.version)->value_name("1|2|3"),
+       "of the simulated participant; each is frozen")  //
       ("settings", po::value(&settings.patch)->value_name("FILE"),
-       "JSON merge patch on the frozen settings of the simulated participant, for ablations");
+       "JSON merge patch on the settings of that version, for ablations");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
   if (plan.participants < 1 || plan.participants > 100000)
     throw UsageError("--participants: must be 1 to 100000");
   if (plan.jobs < 1 || plan.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
+  const std::vector<int> versions = participant_versions();
+  if (std::find(versions.begin(), versions.end(), settings.version) == versions.end()) {
+    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+  }
   settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
   return settings;
 }
@@ -104,7 +112,7 @@ int simulate_command(const std::vector<std::string>& args) {
   if (!given) return 0;
   StudyPlan& plan = given->plan;
   protocols::Protocol protocol = protocols::parse_protocol(given->protocol);
-  const SimulatedSettings simulated = load_simulated_settings(given->patch);
+  const SimulatedSettings simulated = load_simulated_settings(given->patch, given->version);
   fit_to_simulation(protocol, simulated, plan);  // first: what is refused leaves no database behind
   data::Store store = data::Store::open(given->database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());

@@ -17,6 +17,10 @@ inline constexpr int kMostHalvings = 20;
 struct Deepest {
   float distance[ShapeHypotheses::kBlock];  // m
   float cosine[ShapeHypotheses::kBlock];    // outward normal . perceived direction
+  float along[ShapeHypotheses::kBlock];     // m from the line's start
+  float x[ShapeHypotheses::kBlock];         // unit outward normal, in the shape's own frame
+  float y[ShapeHypotheses::kBlock];
+  float z[ShapeHypotheses::kBlock];
 };
 
 template <class ShapeLine>
@@ -25,6 +29,10 @@ void find_at_tip(const ShapeLine& shape, Deepest& out) {
     const SurfacePoint p = shape.surface(i, 0.0f);
     out.distance[i] = p.distance;
     out.cosine[i] = shape.cosine(i, p.normal);
+    out.along[i] = 0.0f;
+    out.x[i] = p.normal.x;
+    out.y[i] = p.normal.y;
+    out.z[i] = p.normal.z;
   }
 }
 
@@ -84,6 +92,10 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
     const float size = std::sqrt(lane::max(dot(n, n), 1e-12f));
     out.distance[i] = a.distance[i] + falling * meet;
     out.cosine[i] = shape.cosine(i, n) / size;
+    out.along[i] = middle[i] - reach + meet;
+    out.x[i] = n.x / size;
+    out.y[i] = n.y / size;
+    out.z[i] = n.z / size;
   }
 }
 

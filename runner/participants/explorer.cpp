@@ -45,6 +45,9 @@ HandTarget Explorer::begin(stimuli::Random random) {
   now_ = 0;
   draw_approach();
   motion_ = Motion::approach;
+  last_contact_ = {};
+  since_choice_ = settings_.heading.interval;
+  turn_left_ = 0;
   tip_ = start_;
   axis_ = goal_axis_;
   return {tip_ + grip_ * axis_, Vec3(0), axis_};
@@ -78,7 +81,9 @@ HandTarget Explorer::step(const TouchState& now, const rendering::LineProbe& sty
 
 Vec3 Explorer::velocity(const TouchState& known) {
   const auto& motor = settings_.motor;
+  if (known.contact) last_contact_ = known;
   left_ -= tick_;
+  since_choice_ += tick_;
   switch (motion_) {
     case Motion::approach:
       if (known.contact) {
@@ -106,9 +111,7 @@ Vec3 Explorer::velocity(const TouchState& known) {
         left_ = -motor.mean_follow * std::log(1 - random_.unit());
         return slide(known);
       }
-      heading_ = unit_or(
-          heading_ + settings_.search.pull_to_centre * tick_ * unit_or(-tip_, Vec3(0)), heading_);
-      return motor.slide_speed * heading_;
+      return search();
     case Motion::retreat:
       return move_to_start();
   }
@@ -117,10 +120,42 @@ Vec3 Explorer::velocity(const TouchState& known) {
   return move_to_start();
 }
 
+Vec3 Explorer::search() {
+  const double speed = settings_.motor.slide_speed;
+  const Vec3 to_centre = unit_or(-tip_, Vec3(0));
+  turn_left_ = 0;
+  switch (settings_.search.after_loss) {
+    case AfterLoss::press_on:
+      return speed * unit_or(-last_contact_.normal + settings_.search.press_on_pull * to_centre,
+                             Vec3(0, 0, -1));
+    case AfterLoss::turn_to_centre:
+      heading_ = unit_or(heading_ + settings_.search.pull_to_centre * tick_ * to_centre, heading_);
+      break;
+  }
+  return speed * heading_;
+}
+
+bool Explorer::wants_heading() const {
+  // Half a tick: the sum of many ticks is the interval but for roundings.
+  return settings_.heading.chosen && motion_ == Motion::follow &&
+         since_choice_ > settings_.heading.interval - tick_ / 2;
+}
+
+void Explorer::turn_to(const Vec3& heading) {
+  const double across = glm::dot(glm::cross(heading_, heading), last_contact_.normal);
+  turn_rate_ = std::atan2(across, glm::dot(heading_, heading)) / settings_.heading.turning_time;
+  turn_left_ = settings_.heading.turning_time;
+  since_choice_ = 0;
+}
+
 Vec3 Explorer::slide(const TouchState& known) {
   const double speed = settings_.motor.slide_speed;
   // A random walk of the heading in the surface whose correlation fades as exp(-t / heading_time).
-  const double turn = std::sqrt(2 * tick_ / settings_.motor.heading_time) * random_.normal();
+  double turn = std::sqrt(2 * tick_ / settings_.motor.heading_time) * random_.normal();
+  if (turn_left_ > 0) {
+    turn += turn_rate_ * std::min(tick_, turn_left_);
+    turn_left_ -= tick_;
+  }
   heading_ -= glm::dot(heading_, known.normal) * known.normal;
   heading_ = unit_or(heading_, any_perpendicular(known.normal));
   heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(known.normal, heading_);

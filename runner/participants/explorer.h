@@ -1,7 +1,8 @@
 #pragma once
 // The exploration of a simulated hand: it approaches from above, slides over the surface in a
 // randomly changing direction with light pressure, lifts off and approaches again. It senses
-// contact with a reaction delay and knows nothing of the shape.
+// contact with a reaction delay and knows nothing of the shape. Where its headings are chosen, who
+// believes something of the shape tells it where to turn to.
 
 #include <cstdint>
 #include <vector>
@@ -31,11 +32,21 @@ class Explorer {
   /// the reaction delay.
   HandTarget step(const TouchState& now, const rendering::LineProbe& stylus);
 
+  /// Whether it slides and a heading is to be chosen (settings.heading); until the next turn_to.
+  bool wants_heading() const;
+  /// Normal of the contact that it knows of, and its heading across it; unit. While it slides.
+  const Vec3& known_normal() const { return last_contact_.normal; }
+  const Vec3& heading() const { return heading_; }
+  /// Turns from the present heading to this one, both across the known normal, in
+  /// settings.heading.turning_time.
+  void turn_to(const Vec3& heading);
+
  private:
   enum class Motion { approach, follow, search, retreat };
 
   void draw_approach();
   Vec3 velocity(const TouchState& known);
+  Vec3 search();
   Vec3 slide(const TouchState& known);
   Vec3 move_to_start();
   void turn_axis();
@@ -53,6 +64,9 @@ class Explorer {
   Vec3 tip_, axis_{0, 0, 1};               ///< target pose
   Vec3 start_, aim_, goal_axis_{0, 0, 1};  ///< of the approach
   Vec3 heading_;                           ///< unit
+  TouchState last_contact_;                ///< that it knows of
+  double since_choice_ = 0;                ///< s
+  double turn_rate_ = 0, turn_left_ = 0;   ///< rad/s and s, of a turn to a chosen heading
   double left_ = 0;                        ///< s left of this motion
 };
 

@@ -136,6 +136,31 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
   }
 }
 
+ShapeHypotheses ShapeHypotheses::one_block_each(const ShapeHypotheses& all) {
+  ShapeHypotheses few;
+  for (Shape shape : all.shapes_) {
+    const int from = shape.first;
+    shape.first = static_cast<int>(few.shapes_.size()) * kBlock;
+    shape.count = kBlock;
+    few.shapes_.push_back(shape);
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float value = all.axes_[a][c][static_cast<std::size_t>(from)];
+        few.axes_[a][c].insert(few.axes_[a][c].end(), kBlock, value);
+      }
+    }
+  }
+  return few;
+}
+
+void ShapeHypotheses::copy_rotation(int to, const ShapeHypotheses& all, int from) {
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      axes_[a][c][static_cast<std::size_t>(to)] = all.axes_[a][c][static_cast<std::size_t>(from)];
+    }
+  }
+}
+
 Mat3 ShapeHypotheses::rotation(int hypothesis) const {
   Mat3 r;
   for (int a = 0; a < 3; ++a) {

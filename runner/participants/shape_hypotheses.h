@@ -37,6 +37,13 @@ class ShapeHypotheses {
   /// or has a size that is not positive; also for an empty list.
   explicit ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli);
 
+  /// One block for every shape of `all`, to be filled by copy_rotation: for questions about a few
+  /// of its hypotheses. All are the first of their shape until then.
+  static ShapeHypotheses one_block_each(const ShapeHypotheses& all);
+  /// Hypothesis `to` of this becomes hypothesis `from` of `all`, of the same shape. Does not
+  /// allocate.
+  void copy_rotation(int to, const ShapeHypotheses& all, int from);
+
   const std::vector<Shape>& shapes() const { return shapes_; }
 
   int padded_size() const { return static_cast<int>(axes_[0][0].size()); }
@@ -48,6 +55,7 @@ class ShapeHypotheses {
   Mat3 rotation(int hypothesis) const;
 
  private:
+  ShapeHypotheses() = default;
   void append(const stimuli::ObjectSpec& stimulus);
 
   std::vector<Shape> shapes_;

@@ -8,6 +8,7 @@
 //   surface(i, s)   distance and unit outward normal, in a frame that the class chooses
 //   along(i)        the line's direction in that frame
 //   cosine(i, v)    scalar product of a vector of that frame with the perceived direction
+//   world(i, v)     a vector of that frame in the world frame
 
 #include <cmath>
 
@@ -63,6 +64,7 @@ class SphereLine {
   }
   FloatVec along(int /*i*/) const { return line_.along; }
   float cosine(int /*i*/, const FloatVec& v) const { return dot(v, line_.direction); }
+  FloatVec world(int /*i*/, const FloatVec& v) const { return v; }
 
  private:
   FloatVec at(float s) const {
@@ -79,7 +81,7 @@ class CubeLine {
  public:
   CubeLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
            const Line& line)
-      : half_(shape.half_size) {
+      : hypotheses_(&hypotheses), first_(first), half_(shape.half_size) {
     for (int a = 0; a < 3; ++a) {
       const float* x = hypotheses.axis_component(a, 0) + first;
       const float* y = hypotheses.axis_component(a, 1) + first;
@@ -111,6 +113,14 @@ class CubeLine {
   float cosine(int i, const FloatVec& v) const {
     return v.x * direction_[0][i] + v.y * direction_[1][i] + v.z * direction_[2][i];
   }
+  FloatVec world(int i, const FloatVec& v) const {
+    const auto component = [&](int c) {
+      return v.x * hypotheses_->axis_component(0, c)[first_ + i] +
+             v.y * hypotheses_->axis_component(1, c)[first_ + i] +
+             v.z * hypotheses_->axis_component(2, c)[first_ + i];
+    };
+    return {component(0), component(1), component(2)};
+  }
 
  private:
   FloatVec at(int i, float s) const {
@@ -132,6 +142,8 @@ class CubeLine {
     return {x * lane::sign(p.x), y * lane::sign(p.y), z * lane::sign(p.z)};
   }
 
+  const ShapeHypotheses* hypotheses_;
+  int first_;
   float half_;
   float start_[3][ShapeHypotheses::kBlock];
   float along_[3][ShapeHypotheses::kBlock];
@@ -204,6 +216,7 @@ class AxialLine {
   }
   FloatVec along(int /*i*/) const { return line_.along; }
   float cosine(int /*i*/, const FloatVec& v) const { return dot(v, line_.direction); }
+  FloatVec world(int /*i*/, const FloatVec& v) const { return v; }
 
  private:
   float radius(int i, float t) const {

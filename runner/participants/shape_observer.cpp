@@ -5,10 +5,11 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 
 #include "runner/participants/deepest_point.h"
 #include "runner/participants/lane_math.h"
-#include "runner/participants/shape_lines.h"
+#include "runner/participants/shape_line_class.h"
 
 // The loops over the hypotheses of a block are written for the compiler to vectorise; the build
 // gives this file -fno-math-errno and -fno-trapping-math, which change no value.
@@ -29,6 +30,10 @@ struct Query {
   float direction_precision = 0;  // 1/rad^2
   float inverse_sd = 0;           // 1 / sqrt v, 1/m
   float free_space_weight = 0;
+
+  float kept = 0;       // share of the earlier evidence
+  float forgotten = 0;  // the rest
+  float weight = 0;     // of this percept
 
   int positions = 0;              // 0: no torque cue
   float position[kMaxPositions];  // m from the tip
@@ -80,6 +85,11 @@ void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_
   }
 }
 
+double weight_of(const Percept& percept, const ObserverSettings& settings) {
+  if (percept.contact) return contact_weight(settings, percept.moved, percept.turned);
+  return settings.evidence == Evidence::percept ? settings.beta : 1;
+}
+
 Query make_query(const Percept& percept, const ObserverSettings& settings) {
   Query query;
   query.contact = percept.contact;
@@ -102,6 +112,12 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.free_space_weight = static_cast<float>(settings.free_space_weight);
   query.inverse_scale = static_cast<float>(1 / settings.soft_min_scale);
   query.torque_floor = static_cast<float>(settings.torque_floor);
+
+  const double kept =
+      settings.forgetting ? std::exp(-1 / (settings.percept_rate * settings.memory)) : 1;
+  query.kept = static_cast<float>(kept);
+  query.forgotten = static_cast<float>(1 - kept);
+  query.weight = static_cast<float>(weight_of(percept, settings));
 
   if (percept.contact && percept.ray && percept.along) {
     query.positions = settings.places_along;
@@ -135,6 +151,8 @@ void check(const ObserverSettings& s) {
   want(not_negative(s.free_space_weight), "free_space_weight: not negative");
   want(std::isfinite(s.floor) && s.floor <= 0, "floor: not positive");
   want(not_negative(s.beta), "beta: not negative");
+  want(positive(s.movement_scale), "movement_scale: positive");
+  want(not_negative(s.turn_length), "turn_length: not negative");
   want(positive(s.memory), "memory: positive");
   want(positive(s.percept_rate), "percept_rate: positive");
   want(s.threshold > 0 && s.threshold < 1, "threshold: between 0 and 1");
@@ -150,29 +168,32 @@ float log_prior(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape&
 template <class ShapeLine>
 void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
                   const Query& query, const ObserverSettings& settings, float* log_posterior) {
-  const double kept = std::exp(-1 / (settings.percept_rate * settings.memory));
-  const auto keep = static_cast<float>(kept);
-  const float regained = static_cast<float>(1 - kept) * log_prior(hypotheses, shape);
-  const auto beta = static_cast<float>(settings.beta);
+  const float regained = query.forgotten * log_prior(hypotheses, shape);
   const auto floor = static_cast<float>(settings.floor);
   for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
     const ShapeLine line(hypotheses, shape, first, query.line);
     float log_likelihood[kBlock];
     find_log_likelihood(line, query, log_likelihood);
     for (int i = 0; i < kBlock; ++i) {
-      log_posterior[first + i] =
-          keep * log_posterior[first + i] + regained + beta * lane::max(log_likelihood[i], floor);
+      log_posterior[first + i] = query.kept * log_posterior[first + i] + regained +
+                                 query.weight * lane::max(log_likelihood[i], floor);
     }
   }
 }
 
 }  // namespace
 
+double contact_weight(const ObserverSettings& settings, double moved, double turned) {
+  if (settings.evidence == Evidence::percept) return settings.beta;
+  return 1 - std::exp(-(moved + settings.turn_length * turned) / settings.movement_scale);
+}
+
 ShapeObserver::ShapeObserver(const ShapeHypotheses& hypotheses, const ObserverSettings& settings)
     : hypotheses_(&hypotheses),
       settings_(settings),
       log_posterior_(static_cast<std::size_t>(hypotheses.padded_size())),
-      probabilities_(hypotheses.shapes().size()) {
+      probabilities_(hypotheses.shapes().size()),
+      masses_(log_posterior_.size()) {
   check(settings);
   reset();
 }
@@ -189,24 +210,9 @@ void ShapeObserver::reset() {
 void ShapeObserver::update(const Percept& percept) {
   const Query query = make_query(percept, settings_);
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
-    float* const l = log_posterior_.data();
-    switch (shape.kind) {
-      case stimuli::ShapeKind::cone:
-        update_shape<AxialLine<ConeProfile>>(*hypotheses_, shape, query, settings_, l);
-        break;
-      case stimuli::ShapeKind::cylinder:
-        update_shape<AxialLine<CylinderProfile>>(*hypotheses_, shape, query, settings_, l);
-        break;
-      case stimuli::ShapeKind::cube:
-        update_shape<CubeLine>(*hypotheses_, shape, query, settings_, l);
-        break;
-      case stimuli::ShapeKind::sphere:
-        update_shape<SphereLine>(*hypotheses_, shape, query, settings_, l);
-        break;
-      case stimuli::ShapeKind::mesh:
-      case stimuli::ShapeKind::compound:
-        break;  // ShapeHypotheses refuses them
-    }
+    visit_line_class(shape.kind, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
+      update_shape<ShapeLine>(*hypotheses_, shape, query, settings_, log_posterior_.data());
+    });
   }
   find_posterior();
 }
@@ -240,6 +246,35 @@ void ShapeObserver::find_posterior() {
   for (double& probability : probabilities_) probability /= total;
   best_ = static_cast<int>(std::max_element(probabilities_.begin(), probabilities_.end()) -
                            probabilities_.begin());
+}
+
+void ShapeObserver::draw(stimuli::Random& random, std::span<int> hypotheses) {
+  const float reference = *std::max_element(log_posterior_.begin(), log_posterior_.end());
+  for (std::size_t h = 0; h < masses_.size(); ++h) {
+    masses_[h] = lane::exp(log_posterior_[h] - reference);
+  }
+  double total = 0;
+  for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
+    for (int h = shape.first; h < shape.first + shape.count; ++h) {
+      total += masses_[static_cast<std::size_t>(h)];
+    }
+  }
+  const auto count = static_cast<double>(hypotheses.size());
+  std::size_t drawn = 0;
+  double below = 0;  // mass of the hypotheses before this one and of itself
+  int last = 0;
+  double next = total * random.unit() / count;
+  for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
+    for (int h = shape.first; h < shape.first + shape.count; ++h) {
+      last = h;
+      below += masses_[static_cast<std::size_t>(h)];
+      while (drawn < hypotheses.size() && next < below) {
+        hypotheses[drawn++] = h;
+        next = total * (static_cast<double>(drawn) + random.unit()) / count;
+      }
+    }
+  }
+  while (drawn < hypotheses.size()) hypotheses[drawn++] = last;  // roundings of the sum
 }
 
 }  // namespace palpate::runner

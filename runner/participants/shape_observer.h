@@ -1,7 +1,6 @@
 #pragma once
 // How a simulated participant identifies a shape: Bayes' rule over shapes and orientations of known
-// size and centre, from a few percepts a second, with exponential forgetting. A mechanistic model,
-// not fitted to any person.
+// size and centre, from a few percepts a second. A mechanistic model, not fitted to any person.
 //
 // With v = contact_sd^2 + model_contact_sd^2, k = 1 / (direction_sd^2 + model_direction_sd^2), and
 // for each hypothesis the signed distance d and outward normal n_h (point: at the tip; ray: the
@@ -11,22 +10,31 @@
 //   torque cue   l += ln(sum_k w_k exp(-(s_k - along)^2 / (2 along_sd^2)) / sum_k w_k
 //                        + torque_floor),       w_k = exp(-(d_k - d) / soft_min_scale)
 //   free space   l  = free_space_weight ln Phi(d / sqrt v)
-//   update       L <- lambda L + (1 - lambda) L0 + beta max(l, floor),
-//                lambda = exp(-1 / (percept_rate memory)),  L0 = -ln(shapes * hypotheses of shape)
+//   update       L <- lambda L + (1 - lambda) L0 + w max(l, floor),
+//                L0 = -ln(shapes * hypotheses of shape)
+//                lambda = exp(-1 / (percept_rate memory)), or 1 without forgetting
+//                w = beta; or, with evidence by movement, 1 for a percept without contact and
+//                1 - exp(-(moved + turn_length turned) / movement_scale) for one with contact
 //
 // Where the minimum over the stylus lies on a kink inside the object (the perceived stylus cuts
 // through an edge), the distance has no gradient. n_h is then the one element of its
 // subdifferential that is perpendicular to the stylus: it makes the point a minimum, and is the
 // normal of a contact between stylus and edge.
 
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "runner/participants/shape_hypotheses.h"
+#include "stimuli/random.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
+
+/// What the weight of a percept goes by.
+enum class Evidence { percept, movement };
 
 struct ObserverSettings {
   double contact_sd = 0.003;                                ///< m; of the perceived position
@@ -39,10 +47,14 @@ struct ObserverSettings {
   double torque_floor = 1e-4;      ///< likelihood of a position that does not fit at all
   double free_space_weight = 0.2;  ///< weight of the evidence of a percept without contact
   double floor = -6;               ///< least log likelihood of one percept
-  double beta = 0.25;              ///< weight of a percept
-  double memory = 15;              ///< s; time constant of forgetting
-  double percept_rate = 6;         ///< Hz
-  double threshold = 0.95;         ///< posterior of a shape at which the observer responds
+  Evidence evidence = Evidence::percept;
+  double beta = 0.25;            ///< weight of a percept; without effect where movement counts
+  double movement_scale = 0.03;  ///< m; of the movement that makes evidence new
+  double turn_length = 0.03;     ///< m/rad; movement that a turn of the normal is worth
+  bool forgetting = true;        ///< whether old evidence fades at all
+  double memory = 15;            ///< s; time constant of forgetting
+  double percept_rate = 6;       ///< Hz
+  double threshold = 0.95;       ///< posterior of a shape at which the observer responds
 };
 
 /// One percept, noise included. Lengths in m, from the object's centre.
@@ -53,7 +65,13 @@ struct Percept {
   Vec3 tail;                    ///< ray only
   Vec3 direction;               ///< unit, of the force: outward normal; contact only
   std::optional<double> along;  ///< m from the tip to the contact, torque over force; ray only
+  /// Since the last percept with contact, infinite before: m that the tip moved, rad that the force
+  /// turned. Contact only; counts with evidence by movement.
+  double moved = std::numeric_limits<double>::infinity(), turned = 0;
 };
+
+/// Weight of the evidence of a percept with contact that is new by so much movement.
+double contact_weight(const ObserverSettings& settings, double moved, double turned);
 
 /// One posterior. Observers may share the hypotheses, which must outlive them. The same percepts
 /// give the same bits in every thread and at every optimisation level.
@@ -70,6 +88,9 @@ class ShapeObserver {
 
   int best() const { return best_; }  ///< Most probable shape; the first of equals.
   double probability(int shape) const { return probabilities_[static_cast<std::size_t>(shape)]; }
+  /// Draws hypotheses from the posterior, in ascending order: one from each of so many equal parts
+  /// of its mass (stratified). Does not allocate.
+  void draw(stimuli::Random& random, std::span<int> hypotheses);
   bool decided() const { return probability(best_) > settings_.threshold; }
 
  private:
@@ -79,6 +100,7 @@ class ShapeObserver {
   ObserverSettings settings_;
   std::vector<float> log_posterior_;  // L, of every hypothesis; not normalised
   std::vector<double> probabilities_;
+  std::vector<float> masses_;  // of every hypothesis, relative to the greatest; for draws
   int best_ = 0;
 };
 

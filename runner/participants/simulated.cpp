@@ -22,7 +22,8 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
       number_(number),
       workspace_{protocol.workspace.centre, protocol.workspace.scale},
       explorer_(own, protocol.stylus.grip * protocol.workspace.scale, wall_stiffness_, period_),
-      observer_(hypotheses, own.observer) {}
+      observer_(hypotheses, own.observer),
+      heading_choice_(hypotheses, own.observer, own.heading) {}
 
 void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   const auto stream = [&](std::uint64_t use) {
@@ -32,12 +33,14 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   };
   random_ = stream(1);
   stylus_.reset(in_device(explorer_.begin(stream(2))));
+  heading_random_ = stream(3);  // its own, so that the hand's and the percepts' stay as they are
   observer_.reset();
   ray_ = renderer_for(trial.renderer).side_contact();
   for (int k = 0; k < 3; ++k) centre_error_[k] = settings_.percept.centre_jitter * random_.normal();
   force_ = torque_ = Vec3(0);
   next_percept_ = 1 / settings_.observer.percept_rate;
   answer_at_.reset();
+  touched_ = false;
 }
 
 std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
@@ -54,6 +57,7 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
     observer_.update(perceive(sample, touch));
     if (observer_.decided()) answer_at_ = time + settings_.non_decision;
   }
+  if (explorer_.wants_heading()) choose_heading(sample, touch);
   return std::nullopt;
 }
 
@@ -82,6 +86,18 @@ TouchState SimulatedParticipant::sense_touch(const Sample& sample) {
   return touch;
 }
 
+/// From the stylus as the device shows it to the one whose contact is on the surface; m.
+Vec3 SimulatedParticipant::perceived_shift() const {
+  return settings_.percept.place == PerceivedPlace::surface ? force_ / wall_stiffness_ : Vec3(0);
+}
+
+void SimulatedParticipant::choose_heading(const Sample& sample, const TouchState& touch) {
+  const Vec3 shift = (touch.contact ? perceived_shift() : Vec3(0)) - centre_error_;
+  const SlidingStylus stylus{ray_, sample.probe.tip + shift, sample.probe.tail + shift,
+                             explorer_.known_normal(), explorer_.heading()};
+  explorer_.turn_to(heading_choice_.choose(observer_, stylus, heading_random_));
+}
+
 Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& touch) {
   const auto noise = [this](double sd) {
     return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
@@ -96,9 +112,17 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& t
   const Vec3 stylus = sample.probe.tail - sample.probe.tip;
   const double length = glm::length(stylus);
   percept.tip = sample.probe.tip - centre_error_ + noise(settings_.observer.contact_sd);
+  if (touch.contact) percept.tip += perceived_shift();
   percept.tail = percept.tip + length * tilted(stylus / length, settings_.percept.axis_sd);
   if (touch.contact) {
     percept.direction = tilted(touch.normal, settings_.observer.direction_sd);
+    if (touched_) {
+      percept.moved = glm::length(sample.probe.tip - touched_tip_);
+      percept.turned = std::acos(std::clamp(glm::dot(touch.normal, touched_normal_), -1.0, 1.0));
+    }
+    touched_ = true;
+    touched_tip_ = sample.probe.tip;
+    touched_normal_ = touch.normal;
     if (along_known_) {
       percept.along =
           std::clamp(touch.along + settings_.observer.along_sd * random_.normal(), 0.0, length);

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "runner/participants/explorer.h"
+#include "runner/participants/heading_choice.h"
 #include "runner/participants/respondent.h"
 #include "runner/participants/shape_observer.h"
 
@@ -27,7 +28,9 @@ class SimulatedParticipant final : public Respondent {
  private:
   HandTarget in_device(HandTarget target) const;
   TouchState sense_touch(const Sample& sample);
+  Vec3 perceived_shift() const;
   Percept perceive(const Sample& sample, const TouchState& touch);
+  void choose_heading(const Sample& sample, const TouchState& touch);
 
   SimulatedSettings settings_;
   SimulatedStylus& stylus_;
@@ -37,13 +40,16 @@ class SimulatedParticipant final : public Respondent {
   WorkspaceMap workspace_;
   Explorer explorer_;
   ShapeObserver observer_;
-  stimuli::Random random_{0};
+  HeadingChoice heading_choice_;
+  stimuli::Random random_{0}, heading_random_{0};
   bool ray_ = false;
   Vec3 centre_error_;         ///< m; error of the believed centre
   Vec3 force_, torque_;       ///< low-passed: N on the hand, N m about the tip
   bool along_known_ = false;  ///< force and stylus are not parallel, so that torque gives `along`
   double next_percept_ = 0;   ///< s from time zero
-  std::optional<double> answer_at_;  ///< s from time zero
+  std::optional<double> answer_at_;    ///< s from time zero
+  bool touched_ = false;               ///< a percept with contact has been
+  Vec3 touched_tip_, touched_normal_;  ///< at the last one: m, and unit
 };
 
 }  // namespace palpate::runner

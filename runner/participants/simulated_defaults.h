@@ -2,7 +2,12 @@
 
 namespace palpate::runner {
 
-/// The settings file, embedded by the build.
-extern const char* const kSimulatedDefaults;
+/// A frozen settings file, embedded by the build.
+struct FrozenSettings {
+  int version;
+  const char* text;  ///< JSON
+};
+/// Ascending; ends with version 0.
+extern const FrozenSettings kFrozenSettings[];
 
 }  // namespace palpate::runner

@@ -1,13 +1,11 @@
 #include "runner/participants/simulated_settings.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <sstream>
 
-#include "protocols/json_document.h"
-#include "protocols/parse.h"
-#include "protocols/sha256.h"
+#include "runner/participants/settings_document.h"
 #include "runner/participants/simulated_defaults.h"
 #include "stimuli/random.h"
 
@@ -16,47 +14,30 @@ namespace {
 
 using nlohmann::json;
 
-/// Every key of the patch must exist in the defaults and be a number there.
-void check_patch(const json& patch, const json& defaults, const std::string& file,
-                 const std::string& pointer, std::vector<protocols::Fault>& faults) {
-  if (!patch.is_object()) {
-    faults.push_back({file, pointer, "must be an object"});
-    return;
-  }
-  for (const auto& [key, value] : patch.items()) {
-    const std::string here = std::string(pointer).append("/").append(key);
-    if (!defaults.contains(key)) {
-      faults.push_back({file, here, "no such setting"});
-    } else if (defaults[key].is_object()) {
-      check_patch(value, defaults[key], file, here, faults);
-    } else if (defaults[key].is_number() &&
-               !(value.is_number() && std::isfinite(value.get<double>()))) {
-      faults.push_back({file, here, "must be a number"});
-    } else if (key == "version") {
-      faults.push_back({file, here, "a patch cannot change the version"});
-    }
-  }
-}
-
-json with_patch(json settings, const std::string& path) {
-  if (path.empty()) return settings;
-  protocols::FaultList found(path);
-  const json patch = protocols::read_json(protocols::read_text_file(path), found);
-  found.throw_if_any();
-  std::vector<protocols::Fault> faults;
-  check_patch(patch, settings, path, "", faults);
-  if (!faults.empty()) throw protocols::InputError(faults);
-  settings.merge_patch(patch);
-  return settings;
-}
-
 double degrees(const json& value) { return value.get<double>() * std::numbers::pi / 180; }
+
+int whole(const json& value) {
+  return static_cast<int>(std::lround(std::clamp(value.get<double>(), -1e9, 1e9)));
+}
+
+HeadingSettings read_heading(const json& heading) {
+  HeadingSettings s;
+  s.chosen = heading.at("chosen");
+  s.interval = heading.at("interval_s");
+  s.turning_time = heading.at("turning_time_s");
+  s.hypotheses = whole(heading.at("hypotheses"));
+  s.headings = whole(heading.at("headings"));
+  s.places = whole(heading.at("places"));
+  s.look_ahead = heading.at("look_ahead_m");
+  return s;
+}
 
 SimulatedSettings read(const json& j) {
   SimulatedSettings s;
   s.version = j.at("version");
   const json &percept = j.at("percept"), &observer = j.at("observer"), &motor = j.at("motor");
-  s.percept = {degrees(percept.at("axis_sd_deg")), percept.at("centre_jitter_m"),
+  s.percept = {percept.at("place") == "tip" ? PerceivedPlace::tip : PerceivedPlace::surface,
+               degrees(percept.at("axis_sd_deg")), percept.at("centre_jitter_m"),
                percept.at("force_low_pass_s"), percept.at("force_threshold_n")};
   s.observer.contact_sd = percept.at("contact_sd_m");
   s.observer.direction_sd = degrees(percept.at("direction_sd_deg"));
@@ -65,11 +46,16 @@ SimulatedSettings read(const json& j) {
   s.observer.model_contact_sd = observer.at("model_contact_sd_m");
   s.observer.model_direction_sd = degrees(observer.at("model_direction_sd_deg"));
   s.observer.soft_min_scale = observer.at("soft_min_scale_m");
-  s.observer.places_along = observer.at("places_along");
+  s.observer.places_along = whole(observer.at("places_along"));
   s.observer.torque_floor = observer.at("torque_floor");
   s.observer.free_space_weight = observer.at("free_space_weight");
   s.observer.floor = observer.at("floor");
   s.observer.beta = observer.at("beta");
+  s.observer.evidence =
+      observer.at("evidence") == "percept" ? Evidence::percept : Evidence::movement;
+  s.observer.movement_scale = observer.at("movement_scale_m");
+  s.observer.turn_length = observer.at("turn_length_m_per_rad");
+  s.observer.forgetting = observer.at("forgetting");
   s.observer.memory = observer.at("memory_s");
   s.observer.threshold = observer.at("threshold");
   s.non_decision = observer.at("non_decision_s");
@@ -79,7 +65,11 @@ SimulatedSettings read(const json& j) {
              motor.at("mean_follow_s"),          motor.at("approach_distance_m"),
              motor.at("approach_min_rise")};
   const json &search = j.at("search"), &stylus = j.at("stylus"), &hand = j.at("hand");
-  s.search = {search.at("aim_sd_m"), search.at("pull_to_centre_per_s"), search.at("give_up_s")};
+  s.search = {
+      search.at("aim_sd_m"),
+      search.at("after_loss") == "press-on" ? AfterLoss::press_on : AfterLoss::turn_to_centre,
+      search.at("pull_to_centre"), search.at("pull_to_centre_per_s"), search.at("give_up_s")};
+  s.heading = read_heading(j.at("heading"));
   s.stylus = {degrees(stylus.at("tilt_deg")), degrees(stylus.at("tilt_sd_deg")),
               degrees(stylus.at("turning_deg_per_s"))};
   s.hand = {hand.at("stiffness_n_per_m"), hand.at("damping_ns_per_m"), hand.at("mass_kg"),
@@ -92,14 +82,37 @@ SimulatedSettings read(const json& j) {
   s.between = {between.at("slide_speed_log_sd"), between.at("percept_noise_log_sd"),
                between.at("reaction_delay_log_sd"), between.at("non_decision_log_sd"),
                between.at("threshold_logit_sd")};
-  s.sha256 = protocols::sha256_hex(j.dump());
+  s.sha256 = settings_checksum(j);
   return s;
+}
+
+json patched_settings(const std::string& patch_path, int version) {
+  json settings = complete_settings(version);
+  if (!patch_path.empty()) patch_settings(settings, patch_path);
+  return settings;
 }
 
 }  // namespace
 
-SimulatedSettings load_simulated_settings(const std::string& patch_path) {
-  return read(with_patch(json::parse(kSimulatedDefaults), patch_path));
+std::vector<int> participant_versions() {
+  std::vector<int> versions;
+  for (const FrozenSettings* frozen = kFrozenSettings; frozen->version != 0; ++frozen)
+    versions.push_back(frozen->version);
+  return versions;
+}
+
+SimulatedSettings load_simulated_settings(const std::string& patch_path, int version) {
+  return read(patched_settings(patch_path, version));
+}
+
+std::string simulated_settings_text(const std::string& patch_path, int version) {
+  return patched_settings(patch_path, version).dump();
+}
+
+SimulatedSettings read_simulated_settings(const std::string& text) {
+  const json settings = json::parse(text);
+  check_settings(settings);
+  return read(settings);
 }
 
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number) {

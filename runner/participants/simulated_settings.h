@@ -1,17 +1,29 @@
 #pragma once
-// Every constant of the simulated participant, from a versioned file that does not change.
+// Every constant of the simulated participant, from versioned files that do not change. Versions
+// differ by switches, which a patch can set in any of them.
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "runner/devices/simulated.h"
+#include "runner/participants/heading_choice.h"
 #include "runner/participants/shape_observer.h"
 
 namespace palpate::runner {
 
+/// Where a percept with contact has the stylus: as the device shows it, with its tip in the object,
+/// or moved out by what the force says, with the contact on the surface.
+enum class PerceivedPlace { tip, surface };
+
+/// Where the hand goes after a loss of contact: on along the direction that it pressed in, or on
+/// with its heading, which turns to the centre.
+enum class AfterLoss { press_on, turn_to_centre };
+
 struct SimulatedSettings {
   int version = 1;
   struct Percept {
+    PerceivedPlace place;
     double axis_sd;          ///< rad
     double centre_jitter;    ///< m, per axis, drawn once a trial
     double force_low_pass;   ///< s, time constant
@@ -31,10 +43,13 @@ struct SimulatedSettings {
     double approach_min_rise;  ///< smallest upward component of the direction of approach
   } motor;
   struct Search {
-    double aim_sd;          ///< m, per axis
+    double aim_sd;  ///< m, per axis
+    AfterLoss after_loss;
+    double press_on_pull;   ///< weight of the direction to the centre beside that of pressing
     double pull_to_centre;  ///< 1/s; rate of turning towards the centre after contact was lost
     double give_up;         ///< s
   } search;
+  HeadingSettings heading;
   struct Stylus {
     double tilt, tilt_sd;  ///< rad, from the direction of approach
     double turning;        ///< rad/s, at most
@@ -48,9 +63,22 @@ struct SimulatedSettings {
   std::string sha256;  ///< of the settings used, patch included
 };
 
-/// The defaults, changed by the JSON merge patch (RFC 7396) in `patch_path` unless that is empty:
-/// for ablation studies. \throws InputError naming unknown keys and wrong values.
-SimulatedSettings load_simulated_settings(const std::string& patch_path);
+/// The version that is used where none is asked for.
+inline constexpr int kDefaultParticipantVersion = 2;
+/// Of the frozen settings, ascending.
+std::vector<int> participant_versions();
+
+/// The frozen settings of a version, changed by the JSON merge patch (RFC 7396) in `patch_path`
+/// unless that is empty: for ablation studies.
+/// \throws InputError naming unknown keys and wrong values; std::invalid_argument: no such version
+SimulatedSettings load_simulated_settings(const std::string& patch_path,
+                                          int version = kDefaultParticipantVersion);
+/// The same as the text of a JSON document that has every key, switches that a version did not know
+/// included, for whoever changes some of them. \throws as load_simulated_settings
+std::string simulated_settings_text(const std::string& patch_path,
+                                    int version = kDefaultParticipantVersion);
+/// From such a text. \throws InputError where a key is missing or has a value that it cannot have
+SimulatedSettings read_simulated_settings(const std::string& text);
 
 /// The settings of participant `number` of a study, with individual speed, noise, delay and
 /// threshold.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 
 namespace palpate::runner {
 namespace {
@@ -40,6 +41,88 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
     }
     const rendering::LineProbe stylus = held_at(target);
     EXPECT_FALSE(same(touching.step({}, stylus), free.step({}, stylus))) << "delay " << ticks;
+  }
+}
+
+/// Felt on a level surface at height zero, by a hand without reaction delay.
+TouchState felt_below(const HandTarget& target) {
+  return {true, Vec3(0, 0, 1), held_at(target).tip, 0};
+}
+
+/// A hand that has slid for 0.1 s with contact and has known for one tick that it lost it.
+struct AfterLossOfContact {
+  explicit AfterLossOfContact(const SimulatedSettings& settings)
+      : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(stimuli::Random(6))) {
+    for (int tick = 0; tick < 100; ++tick) target = hand.step(felt_below(target), held_at(target));
+    slid = hand.heading();
+    before = held_at(target).tip;
+    target = hand.step({}, held_at(target));  // known one tick later
+    before = held_at(target).tip;
+    target = hand.step({}, held_at(target));
+  }
+  Explorer hand;
+  HandTarget target;
+  Vec3 slid, before;
+};
+
+SimulatedSettings quick_hand(int version) {
+  SimulatedSettings settings = load_simulated_settings("", version);
+  settings.motor.reaction_delay = kPeriod;
+  settings.motor.heading_time = 1e12;  // it hardly wanders
+  settings.motor.mean_follow = 1e6;
+  return settings;
+}
+
+TEST(Explorer, OfVersion1PressesOnAfterALossOfContact) {
+  const AfterLossOfContact at(quick_hand(1));
+  const Vec3 expected = glm::normalize(Vec3(0, 0, -1) + 0.15 * glm::normalize(-at.before));
+  EXPECT_LT(glm::length(at.target.velocity / 0.06 - expected), 1e-9);
+}
+
+TEST(Explorer, OfVersion2TurnsToTheCentreAfterALossOfContact) {
+  const SimulatedSettings settings = quick_hand(2);
+  const AfterLossOfContact at(settings);
+  const Vec3 way = at.target.velocity / settings.motor.slide_speed;
+  EXPECT_NEAR(glm::length(way), 1, 1e-9);
+  EXPECT_GT(glm::dot(way, at.slid), 0.99) << "15 a second: hardly turned after two ticks";
+  EXPECT_GT(glm::dot(way, glm::normalize(-at.before)),
+            glm::dot(at.slid, glm::normalize(-at.before)));
+}
+
+TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
+  for (const double angle : {0.5, -2.0, 3.0, 0.0}) {
+    SimulatedSettings settings = quick_hand(2);
+    settings.heading.chosen = true;
+    Explorer hand(settings, kFromTip, kStiffness, kPeriod);
+    HandTarget target = hand.begin(stimuli::Random(7));
+    int waited = 0;
+    while (!hand.wants_heading()) {
+      ASSERT_LT(++waited, 10) << "it slides from the second tick on";
+      target = hand.step(felt_below(target), held_at(target));
+    }
+    const Vec3 from = hand.heading(), side = glm::cross(hand.known_normal(), from);
+    const Vec3 goal = std::cos(angle) * from + std::sin(angle) * side;
+    hand.turn_to(goal);
+    EXPECT_FALSE(hand.wants_heading());
+    for (int tick = 0; tick < 50; ++tick) target = hand.step(felt_below(target), held_at(target));
+    const Vec3 half = std::cos(angle / 2) * from + std::sin(angle / 2) * side;
+    EXPECT_LT(glm::length(hand.heading() - half), 1e-4) << angle;
+    for (int tick = 50; tick < 299; ++tick) {
+      target = hand.step(felt_below(target), held_at(target));
+      EXPECT_FALSE(hand.wants_heading()) << "tick " << tick;
+    }
+    EXPECT_LT(glm::length(hand.heading() - goal), 1e-4) << angle;
+    hand.step(felt_below(target), held_at(target));
+    EXPECT_TRUE(hand.wants_heading()) << "0.3 s are over";
+  }
+}
+
+TEST(Explorer, WantsNoHeadingWhereItWanders) {
+  Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
+  HandTarget target = hand.begin(stimuli::Random(7));
+  for (int tick = 0; tick < 1000; ++tick) {
+    target = hand.step(felt_below(target), held_at(target));
+    ASSERT_FALSE(hand.wants_heading());
   }
 }
 

@@ -20,6 +20,14 @@ inline std::vector<stimuli::ObjectSpec> four_shapes() {
   return stimuli;
 }
 
+/// Of an observer that sums up evidence by movement and forgets nothing.
+inline ObserverSettings by_movement() {
+  ObserverSettings settings;
+  settings.evidence = Evidence::movement;
+  settings.forgetting = false;
+  return settings;
+}
+
 struct DeepestReference {
   double distance;  // m
   double along;     // m from the tip

@@ -4,14 +4,19 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
+#include <vector>
 
 #include "data/export/csv.h"
 #include "protocols/parse.h"
+#include "protocols/sha256.h"
 #include "stimuli/random.h"
 
 namespace palpate::runner {
@@ -53,11 +58,22 @@ class SimulatedStudy : public ::testing::Test {
   }
 
   StudyProgress simulate(const protocols::Protocol& protocol, const fs::path& db, int jobs,
-                         std::uint64_t seed = 1) const {
+                         std::uint64_t seed = 1,
+                         const SimulatedSettings& settings = load_simulated_settings("")) const {
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
-    return simulate_study(protocol, store, load_simulated_settings(""), {3, seed, jobs}, never, {});
+    return simulate_study(protocol, store, settings, {3, seed, jobs}, never, {});
   }
+
+  /// Settings with a patch that the text says.
+  SimulatedSettings patched(const std::string& text, int version) const {
+    std::ofstream(folder_ / "patch.json") << text;
+    return load_simulated_settings(folder_ / "patch.json", version);
+  }
+
+  /// The trials of the frozen participant against those on record; they are written beside the
+  /// study when the test fails.
+  void expect_frozen(int version) const;
 
   fs::path folder_;
 };
@@ -98,17 +114,14 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
   EXPECT_EQ(csv_of(db), csv_of(folder_ / "whole.db"));
 }
 
-// The participant is frozen: whoever changes it gives it another version, and other trials here.
-// The file is what this test writes beside the study when it fails.
-TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
-#ifdef __clang__
-  GTEST_SKIP() << "other roundings grow to other trials: the file is the release compiler's, g++";
-#endif
+void SimulatedStudy::expect_frozen(int version) const {
+  const std::string name = "simulated_v" + std::to_string(version) + "_trials.txt";
   const protocols::Protocol p =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
-  simulate(p, folder_ / "frozen.db", 2);
-  data::Store store = data::Store::open(folder_ / "frozen.db", data::Store::Mode::read_only);
-  std::ifstream kept(PALPATE_SOURCE_DIR "/tests/runner/session/simulated_v2_trials.txt");
+  const fs::path db = folder_ / ("frozen " + std::to_string(version) + ".db");
+  simulate(p, db, 2, 1, load_simulated_settings("", version));
+  data::Store store = data::Store::open(db, data::Store::Mode::read_only);
+  std::ifstream kept(PALPATE_SOURCE_DIR "/tests/runner/session/" + name);
   std::ostringstream found;
   int trials = 0;
   store.for_each_trial([&](const data::StoredTrial& trial) {
@@ -140,7 +153,63 @@ TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
     EXPECT_NEAR(r.start_tip[0], k.start, 1e-6) << line;
   });
   EXPECT_EQ(trials, 3 * 24);
-  if (HasFailure()) std::ofstream(::testing::TempDir() + "simulated_v2_trials.txt") << found.str();
+  if (HasFailure()) std::ofstream(::testing::TempDir() + name) << found.str();
+}
+
+// The participants are frozen: whoever changes one gives it another version, and other trials here.
+TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
+#ifdef __clang__
+  GTEST_SKIP() << "other roundings grow to other trials: the files are the release compiler's, g++";
+#endif
+  for (const int version : participant_versions()) {
+    SCOPED_TRACE("version " + std::to_string(version));
+    expect_frozen(version);
+  }
+}
+
+// Version 3 is version 2 with its switches on, and version 2 is version 1 with another search.
+TEST_F(SimulatedStudy, VersionsDifferByTheirSwitchesAlone) {
+  const protocols::Protocol p = protocol();
+  const auto trials = [&](const std::string& name, const SimulatedSettings& settings) {
+    simulate(p, folder_ / name, 2, 1, settings);
+    std::string csv = csv_of(folder_ / name);
+    for (std::size_t at; (at = csv.find(settings.sha256)) != std::string::npos;)
+      csv.erase(at, settings.sha256.size());
+    return csv;
+  };
+  const std::string version2 = trials("2.db", load_simulated_settings("", 2));
+  const std::string version3 = trials("3.db", load_simulated_settings("", 3));
+  EXPECT_NE(version2, version3);
+  EXPECT_EQ(trials("3 from 2.db", patched(R"({"percept": {"place": "surface"},
+      "observer": {"forgetting": false, "evidence": "movement"}, "heading": {"chosen": true}})",
+                                          2)),
+            version3);
+  EXPECT_EQ(trials("2 from 1.db", patched(R"({"search": {"after_loss": "turn-to-centre"}})", 1)),
+            version2);
+  EXPECT_NE(trials("1.db", load_simulated_settings("", 1)), version2);
+}
+
+// Each switch does something of its own.
+TEST_F(SimulatedStudy, EverySwitchChangesTheTrials) {
+  const protocols::Protocol p = protocol();
+  std::vector<std::string> seen;
+  for (const char* patch :
+       {"{}", R"({"percept": {"place": "tip"}})", R"({"observer": {"forgetting": true}})",
+        R"({"observer": {"evidence": "percept"}})", R"({"observer": {"movement_scale_m": 0.01}})",
+        R"({"observer": {"turn_length_m_per_rad": 0.1}})",
+        R"({"search": {"after_loss": "press-on"}})", R"({"heading": {"chosen": false}})",
+        R"({"heading": {"interval_s": 0.1}})", R"({"heading": {"turning_time_s": 0.3}})",
+        R"({"heading": {"hypotheses": 8}})", R"({"heading": {"headings": 3}})",
+        R"({"heading": {"places": 1}})", R"({"heading": {"look_ahead_m": 0.04}})"}) {
+    const SimulatedSettings settings = patched(patch, 3);
+    const fs::path db = folder_ / (std::to_string(seen.size()) + ".db");
+    simulate(p, db, 2, 1, settings);
+    std::string csv = csv_of(db);
+    for (std::size_t at; (at = csv.find(settings.sha256)) != std::string::npos;)
+      csv.erase(at, settings.sha256.size());
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), csv), 0) << patch;
+    seen.push_back(csv);
+  }
 }
 
 TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
@@ -172,21 +241,72 @@ TEST_F(SimulatedStudy, RefusesWhatTheDeviceOrTheParticipantCannotDo) {
   EXPECT_NE(refusal(R"(, "workspace": {"scale": 0.1})").find("reaches"), std::string::npos);
 }
 
-TEST(SimulatedSettings, PatchesAreCheckedAndChangeTheChecksum) {
-  const fs::path path = fs::path(::testing::TempDir()) / "patch.json";
-  const auto patched = [&](const std::string& text) {
-    std::ofstream(path) << text;
-    return load_simulated_settings(path);
-  };
+TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
   const SimulatedSettings defaults = load_simulated_settings("");
-  const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})");
+  const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})", 2);
   EXPECT_EQ(quick.motor.reaction_delay, 0.02);
   EXPECT_NE(quick.sha256, defaults.sha256);
-  EXPECT_THROW(patched(R"({"motor": {"reaction": 0.02}})"), protocols::InputError);
-  EXPECT_THROW(patched(R"({"motor": {"reaction_delay_s": "soon"}})"), protocols::InputError);
-  EXPECT_THROW(patched(R"({"motor": 3})"), protocols::InputError);
-  EXPECT_THROW(patched("{"), protocols::InputError);
-  fs::remove(path);
+  EXPECT_EQ(patched("{}", 2).sha256, defaults.sha256);
+  for (const char* bad :
+       {R"({"motor": {"reaction": 0.02}})", R"({"motor": {"reaction_delay_s": "soon"}})",
+        R"({"motor": {"reaction_delay_s": null}})", R"({"motor": 3})", "{", R"({"version": 3})",
+        R"({"percept": {"place": "edge"}})", R"({"percept": {"place": 1}})",
+        R"({"percept": {"place": null}})", R"({"observer": {"forgetting": 0}})",
+        R"({"observer": {"evidence": true}})", R"({"heading": {"hypotheses": "many"}})",
+        R"({"note": 5})"}) {
+    EXPECT_THROW(patched(bad, 2), protocols::InputError) << bad;
+  }
+  EXPECT_THROW(load_simulated_settings("", 4), std::invalid_argument);
+}
+
+// A checksum that stands with results is that of the file that was published with them.
+TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
+  for (const int version : participant_versions()) {
+    std::ifstream file(PALPATE_SOURCE_DIR "/runner/participants/simulated_v" +
+                       std::to_string(version) + ".json");
+    EXPECT_EQ(load_simulated_settings("", version).sha256,
+              protocols::sha256_hex(nlohmann::json::parse(file).dump()))
+        << "version " << version;
+  }
+}
+
+// A switch of a later version counts in an earlier one's checksum where it is moved.
+TEST_F(SimulatedStudy, ChecksumsKnowEverySwitch) {
+  const SimulatedSettings defaults = load_simulated_settings("", 2);
+  EXPECT_EQ(patched(R"({"percept": {"place": "tip"}, "heading": {"chosen": false}})", 2).sha256,
+            defaults.sha256);
+  std::vector<std::string> seen{defaults.sha256};
+  for (const char* patch :
+       {R"({"percept": {"place": "surface"}})", R"({"heading": {"chosen": true}})",
+        R"({"observer": {"forgetting": false}})", R"({"heading": {"interval_s": 0.2}})"}) {
+    const std::string sha256 = patched(patch, 2).sha256;
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), sha256), 0) << patch;
+    seen.push_back(sha256);
+  }
+}
+
+// Every key can be found and changed in the text, in every version.
+TEST_F(SimulatedStudy, SettingsAsTextHaveEveryKeyAndReadAsTheyWere) {
+  const auto keys = [](int version) {
+    std::vector<std::string> found;
+    const nlohmann::json settings =
+        nlohmann::json::parse(simulated_settings_text("", version)).flatten();
+    for (const auto& [pointer, value] : settings.items()) found.push_back(pointer);
+    return found;
+  };
+  EXPECT_EQ(keys(1), keys(3));
+  EXPECT_EQ(keys(2), keys(3));
+  for (const int version : participant_versions()) {
+    EXPECT_EQ(read_simulated_settings(simulated_settings_text("", version)).sha256,
+              load_simulated_settings("", version).sha256);
+  }
+  nlohmann::json settings = nlohmann::json::parse(simulated_settings_text("", 3));
+  settings["heading"].erase("places");
+  EXPECT_THROW(read_simulated_settings(settings.dump()), protocols::InputError);
+  settings["heading"]["places"] = "two";
+  EXPECT_THROW(read_simulated_settings(settings.dump()), protocols::InputError);
+  settings["heading"]["places"] = 3;
+  EXPECT_EQ(read_simulated_settings(settings.dump()).heading.places, 3);
 }
 
 }  // namespace
