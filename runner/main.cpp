@@ -52,6 +52,7 @@ constexpr Command kCommands[] = {
     {"simulate", "the whole study with simulated participants", palpate::runner::simulate_command},
     {"stability", "at what stiffness a loop of hand, device and renderer buzzes",
      palpate::runner::stability_command},
+    {"sweep", "simulated studies over a space of settings", palpate::runner::sweep_command},
     {"validate", "check a protocol and list all its faults", palpate::runner::validate_command},
 };
 

@@ -16,6 +16,7 @@
 #include "data/files/atomic_folder.h"
 #include "data/store/seal_writer.h"
 #include "data/store/sqlite_errors.h"
+#include "data/store/sweep_file.h"
 
 namespace palpate::data {
 namespace {
@@ -85,6 +86,11 @@ void create_database(const std::string& path) {
 
 void require_application_id(SQLite::Database& db, const std::string& path) {
   if (db.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return;
+  if (db.execAndGet("PRAGMA application_id").getInt() == kSweepApplicationId) {
+    throw StoreRefused(path +
+                       ": is the file of a sweep, no study's database; 'palpate analyze --sweep', "
+                       "'export' and 'merge' take it, 'palpate sweep' goes on with it");
+  }
   throw StoreRefused(path + ": is not a palpate database but another program's; name another file");
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -7,7 +8,9 @@
 #include "data/export/bids.h"
 #include "data/export/csv.h"
 #include "data/export/psychds.h"
+#include "data/export/sweep_csv.h"
 #include "data/store/store.h"
+#include "data/store/sweep_file.h"
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -113,10 +116,13 @@ void add_options(CommandLine& line) {
       "  palpate export --db study.db --format csv --out trials.csv\n"
       "  palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv\n"
       "  palpate export --db study.db --format bids --out study-bids\n"
+      "  palpate export --db people.sweep --format csv --out people.csv         a sweep: a row a "
+      "point\n"
       "  palpate export --db study.db --format psych-ds --out study-psychds --force\n"
       "      (replaces an earlier export; a folder that palpate did not make is never replaced)";
   auto add = line.options.add_options();
-  add("db", po::value<std::string>()->required()->value_name("FILE"), "the study's database");
+  add("db", po::value<std::string>()->required()->value_name("FILE"),
+      "the study's database, or a sweep's file (csv only)");
   add("format", po::value<std::string>()->required()->value_name("NAME"), "csv, bids or psych-ds");
   add("out", po::value<std::string>()->required()->value_name("PATH"),
       "the file (csv) or folder (others) to write");
@@ -176,6 +182,30 @@ void print(const Request& request, const data::ExportResult& done) {
 
 }  // namespace
 
+namespace {
+
+void export_sweep(const Request& request, bool times_given) {
+  if (request.format != "csv" || !request.codebook.empty() || times_given) {
+    throw UsageError(request.database +
+                     ": is the file of a sweep, which is exported with --format csv alone, without "
+                     "--times and --codebook");
+  }
+  data::SweepFile sweep = data::SweepFile::open(request.database);
+  const std::atomic<bool>& stop_asked = catch_stop_signals();
+  ProgressLine line("export");
+  const auto all = static_cast<double>(std::max<std::int64_t>(1, sweep.count()));
+  const std::int64_t points =
+      data::export_sweep_csv(sweep, request.out, request.force, [&](std::int64_t done) {
+        if (stop_asked) throw std::runtime_error("stopped; nothing was exported");
+        line.show(static_cast<double>(done) / all);
+      });
+  line.clear();
+  std::cerr << stimuli::printable(request.out) << ": " << points << " of " << sweep.plan().points
+            << " points, of SIMULATED participants\n";
+}
+
+}  // namespace
+
 int export_command(const std::vector<std::string>& args) {
   CommandLine line;
   add_options(line);
@@ -183,6 +213,10 @@ int export_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   const Request request = request_of(*values, line.usage);
   try {
+    if (data::is_sweep_file(request.database)) {
+      export_sweep(request, !(*values)["times"].as<std::string>().empty());
+      return 0;
+    }
     print(request, write_export(request));
   } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the files named are bad input: status 2

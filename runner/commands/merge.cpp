@@ -1,5 +1,6 @@
 #include "data/merge/merge.h"
 
+#include <algorithm>
 #include <atomic>
 #include <filesystem>
 #include <iostream>
@@ -7,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "data/merge/sweep_merge.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
@@ -43,6 +45,35 @@ void print(const std::string& out, const data::MergeResult& done) {
   }
 }
 
+/// \throws UsageError: some are, some are not
+bool are_sweeps(const std::vector<std::string>& inputs) {
+  const auto sweep = std::find_if(inputs.begin(), inputs.end(), data::is_sweep_file);
+  const auto other = std::find_if_not(inputs.begin(), inputs.end(), data::is_sweep_file);
+  if (sweep != inputs.end() && other != inputs.end()) {
+    throw UsageError(*sweep + " is the file of a sweep and " + *other +
+                     " is not: a study and a sweep cannot be put together");
+  }
+  return sweep != inputs.end();
+}
+
+void merge_shards(const std::string& out, const std::vector<std::string>& inputs,
+                  const std::atomic<bool>& stop_asked) {
+  ProgressLine progress("files");
+  const data::SweepMergeResult done = data::merge_sweeps(out, inputs, [&](std::int64_t file) {
+    if (stop_asked) throw std::runtime_error("stopped; nothing was written");
+    progress.show(static_cast<double>(file) / static_cast<double>(inputs.size()));
+  });
+  progress.clear();
+  warn_of_exposure(out);
+  std::cout << stimuli::printable(out) << ": " << done.points << " of " << done.plan.points
+            << " points of a sweep, SIMULATED participants";
+  if (done.failed > 0) std::cout << ", " << done.failed << " of them failed";
+  std::cout << "\n";
+  if (done.points < done.plan.points)
+    std::cerr << "the others are in none of the files; 'palpate sweep' with --db "
+              << stimuli::printable(out) << " goes on with them\n";
+}
+
 }  // namespace
 
 int merge_command(const std::vector<std::string>& args) {
@@ -53,10 +84,12 @@ int merge_command(const std::vector<std::string>& args) {
       "Refuses, with every reason, what cannot be one study: a participant with different\n"
       "content, one number for two codes (unless --renumber), different protocols under one\n"
       "name. Participants who have withdrawn at one station are left out altogether. Merging\n"
-      "a merged database again with its parts changes nothing.";
+      "a merged database again with its parts changes nothing. The files of a sweep's shards are\n"
+      "merged likewise, if they are of one plan; the result has the bytes of a sweep in one go.";
   line.example =
       "  palpate merge --out all.db station1.db station2.db\n"
-      "  palpate merge --out all2.db all.db station3.db";
+      "  palpate merge --out all2.db all.db station3.db\n"
+      "  palpate merge --out people.sweep shard*.sweep";
   std::string out;
   std::vector<std::string> inputs;
   auto add = line.options.add_options();
@@ -75,6 +108,12 @@ int merge_command(const std::vector<std::string>& args) {
   refuse_folders(inputs);
   const std::atomic<bool>& stop_asked = catch_stop_signals();
   try {
+    if (are_sweeps(inputs)) {
+      if ((*values)["renumber"].as<bool>())
+        throw UsageError("--renumber: a sweep has no participants with numbers of their own");
+      merge_shards(out, inputs, stop_asked);
+      return 0;
+    }
     ProgressLine progress("sessions");
     const data::MergeResult done = data::merge(
         out, inputs,

@@ -16,6 +16,7 @@
 #include "runner/session/device_check.h"
 #include "runner/session/protocol_info.h"
 #include "runner/session/session.h"
+#include "runner/session/simulated_session.h"
 
 namespace palpate::runner {
 namespace {
@@ -91,40 +92,13 @@ SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
   return plan;
 }
 
-/// What all workers share, read only.
-struct Shared {
-  const protocols::Protocol& protocol;
-  const SimulatedSettings& settings;
-  StimulusLibrary library;
-  ShapeHypotheses hypotheses;
-  std::uint64_t seed;
-  const std::atomic<bool>& stop;    ///< asked for from outside
-  std::atomic<bool> failed{false};  ///< a worker or the store threw
-
-  bool halting() const { return stop || failed; }
-};
-
-void run_session(const Shared& shared, const Work& work, std::size_t index, Queue& queue) {
-  const protocols::Protocol& protocol = shared.protocol;
-  const SimulatedSettings own =
-      individual(shared.settings, shared.seed, work.participant.enrolled_number);
-  SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
-                         1 / protocol.servo_rate);
-  VirtualClock clock(work.clock_ns);
-  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{},
-              {protocol.workspace.centre, protocol.workspace.scale});
-  if (protocol.passivity_controller) servo.control_passivity();
-  SimulatedParticipant participant(own, shared.hypotheses, stylus, protocol, shared.seed,
-                                   work.participant.enrolled_number);
+void run_session(const SimulatedStudy& study, const Work& work, std::size_t index, Queue& queue,
+                 const std::function<bool()>& halting) {
   QueueLog log(queue, index);
-  const Station station{
-      protocol, shared.library, plan_of(protocol, work), servo, clock, work.info.clock, log};
-  Session session(station, participant);
-  // A trial that was shown is recorded, also when it is the last for now.
-  while (session.state() != Session::State::end &&
-         (!shared.halting() || session.state() == Session::State::response)) {
-    session.step();
-  }
+  run_simulated_session(study,
+                        {work.participant.enrolled_number, plan_of(study.protocol, work),
+                         work.clock_ns, work.info.clock},
+                        log, halting);
 }
 
 std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Store& store,
@@ -214,13 +188,6 @@ class Recorder {
   std::map<std::size_t, data::Run> runs_;
 };
 
-std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
-  std::vector<stimuli::ObjectSpec> shapes;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    shapes.push_back(stimulus.object);
-  return shapes;
-}
-
 SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
                                  const SimulatedSettings& settings) {
   return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -228,6 +195,13 @@ SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 }
 
 }  // namespace
+
+std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
+  std::vector<stimuli::ObjectSpec> shapes;
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    shapes.push_back(stimulus.object);
+  return shapes;
+}
 
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
                                           const SimulatedSettings& settings) {
@@ -270,14 +244,9 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
                              const SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
-  StimulusLibrary library(protocol);
-  std::string reasons;
-  for (const std::string& fault : simulation_faults(protocol, library, settings)) {
-    reasons += (reasons.empty() ? "" : "\n") + fault;
-  }
-  if (!reasons.empty()) throw std::invalid_argument(reasons);
-  Shared shared{protocol,  settings, std::move(library), ShapeHypotheses(shapes_of(protocol)),
-                plan.seed, stop};
+  const SimulatedStudy study(protocol, settings, plan.seed);
+  std::atomic<bool> failed{false};  // a worker or the store threw
+  const auto halting = [&] { return stop || failed; };
 
   StudyProgress progress;
   std::vector<Work> work = unfinished_work(protocol, store, settings, plan, progress);
@@ -290,12 +259,12 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
   const auto worker = [&] {
     std::exception_ptr error;
     try {
-      for (std::size_t i = next++; i < sessions.size() && !shared.halting(); i = next++) {
-        run_session(shared, sessions[i], i, queue);
+      for (std::size_t i = next++; i < sessions.size() && !halting(); i = next++) {
+        run_session(study, sessions[i], i, queue, halting);
       }
     } catch (...) {
       error = std::current_exception();
-      shared.failed = true;
+      failed = true;
     }
     queue.worker_done(error);
   };
@@ -311,7 +280,7 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
       if (report) report(progress);
     } catch (...) {
       failure = std::current_exception();
-      shared.failed = true;
+      failed = true;
     }
   }
   threads.clear();

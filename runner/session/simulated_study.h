@@ -38,6 +38,9 @@ struct LimitedForSimulation {
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
                                           const SimulatedSettings& settings);
 
+/// The stimuli as the observer's hypotheses need them.
+std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol);
+
 /// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,

@@ -17,6 +17,8 @@ PROGRAM_ONLY = {
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key",
     "too-many-trials", "two-keys",
 }
+# The same, of sweep spaces.
+SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "values-set-twice"}
 
 
 def refuse_constant(word):
@@ -95,6 +97,21 @@ def main(source):
             failures.append(f"{path.name}: the schema accepts it")
         if not accepted and path.stem in PROGRAM_ONLY:
             failures.append(f"{path.name}: the schema refuses it, so it is not for the program only")
+    space = jsonschema.Draft202012Validator(read(source / "protocols" / "sweep_space.schema.json"))
+    space.check_schema(space.schema)
+    good_spaces = sorted((tests / "spaces" / "good").glob("*.json")) + sorted((source / "protocols" / "spaces").glob("*.json"))
+    bad_spaces = sorted((tests / "spaces" / "bad").glob("*.json"))
+    for path in good_spaces:
+        failures += [f"{path.name}, which is good: {fault.message}" for fault in space.iter_errors(read(path))]
+    for path in bad_spaces:
+        try:
+            accepted = space.is_valid(read(path))
+        except ValueError:
+            accepted = False
+        if accepted != (path.stem in SPACES_PROGRAM_ONLY):
+            failures.append(f"{path.name}: the schema {'accepts' if accepted else 'refuses'} it")
+    if len(good_spaces) < 2 or len(bad_spaces) < 15:
+        failures.append(f"only {len(good_spaces)} good and {len(bad_spaces)} bad spaces were found")
     # The parser accepts everything.json: so it knows every key that the schema names.
     unused = properties(protocol.schema) - keys(read(tests / "good" / "everything.json"))
     unused -= {"objects"}  # of scenes

@@ -48,6 +48,7 @@ int run_command(const std::vector<std::string>& args);
 int schedule_command(const std::vector<std::string>& args);
 int simulate_command(const std::vector<std::string>& args);
 int stability_command(const std::vector<std::string>& args);
+int sweep_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);
 
 }  // namespace palpate::runner

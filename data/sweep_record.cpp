@@ -1,0 +1,105 @@
+#include "data/sweep_record.h"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace palpate::data {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxNamed = 5;  // places that a difference names
+constexpr std::size_t kMaxValue = 40;
+
+std::string shown(const json& value) {
+  std::string text = value.dump(-1, ' ', true, json::error_handler_t::replace);
+  if (text.size() > kMaxValue) text = text.substr(0, kMaxValue) + "...";
+  return text;
+}
+
+std::string value_at(const json& document, const std::string& pointer) {
+  const json::json_pointer place(pointer);
+  return document.contains(place) ? shown(document[place]) : "(nothing)";
+}
+
+/// "/seed 1 and 2; /stimuli/0/radius_m 0.03 and 0.02"
+std::string json_differences(const std::string& a, const std::string& b) {
+  const json one = json::parse(a, nullptr, false), two = json::parse(b, nullptr, false);
+  if (one.is_discarded() || two.is_discarded()) return "texts that cannot be compared";
+  std::string out;
+  std::size_t named = 0;
+  const json patch = json::diff(one, two);
+  for (const json& step : patch) {
+    if (named++ == kMaxNamed) {
+      return out + "; and " + std::to_string(patch.size() - kMaxNamed) + " more";
+    }
+    const std::string place = step.at("path").get<std::string>();
+    out += (out.empty() ? "" : "; ") + place + " " + value_at(one, place) + " and " +
+           value_at(two, place);
+  }
+  return out.empty() ? "their layout alone" : out;
+}
+
+}  // namespace
+
+std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
+  std::vector<std::string> out;
+  const auto texts = [&](const char* what, const std::string& one, const std::string& two) {
+    if (one != two) out.push_back(std::string(what) + ": " + json_differences(one, two));
+  };
+  const auto values = [&](const char* what, const auto& one, const auto& two) {
+    if (one != two)
+      out.push_back(std::string(what) + ": " + shown(json(one)) + " and " + shown(json(two)));
+  };
+  texts("protocol", a.protocol, b.protocol);
+  if (a.files_sha256 != b.files_sha256)
+    out.emplace_back("contents of the files that the protocol names");
+  texts("settings of the participant", a.settings, b.settings);
+  texts("space", a.space, b.space);
+  values("design", a.design, b.design);
+  values("points", a.points, b.points);
+  values("seed", a.seed, b.seed);
+  values("participants", a.participants, b.participants);
+  values("program version", a.program_version, b.program_version);
+  values("parameters", a.parameters, b.parameters);
+  values("shapes", a.shapes, b.shapes);
+  values("renderers", a.renderers, b.renderers);
+  return out;
+}
+
+std::vector<std::string> figure_columns(const SweepPlan& plan) {
+  std::vector<std::string> out;
+  for (const char* what : {"gain_", "gain_se_"}) {
+    for (const std::string& shape : plan.shapes) out.push_back(what + shape);
+  }
+  for (const char* what : {"time_", "accuracy_", "time_outs_", "contact_share_"}) {
+    for (const std::string& renderer : plan.renderers) {
+      for (const std::string& shape : plan.shapes) out.push_back(what + (renderer + "_" + shape));
+    }
+  }
+  return out;
+}
+
+std::vector<std::string> sweep_columns(const SweepPlan& plan) {
+  std::vector<std::string> out{"point", "status", "reason"};
+  out.insert(out.end(), plan.parameters.begin(), plan.parameters.end());
+  const std::vector<std::string> figures = figure_columns(plan);
+  out.insert(out.end(), figures.begin(), figures.end());
+  return out;
+}
+
+std::optional<std::pair<std::string, std::string>> columns_alike(const SweepPlan& plan) {
+  std::map<std::string, std::string> seen{{"seed", "seed"}, {"order_seed", "order_seed"}};
+  for (const std::string& column : sweep_columns(plan)) {
+    std::string lower = column;
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    const auto [found, added] = seen.emplace(lower, column);
+    if (!added) return std::pair(found->second, column);
+  }
+  return std::nullopt;
+}
+
+}  // namespace palpate::data

@@ -1,0 +1,53 @@
+#pragma once
+// The records of a sweep: its plan, and what came out at each point. Plain values.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace palpate::data {
+
+/// All that the results of a sweep depend on. Two files of one plan can be put together.
+struct SweepPlan {
+  std::string protocol;      ///< JSON; layout and order of keys do not count
+  std::string files_sha256;  ///< of the names and contents of the files that it names; "": none
+  std::string settings;      ///< JSON, of the simulated participant before anything varies
+  std::string space;         ///< JSON, what varies
+  std::string design;        ///< lhs, sobol, grid, saltelli
+  std::int64_t points = 0;   ///< of the whole sweep, whatever this file holds
+  std::uint64_t seed = 1;
+  int participants = 7;
+  std::string program_version;
+  std::vector<std::string> parameters;         ///< names, as the space lists them
+  std::vector<std::string> shapes, renderers;  ///< names, as the protocol lists them
+};
+
+/// A sentence for each thing in which two plans differ, a's value first; empty: they are one plan.
+std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b);
+
+using SweepValue = std::variant<double, std::string>;  ///< true and false are 1 and 0
+
+/// One point of a sweep: a study with simulated participants.
+struct SweepRow {
+  std::int64_t point = 1;                  ///< 1, 2, ...
+  std::uint64_t seed = 0, order_seed = 0;  ///< of its participants, and of their schedules
+  std::string reason;                      ///< why it failed; "": it did not
+  std::vector<SweepValue> values;          ///< of the plan's parameters
+  /// As figure_columns() names them; none: undefined, or the point failed.
+  std::vector<std::optional<double>> figures;
+};
+
+/// gain_SHAPE and gain_se_SHAPE (percent reduction of time with the second renderer, geometric, and
+/// its standard error); then for each renderer and shape time_R_S (s, mean of participants' means
+/// over correct answers), accuracy_R_S, time_outs_R_S (share of trials) and contact_share_R_S
+/// (share of the time with forces on).
+std::vector<std::string> figure_columns(const SweepPlan& plan);
+/// point, status, reason, the parameters, the figures.
+std::vector<std::string> sweep_columns(const SweepPlan& plan);
+/// Two columns of one name, also by upper and lower case alone; none: there are no two.
+std::optional<std::pair<std::string, std::string>> columns_alike(const SweepPlan& plan);
+
+}  // namespace palpate::data

@@ -1,0 +1,236 @@
+#include "protocols/sweep_space.h"
+
+#include <algorithm>
+#include <boost/math/special_functions/erf.hpp>
+#include <cctype>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
+
+namespace palpate::protocols {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxParameters = 200;
+constexpr std::size_t kMaxPaths = 100;
+constexpr std::size_t kMaxChoices = 1000;
+constexpr std::size_t kMaxName = 64;  // it is a column's name
+constexpr double kLargest = 1e12;     // larger values are mistakes
+
+/// Share of a standard normal distribution below z. Accurate in both tails.
+double normal_share(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+double normal_value(double share) {
+  return -std::numbers::sqrt2 * boost::math::erfc_inv(2 * share);
+}
+
+/// Of a normal distribution that is cut off at both limits. Limits above the mean are mirrored:
+/// shares near 1 have no digits left.
+double cut_normal_value(const SweepParameter& p, double u) {
+  const double low = (p.low - p.mean) / p.sd, high = (p.high - p.mean) / p.sd;
+  const bool mirrored = low > 0;
+  const double from = normal_share(mirrored ? -high : low);
+  const double to = normal_share(mirrored ? -low : high);
+  const double share = from + (mirrored ? 1 - u : u) * (to - from);
+  if (!(share > 0) || !(share < 1)) return u < 0.5 ? p.low : p.high;
+  const double z = normal_value(share);
+  return std::clamp(p.mean + p.sd * (mirrored ? -z : z), p.low, p.high);
+}
+
+bool is_name(const std::string& text) {
+  return !text.empty() && text.size() <= kMaxName &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; });
+}
+
+/// RFC 6901: "/a/0/b"; ~ only as ~0 or ~1.
+bool is_pointer(const std::string& text) {
+  if (text.size() < 2 || text[0] != '/') return false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '~') continue;
+    if (i + 1 == text.size() || (text[i + 1] != '0' && text[i + 1] != '1')) return false;
+  }
+  return true;
+}
+
+void read_path(const json& value, const std::string& place, SweepParameter& out,
+               FaultList& faults) {
+  if (!value.is_string() || !is_pointer(value.get_ref<const std::string&>())) {
+    faults.add(place,
+               "expected a JSON pointer such as '/motor/reaction_delay_s'" + found_text(value));
+    return;
+  }
+  const std::string path = value.get<std::string>();
+  if (std::find(out.paths.begin(), out.paths.end(), path) != out.paths.end()) {
+    faults.add(place, "expected each pointer once" + found_text(value) + " again");
+  }
+  out.paths.push_back(path);
+}
+
+void read_paths(ObjectReader& reader, SweepParameter& out) {
+  const json* const value = reader.member("path", Presence::required);
+  if (value == nullptr) return;
+  if (!value->is_array()) {
+    read_path(*value, reader.pointer("path"), out, reader.faults());
+    return;
+  }
+  if (const json* const list = reader.array("path", 1, kMaxPaths)) {
+    for (std::size_t i = 0; i < list->size(); ++i)
+      read_path((*list)[i], child_pointer(reader.pointer("path"), i), out, reader.faults());
+  }
+}
+
+void read_values(ObjectReader& reader, SweepParameter& out) {
+  const json* const list = reader.array("values", 1, kMaxChoices, Presence::required);
+  if (list == nullptr) return;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const json& value = (*list)[i];
+    const std::string place = child_pointer(reader.pointer("values"), i);
+    if (!value.is_number() && !value.is_string() && !value.is_boolean()) {
+      reader.faults().add(place, "expected a number, a text, true or false" + found_text(value));
+    } else if (std::find(out.values.begin(), out.values.end(), value) != out.values.end()) {
+      reader.faults().add(place, "expected each value once" + found_text(value) + " again");
+    }
+    out.values.push_back(value);
+  }
+}
+
+void read_limits(ObjectReader& reader, SweepParameter& out) {
+  const NumberRange range = out.distribution == DistributionKind::log_uniform
+                                ? NumberRange{0, kLargest, "", true}
+                                : NumberRange{-kLargest, kLargest};
+  const bool both = reader.has("low") && reader.has("high");
+  reader.number("low", out.low, range, Presence::required);
+  reader.number("high", out.high, range, Presence::required);
+  if (both && reader.member("low")->is_number() && reader.member("high")->is_number() &&
+      !(reader.member("low")->get<double>() < reader.member("high")->get<double>())) {
+    reader.faults().add(reader.pointer("high"),
+                        "expected more than 'low'" + found_text(*reader.member("high")));
+  }
+}
+
+SweepParameter read_parameter(ObjectReader& reader) {
+  SweepParameter out;
+  if (const json* const name = reader.member("name", Presence::required)) {
+    if (name->is_string()) out.name = name->get<std::string>();
+    if (!is_name(out.name)) {
+      reader.faults().add(reader.pointer("name"),
+                          "expected a name of 1 to " + std::to_string(kMaxName) +
+                              " letters, digits, '_' and '-'" + found_text(*name));
+    }
+  }
+  reader.choice(
+      "of", out.of,
+      {{"participant", SweptDocument::participant}, {"protocol", SweptDocument::protocol}},
+      Presence::required);
+  read_paths(reader, out);
+  reader.choice("distribution", out.distribution,
+                {{to_string(DistributionKind::uniform), DistributionKind::uniform},
+                 {to_string(DistributionKind::log_uniform), DistributionKind::log_uniform},
+                 {to_string(DistributionKind::normal), DistributionKind::normal},
+                 {to_string(DistributionKind::choice), DistributionKind::choice}},
+                Presence::required);
+  if (out.distribution == DistributionKind::choice) {
+    read_values(reader, out);
+    return out;
+  }
+  read_limits(reader, out);
+  if (out.distribution != DistributionKind::normal) return out;
+  reader.number("mean", out.mean, {-kLargest, kLargest}, Presence::required);
+  reader.number("sd", out.sd, {0, kLargest, "", true}, Presence::required);
+  return out;
+}
+
+/// Whether one pointer leads into what another one replaces, or is the same.
+bool overlap(const std::string& a, const std::string& b) {
+  const std::string &shorter = a.size() < b.size() ? a : b, &longer = a.size() < b.size() ? b : a;
+  return longer.starts_with(shorter) &&
+         (longer.size() == shorter.size() || longer[shorter.size()] == '/');
+}
+
+void check_together(const SweepSpace& space, FaultList& faults) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < space.parameters.size(); ++i) {
+    const SweepParameter& one = space.parameters[i];
+    const std::string place = child_pointer("/parameters", i);
+    if (!one.name.empty() && !names.insert(one.name).second) {
+      faults.add(child_pointer(place, "name"),
+                 "expected a name of its own, found '" + one.name + "' again");
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      const SweepParameter& other = space.parameters[j];
+      if (other.of != one.of) continue;
+      for (const std::string& a : one.paths) {
+        for (const std::string& b : other.paths) {
+          if (!overlap(a, b)) continue;
+          faults.add(
+              child_pointer(place, "path"),
+              "expected pointers that no other parameter sets; '" + other.name + "' sets " + b);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+const char* to_string(DistributionKind kind) {
+  switch (kind) {
+    case DistributionKind::uniform:
+      return "uniform";
+    case DistributionKind::log_uniform:
+      return "log_uniform";
+    case DistributionKind::normal:
+      return "normal";
+    case DistributionKind::choice:
+      return "choice";
+  }
+  return "";
+}
+
+json SweepParameter::value_at(double u) const {
+  const double share = std::clamp(u, 0.0, 1.0);
+  switch (distribution) {
+    case DistributionKind::uniform:
+      return std::clamp(low + share * (high - low), low, high);
+    case DistributionKind::log_uniform:
+      return std::clamp(low * std::exp(share * std::log(high / low)), low, high);
+    case DistributionKind::normal:
+      return cut_normal_value(*this, share);
+    case DistributionKind::choice:
+      break;
+  }
+  const auto slot = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  return values.at(std::min(slot, values.size() - 1));
+}
+
+SweepSpace parse_sweep_space(const std::string& path) {
+  return parse_sweep_space_text(read_text_file(path), path);
+}
+
+SweepSpace parse_sweep_space_text(const std::string& text, const std::string& file_name) {
+  FaultList faults(file_name);
+  const json root = read_json(text, faults);
+  SweepSpace space;
+  ObjectReader reader(root, "", faults);
+  reader.member("$schema");
+  reader.integer("version", space.version, {1, 1}, Presence::required);
+  if (const json* const list = reader.array("parameters", 1, kMaxParameters, Presence::required)) {
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      ObjectReader parameter((*list)[i], child_pointer("/parameters", i), faults);
+      space.parameters.push_back(read_parameter(parameter));
+      parameter.refuse_unknown_keys();
+    }
+  }
+  reader.refuse_unknown_keys();
+  check_together(space, faults);
+  faults.throw_if_any();
+  space.source_text = text;
+  return space;
+}
+
+}  // namespace palpate::protocols

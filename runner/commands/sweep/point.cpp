@@ -1,0 +1,168 @@
+#include "runner/commands/sweep/point.h"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "analysis/statistics/describe.h"
+#include "analysis/statistics/paired.h"
+#include "runner/session/simulated_session.h"
+#include "runner/session/simulated_study.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kTooFast = 0.2;         // s, as `analyze` leaves out by default
+constexpr std::size_t kMaxReason = 300;  // bytes: a row a point
+
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw std::runtime_error("a trial of '" + name + "', which the protocol has not");
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+/// Trials as the analysis takes them, and the time in contact of each cell.
+class TrialCollection {
+ public:
+  explicit TrialCollection(const data::SweepPlan& plan)
+      : cells_(plan.renderers.size() * plan.shapes.size()) {
+    table_.renderers = plan.renderers;
+    table_.shapes = table_.answers = plan.shapes;
+    for (int i = 1; i <= plan.participants; ++i) table_.participants.push_back(simulated_code(i));
+  }
+
+  void add(int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
+    if (record.practice) return;
+    analysis::TrialRow row;
+    row.participant = static_cast<std::uint32_t>(participant - 1);
+    row.renderer = static_cast<std::uint16_t>(index_of(table_.renderers, record.renderer));
+    row.shape = static_cast<std::uint16_t>(index_of(table_.shapes, record.shape));
+    if (!record.response.empty())
+      row.answer = static_cast<std::int32_t>(index_of(table_.answers, record.response));
+    row.correct = record.correct;
+    row.timed_out = record.timed_out;
+    row.response_time = record.response_time;
+    table_.rows.push_back(row);
+    Cell& cell = cells_[row.renderer * table_.shapes.size() + row.shape];
+    cell.ticks += record.ticks;
+    cell.contact_ticks += contact_ticks;
+  }
+
+  /// In the order of figure_columns().
+  std::vector<std::optional<double>> figures() const {
+    const analysis::Description description = analysis::describe(table_, kTooFast);
+    std::vector<std::optional<double>> out = gains(description);
+    const auto each_cell = [&](const auto& figure) {
+      for (std::size_t r = 0; r < table_.renderers.size(); ++r) {
+        for (std::size_t s = 0; s < table_.shapes.size(); ++s) out.push_back(figure(r, s));
+      }
+    };
+    using Figure = std::optional<double>;
+    each_cell([&](auto r, auto s) { return description.times[r][s].mean_of_participant_means; });
+    each_cell([&](auto r, auto s) { return description.accuracy[r][s].accuracy; });
+    each_cell([&](auto r, auto s) -> Figure {
+      const analysis::AccuracyCell& cell = description.accuracy[r][s];
+      if (cell.n_trials == 0) return std::nullopt;
+      return static_cast<double>(cell.n_timeouts) / static_cast<double>(cell.n_trials);
+    });
+    each_cell([&](auto r, auto s) -> Figure {
+      const Cell& cell = cells_[r * table_.shapes.size() + s];
+      if (cell.ticks == 0) return std::nullopt;
+      return static_cast<double>(cell.contact_ticks) / static_cast<double>(cell.ticks);
+    });
+    return out;
+  }
+
+ private:
+  struct Cell {
+    std::uint64_t ticks = 0, contact_ticks = 0;
+  };
+
+  std::vector<std::optional<double>> gains(const analysis::Description& description) const {
+    std::vector<std::optional<double>> gains(table_.shapes.size()), errors(table_.shapes.size());
+    if (table_.renderers.size() == 2) {
+      const analysis::RendererPair pair = analysis::renderer_pairs(table_.renderers).front();
+      const auto shapes = analysis::compare_by_shape(table_, description, pair);
+      for (std::size_t s = 0; s < shapes.size(); ++s) {
+        gains[s] = shapes[s].percent_reduction_geometric;
+        // To first order: the slope of 100 (1 - exp m) is 100 exp m.
+        if (gains[s] && shapes[s].t_test.se) errors[s] = (100 - *gains[s]) * *shapes[s].t_test.se;
+      }
+    }
+    gains.insert(gains.end(), errors.begin(), errors.end());
+    return gains;
+  }
+
+  analysis::TrialTable table_;
+  std::vector<Cell> cells_;
+};
+
+std::vector<json> values_of_point(const Sweep& sweep, std::int64_t point) {
+  std::vector<json> values;
+  const std::vector<double> shares = sweep.design.at(point);
+  const auto& parameters = sweep.study.space().parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    values.push_back(parameters[i].value_at(shares[i]));
+  return values;
+}
+
+data::SweepValue stored(const json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? 1.0 : 0.0;
+  return value.get<double>();
+}
+
+/// Without names of files: the same on every machine.
+std::string reason_of(const std::exception& error) {
+  std::string text;
+  if (const auto* const input = dynamic_cast<const protocols::InputError*>(&error)) {
+    for (const protocols::Fault& fault : input->faults())
+      text += (text.empty() ? "" : "; ") + fault.location + ": " + fault.expected;
+  } else {
+    text = error.what();
+  }
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  text = stimuli::printable(text, kMaxReason);
+  return text.empty() ? "unknown" : text;
+}
+
+}  // namespace
+
+PointStudy study_of_point(const Sweep& sweep, std::int64_t point) {
+  return sweep.study.at(sweep.plan.seed, point, values_of_point(sweep, point));
+}
+
+std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
+                                        const std::atomic<bool>& stop) {
+  data::SweepRow row;
+  row.point = point;
+  for (const json& value : values_of_point(sweep, point)) row.values.push_back(stored(value));
+  const PointStudy study = study_of_point(sweep, point);
+  row.seed = study.seed;
+  row.order_seed = study.order_seed;
+  try {
+    protocols::Protocol protocol = sweep.study.parse(study.protocol);
+    const SimulatedSettings settings = read_simulated_settings(study.settings.dump());
+    limit_for_simulation(protocol, settings);
+    TrialCollection trials(sweep.plan);
+    const bool done = simulate_in_memory(
+        protocol, settings, sweep.plan.participants, study.seed, stop,
+        [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
+          trials.add(participant, record, contact_ticks);
+        });
+    if (!done) return std::nullopt;
+    row.figures = trials.figures();
+  } catch (const std::exception& error) {
+    row.reason = reason_of(error);
+    row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);
+  }
+  return row;
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,338 @@
+// `palpate sweep`: simulated studies over a space of settings.
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "data/store/sweep_file.h"
+#include "protocols/sha256.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/stop_signal.h"
+#include "runner/commands/sweep/point.h"
+#include "runner/commands/sweep/shard.h"
+#include "runner/session/protocol_info.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace po = boost::program_options;
+using nlohmann::json;
+
+struct SweepSettings {
+  std::string protocol, space, database, patch, design, shard;
+  std::int64_t points = 0;
+  std::int64_t print_point = 0;  ///< 0: none, the sweep runs
+  std::uint64_t seed = 1;
+  int participants = 7, repetitions = 0, jobs = 1;  ///< repetitions 0: the protocol's
+};
+
+void add_options(CommandLine& line, SweepSettings& settings) {
+  line.usage =
+      "palpate sweep PROTOCOL.json --space SPACE.json --points N --db FILE [--design NAME]\n"
+      "       [--seed S] [--participants N] [--repetitions R] [--jobs J] [--shard K/N|auto]";
+  line.summary =
+      "Simulates a study at each of many points of a space of settings: of the simulated\n"
+      "participant and of the protocol. FILE gets a row a point: its settings, and per shape and\n"
+      "renderer times, accuracy, time-outs, contact, gains with standard errors, or why it "
+      "failed,\n"
+      "which does not end the sweep. Started again, it goes on where it stopped or was killed. "
+      "The\n"
+      "same plan gives the same file, to the byte, whatever the jobs, shards and interruptions.\n"
+      "Where to go from there: palpate analyze --sweep FILE, palpate export --format csv, and\n"
+      "palpate merge for shards.";
+  line.example =
+      "  palpate sweep protocols/quick.json --space protocols/spaces/small.json --points 8 \\\n"
+      "      --participants 2 --repetitions 2 --db small.sweep              half a minute's try\n"
+      "  palpate sweep protocols/ho2000.json --space protocols/spaces/participants.json \\\n"
+      "      --points 2000 --repetitions 20 --db people.sweep               an hour or two\n"
+      "  palpate sweep ... --points 2000 --shard 3/8 --db shard3.sweep      the third of eight "
+      "parts\n"
+      "  palpate sweep ... --print-point 17                                 what point 17 is, as "
+      "JSON";
+  line.options.add_options()  //
+      ("space", po::value(&settings.space)->required()->value_name("FILE"),
+       "what varies, and how (JSON)")  //
+      ("points", po::value(&settings.points)->required()->value_name("N"),
+       "studies; a grid and saltelli have the greatest number up to it that they can")  //
+      ("design",
+       po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
+       "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "
+       "samples "
+       "for Sobol indices")  //
+      ("seed", po::value(&settings.seed)->default_value(settings.seed)->value_name("S"),
+       "of the design and, with its number, of every point")  //
+      ("participants",
+       po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
+       "simulated participants at each point")  //
+      ("repetitions", po::value(&settings.repetitions)->value_name("R"),
+       "of each shape with each renderer, in place of the protocol's")  //
+      ("jobs", po::value(&settings.jobs)->default_value(settings.jobs)->value_name("J"),
+       "points simulated at a time")  //
+      ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
+       "only the K-th of N parts of the points; auto: the task of a Slurm array")  //
+      ("settings", po::value(&settings.patch)->value_name("FILE"),
+       "JSON merge patch on the frozen settings of the simulated participant, before anything "
+       "varies")  //
+      ("db", po::value(&settings.database)->value_name("FILE"),
+       "the sweep's file; created or continued")  //
+      ("print-point", po::value(&settings.print_point)->value_name("P"),
+       "print the protocol and the participant's settings of a point instead");
+  line.positional_names = {"PROTOCOL.json"};
+}
+
+/// None where --help was asked for and printed. \throws UsageError
+std::optional<SweepSettings> parse_sweep_settings(const std::vector<std::string>& args) {
+  SweepSettings settings;
+  settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  CommandLine line;
+  add_options(line, settings);
+  const auto values = line.parse(args);
+  if (!values) return std::nullopt;
+  constexpr std::int64_t kMostPoints = 100'000'000;
+  if (settings.points < 1 || settings.points > kMostPoints)
+    throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
+  if (settings.participants < 1 || settings.participants > 100000)
+    throw UsageError("--participants: must be 1 to 100000");
+  if (values->count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
+    throw UsageError("--repetitions: must be 1 to 1000000");
+  if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
+  if (values->count("print-point") && settings.print_point < 1)
+    throw UsageError("--print-point: must be the number of a point, from 1");
+  if (!values->count("print-point") && settings.database.empty()) {
+    throw UsageError("missing --db FILE, the sweep's file\nUsage: " + line.usage +
+                     "\nMore: add --help");
+  }
+  settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
+  return settings;
+}
+
+/// The protocol with --repetitions; no more blocks than those.
+json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
+  json out = json::parse(protocol.source_text);
+  if (settings.repetitions == 0) return out;
+  out["repetitions"] = settings.repetitions;
+  if (protocol.blocks_per_renderer > settings.repetitions) {
+    out["blocks_per_renderer"] = settings.repetitions;
+    std::cerr << "blocks_per_renderer: " << settings.repetitions << " instead of "
+              << protocol.blocks_per_renderer << ", as there are " << settings.repetitions
+              << " repetitions\n";
+  }
+  return out;
+}
+
+std::string sha256_of_files(const protocols::Protocol& protocol) {
+  std::string all;
+  for (const data::ProtocolFile& file : info_of(protocol).files)
+    all += file.name + '\n' + protocols::sha256_hex(file.bytes) + '\n';
+  return all.empty() ? "" : protocols::sha256_hex(all);
+}
+
+data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& study,
+                              const Design& design, const protocols::Protocol& protocol) {
+  data::SweepPlan plan;
+  plan.protocol = study.protocol().dump();
+  plan.files_sha256 = sha256_of_files(protocol);
+  plan.settings = study.settings().dump();
+  plan.space = json::parse(study.space().source_text).dump();
+  plan.design = settings.design;
+  plan.points = design.size();
+  plan.seed = settings.seed;
+  plan.participants = settings.participants;
+  plan.program_version = PALPATE_VERSION;
+  for (const protocols::SweepParameter& one : study.space().parameters)
+    plan.parameters.push_back(one.name);
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    plan.shapes.push_back(stimulus.name);
+  // The analysis' order: gains are of the ray against the point, whichever is listed first.
+  for (const protocols::RendererKind kind :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
+    if (std::count(protocol.renderers.begin(), protocol.renderers.end(), kind) > 0)
+      plan.renderers.emplace_back(to_string(kind));
+  }
+  if (const auto alike = data::columns_alike(plan)) {
+    throw UsageError(settings.space + ": the parameter '" + alike->first +
+                     "' has the name of another column, '" + alike->second +
+                     "'; give it another one");
+  }
+  return plan;
+}
+
+Design design_of(const SweepSettings& settings, const SweptStudy& study) {
+  try {
+    return {design_kind(settings.design), settings.points, settings.seed, study.space().parameters};
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--design, --points: ") + error.what());
+  }
+}
+
+/// The points that workers take, and the rows that they give to the thread that owns the file.
+class PointQueue {
+ public:
+  explicit PointQueue(std::vector<std::int64_t> todo) : todo_(std::move(todo)) {}
+
+  /// 0: none is left.
+  std::int64_t take() {
+    const std::size_t at = next_++;
+    return at < todo_.size() ? todo_[at] : 0;
+  }
+  void put(data::SweepRow row) {
+    const std::lock_guard lock(mutex_);
+    rows_.push_back(std::move(row));
+    came_.notify_all();
+  }
+  void worker_done(std::exception_ptr error) {
+    const std::lock_guard lock(mutex_);
+    ++done_;
+    if (error && !error_) error_ = std::move(error);
+    came_.notify_all();
+  }
+  /// What has come within 0.2 s; at least one row or the workers' end, if that takes longer.
+  std::vector<data::SweepRow> wait(int workers, bool& all_done) {
+    std::unique_lock lock(mutex_);
+    came_.wait_for(lock, std::chrono::milliseconds(200), [&] { return done_ == workers; });
+    all_done = done_ == workers;
+    return std::exchange(rows_, {});
+  }
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+  std::size_t size() const { return todo_.size(); }
+
+ private:
+  const std::vector<std::int64_t> todo_;
+  std::atomic<std::size_t> next_{0};
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::vector<data::SweepRow> rows_;
+  int done_ = 0;
+  std::exception_ptr error_;
+};
+
+/// \param before  points of the shard that were on record \return points that are now
+std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& queue, int jobs,
+                        std::int64_t before) {
+  const std::atomic<bool>& signal = catch_stop_signals();
+  std::atomic<bool> stop{false};
+  const int workers =
+      static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(jobs), queue.size()));
+  const auto work = [&] {
+    std::exception_ptr error;
+    try {
+      for (std::int64_t point = queue.take(); point != 0 && !stop; point = queue.take()) {
+        if (auto row = run_point(sweep, point, stop)) queue.put(std::move(*row));
+      }
+    } catch (...) {
+      error = std::current_exception();
+      stop = true;
+    }
+    queue.worker_done(error);
+  };
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < workers; ++i) threads.emplace_back(work);
+  ProgressLine line("points");
+  std::int64_t done = before;
+  const auto all = static_cast<double>(before) + static_cast<double>(queue.size());
+  std::exception_ptr failure;
+  for (bool all_done = workers == 0; !all_done;) {
+    const std::vector<data::SweepRow> rows = queue.wait(workers, all_done);
+    if (signal) stop = true;
+    if (failure || rows.empty()) continue;
+    try {
+      file.record(rows);
+      done += static_cast<std::int64_t>(rows.size());
+      line.show(static_cast<double>(done) / all);
+    } catch (...) {
+      failure = std::current_exception();
+      stop = true;
+    }
+  }
+  threads.clear();
+  line.clear();
+  if (failure) std::rethrow_exception(failure);
+  queue.rethrow();
+  return done;
+}
+
+void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std::string& name) {
+  const std::int64_t count = file.count(), failed = file.failed();
+  std::cout << name << ", SIMULATED participants: " << count << " of " << plan.points << " points ("
+            << plan.design << ", seed " << plan.seed << ") in " << stimuli::printable(file.path());
+  if (failed > 0) std::cout << ", " << failed << " of them failed";
+  std::cout << "\n";
+  if (failed == 0) return;
+  std::cerr
+      << "the reasons stand in the column 'reason' of: palpate export --db FILE --format csv\n";
+}
+
+int run_shard(const Sweep& sweep, const SweepSettings& settings, const Shard& shard,
+              const std::string& name) {
+  data::SweepFile file = data::SweepFile::open(settings.database, sweep.plan);
+  warn_of_exposure(settings.database);
+  const std::vector<bool> recorded = file.recorded();
+  std::vector<std::int64_t> todo;
+  const std::int64_t first = shard.first(sweep.plan.points), last = shard.last(sweep.plan.points);
+  for (std::int64_t point = first + 1; point <= last; ++point) {
+    if (!recorded[static_cast<std::size_t>(point) - 1]) todo.push_back(point);
+  }
+  const std::int64_t before = last - first - static_cast<std::int64_t>(todo.size());
+  PointQueue queue(std::move(todo));
+  const std::int64_t done = run_points(sweep, file, queue, settings.jobs, before);
+  if (done < last - first) {
+    print_summary(file, sweep.plan, name);
+    std::cerr << "stopped; the same command resumes from here\n";
+    return 1;
+  }
+  file.finish();
+  print_summary(file, sweep.plan, name);
+  return 0;
+}
+
+void print_point(const Sweep& sweep, std::int64_t point) {
+  if (point > sweep.plan.points) {
+    throw UsageError("--print-point: the sweep has " + std::to_string(sweep.plan.points) +
+                     " points");
+  }
+  const PointStudy study = study_of_point(sweep, point);
+  json out{{"point", point}, {"seed", study.seed}, {"participants", sweep.plan.participants}};
+  out["protocol"] = study.protocol;
+  out["settings"] = study.settings;
+  std::cout << out.dump(2) << "\n";
+}
+
+}  // namespace
+
+int sweep_command(const std::vector<std::string>& args) {
+  const std::optional<SweepSettings> given = parse_sweep_settings(args);
+  if (!given) return 0;
+  const SweepSettings& settings = *given;
+  const Shard shard =
+      parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
+  const protocols::Protocol protocol = protocols::parse_protocol(settings.protocol);
+  const SweptStudy study(base_protocol(protocol, settings), settings.protocol,
+                         json::parse(simulated_settings_text(settings.patch)),
+                         protocols::parse_sweep_space(settings.space), settings.space);
+  const Design design = design_of(settings, study);
+  const data::SweepPlan plan = plan_of_sweep(settings, study, design, protocol);
+  const Sweep sweep{study, design, plan};
+  if (settings.print_point > 0) {
+    print_point(sweep, settings.print_point);
+    return 0;
+  }
+  if (design.size() < settings.points) {
+    std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
+              << " asked for\n";
+  }
+  return run_shard(sweep, settings, shard, protocol.name);
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,113 @@
+#include "runner/session/simulated_session.h"
+
+#include <stdexcept>
+#include <string>
+
+#include "runner/session/session.h"
+#include "runner/session/simulated_study.h"
+
+namespace palpate::runner {
+namespace {
+
+/// \throws std::invalid_argument
+const protocols::Protocol& checked(const protocols::Protocol& protocol,
+                                   const StimulusLibrary& library,
+                                   const SimulatedSettings& settings) {
+  std::string reasons;
+  for (const std::string& fault : simulation_faults(protocol, library, settings)) {
+    reasons += (reasons.empty() ? "" : "\n") + fault;
+  }
+  if (!reasons.empty()) throw std::invalid_argument(reasons);
+  return protocol;
+}
+
+/// The servo loop, counting.
+class ContactCount final : public TickSource {
+ public:
+  ContactCount(TickSource& servo, std::uint64_t& ticks) : servo_(servo), ticks_(ticks) {}
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const HomeZone& home) override {
+    ticks_ = 0;
+    servo_.prepare(scene, renderer, home);
+  }
+  const Sample& next() noexcept override {
+    const Sample& sample = servo_.next();
+    if (sample.phase == Phase::feeling && sample.rendering.contacts > 0) ++ticks_;
+    return sample;
+  }
+  ServoQuality stop() noexcept override { return servo_.stop(); }
+
+ private:
+  TickSource& servo_;
+  std::uint64_t& ticks_;
+};
+
+class VisitingLog final : public TrialLog {
+ public:
+  explicit VisitingLog(std::function<void(const data::TrialRecord&)> visit)
+      : visit_(std::move(visit)) {}
+  int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
+  void finish(const data::TrialRecord& record) override { visit_(record); }
+  void cut_off(const std::string& reason) override {
+    throw std::runtime_error("a simulated trial was cut off: " + reason);
+  }
+
+ private:
+  std::function<void(const data::TrialRecord&)> visit_;
+};
+
+}  // namespace
+
+SimulatedStudy::SimulatedStudy(const protocols::Protocol& p, const SimulatedSettings& s,
+                               std::uint64_t seed_)
+    : protocol(p),
+      settings(s),
+      library(p),
+      hypotheses(shapes_of(checked(p, library, s))),
+      seed(seed_) {}
+
+void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
+                           TrialLog& log, const std::function<bool()>& halting,
+                           std::uint64_t* contact_ticks) {
+  const protocols::Protocol& protocol = study.protocol;
+  const SimulatedSettings own = individual(study.settings, study.seed, session.participant);
+  SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
+                         1 / protocol.servo_rate);
+  VirtualClock clock(session.clock_ns);
+  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{},
+              {protocol.workspace.centre, protocol.workspace.scale});
+  if (protocol.passivity_controller) servo.control_passivity();
+  SimulatedParticipant participant(own, study.hypotheses, stylus, protocol, study.seed,
+                                   session.participant);
+  std::uint64_t uncounted = 0;
+  ContactCount counting(servo, contact_ticks != nullptr ? *contact_ticks : uncounted);
+  TickSource& ticks = contact_ticks != nullptr ? static_cast<TickSource&>(counting) : servo;
+  const Station station{protocol, study.library, session.plan, ticks, clock, session.utc, log};
+  Session trials(station, participant);
+  // A trial that was shown is recorded, also when it is the last for now.
+  while (trials.state() != Session::State::end &&
+         (trials.state() == Session::State::response || !halting())) {
+    trials.step();
+  }
+}
+
+bool simulate_in_memory(
+    const protocols::Protocol& protocol, const SimulatedSettings& settings, int participants,
+    std::uint64_t seed, const std::atomic<bool>& stop,
+    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit) {
+  const SimulatedStudy study(protocol, settings, seed);
+  for (int number = 1; number <= participants; ++number) {
+    for (int session = 1; session <= protocol.sessions.count; ++session) {
+      std::uint64_t contact_ticks = 0;
+      VisitingLog log(
+          [&](const data::TrialRecord& record) { visit(number, record, contact_ticks); });
+      run_simulated_session(
+          study, {number, SessionPlan(protocol, number, session), 0, {}}, log,
+          [&stop] { return stop.load(); }, &contact_ticks);
+      if (stop) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,164 @@
+#include "runner/sweep/swept_study.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "protocols/object_reader.h"
+#include "runner/sweep/json_places.h"
+#include "stimuli/random.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::json;
+using protocols::child_pointer;
+using protocols::SweepParameter;
+using protocols::SweptDocument;
+
+/// 53 bits: every reader of JSON takes them exactly.
+std::uint64_t short_seed(std::uint64_t sweep_seed, std::int64_t point, std::uint64_t use) {
+  constexpr std::uint64_t kPointSeeds = 4;  // other streams of the sweep's seed: design.cpp
+  return stimuli::Random(sweep_seed, {kPointSeeds, static_cast<std::uint64_t>(point), use})
+             .next() >>
+         11U;
+}
+
+std::string place_of(std::size_t parameter, const SweepParameter& one, std::size_t path) {
+  const std::string place = child_pointer(child_pointer("/parameters", parameter), "path");
+  return one.paths.size() == 1 ? place : child_pointer(place, path);
+}
+
+std::string near_text(const json& document, const std::string& pointer) {
+  std::string out;
+  for (const std::string& place : near_pointers(document, pointer))
+    out += (out.empty() ? "" : ", ") + place;
+  return out.empty() ? "" : "; near to it: " + out;
+}
+
+/// Values to try: all of a choice; of a distribution its middle and, for limits of a kind, no more.
+std::vector<json> typical_values(const SweepParameter& one) {
+  if (!one.values.empty()) return one.values;
+  return {one.value_at(0.5)};
+}
+
+bool same_kind(const json& a, const json& b) {
+  return (a.is_number() && b.is_number()) || a.type() == b.type();
+}
+
+/// Names that columns are made of.
+std::vector<std::string> names_in(const json& protocol) {
+  std::vector<std::string> out;
+  if (const json* const stimuli = value_at(protocol, "/stimuli");
+      stimuli != nullptr && stimuli->is_array()) {
+    for (const json& stimulus : *stimuli) {
+      const json* const name = value_at(stimulus, "/name");
+      out.push_back(name == nullptr ? "" : name->dump());
+    }
+  }
+  if (const json* const renderers = value_at(protocol, "/renderers"))
+    out.push_back(renderers->dump());
+  return out;
+}
+
+}  // namespace
+
+SweptStudy::SweptStudy(json protocol, std::string protocol_path, json settings,
+                       protocols::SweepSpace space, const std::string& space_path)
+    : protocol_(std::move(protocol)),
+      protocol_path_(std::move(protocol_path)),
+      settings_(std::move(settings)),
+      space_(std::move(space)) {
+  protocols::FaultList faults(space_path);
+  protocols::read_json(space_.source_text, faults);  // for the lines of its values
+  for (std::size_t i = 0; i < space_.parameters.size(); ++i) {
+    const SweepParameter& one = space_.parameters[i];
+    if (one.of == SweptDocument::participant) {
+      check_participant(one, i, faults);
+    } else {
+      check_protocol(one, i, faults);
+      varies_order_ = varies_order_ || std::count(one.paths.begin(), one.paths.end(), "/seed") > 0;
+    }
+  }
+  faults.throw_if_any();
+}
+
+void SweptStudy::check_participant(const SweepParameter& one, std::size_t number,
+                                   protocols::FaultList& faults) const {
+  for (std::size_t p = 0; p < one.paths.size(); ++p) {
+    const std::string& path = one.paths[p];
+    const std::string place = place_of(number, one, p);
+    const json* const now = value_at(settings_, path);
+    if (now == nullptr || now->is_structured() || path == "/version" || path == "/note") {
+      faults.add(place, "expected a pointer to a setting of the simulated participant, found " +
+                            path + near_text(settings_, path));
+      continue;
+    }
+    for (const json& value : typical_values(one)) {
+      if (same_kind(value, *now)) continue;
+      faults.add(place, "expected values like " + now->dump() + ", which stands at " + path +
+                            " now" + protocols::found_text(value));
+      break;
+    }
+  }
+}
+
+std::string SweptStudy::refusal_of(const std::string& path, const json& value) const {
+  json changed = protocol_;
+  if (!set_value(changed, path, value)) {
+    return "expected a pointer into the protocol, found " + path +
+           ", which leads through a value or past the end of a list" + near_text(protocol_, path);
+  }
+  if (names_in(changed) != names_in(protocol_))
+    return "names of stimuli and the list of renderers cannot vary: they name the columns";
+  try {
+    parse(changed);
+  } catch (const protocols::InputError& error) {
+    for (const protocols::Fault& fault : error.faults()) {
+      const std::string& at = fault.location;
+      if (at != path && !path.starts_with(at + "/") && !at.starts_with(path + "/")) continue;
+      const bool unknown = fault.expected.starts_with("unknown key");
+      return "expected what the protocol can have; with " + value.dump() + " it says: " + at +
+             ": " + fault.expected + (unknown ? near_text(protocol_, path) : "");
+    }
+  }
+  return "";
+}
+
+void SweptStudy::check_protocol(const SweepParameter& one, std::size_t number,
+                                protocols::FaultList& faults) const {
+  for (std::size_t p = 0; p < one.paths.size(); ++p) {
+    const std::vector<json> values = typical_values(one);
+    std::string first;
+    std::size_t refused = 0;
+    for (const json& value : values) {
+      const std::string refusal = refusal_of(one.paths[p], value);
+      if (refusal.empty()) continue;
+      if (first.empty()) first = refusal;
+      // A word is known or not; a number may be too large beside another one only.
+      refused += value.is_string() ? values.size() : 1;
+    }
+    if (refused >= values.size()) faults.add(place_of(number, one, p), first);
+  }
+}
+
+PointStudy SweptStudy::at(std::uint64_t sweep_seed, std::int64_t point,
+                          const std::vector<json>& values) const {
+  PointStudy out;
+  out.seed = short_seed(sweep_seed, point, 1);
+  out.order_seed = short_seed(sweep_seed, point, 2);
+  out.settings = settings_;
+  out.protocol = protocol_;
+  if (!varies_order_) out.protocol["seed"] = out.order_seed;
+  for (std::size_t i = 0; i < space_.parameters.size(); ++i) {
+    const SweepParameter& one = space_.parameters[i];
+    json& document = one.of == SweptDocument::participant ? out.settings : out.protocol;
+    for (const std::string& path : one.paths) set_value(document, path, values.at(i));
+  }
+  return out;
+}
+
+protocols::Protocol SweptStudy::parse(const json& protocol) const {
+  return protocols::parse_protocol_text(protocol.dump(), protocol_path_);
+}
+
+}  // namespace palpate::runner

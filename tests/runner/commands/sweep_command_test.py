@@ -1,0 +1,271 @@
+"""palpate sweep, merge and export of sweeps, from outside. Usage: sweep_command_test.py PALPATE PROTOCOLS"""
+
+import csv
+import json
+import os
+import pathlib
+import signal
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+PALPATE, PROTOCOLS = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+
+SPACE = {"version": 1, "parameters": [
+    {"name": "noise", "of": "participant", "path": "/percept/direction_sd_deg", "distribution": "normal",
+     "mean": 15, "sd": 4, "low": 5, "high": 30},
+    {"name": "size", "of": "protocol", "path": ["/stimuli/0/radius_m", "/stimuli/1/radius_m"],
+     "distribution": "log_uniform", "low": 0.025, "high": 0.035},
+    {"name": "order", "of": "protocol", "path": "/renderer_order", "distribution": "choice",
+     "values": ["counterbalanced", "interleaved"]}]}
+PROTOCOL = {"version": 1, "name": "two", "renderers": ["point", "ray"], "repetitions": 4, "blocks_per_renderer": 2,
+            "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03},
+                        {"name": "hat", "shape": "cone", "radius_m": 0.03, "height_m": 0.06}],
+            "response": {"keys": {"1": "ball", "2": "hat"}, "time_out_s": 20}, "seed": 5}
+COLUMNS = ("point,status,reason,noise,size,order,gain_ball,gain_hat,gain_se_ball,gain_se_hat,time_point_ball,time_point_hat,"
+           "time_ray_ball,time_ray_hat,accuracy_point_ball,accuracy_point_hat,accuracy_ray_ball,accuracy_ray_hat,"
+           "time_outs_point_ball,time_outs_point_hat,time_outs_ray_ball,time_outs_ray_hat,contact_share_point_ball,"
+           "contact_share_point_hat,contact_share_ray_ball,contact_share_ray_hat")
+
+
+class Sweeps(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.write("p.json", PROTOCOL)
+        self.write("s.json", SPACE)
+
+    def write(self, name, value):
+        (self.folder / name).write_text(value if isinstance(value, str) else json.dumps(value))
+
+    def palpate(self, *arguments, status=0, env=None):
+        done = subprocess.run([PALPATE, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=600,
+                              env={**os.environ, **(env or {})})
+        self.assertEqual(done.returncode, status, f"{arguments}\n{done.stdout}{done.stderr}")
+        return done.stdout if status == 0 else done.stderr
+
+    def command(self, file, *more, points=6):
+        return ["sweep", "p.json", "--space", "s.json", "--points", points, "--participants", 2, "--repetitions", 2,
+                "--db", file, *more]
+
+    def sweep(self, file, *more, points=6, status=0, env=None):
+        return self.palpate(*self.command(file, *more, points=points), status=status, env=env)
+
+    def bytes(self, name):
+        return (self.folder / name).read_bytes()
+
+    def rows(self, file):
+        self.palpate("export", "--db", file, "--format", "csv", "--out", file + ".csv")
+        with open(self.folder / (file + ".csv"), newline="") as text:
+            return list(csv.DictReader(text))
+
+    def test_a_row_a_point_with_the_columns_in_their_order(self):
+        self.sweep("a.sweep")
+        rows = self.rows("a.sweep")
+        self.assertEqual(self.bytes("a.sweep.csv").split(b"\r\n")[0].decode(), COLUMNS)
+        self.assertEqual([row["point"] for row in rows], [str(i) for i in range(1, 7)])
+        for row in rows:
+            self.assertEqual((row["status"], row["reason"]), ("ok", ""))
+            self.assertTrue(5 <= float(row["noise"]) <= 30 and 0.025 <= float(row["size"]) <= 0.035)
+            for column in COLUMNS.split(",")[14:]:
+                self.assertTrue(0 <= float(row[column]) <= 1, column)
+        # A Latin hypercube: one point in each sixth of the logarithm of the size.
+        import math
+        parts = sorted(int(6 * math.log(float(row["size"]) / 0.025) / math.log(1.4)) for row in rows)
+        self.assertEqual(parts, list(range(6)))
+        self.assertEqual(len({row["noise"] for row in rows}), 6)
+        self.assertIn("exists", self.palpate("export", "--db", "a.sweep", "--format", "csv", "--out", "a.sweep.csv", status=2))
+
+    def test_a_point_is_the_study_that_simulate_and_analyze_make_of_it(self):
+        self.sweep("a.sweep", "--shard", "2/3")
+        rows = {row["point"]: row for row in self.rows("a.sweep")}
+        self.assertEqual(set(rows), {"3", "4"})
+        point = json.loads(self.palpate(*self.command("a.sweep", "--print-point", 4)))
+        self.write("point.json", point["protocol"])
+        self.write("patch.json", {group: values for group, values in point["settings"].items() if isinstance(values, dict)})
+        self.palpate("simulate", "point.json", "--db", "study.db", "--participants", 2, "--seed", point["seed"],
+                     "--settings", "patch.json")
+        self.palpate("analyze", "--db", "study.db", "--json", "a.json")
+        analysis, row = json.loads((self.folder / "a.json").read_text()), rows["4"]
+        self.assertEqual(float(row["noise"]), point["settings"]["percept"]["direction_sd_deg"])
+        self.assertEqual([float(row["size"])] * 2, [stimulus["radius_m"] for stimulus in point["protocol"]["stimuli"]])
+        for shape in ("ball", "hat"):
+            pair = analysis["paired_by_shape"][shape]
+            gain = pair["percent_reduction_geometric"]
+            self.assertEqual(float(row["gain_" + shape]), gain)
+            self.assertAlmostEqual(float(row["gain_se_" + shape]), (100 - gain) * pair["t_test"]["se_log_ratio"], 9)
+            for renderer in ("point", "ray"):
+                cell = f"{renderer}_{shape}"
+                self.assertEqual(float(row["time_" + cell]), analysis["times"][renderer][shape]["mean_of_participant_means"])
+                self.assertEqual(float(row["accuracy_" + cell]), analysis["accuracy"][renderer][shape]["accuracy"])
+
+    def test_the_same_bytes_whatever_jobs_shards_and_kills(self):
+        self.sweep("one.sweep", "--jobs", 1)
+        self.sweep("two.sweep", "--jobs", 2)
+        self.assertEqual(self.bytes("one.sweep"), self.bytes("two.sweep"))
+        for k in (3, 1, 2, 4):
+            self.sweep(f"part{k}.sweep", "--shard", f"{k}/4")
+        self.palpate("merge", "--out", "all.sweep", *[f"part{k}.sweep" for k in (4, 2, 1, 3)])
+        self.assertEqual(self.bytes("one.sweep"), self.bytes("all.sweep"))
+        self.palpate("merge", "--out", "again.sweep", "part3.sweep", "all.sweep", "part1.sweep")
+        self.assertEqual(self.bytes("one.sweep"), self.bytes("again.sweep"))
+        for k in (2, 1):  # several shards in one file
+            self.sweep("same.sweep", "--shard", f"{k}/2")
+        self.assertEqual(self.bytes("one.sweep"), self.bytes("same.sweep"))
+
+        killed, file = 0, self.folder / "killed.sweep"
+        for attempt in range(60):
+            running = subprocess.Popen([PALPATE, *map(str, self.command("killed.sweep", "--jobs", 2))], cwd=self.folder,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            try:
+                running.wait(0.3 + 0.2 * attempt)
+                if running.returncode == 0:
+                    break
+            except subprocess.TimeoutExpired:
+                running.send_signal(signal.SIGKILL)
+                running.wait()
+                killed += 1
+        self.assertEqual(running.returncode, 0, "never came to its end")
+        self.assertGreater(killed, 0)
+        self.assertEqual(self.bytes("one.sweep"), file.read_bytes())
+        self.assertEqual([path.name for path in self.folder.iterdir() if "journal" in path.name], [])
+
+    def test_a_signal_stops_it_and_the_same_command_goes_on(self):
+        running = subprocess.Popen([PALPATE, *map(str, self.command("a.sweep", points=500))], cwd=self.folder, text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        for _ in range(600):  # until a first point is on record
+            time.sleep(0.1)
+            if (self.folder / "a.sweep").exists() and sqlite3.connect(self.folder / "a.sweep").execute(
+                    "SELECT count(*) FROM points").fetchone()[0] > 0:
+                break
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=60)
+        self.assertEqual(running.returncode, 1)
+        self.assertIn("resumes from here", said)
+
+    def test_seeds_follow_from_the_sweeps_seed_and_the_point_alone(self):
+        print_point = lambda point, *more: json.loads(self.palpate(*self.command("a", "--print-point", point, *more)))
+        a, b, c = print_point(1), print_point(2), print_point(1, "--seed", 2)
+        self.assertEqual(a, print_point(1, "--jobs", 2))
+        self.assertEqual(len({p["seed"] for p in (a, b, c)} | {p["protocol"]["seed"] for p in (a, b, c)}), 6)
+
+    def test_a_point_that_fails_says_why_and_the_others_go_on(self):
+        space = json.loads(json.dumps(SPACE))
+        space["parameters"].append({"name": "grip", "of": "protocol", "path": "/stylus/grip_m", "distribution": "choice",
+                                    "values": [0.05, 0.3]})
+        self.write("s.json", space)
+        out = self.sweep("a.sweep", "--design", "lhs")
+        rows = self.rows("a.sweep")
+        failed = [row for row in rows if row["status"] == "failed"]
+        self.assertEqual(len(failed), 3)
+        self.assertIn("3 of them failed", out)
+        for row in failed:
+            self.assertEqual(row["grip"], "0.3")
+            self.assertIn("/stylus/grip_m: expected a grip on the stylus", row["reason"])
+            self.assertEqual(row["gain_ball"] + row["time_ray_hat"], "")
+        self.assertTrue(all(row["status"] == "ok" and row["gain_ball"] for row in rows if row["grip"] == "0.05"))
+
+    def test_pointers_that_lead_nowhere_are_all_named_with_near_ones(self):
+        space = {"version": 1, "parameters": [
+            {"name": "a", "of": "participant", "path": "/motor/reaction_delay", "distribution": "uniform", "low": 0, "high": 1},
+            {"name": "b", "of": "protocol", "path": "/stimuli/4/radius_m", "distribution": "uniform", "low": 0.02, "high": 0.03},
+            {"name": "c", "of": "protocol", "path": "/stimuli/0/radius", "distribution": "uniform", "low": 0.02, "high": 0.03},
+            {"name": "d", "of": "protocol", "path": "/repetitions", "distribution": "uniform", "low": 2, "high": 3},
+            {"name": "e", "of": "participant", "path": "/observer/beta", "distribution": "choice", "values": ["much"]},
+            {"name": "f", "of": "protocol", "path": "/stimuli/0/name", "distribution": "choice", "values": ["x", "y"]},
+            {"name": "good", "of": "protocol", "path": "/material/stiffness_n_per_m", "distribution": "uniform", "low": 500, "high": 900}]}
+        self.write("s.json", json.dumps(space, indent=1))
+        said = self.sweep("a.sweep", status=2)
+        lines = said.strip().splitlines()
+        self.assertEqual([line.split(": ")[1] for line in lines], [f"/parameters/{i}/path" for i in range(6)], said)
+        self.assertTrue(all(line.startswith("s.json:") for line in lines))
+        self.assertIn("/motor/reaction_delay_s", lines[0])
+        self.assertIn("radius_m", lines[2])
+        self.assertIn("expected an integer", lines[3])
+        self.assertIn("name the columns", lines[5])
+        self.assertFalse((self.folder / "a.sweep").exists())
+
+    def test_another_plan_is_refused_with_what_differs(self):
+        self.sweep("a.sweep", points=1)
+        said = self.sweep("a.sweep", "--seed", 2, points=2, status=2)
+        self.assertIn("points: 1 and 2", said)
+        self.assertIn("seed: 1 and 2", said)
+        changed = json.loads(json.dumps(PROTOCOL))
+        changed["stimuli"][0]["radius_m"] = 0.031
+        self.write("p.json", json.dumps(changed))
+        self.sweep("b.sweep", points=1)
+        said = self.palpate("merge", "--out", "c.sweep", "a.sweep", "b.sweep", status=2)
+        self.assertIn("protocol: /stimuli/0/radius_m 0.03 and 0.031", said)
+        self.assertFalse((self.folder / "c.sweep").exists())
+        self.write("p.json", json.dumps(PROTOCOL, indent=3))  # only its layout
+        self.sweep("a.sweep", points=1)
+
+    def test_sweeps_and_studies_are_not_taken_for_each_other(self):
+        self.sweep("a.sweep", points=1)
+        self.palpate("simulate", "p.json", "--db", "study.db", "--participants", 1)
+        before = self.bytes("a.sweep"), self.bytes("study.db")
+        self.assertIn("is no sweep's file", self.sweep("study.db", points=1, status=2))
+        for command in (["simulate", "p.json", "--db", "a.sweep"], ["analyze", "--db", "a.sweep"],
+                        ["forget", "--db", "a.sweep", "--participant", "S001", "--yes"]):
+            self.assertIn("is the file of a sweep", self.palpate(*command, status=2), command)
+        self.assertIn("cannot be put together", self.palpate("merge", "--out", "x.db", "a.sweep", "study.db", status=2))
+        self.assertIn("--format csv alone", self.palpate("export", "--db", "a.sweep", "--format", "bids", "--out", "x", status=2))
+        self.assertEqual((self.bytes("a.sweep"), self.bytes("study.db")), before)
+        (self.folder / "broken.sweep").write_bytes(before[0][:5000])
+        self.assertIn("damaged", self.sweep("broken.sweep", points=1, status=2))
+
+    def test_two_writers_at_once_are_refused(self):
+        running = subprocess.Popen([PALPATE, *map(str, self.command("a.sweep", points=500))], cwd=self.folder,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(running.wait)
+        self.addCleanup(running.kill)
+        while not (self.folder / "a.sweep").exists():
+            time.sleep(0.05)
+        self.assertIn(f"process {running.pid}", self.sweep("a.sweep", points=500, status=2))
+        self.assertIn(f"process {running.pid}", self.palpate("merge", "--out", "b.sweep", "a.sweep", status=2))
+        self.rows("a.sweep")  # reading is allowed
+
+    def test_shards_of_a_slurm_array(self):
+        variables = {"SLURM_ARRAY_TASK_ID": "12", "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_ARRAY_TASK_MIN": "10"}
+        self.sweep("a.sweep", "--shard", "auto", env=variables)
+        self.sweep("b.sweep", "--shard", "3/3")
+        self.assertEqual(self.bytes("a.sweep"), self.bytes("b.sweep"))
+        self.assertIn("SLURM_ARRAY_TASK_COUNT is not set", self.sweep("c.sweep", "--shard", "auto", status=2))
+        variables["SLURM_ARRAY_TASK_ID"] = "13"
+        self.assertIn("is no shard", self.sweep("c.sweep", "--shard", "auto", status=2, env=variables))
+
+    def test_designs(self):
+        for design, points, expected in (("sobol", 5, 5), ("grid", 7, 6), ("saltelli", 9, 5)):
+            self.sweep(f"{design}.sweep", "--design", design, "--shard", "1/1000000", points=points)
+            with sqlite3.connect(self.folder / f"{design}.sweep") as file:
+                self.assertEqual(file.execute("SELECT points FROM sweep").fetchone()[0], expected, design)
+        self.assertIn("5 points for each base point", self.sweep("x", "--design", "saltelli", points=4, status=2))
+        self.assertIn("there are: lhs, sobol, grid, saltelli", self.sweep("x", "--design", "random", status=2))
+
+    def test_wrong_usage(self):
+        for change, said in ((("--points", "0"), "--points"), (("--points", "x"), "points"), (("--jobs", "0"), "--jobs"),
+                             (("--participants", "0"), "--participants"), (("--repetitions", "0"), "--repetitions"),
+                             (("--shard", "0/3"), "1 <= K <= N"), (("--shard", "4/3"), "1 <= K <= N"),
+                             (("--shard", "3"), "K/N"), (("--seed", "-1"), "--seed"), (("--space", "none.json"), "none.json"),
+                             (("--print-point", "7"), "6 points"), (("--print-point", "0"), "--print-point")):
+            arguments = {"--space": "s.json", "--points": "6", "--db": "x.sweep", change[0]: change[1]}
+            message = self.palpate("sweep", "p.json", *sum(arguments.items(), ()), status=2)
+            self.assertIn(said, message)
+        self.assertIn("missing --db", self.palpate("sweep", "p.json", "--space", "s.json", "--points", "3", status=2))
+        self.assertEqual([path.name for path in self.folder.iterdir() if "sweep" in path.name], [])
+        space = json.loads(json.dumps(SPACE))
+        space["parameters"][0]["name"] = "Gain_ball"
+        self.write("s.json", space)
+        self.assertIn("the name of another column", self.sweep("x.sweep", status=2))
+
+    def test_the_published_spaces_fit_to_the_papers_protocol(self):
+        for path in sorted(PROTOCOLS.glob("spaces/*.json")):
+            self.palpate("sweep", PROTOCOLS / "ho2000.json", "--space", path, "--points", "1000", "--print-point", "1000")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
