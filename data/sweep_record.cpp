@@ -8,30 +8,29 @@
 namespace palpate::data {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::size_t kMaxNamed = 5;  // places that a difference names
 constexpr std::size_t kMaxValue = 40;
 
-std::string shown(const json& value) {
-  std::string text = value.dump(-1, ' ', true, json::error_handler_t::replace);
+std::string shown(const nlohmann::json& value) {
+  std::string text = value.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
   if (text.size() > kMaxValue) text = text.substr(0, kMaxValue) + "...";
   return text;
 }
 
-std::string value_at(const json& document, const std::string& pointer) {
-  const json::json_pointer place(pointer);
+std::string value_at(const nlohmann::json& document, const std::string& pointer) {
+  const nlohmann::json::json_pointer place(pointer);
   return document.contains(place) ? shown(document[place]) : "(nothing)";
 }
 
 /// "/seed 1 and 2; /stimuli/0/radius_m 0.03 and 0.02"
 std::string json_differences(const std::string& a, const std::string& b) {
-  const json one = json::parse(a, nullptr, false), two = json::parse(b, nullptr, false);
+  const nlohmann::json one = nlohmann::json::parse(a, nullptr, false),
+                       two = nlohmann::json::parse(b, nullptr, false);
   if (one.is_discarded() || two.is_discarded()) return "texts that cannot be compared";
   std::string out;
   std::size_t named = 0;
-  const json patch = json::diff(one, two);
-  for (const json& step : patch) {
+  const nlohmann::json patch = nlohmann::json::diff(one, two);
+  for (const nlohmann::json& step : patch) {
     if (named++ == kMaxNamed) {
       return out + "; and " + std::to_string(patch.size() - kMaxNamed) + " more";
     }
@@ -51,7 +50,8 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
   };
   const auto values = [&](const char* what, const auto& one, const auto& two) {
     if (one != two)
-      out.push_back(std::string(what) + ": " + shown(json(one)) + " and " + shown(json(two)));
+      out.push_back(std::string(what) + ": " + shown(nlohmann::json(one)) + " and " +
+                    shown(nlohmann::json(two)));
   };
   texts("protocol", a.protocol, b.protocol);
   if (a.files_sha256 != b.files_sha256)

@@ -31,6 +31,8 @@ double normal_value(double share) {
 /// Of a normal distribution that is cut off at both limits. Limits above the mean are mirrored:
 /// shares near 1 have no digits left.
 double cut_normal_value(const SweepParameter& p, double u) {
+  if (u <= 0) return p.low;
+  if (u >= 1) return p.high;
   const double low = (p.low - p.mean) / p.sd, high = (p.high - p.mean) / p.sd;
   const bool mirrored = low > 0;
   const double from = normal_share(mirrored ? -high : low);

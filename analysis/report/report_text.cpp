@@ -81,6 +81,18 @@ void put_text_table(std::string& out, const Table& table) {
 
 }  // namespace
 
+std::string table_text(const Table& table) {
+  std::string out;
+  put_text_table(out, table);
+  return out;
+}
+
+std::string paragraph_text(const std::string& text) {
+  std::string out;
+  put_wrapped(out, text, "");
+  return out;
+}
+
 std::string report_text(const Analysis& analysis) {
   std::string out;
   const std::string label = simulated_label(analysis.table.simulated);

@@ -15,7 +15,6 @@
 namespace palpate::data {
 namespace {
 
-using nlohmann::json;
 using Objects = std::map<std::string, std::string>;  // name -> SQL
 
 constexpr const char* kSweepTable =
@@ -64,10 +63,10 @@ void require_version(SQLite::Database& db, const std::string& path) {
 }
 
 std::vector<std::string> names_of(const std::string& text) {
-  const json list = json::parse(text, nullptr, false);
+  const nlohmann::json list = nlohmann::json::parse(text, nullptr, false);
   std::vector<std::string> out;
   if (!list.is_array()) throw SQLite::Exception("the names of columns", SQLITE_CORRUPT);
-  for (const json& name : list) {
+  for (const nlohmann::json& name : list) {
     if (!name.is_string()) throw SQLite::Exception("the names of columns", SQLITE_CORRUPT);
     out.push_back(name.get<std::string>());
   }
@@ -101,8 +100,8 @@ void create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
   SQLite::Statement insert(db, "INSERT INTO sweep VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
   Binder(insert) << plan.protocol << plan.files_sha256 << plan.settings << plan.space << plan.design
                  << plan.points << std::to_string(plan.seed) << plan.participants
-                 << plan.program_version << json(plan.parameters).dump() << json(plan.shapes).dump()
-                 << json(plan.renderers).dump();
+                 << plan.program_version << nlohmann::json(plan.parameters).dump()
+                 << nlohmann::json(plan.shapes).dump() << nlohmann::json(plan.renderers).dump();
   insert.exec();
 }
 
@@ -176,10 +175,17 @@ void copy_row(const std::vector<SQLite::Column>& row, SQLite::Statement& insert)
   for (const SQLite::Column& value : row) {
     ++index;
     switch (value.getType()) {
-      case SQLITE_INTEGER: insert.bind(index, value.getInt64()); break;
-      case SQLITE_FLOAT: insert.bind(index, value.getDouble()); break;
-      case SQLITE_NULL: insert.bind(index); break;
-      default: insert.bind(index, value.getString());
+      case SQLITE_INTEGER:
+        insert.bind(index, value.getInt64());
+        break;
+      case SQLITE_FLOAT:
+        insert.bind(index, value.getDouble());
+        break;
+      case SQLITE_NULL:
+        insert.bind(index);
+        break;
+      default:
+        insert.bind(index, value.getString());
     }
   }
 }

@@ -1,3 +1,5 @@
+#include "runner/commands/sweep/analyze.h"
+
 #include <cmath>
 #include <cstdint>
 #include <iostream>
@@ -21,12 +23,17 @@ namespace palpate::runner {
 
 namespace {
 
-void check(const std::string& database, const std::string& csv,
+void check(const boost::program_options::variables_map& values,
            const analysis::AnalysisSettings& settings, const std::string& usage) {
-  if (database.empty() == csv.empty()) {
-    throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + usage +
+  const std::size_t sources = values.count("db") + values.count("csv") + values.count("sweep");
+  if (sources != 1) {
+    throw UsageError("expected one of --db FILE, --csv FILE and --sweep FILE\nUsage: " + usage +
                      "\nMore: add --help");
   }
+  if (values.count("pattern") && !values.count("sweep"))
+    throw UsageError("--pattern: is looked for in a sweep; give --sweep FILE");
+  if (values.count("sweep") && !values["too-fast-s"].defaulted())
+    throw UsageError("--too-fast-s: a sweep's points have their times already");
   if (!(settings.too_fast > 0) || !std::isfinite(settings.too_fast)) {
     throw UsageError("--too-fast-s: expected a time in s above 0 (a time of 0 has no logarithm)");
   }
@@ -49,24 +56,34 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
 int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate analyze (--db FILE | --csv FILE) [--json FILE] [--report FILE.html] [--figures DIR] "
-      "[--force]";
+      "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--json FILE]\n"
+      "       [--report FILE.html] [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
       "renderers each is compared with the first (point if it is among them). The conclusion\n"
-      "and the tables go to stdout. Existing files are replaced only with --force.";
+      "and the tables go to stdout. Existing files are replaced only with --force.\n"
+      "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and "
+      "what\n"
+      "they depend on (Sobol indices of a saltelli design, rank correlations of others).";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
       "      (data of others: participant_id, session, block, trial, renderer, shape, response,\n"
-      "      correct and response_time suffice)";
-  std::string database, csv, json, report, figures;
+      "      correct and response_time suffice)\n"
+      "  palpate analyze --sweep people.sweep --report people.html\n"
+      "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
+      "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
+      "      time_ray_cone; + - * /, < <= > >= == !=, && || !, min, max, abs, parentheses)";
+  std::string database, csv, sweep, pattern, json, report, figures;
   analysis::AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("db", po::value(&database)->value_name("FILE"), "the study's database");
   add("csv", po::value(&csv)->value_name("FILE"), "trials as CSV, one row a trial");
+  add("sweep", po::value(&sweep)->value_name("FILE"), "a sweep's file");
+  add("pattern", po::value(&pattern)->value_name("EXPR"),
+      "of a sweep: what to look for at each point; default: the paper's pattern");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
@@ -76,8 +93,14 @@ int analyze_command(const std::vector<std::string>& args) {
       "exclude correct answers faster than this from the times");
   const auto values = line.parse(args);
   if (!values) return 0;
-  check(database, csv, settings, line.usage);
-  Outputs outputs(*values, {"json", "report"}, {"db", "csv"}, "figures");
+  check(*values, settings, line.usage);
+  Outputs outputs(*values, {"json", "report"}, {"db", "csv", "sweep"}, "figures");
+  if (values->count("sweep")) {
+    const std::string text = analyze_sweep_file(sweep, pattern, outputs);
+    outputs.write();
+    std::cout << text;
+    return 0;
+  }
 
   const analysis::Analysis analysis =
       analysis::analyze(read_study_trials(database, csv), settings, PALPATE_VERSION);

@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
+#include "analysis/report/report_text.h"
+#include "analysis/report/sweep_report.h"
+#include "analysis/report/table_cells.h"
+#include "analysis/statistics/paper_effects.h"
+#include "analysis/text.h"
+
+namespace palpate::analysis {
+
+namespace {
+
+constexpr const char* kSimulated = " (SIMULATED PARTICIPANTS)";
+constexpr std::size_t kShownReasons = 20;
+
+std::string driver_name(const SweepAnalysis& analysis) {
+  return analysis.table.design == "saltelli" ? "Sobol indices" : "rank correlations";
+}
+
+std::string paper_gain(const SweepAnalysis& analysis, const std::string& shape) {
+  if (analysis.table.renderers != std::vector<std::string>{"point", "ray"}) return "";
+  const PaperEffect* const effect = find_paper_effect(shape);
+  if (effect == nullptr) return "";
+  return effect->percent_reduction ? fixed(*effect->percent_reduction, 0) + " %" : "n.s.";
+}
+
+std::string range(const std::optional<double>& low, const std::optional<double>& high,
+                  int decimals) {
+  return low && high ? fixed(*low, decimals) + " to " + fixed(*high, decimals) : kMissing;
+}
+std::string range(const std::optional<Interval>& ends) {
+  return ends ? range(ends->low, ends->high, 2) : kMissing;
+}
+
+Table gains_table(const SweepAnalysis& analysis) {
+  Table table;
+  table.caption =
+      "Less time with the second renderer, percent, over the settings" + std::string(kSimulated);
+  table.header = {"shape",       "paper", "settings", "median", "half of them",
+                  "nine in ten", "mean",  "above 0",  "chance"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    const Spread& one = analysis.gains[s];
+    const auto percent_of = [](const std::optional<double>& share) {
+      return share ? fixed(100 * *share, 0) + " %" : std::string(kMissing);
+    };
+    table.rows.push_back({analysis.table.shapes[s], paper_gain(analysis, analysis.table.shapes[s]),
+                          std::to_string(one.n), one.q50 ? fixed(*one.q50, 1) : kMissing,
+                          range(one.q25, one.q75, 1), range(one.q05, one.q95, 1),
+                          one.mean ? fixed(*one.mean, 1) : kMissing, percent_of(one.share_positive),
+                          percent_of(one.noise_share)});
+  }
+  table.notes = {
+      "chance: how much of the variance over the settings is that of the studies, by their "
+      "standard "
+      "errors; more participants or repetitions at each point make it smaller."};
+  return table;
+}
+
+Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
+  Table table;
+  const bool sobol = drivers.sobol.has_value();
+  table.caption = "What " + drivers.output + " depends on: " + driver_name(analysis) + kSimulated;
+  table.header = sobol
+                     ? std::vector<std::string>{"parameter", "total", "95 %", "first order", "95 %"}
+                     : std::vector<std::string>{"parameter", "partial", "95 %", "Spearman", "95 %"};
+  for (const std::size_t p : drivers.strongest) {
+    const std::string& name = analysis.table.parameters[p];
+    const auto cell = [](const std::optional<double>& value) {
+      return value ? fixed(*value, 2) : kMissing;
+    };
+    if (sobol) {
+      const SobolIndex& one = drivers.sobol->of[p];
+      table.rows.push_back(
+          {name, cell(one.total), range(one.total_ci95), cell(one.first), range(one.first_ci95)});
+    } else {
+      const RankCorrelation& one = drivers.ranks[p];
+      table.rows.push_back({name, cell(one.partial), range(one.partial_ci95), cell(one.spearman),
+                            range(one.spearman_ci95)});
+    }
+  }
+  if (sobol && !drivers.sobol->undefined.empty())
+    table.notes.push_back("None: " + drivers.sobol->undefined + ".");
+  if (sobol && drivers.sobol->dropped > 0) {
+    table.notes.push_back(counted(drivers.sobol->dropped, "base point is", "base points are") +
+                          " left out, of which a sample has no figure.");
+  }
+  for (std::size_t p = 0; p < drivers.ranks.size(); ++p) {
+    if (!drivers.ranks[p].undefined.empty())
+      table.notes.push_back(analysis.table.parameters[p] + ": none, " + drivers.ranks[p].undefined +
+                            ".");
+  }
+  return table;
+}
+
+Table reasons_table(const SweepAnalysis& analysis) {
+  Table table;
+  table.caption = "Why points failed";
+  table.header = {"points", "reason"};
+  table.n_names = 2;
+  const auto& reasons = analysis.table.reasons;
+  for (std::size_t i = 0; i < std::min(reasons.size(), kShownReasons); ++i)
+    table.rows.push_back({std::to_string(reasons[i].second), reasons[i].first});
+  if (reasons.size() > kShownReasons)
+    table.notes.push_back("And " + std::to_string(reasons.size() - kShownReasons) +
+                          " other reasons.");
+  return table;
+}
+
+}  // namespace
+
+std::vector<Table> sweep_tables(const SweepAnalysis& analysis) {
+  std::vector<Table> out{gains_table(analysis)};
+  for (const Drivers& drivers : analysis.drivers) out.push_back(drivers_table(analysis, drivers));
+  if (!analysis.table.reasons.empty()) out.push_back(reasons_table(analysis));
+  return out;
+}
+
+std::string sweep_answer(const SweepAnalysis& analysis) {
+  const std::size_t points = analysis.table.rows();
+  if (!analysis.pattern)
+    return counted(points, "setting", "settings") + " of simulated participants";
+  const PatternShare& pattern = *analysis.pattern;
+  const std::string what = pattern.of_the_paper ? "The paper's pattern" : "The pattern";
+  if (!pattern.share) return what + " is defined in none of the settings";
+  return what + " holds in " + fixed(100 * *pattern.share, 1) +
+         " % of the settings (95 % interval " + fixed(100 * pattern.ci95->low, 1) + " to " +
+         fixed(100 * pattern.ci95->high, 1) + " %)";
+}
+
+std::string sweep_text(const SweepAnalysis& analysis) {
+  const SweepTable& table = analysis.table;
+  std::string out =
+      "SIMULATED PARTICIPANTS: a sweep of " +
+      (table.protocol_name.empty() ? "a protocol" : table.protocol_name) + ", " +
+      counted(table.rows(), "point", "points") + " (" + table.design + ", seed " +
+      std::to_string(table.seed) + "), " +
+      counted(static_cast<std::size_t>(table.participants), "participant", "participants") +
+      " and " + counted(static_cast<std::size_t>(table.repetitions), "repetition", "repetitions") +
+      " each\n\n";
+  out += paragraph_text(sweep_answer(analysis) + ".");
+  if (analysis.pattern) {
+    const PatternShare& pattern = *analysis.pattern;
+    out += "  " + stimuli::printable(pattern.expression, 400) + "\n";
+    out += paragraph_text(
+        "It holds in " + std::to_string(pattern.holds) + " of " + std::to_string(pattern.n) +
+        " settings" +
+        (pattern.undefined > 0 ? "; in " + std::to_string(pattern.undefined) +
+                                     " others it is undefined (failed, or a figure is missing)"
+                               : std::string()) +
+        ". Wilson's interval: it is about the space that was given, with its distributions, "
+        "not about people.");
+  }
+  for (const std::string& note : analysis.notes) out += paragraph_text("Note: " + note);
+  for (const Table& one : sweep_tables(analysis)) out += "\n" + table_text(one);
+  return out;
+}
+
+}  // namespace palpate::analysis

@@ -1,0 +1,59 @@
+#pragma once
+// A pattern that is looked for at each point of a sweep: "cone>5 && cube>5 && min(cone,cube)>3".
+//
+//   or      := and { "||" and }                       number or truth, told apart when it is read
+//   and     := not { "&&" not }
+//   not     := "!" not | compare
+//   compare := sum [ ("<" | "<=" | ">" | ">=" | "==" | "!=") sum ]
+//   sum     := product { ("+" | "-") product }
+//   product := sign { ("*" | "/") sign }
+//   sign    := "-" sign | atom
+//   atom    := number | name | "min" "(" or { "," or } ")" | "max" ... | "abs" "(" or ")" | "(" or
+//   ")" name    := letters, digits and _, or any text in ' or "
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::analysis {
+
+/// what(): the expression, a mark below the place, and what was expected there.
+class PatternError : public std::runtime_error {
+ public:
+  PatternError(const std::string& expression, std::size_t place, const std::string& expected);
+  std::size_t place() const { return place_; }  ///< byte of the expression, from 0
+
+ private:
+  std::size_t place_;
+};
+
+class Pattern {
+ public:
+  /// The column that a name stands for; none: it is unknown.
+  using Resolve = std::function<std::optional<std::size_t>(const std::string& name)>;
+
+  /// \param known  names to suggest for an unknown one. \throws PatternError
+  Pattern(std::string expression, const Resolve& resolve, const std::vector<std::string>& known);
+  Pattern(Pattern&&) noexcept;
+  Pattern& operator=(Pattern&&) noexcept;
+  ~Pattern();
+
+  const std::string& expression() const { return expression_; }
+
+  /// Whether it holds. None: it hangs on a value that is undefined (not a number); what is false or
+  /// true whatever that value may be, is.
+  /// \param value  of a column
+  std::optional<bool> holds(const std::function<double(std::size_t column)>& value) const;
+
+  struct Node;
+
+ private:
+  std::string expression_;
+  std::unique_ptr<Node> root_;
+};
+
+}  // namespace palpate::analysis
