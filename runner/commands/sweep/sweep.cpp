@@ -33,6 +33,7 @@ struct SweepSettings {
   std::int64_t points = 0;
   std::int64_t print_point = 0;  ///< 0: none, the sweep runs
   std::uint64_t seed = 1;
+  int version = kDefaultParticipantVersion;         ///< of the simulated participant
   int participants = 7, repetitions = 0, jobs = 1;  ///< repetitions 0: the protocol's
 };
 
@@ -80,6 +81,9 @@ void add_options(CommandLine& line, SweepSettings& settings) {
        "points simulated at a time")  //
       ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
        "only the K-th of N parts of the points; auto: the task of a Slurm array")  //
+      ("participant-version",
+       po::value(&settings.version)->default_value(settings.version)->value_name("1|2|3"),
+       "which of the frozen settings of the simulated participant")  //
       ("settings", po::value(&settings.patch)->value_name("FILE"),
        "JSON merge patch on the frozen settings of the simulated participant, before anything "
        "varies")  //
@@ -105,6 +109,9 @@ std::optional<SweepSettings> parse_sweep_settings(const std::vector<std::string>
     throw UsageError("--participants: must be 1 to 100000");
   if (values->count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
     throw UsageError("--repetitions: must be 1 to 1000000");
+  const std::vector<int> versions = participant_versions();
+  if (std::find(versions.begin(), versions.end(), settings.version) == versions.end())
+    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
   if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
   if (values->count("print-point") && settings.print_point < 1)
     throw UsageError("--print-point: must be the number of a point, from 1");
@@ -319,7 +326,7 @@ int sweep_command(const std::vector<std::string>& args) {
       parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
   const protocols::Protocol protocol = protocols::parse_protocol(settings.protocol);
   const SweptStudy study(base_protocol(protocol, settings), settings.protocol,
-                         json::parse(simulated_settings_text(settings.patch)),
+                         json::parse(simulated_settings_text(settings.patch, settings.version)),
                          protocols::parse_sweep_space(settings.space), settings.space);
   const Design design = design_of(settings, study);
   const data::SweepPlan plan = plan_of_sweep(settings, study, design, protocol);
