@@ -299,6 +299,17 @@ TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {
     if (gap <= 64) ++near;
   }
   EXPECT_GT(near, mesh.edges().size() * 3 / 4);
+  // From a facet to the next one in memory: in random order that would be as far as the radius.
+  double step = 0, side = 0;  // m, sums
+  for (std::size_t f = 1; f < mesh.facets().size(); ++f) {
+    const auto place = [&](std::size_t facet) {
+      return mesh.vertices()[checks::corner_of(mesh, static_cast<std::uint32_t>(facet), 0)];
+    };
+    step += glm::distance(place(f), place(f - 1));
+  }
+  for (const Edge& edge : mesh.edges()) side += glm::distance(edge.from, edge.to);
+  EXPECT_LT(step / static_cast<double>(mesh.facets().size()),
+            4 * side / static_cast<double>(mesh.edges().size()));
   for (std::uint32_t f = 0, seen = 0; f < mesh.facets().size(); ++f) {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t corner = checks::corner_of(mesh, f, k);

@@ -99,7 +99,8 @@ Analysis analysis_of(std::size_t renderers, std::size_t shapes) {
           raw.shape = raw.response = shape;
           raw.correct = true;
           raw.trial = ++trial;
-          const double own = 1 + 0.01 * ((p + i + static_cast<int>(r * (s + 1))) % 3);
+          // Differences between renderers vary with the participant.
+          const double own = 1 + 0.01 * ((7 * p + 3 * i + 5 * static_cast<int>(r) * (p + 1)) % 11);
           raw.response_time = (r + 1 == renderers ? 2 : 4) * own;
           builder.add(raw);
         }
