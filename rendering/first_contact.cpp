@@ -132,10 +132,34 @@ void meet_polygons(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, c
              [&](std::uint32_t i) { meet_polygon(mesh, i, a, b, tolerance, first); });
 }
 
+/// Whether two faces meet at less than twice the blend angle (kBlendAngle), each of them large:
+/// over smaller ones the equivalent point of (2) moves too little to be felt to jump.
+bool has_shallow_ridges(const stimuli::ConvexMesh& mesh) {
+  constexpr double kCosine = 0.99939082701909573;  // of 2 degrees
+  constexpr double kLarge = 1.0 / 16;              // of the size
+  const auto large = [&](std::uint32_t index) {
+    const stimuli::Facet& facet = mesh.facets()[index];
+    const Vec3& from = mesh.edges()[mesh.sides()[facet.first_side].edge].from;
+    double farthest2 = 0;
+    for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+      const stimuli::Edge& edge = mesh.edges()[mesh.sides()[i].edge];
+      const Vec3 to_one = edge.from - from, to_other = edge.to - from;
+      farthest2 = std::max({farthest2, glm::dot(to_one, to_one), glm::dot(to_other, to_other)});
+    }
+    return farthest2 > kLarge * kLarge * mesh.size() * mesh.size();
+  };
+  for (const stimuli::Edge& edge : mesh.edges()) {
+    if (glm::dot(mesh.facets()[edge.left].normal, mesh.facets()[edge.right].normal) > kCosine &&
+        large(edge.left) && large(edge.right))
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scan_limit)
-    : support_map_(mesh) {
+    : support_map_(mesh), shallow_ridges_(with_edges && has_shallow_ridges(mesh)) {
   if (mesh.facets().size() > scan_limit) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());

@@ -25,11 +25,14 @@ class ContactTrees {
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
+  /// Two large faces meet at less than twice the blend angle of equation (2).
+  bool shallow_ridges() const { return shallow_ridges_; }
   const SupportMap* support_map() const { return support_map_.empty() ? nullptr : &support_map_; }
 
  private:
   BoundingTree polygons_, edges_;
   SupportMap support_map_;
+  bool shallow_ridges_ = false;
 };
 
 /// Where and when the probe entered.

@@ -82,6 +82,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
     part.material = object.material;
     features.damping |= part.material.damping != 0;
     features.friction |= part.material.has_friction();
+    part.shallow_ridges = side_contact && part.trees->shallow_ridges();
     part.object = object.object;
     part.layer = object.layer;
     part.break_force = object.break_force;

@@ -45,6 +45,7 @@ struct ScenePart {
   double tolerance = 0;      ///< m; shorter is rounding, at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
+  bool shallow_ridges = false;  ///< equation (2) goes over several faces (equivalent_point.h)
 
   int layer = 0;
   double break_force = std::numeric_limits<double>::infinity();  ///< N; of its layer

@@ -11,6 +11,7 @@
 #include <span>
 
 #include "rendering/contact_detection.h"
+#include "rendering/equivalent_point.h"
 #include "rendering/force.h"
 #include "rendering/material_forces.h"
 #include "rendering/release.h"
@@ -86,6 +87,10 @@ struct Tick {
     if (hit.feature.kind == ContactFeature::Kind::none) return false;
     c.part = index;
     Probe::classify(*part.mesh, hit, tip, d, length, c);
+    if (Probe::kSegment && part.shallow_ridges) [[unlikely]] {
+      const FacedPart alone{&part, hit.feature, tip + hit.depth * hit.normal, d};
+      spread_over_faces(std::span<const FacedPart>(&alone, 1), hit, part.tolerance, c);
+    }
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth;
     c.stiffness = part.material.stiffness;

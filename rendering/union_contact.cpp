@@ -8,6 +8,7 @@
 
 #include "rendering/active_planes.h"
 #include "rendering/approach.h"
+#include "rendering/equivalent_point.h"
 #include "rendering/pair_cast.h"
 #include "rendering/render_fault.h"
 #include "rendering/segment_probe.h"
@@ -161,6 +162,8 @@ class IdealTool {
   bool slid_off(const Plane& plane) const;
   void add_contacts();
   void add_contact(const Plane& plane, const Vec3& shift);
+  void spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
+                         LoadedContact& c);
   void remember(std::size_t first_contact);
 
   UnionTick& tick_;
@@ -544,6 +547,27 @@ void IdealTool::translate() {
   stuck_ = true;
 }
 
+/// Equation (2) over all faces that the segment lies along, of the part that carries it and of
+/// those that abut.
+/// \param tip  of the ideal segment, frame of the part that carries it
+void IdealTool::spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
+                                  LoadedContact& c) {
+  const ScenePart& part = part_of(carrying);
+  const Vec3 world_tip = part.world_vector(tip) + part.position;
+  std::array<FacedPart, kMostFacedParts> faced;
+  std::size_t count = 0;
+  faced[count++] = {&part, hit.feature, tip, carrying.true_d};
+  for (const NearPair& other : all_.near) {
+    if (other.segment != carrying.segment || other.part == carrying.part) continue;
+    if (count == faced.size()) break;
+    const ScenePart& beside = part_of(other);
+    faced[count++] = {&beside, state_of(other).feature, beside.local_point(world_tip),
+                      other.true_d};
+  }
+  spread_over_faces(std::span<const FacedPart>(faced.data(), count), hit,
+                    kSlidOff * group_.skin, c);
+}
+
 void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   const NearPair& near = all_.near[plane.near];
   const ScenePart& part = part_of(near);
@@ -562,6 +586,8 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   at.feature = plane.feature;
   if (tick_.sides) {
     tick::SegmentProbe::classify(*part.mesh, at, tip, near.true_d, glm::length(near.true_d), c);
+    if (part.shallow_ridges || c.contact.type == ContactType::segment_face)
+      spread_over_parts(near, at, tip, c);
   } else {
     c.contact.type = ContactType::point_polygon;
   }

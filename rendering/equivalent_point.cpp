@@ -1,0 +1,205 @@
+#include "rendering/equivalent_point.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rendering/segment_probe.h"
+
+namespace palpate::rendering {
+namespace {
+
+using Kind = ContactFeature::Kind;
+
+constexpr int kMostFaces = 12;  // to each side; smaller ones move the point less than their length
+
+/// Angle of the segment to a face, of the blend angle, -1 to 1; 1: its first end dips.
+double turned(double slope, double length) {
+  if (slope >= tick::kSinBlendAngle * length) return 1;
+  if (slope <= -tick::kSinBlendAngle * length) return -1;
+  return std::clamp(tick::small_asin(slope / length) / tick::kBlendAngle, -1.0, 1.0);
+}
+
+/// A facet of one of the parts.
+struct Face {
+  std::size_t part = 0;
+  std::uint32_t facet = 0;
+};
+
+/// The segment over the faces of all parts.
+class Faces {
+ public:
+  Faces(std::span<const FacedPart> parts, double tolerance)
+      : parts_(parts), tolerance_(tolerance), length_(glm::length(parts[0].d)) {}
+
+  tick::Portion portion(const Face& face) const {
+    const FacedPart& at = parts_[face.part];
+    return tick::touching_portion(*at.part->mesh, face.facet, at.ideal, at.d);
+  }
+
+  /// The face beyond the side over which the segment leaves a face, towards its end or its
+  /// beginning.
+  Face beyond(const Face& face, bool towards_end) const {
+    const FacedPart& at = parts_[face.part];
+    const stimuli::Facet& facet = facet_of(face);
+    Face out = face;
+    double nearest = HUGE_VAL;
+    for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+      const stimuli::Side& side = at.part->mesh->sides()[i];
+      const double slope = glm::dot(side.inward, at.d) * (towards_end ? 1 : -1);
+      if (!(slope < 0)) continue;
+      const double start =
+          glm::dot(side.inward, towards_end ? at.ideal : at.ideal + at.d) - side.offset;
+      if (start / -slope >= nearest) continue;
+      nearest = start / -slope;
+      out.facet = side.across;
+    }
+    return out;
+  }
+
+  /// By how much `face` and those that follow, towards the end or the beginning, move the point
+  /// from `from`. Counts those within the blend angle.
+  /// \param on  the point at `from`, on the surface, world frame
+  double way(Face face, double from, Vec3 on, bool towards_end, int& along) const {
+    double moved = 0;
+    for (int i = 0; i < kMostFaces; ++i) {
+      // A convex surface falls away: once a face is past the blend angle, so are all beyond. But
+      // where it was cut, behind a wall at any angle, another part goes on.
+      const bool past_angle = past(face, towards_end);
+      tick::Portion at = portion(face);
+      const bool beside = !(at.enter <= at.leave);
+      const bool wall = past_angle || beside || (i > 0 && std::abs(turned_to(face)) >= 1);
+      if (wall) {
+        const bool goes_on = continues(face, from, on, towards_end);
+        if (!goes_on && (past_angle || beside)) break;
+        if (goes_on) at = portion(face);
+      }
+      const double end = towards_end ? std::max(from, at.leave) : std::min(from, at.enter);
+      const double angle = turned_to(face);
+      along += std::abs(angle) < 1;
+      moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
+      from = end;
+      if (towards_end ? from >= 1 : from <= 0) break;
+      on = foot(face, from);
+      face = beyond(face, towards_end);
+    }
+    return moved;
+  }
+
+  /// The point of the segment at a fraction, moved onto a face. World frame.
+  Vec3 foot(const Face& face, double fraction) const {
+    const FacedPart& at = parts_[face.part];
+    const stimuli::Facet& facet = facet_of(face);
+    const Vec3 point = at.ideal + fraction * at.d;
+    return at.part->world_vector(
+               point - (glm::dot(facet.normal, point) - facet.offset) * facet.normal) +
+           at.part->position;
+  }
+
+ private:
+  const stimuli::Facet& facet_of(const Face& face) const {
+    return parts_[face.part].part->mesh->facets()[face.facet];
+  }
+
+  double turned_to(const Face& face) const {
+    return turned(glm::dot(facet_of(face).normal, parts_[face.part].d), length_);
+  }
+
+  bool past(const Face& face, bool towards_end) const {
+    const double angle = turned_to(face);
+    return towards_end ? angle >= 1 : angle <= -1;
+  }
+
+  bool is_on(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& point) const {
+    const stimuli::Facet& facet = mesh.facets()[index];
+    if (std::abs(glm::dot(facet.normal, point) - facet.offset) > tolerance_) return false;
+    for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+      const stimuli::Side& side = mesh.sides()[i];
+      if (glm::dot(side.inward, point) < side.offset - tolerance_) return false;
+    }
+    return true;
+  }
+
+  /// Whether a face of another part goes on where one ends; then `face` is that one.
+  bool continues(Face& face, double from, const Vec3& on, bool towards_end) const {
+    const std::size_t own = face.part;
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      if (k == own) continue;
+      const stimuli::ConvexMesh& mesh = *parts_[k].part->mesh;
+      const Vec3 point = parts_[k].part->local_point(on);
+      const auto takes = [&](std::uint32_t facet) {
+        const Face other{k, facet};
+        // Inner walls, where parts abut, stand across.
+        if (std::abs(turned_to(other)) >= 1 || !is_on(mesh, facet, point)) return false;
+        const tick::Portion at = portion(other);
+        const double gap = tolerance_ / length_;
+        if (!(at.enter <= at.leave)) return false;
+        if (!(towards_end ? at.leave > from + gap : at.enter < from - gap)) return false;
+        face = other;
+        return true;
+      };
+      if (mesh.facets().size() <= ContactTrees::kScanLimit) {
+        for (std::uint32_t facet = 0; facet < mesh.facets().size(); ++facet) {
+          if (takes(facet)) return true;
+        }
+      } else if (takes_near(mesh, parts_[k].feature, point, takes)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// The same on a large mesh, among the facets round the one under the point.
+  template <class Takes>
+  static bool takes_near(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& point,
+                         const Takes& takes) {
+    if (start.kind == Kind::none) start = {Kind::facet, false, 0};
+    if (start.kind == Kind::edge) start = {Kind::facet, false, mesh.edges()[start.index].left};
+    const WalkResult under = walk_point(mesh, start, point);
+    const std::uint32_t facet = under.feature.kind != Kind::none ? under.feature.index
+                                                                 : under.separating_feature.index;
+    if (takes(facet)) return true;
+    const stimuli::Facet& centre = mesh.facets()[facet];
+    for (std::uint32_t i = centre.first_side; i < centre.first_side + centre.side_count; ++i) {
+      if (takes(mesh.sides()[i].across)) return true;
+    }
+    return false;
+  }
+
+  std::span<const FacedPart> parts_;
+  double tolerance_;
+  double length_;
+};
+
+}  // namespace
+
+void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, double tolerance,
+                       LoadedContact& c) {
+  const FacedPart& carrying = parts[0];
+  const ScenePart& part = *carrying.part;
+  if (!(glm::dot(carrying.d, carrying.d) > 0)) return;
+  const Faces faces(parts, tolerance);
+  int along = 0;
+  double at = hit.probe_fraction;
+  if (hit.feature.kind == Kind::edge) {
+    const stimuli::Edge& edge = part.mesh->edges()[hit.feature.index];
+    const Face ahead{0, hit.feature.left_ahead ? edge.left : edge.right};
+    const Face behind{0, hit.feature.left_ahead ? edge.right : edge.left};
+    const Vec3 on = part.world_vector(carrying.ideal + at * carrying.d) + part.position;
+    const double forwards = faces.way(ahead, at, on, true, along);
+    at += forwards + faces.way(behind, at, on, false, along);
+  } else {
+    const Face face{0, hit.feature.index};
+    const tick::Portion portion = faces.portion(face);
+    if (!(portion.enter <= portion.leave)) return;
+    const Vec3 on = faces.foot(face, portion.enter);
+    at = portion.enter + faces.way(face, portion.enter, on, true, along);
+    if (portion.enter > 0)
+      at += faces.way(faces.beyond(face, false), portion.enter, on, false, along);
+  }
+  if (along < 2) return;  // one face is (2) itself
+  c.probe_fraction = std::clamp(at, 0.0, 1.0);
+  c.contact.type = ContactType::segment_face;
+}
+
+}  // namespace palpate::rendering

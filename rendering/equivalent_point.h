@@ -1,0 +1,36 @@
+#pragma once
+// Equation (2) of Ho, Basdogan & Srinivasan 2000 where a segment lies along several faces at once:
+// faces of one part that meet at less than twice the blend angle, and faces of parts that abut.
+
+#include <cstddef>
+#include <span>
+
+#include "rendering/facet_walk.h"
+#include "rendering/force.h"
+#include "rendering/scene.h"
+
+namespace palpate::rendering {
+
+/// A part as a segment in contact has it. Mesh frame, m.
+struct FacedPart {
+  const ScenePart* part = nullptr;
+  ContactFeature feature;  ///< any near the segment; none is slower
+  Vec3 ideal, d;           ///< the ideal segment from ideal to ideal + d
+};
+
+/// More parts than these have no say.
+inline constexpr std::size_t kMostFacedParts = 32;
+
+/// Places the contact of a segment on the faces that it lies along. For each face the point of (2)
+/// moves from the beginning of its touching portion to the end while the segment turns through the
+/// face's plane; the ways of all faces add up, from the place that no face changes. One face gives
+/// (2), coplanar ones give (2) over all of them, and nothing jumps from face to face.
+/// \param parts      of the same object; the first carries the contact
+/// \param hit        the contact's feature, measured
+/// \param tolerance  m, between faces that abut
+/// \param c          as (2) over one face has it; changed where two or more are within the blend
+///                   angle
+void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, double tolerance,
+                       LoadedContact& c);
+
+}  // namespace palpate::rendering
