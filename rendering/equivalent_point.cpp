@@ -91,8 +91,8 @@ class Faces {
     const FacedPart& at = parts_[face.part];
     const stimuli::Facet& facet = facet_of(face);
     const Vec3 point = at.ideal + fraction * at.d;
-    return at.part->world_vector(
-               point - (glm::dot(facet.normal, point) - facet.offset) * facet.normal) +
+    return at.part->world_vector(point -
+                                 (glm::dot(facet.normal, point) - facet.offset) * facet.normal) +
            at.part->position;
   }
 
@@ -156,8 +156,8 @@ class Faces {
     if (start.kind == Kind::none) start = {Kind::facet, false, 0};
     if (start.kind == Kind::edge) start = {Kind::facet, false, mesh.edges()[start.index].left};
     const WalkResult under = walk_point(mesh, start, point);
-    const std::uint32_t facet = under.feature.kind != Kind::none ? under.feature.index
-                                                                 : under.separating_feature.index;
+    const std::uint32_t facet =
+        under.feature.kind != Kind::none ? under.feature.index : under.separating_feature.index;
     if (takes(facet)) return true;
     const stimuli::Facet& centre = mesh.facets()[facet];
     for (std::uint32_t i = centre.first_side; i < centre.first_side + centre.side_count; ++i) {

@@ -564,8 +564,8 @@ void IdealTool::spread_over_parts(const NearPair& carrying, const WalkResult& hi
     faced[count++] = {&beside, state_of(other).feature, beside.local_point(world_tip),
                       other.true_d};
   }
-  spread_over_faces(std::span<const FacedPart>(faced.data(), count), hit,
-                    kSlidOff * group_.skin, c);
+  spread_over_faces(std::span<const FacedPart>(faced.data(), count), hit, kSlidOff * group_.skin,
+                    c);
 }
 
 void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {

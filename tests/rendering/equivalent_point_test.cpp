@@ -82,7 +82,8 @@ TEST(EquivalentPoint, AFaceFarFromTheRidgeHasEquationTwoAlone) {
   // Half of the stylus is over one face, and the other is beyond its end.
   const double angle = 1.5 * std::numbers::pi / 180;
   const Scene scene = ridge(angle);
-  const Vec3 along(std::cos(angle / 2), 0, -std::sin(angle / 2)), out(std::sin(angle / 2), 0, std::cos(angle / 2));
+  const Vec3 along(std::cos(angle / 2), 0, -std::sin(angle / 2)),
+      out(std::sin(angle / 2), 0, std::cos(angle / 2));
   for (const double theta : {-0.5 * kBlendAngle, 0.0, 0.3 * kBlendAngle}) {
     // The tip is over the right-hand face, 10 mm from the ridge; the face ends 30 mm / cos from it.
     const Vec3 d = 0.1 * (std::cos(theta) * along + std::sin(theta) * out);
@@ -98,7 +99,8 @@ TEST(EquivalentPoint, AFaceFarFromTheRidgeHasEquationTwoAlone) {
 }
 
 TEST(EquivalentPoint, ASlabThatIsCutHasThatOfTheWhole) {
-  const Scene whole(testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {0.05, 0.05, 0})}));
+  const Scene whole(
+      testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {0.05, 0.05, 0})}));
   const Scene cut(testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {-0.01, 0.05, 0}),
                                       testing::box_soup({-0.01, -0.05, -0.04}, {0, 0.05, 0}),
                                       testing::box_soup({0, -0.05, -0.04}, {0.05, 0.05, 0})}));
@@ -106,7 +108,8 @@ TEST(EquivalentPoint, ASlabThatIsCutHasThatOfTheWhole) {
   RenderState of_whole = whole.initial_state(), of_cut = cut.initial_state();
   for (double tilt = -2 * kBlendAngle; tilt <= 2 * kBlendAngle; tilt += 1e-4) {
     LineProbe probe = across(tilt);
-    if (tilt == -2 * kBlendAngle) probe = {probe.tip + Vec3(0, 0, 0.1), probe.tail + Vec3(0, 0, 0.1)};
+    if (tilt == -2 * kBlendAngle)
+      probe = {probe.tip + Vec3(0, 0, 0.1), probe.tail + Vec3(0, 0, 0.1)};
     const Rendering a = ray_renderer().tick(whole, of_whole, probe, kTick),
                     b = ray_renderer().tick(cut, of_cut, probe, kTick);
     ASSERT_EQ(a.contacts, b.contacts);

@@ -120,7 +120,8 @@ TEST_P(UnionContact, ACrackAsWideAsRoundingLetsNothingIn) {
       const LineProbe local{{0, y, z}, {0, y + 0.02, z + 0.1}};
       r = tick(scene, state, testing::to_world(pose, local));
     }
-    EXPECT_LE(glm::length(r.force - pose.orientation * Vec3(0, 0, kStiffness * kPressed)), 1e-7) << i;
+    EXPECT_LE(glm::length(r.force - pose.orientation * Vec3(0, 0, kStiffness * kPressed)), 1e-7)
+        << i;
   }
 }
 
