@@ -145,7 +145,15 @@ Shown outer(const Drivers& drivers, std::size_t p) {
   return {one.spearman.value_or(0), one.spearman_ci95};
 }
 std::optional<double> inner(const Drivers& drivers, std::size_t p) {
-  return drivers.sobol ? drivers.sobol->of[p].first : drivers.ranks[p].spearman;
+  if (drivers.sobol) return drivers.sobol->of[p].first;
+  return drivers.ranks[p].partial ? drivers.ranks[p].spearman : std::nullopt;
+}
+
+bool has_partial(const SweepAnalysis& analysis) {
+  return std::any_of(analysis.drivers.begin(), analysis.drivers.end(), [](const Drivers& drivers) {
+    return std::any_of(drivers.ranks.begin(), drivers.ranks.end(),
+                       [](const RankCorrelation& one) { return one.partial.has_value(); });
+  });
 }
 
 std::string title_of(const std::string& output) {
@@ -206,6 +214,7 @@ Figure drivers_figure(const SweepAnalysis& analysis) {
   } else {
     figure.legend = {{"partial, the others' part taken out", Role::ink, MarkerShape::circle},
                      {"Spearman", Role::ray, MarkerShape::square}};
+    if (!has_partial(analysis)) figure.legend = {{"Spearman", Role::ink, MarkerShape::circle}};
     figure.notes = {
         "Rank correlations of the gain with each parameter, with 95 % intervals; below 0: the "
         "larger the "

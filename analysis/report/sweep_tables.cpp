@@ -14,6 +14,7 @@ namespace {
 
 constexpr const char* kSimulated = " (SIMULATED PARTICIPANTS)";
 constexpr std::size_t kShownReasons = 20;
+constexpr std::size_t kMostInText = 10;  // rows of a table
 
 std::string driver_name(const SweepAnalysis& analysis) {
   return analysis.table.design == "saltelli" ? "Sobol indices" : "rank correlations";
@@ -86,6 +87,15 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
     table.notes.push_back(counted(drivers.sobol->dropped, "base point is", "base points are") +
                           " left out, of which a sample has no figure.");
   }
+  const auto lacks_partial = [](const RankCorrelation& one) {
+    return one.spearman && !one.partial;
+  };
+  if (std::any_of(drivers.ranks.begin(), drivers.ranks.end(), lacks_partial)) {
+    table.notes.emplace_back(
+        "No partial correlations: fewer points with a figure than they need with so many "
+        "parameters, or parameters that "
+        "vary together.");
+  }
   for (std::size_t p = 0; p < drivers.ranks.size(); ++p) {
     if (!drivers.ranks[p].undefined.empty())
       table.notes.push_back(analysis.table.parameters[p] + ": none, " + drivers.ranks[p].undefined +
@@ -153,7 +163,14 @@ std::string sweep_text(const SweepAnalysis& analysis) {
         "not about people.");
   }
   for (const std::string& note : analysis.notes) out += paragraph_text("Note: " + note);
-  for (const Table& one : sweep_tables(analysis)) out += "\n" + table_text(one);
+  for (Table one : sweep_tables(analysis)) {
+    const std::size_t more = one.rows.size() > kMostInText ? one.rows.size() - kMostInText : 0;
+    if (more > 0) {
+      one.rows.resize(kMostInText);
+      one.notes.push_back("And " + std::to_string(more) + " more: --json and --report have all.");
+    }
+    out += "\n" + table_text(one);
+  }
   return out;
 }
 
