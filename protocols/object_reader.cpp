@@ -248,8 +248,8 @@ void ObjectReader::name(const char* key, std::string& out) {
                                 found_text(*value));
 }
 
-void ObjectReader::vector(const char* key, Vec3& out, const NumberRange& range) {
-  const json* const value = member(key);
+void ObjectReader::vector(const char* key, Vec3& out, const NumberRange& range, Presence presence) {
+  const json* const value = member(key, presence);
   std::array<double, 3> xyz{};
   if (value != nullptr && read_numbers(*value, pointer(key), xyz, range, faults_)) {
     out = Vec3(xyz[0], xyz[1], xyz[2]);

@@ -71,7 +71,8 @@ class ObjectReader {
   void boolean(const char* key, bool& out);
   void text(const char* key, std::string& out);
   void name(const char* key, std::string& out);  ///< required; letters, digits, '-'
-  void vector(const char* key, Vec3& out, const NumberRange& range);
+  void vector(const char* key, Vec3& out, const NumberRange& range,
+              Presence presence = Presence::optional);
   void quaternion(const char* key, Quat& out);
 
   template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>

@@ -91,8 +91,8 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   reader.choice<std::optional<stimuli::ShapeKind>>("shape", shape, shapes, Presence::required);
   if (!shape) {
     // Without a shape no key of any shape is called unknown.
-    for (const char* key :
-         {"radius_m", "height_m", "edge_m", "subdivisions", "segments", "file", "parts"}) {
+    for (const char* key : {"radius_m", "height_m", "edge_m", "size_m", "subdivisions", "segments",
+                            "file", "parts"}) {
       reader.member(key);
     }
     return spec;
@@ -102,6 +102,7 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   if (traits.radius) reader.number("radius_m", spec.radius, kLength, Presence::required);
   if (traits.height) reader.number("height_m", spec.height, kLength, Presence::required);
   if (traits.edge) reader.number("edge_m", spec.edge, kLength, Presence::required);
+  if (traits.size) reader.vector("size_m", spec.size, kLength, Presence::required);
   if (traits.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
   if (traits.segments) reader.integer("segments", spec.segments, kSegments);
   if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);

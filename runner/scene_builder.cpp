@@ -17,7 +17,8 @@ Pose compose(const Pose& outer, const Pose& inner) {
 /// Shapes with equal keys have equal meshes.
 std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
   std::string key = std::to_string(static_cast<int>(spec.shape)) + (side_contact ? "s" : "p");
-  for (const double value : {spec.radius, spec.height, spec.edge}) {
+  for (const double value :
+       {spec.radius, spec.height, spec.edge, spec.size.x, spec.size.y, spec.size.z}) {
     char text[32];
     key.append(1, ' ').append(text, std::to_chars(text, text + sizeof text, value).ptr);
   }

@@ -12,7 +12,7 @@
 
 namespace palpate::stimuli {
 
-enum class ShapeKind { sphere, cone, cylinder, cube, mesh, compound };
+enum class ShapeKind { sphere, cone, cylinder, cube, box, mesh, compound };
 
 /// A layer of an object: its surface moved inwards, felt beside the surface.
 struct Layer {
@@ -35,13 +35,14 @@ struct Material {
   bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
-/// Local frames: sphere, cube and cylinder centred, cylinder axis +z; cone axis +z, apex at
+/// Local frames: sphere, cube, box and cylinder centred, cylinder axis +z; cone axis +z, apex at
 /// +height/2, base at -height/2.
 struct ObjectSpec {
   ShapeKind shape = ShapeKind::sphere;
   double radius = 0.03;   ///< m; sphere, cone, cylinder
   double height = 0.06;   ///< m; cone, cylinder
   double edge = 0.06;     ///< m; cube
+  Vec3 size{0.06};        ///< m; box, its three edges
   int subdivisions = 4;   ///< sphere: an icosphere of 20 * 4^subdivisions triangles
   int segments = 64;      ///< cone, cylinder: corners of the rim
   std::string file_name;  ///< mesh: as the scene or protocol names its file

@@ -146,15 +146,20 @@ PolygonSoup cylinder(double radius, double height, int segments) {
 
 PolygonSoup cube(double edge) {
   require_length(edge, "cube", "edge");
-  const double h = edge / 2;
-  return {{{-h, -h, -h},
-           {h, -h, -h},
-           {h, h, -h},
-           {-h, h, -h},
-           {-h, -h, h},
-           {h, -h, h},
-           {h, h, h},
-           {-h, h, h}},
+  return box(Vec3(edge));
+}
+
+PolygonSoup box(const Vec3& size) {
+  for (int axis = 0; axis < 3; ++axis) require_length(size[axis], "box", "size");
+  const Vec3 h = size / 2.0;
+  return {{{-h.x, -h.y, -h.z},
+           {h.x, -h.y, -h.z},
+           {h.x, h.y, -h.z},
+           {-h.x, h.y, -h.z},
+           {-h.x, -h.y, h.z},
+           {h.x, -h.y, h.z},
+           {h.x, h.y, h.z},
+           {-h.x, h.y, h.z}},
           {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
 }
 
@@ -168,6 +173,8 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
       return cylinder(spec.radius, spec.height, spec.segments);
     case ShapeKind::cube:
       return cube(spec.edge);
+    case ShapeKind::box:
+      return box(spec.size);
     case ShapeKind::mesh:
       return spec.file_bytes ? read_mesh(spec.file, *spec.file_bytes) : read_mesh_file(spec.file);
     case ShapeKind::compound:

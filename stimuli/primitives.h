@@ -11,6 +11,7 @@ PolygonSoup icosphere(double radius, int subdivisions);        ///< 20 * 4^subdi
 PolygonSoup cone(double radius, double height, int segments);  ///< axis +z, apex at +height/2
 PolygonSoup cylinder(double radius, double height, int segments);  ///< axis +z, centred
 PolygonSoup cube(double edge);                                     ///< centred
+PolygonSoup box(const Vec3& size);  ///< centred, edges along the axes
 
 /// The polygons of a primitive or mesh file in its local frame (pose and parts are not applied).
 /// \throws MeshError, std::runtime_error for an unreadable file; std::invalid_argument for a

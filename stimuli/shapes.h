@@ -14,6 +14,7 @@ namespace palpate::stimuli {
 struct ShapeTraits {
   const char* name;                                   ///< in files
   bool radius = false, height = false, edge = false;  ///< lengths that it has
+  bool size = false;                                  ///< three of them
   bool subdivisions = false, segments = false;        ///< how finely it is tessellated
   /// Its surface is known exactly: it has a signed distance and local penetration depths, and the
   /// accuracy study and simulated participants use it.
@@ -31,6 +32,8 @@ constexpr ShapeTraits traits_of(ShapeKind shape) {
           .name = "cylinder", .radius = true, .height = true, .segments = true, .analytic = true};
     case ShapeKind::cube:
       return {.name = "cube", .edge = true, .analytic = true};
+    case ShapeKind::box:
+      return {.name = "box", .size = true};
     case ShapeKind::mesh:
       return {.name = "mesh"};
     case ShapeKind::compound:

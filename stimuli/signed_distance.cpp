@@ -99,6 +99,7 @@ SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point) 
     case ShapeKind::cone:
       return revolved(to_cone(primitive.radius, primitive.height, from_axis, point.z), point,
                       from_axis);
+    case ShapeKind::box:
     case ShapeKind::mesh:
     case ShapeKind::compound:
       break;

@@ -89,6 +89,7 @@ double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
       const Vec3 side = cone_normal(s, Vec3(1, 0, 0));
       return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
     }
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;
@@ -123,6 +124,7 @@ double support(const stimuli::ObjectSpec& primitive, const Vec3& n) {
       return out + std::abs(up);
     case stimuli::ShapeKind::cone:
       return std::max(up, out - up);
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;
@@ -151,6 +153,7 @@ std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const
     case stimuli::ShapeKind::cone:
       depths::depths_in_cone(collector);
       break;
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;  // refused above

@@ -131,6 +131,7 @@ int triangles_of(const stimuli::ObjectSpec& spec) {
       return 4 * spec.segments - 4;
     case stimuli::ShapeKind::cube:
       return 12;
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;

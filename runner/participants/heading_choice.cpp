@@ -119,7 +119,7 @@ void HeadingChoice::predict(const SlidingStylus& stylus, const Vec3& shift, Pred
   for (std::size_t s = 0; s < few_.shapes().size(); ++s) {
     if (count_[s] == 0) continue;
     const ShapeHypotheses::Shape& shape = few_.shapes()[s];
-    visit_line_class(shape.kind, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
+    visit_line_class(shape, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
       const ShapeLine to_shape(few_, shape, shape.first, line);
       Deepest deepest;
       if (line.length > 0) {

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "runner/participants/felt_parts.h"
+#include "runner/participants/rotation_grid.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner {
@@ -46,25 +48,16 @@ bool in_cubic_zone(const Quat& q) {
   return x <= face && y <= face && z <= face && x + y + z <= w;
 }
 
-/// Super-Fibonacci spirals (Alexa 2022, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling
-/// of SO(3)", algorithm 1), restricted to the fundamental zone.
 std::vector<Mat3> cube_rotations() {
-  constexpr double kPsi = 1.533751168755204288118041;  // his constant: psi^4 = psi + 4
   std::vector<Mat3> rotations;
   for (int i = 0; i < kAllRotations; ++i) {
-    const double s = i + 0.5;
-    const double inner = std::sqrt(s / kAllRotations);
-    const double outer = std::sqrt(1 - s / kAllRotations);
-    const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
-    const double beta = 2 * std::numbers::pi * s / kPsi;
-    const Quat q(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
-                 outer * std::cos(beta));
+    const Quat q = super_fibonacci(i, kAllRotations);
     if (in_cubic_zone(q)) rotations.push_back(glm::mat3_cast(q));
   }
   return rotations;
 }
 
-std::vector<Mat3> distinct_rotations(stimuli::ShapeKind kind) {
+std::vector<Mat3> analytic_rotations(stimuli::ShapeKind kind) {
   switch (kind) {
     case stimuli::ShapeKind::cone:
       return spiral_axes(kConeAxes, -1);
@@ -74,11 +67,18 @@ std::vector<Mat3> distinct_rotations(stimuli::ShapeKind kind) {
       return cube_rotations();
     case stimuli::ShapeKind::sphere:
       return {Mat3(1)};
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
-      break;  // fault_of has refused them
+      break;
   }
-  return {};
+  throw std::invalid_argument("no analytic shape");
+}
+
+/// One of the analytic shapes, centred, felt at its surface.
+bool has_formula(const stimuli::ObjectSpec& stimulus) {
+  return stimuli::traits_of(stimulus.shape).analytic && stimulus.pose.position == Vec3(0) &&
+         stimulus.pose.orientation == Quat(1, 0, 0, 0) && stimulus.material.stiffness > 0;
 }
 
 bool usable(double length) { return std::isfinite(length) && length > 0; }
@@ -87,17 +87,10 @@ bool usable(double length) { return std::isfinite(length) && length > 0; }
 
 std::string ShapeHypotheses::fault_of(const stimuli::ObjectSpec& stimulus) {
   const stimuli::ShapeTraits needs = stimuli::traits_of(stimulus.shape);
-  if (!needs.analytic) {
-    std::string known;
-    for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-      if (!stimuli::traits_of(shape).analytic) continue;
-      known += (known.empty() ? "" : ", ") + std::string(stimuli::traits_of(shape).name);
-    }
-    return std::string("a simulated participant knows ") + known + ", not " + needs.name;
-  }
   if (needs.radius && !usable(stimulus.radius)) return "its radius is not positive";
   if (needs.height && !usable(stimulus.height)) return "its height is not positive";
   if (needs.edge && !usable(stimulus.edge)) return "its edge is not positive";
+  if (!can_be_felt(stimulus)) return "it has no stiffness anywhere, so it cannot be felt";
   return "";
 }
 
@@ -115,12 +108,19 @@ ShapeHypotheses::ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli
 }
 
 void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
-  const std::vector<Mat3> rotations = distinct_rotations(stimulus.shape);
   Shape shape;
   shape.kind = stimulus.shape;
-  shape.radius = static_cast<float>(stimulus.radius);
-  shape.half_size = static_cast<float>(
-      (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
+  std::vector<Mat3> rotations;
+  if (has_formula(stimulus)) {
+    rotations = analytic_rotations(stimulus.shape);
+    shape.radius = static_cast<float>(stimulus.radius);
+    shape.half_size = static_cast<float>(
+        (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
+  } else {
+    const std::vector<PlacedPart> parts = felt_parts(stimulus);
+    shape.field = std::make_shared<const DistanceField>(parts);
+    rotations = distinct_rotations(symmetries(parts, *shape.field));
+  }
   shape.first = padded_size();
   shape.count = static_cast<int>(rotations.size());
   shapes_.push_back(shape);

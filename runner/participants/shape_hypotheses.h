@@ -3,14 +3,20 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "runner/participants/distance_field.h"
 #include "stimuli/object_spec.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
 
-/// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it.
+/// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it. A
+/// stimulus is known by the surface that is felt first (felt_parts.h), as it is placed about the
+/// centre of the workspace. The four analytic shapes there have formulas; any other has a field of
+/// distances and some 4600 rotations 14 degrees apart, fewer and 11 degrees apart with symmetries.
 /// Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
 /// Cube: 384 rotations modulo its 24. Neighbours are 10 to 12 degrees apart; no orientation is
 /// further than 8, 10 and 12 degrees from the grid of cone, cylinder and cube.
@@ -25,16 +31,16 @@ class ShapeHypotheses {
     stimuli::ShapeKind kind = stimuli::ShapeKind::sphere;
     float radius = 0;     ///< m; sphere, cone, cylinder
     float half_size = 0;  ///< m; half the height of a cone or cylinder, half the edge of a cube
-    int first = 0;        ///< index of its first hypothesis, a multiple of kBlock
-    int count = 0;        ///< of hypotheses, without the padding
+    std::shared_ptr<const DistanceField> field;  ///< of a stimulus that has no formula
+    int first = 0;  ///< index of its first hypothesis, a multiple of kBlock
+    int count = 0;  ///< of hypotheses, without the padding
   };
 
   /// Why a stimulus cannot be simulated; empty: it can.
   static std::string fault_of(const stimuli::ObjectSpec& stimulus);
 
-  /// Shape i is stimulus i in its own frame; poses and materials are ignored.
-  /// \throws std::invalid_argument naming every stimulus that is no sphere, cone, cylinder or cube
-  /// or has a size that is not positive; also for an empty list.
+  /// Shape i is stimulus i. \throws std::invalid_argument naming every stimulus that has a size
+  /// that is not positive or cannot be felt at all; also for an empty list. MeshError.
   explicit ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli);
 
   /// One block for every shape of `all`, to be filled by copy_rotation: for questions about a few

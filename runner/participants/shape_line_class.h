@@ -1,18 +1,23 @@
 #pragma once
-// Which class of lines (shape_lines.h) measures to which kind of shape.
+// Which class of lines (shape_lines.h, solid_line.h) measures to which stimulus.
 
 #include <type_traits>
 #include <utility>
 
 #include "runner/participants/shape_lines.h"
+#include "runner/participants/solid_line.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::runner {
 
-/// Calls visit(std::type_identity<ShapeLine>()) with the class of the kind.
+/// Calls visit(std::type_identity<ShapeLine>()) with the class of the stimulus.
 template <class Visit>
-void visit_line_class(stimuli::ShapeKind kind, Visit&& visit) {
-  switch (kind) {
+void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {
+  if (shape.field) {
+    std::forward<Visit>(visit)(std::type_identity<SolidLine>());
+    return;
+  }
+  switch (shape.kind) {
     case stimuli::ShapeKind::cone:
       std::forward<Visit>(visit)(std::type_identity<AxialLine<ConeProfile>>());
       break;
@@ -25,9 +30,10 @@ void visit_line_class(stimuli::ShapeKind kind, Visit&& visit) {
     case stimuli::ShapeKind::sphere:
       std::forward<Visit>(visit)(std::type_identity<SphereLine>());
       break;
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
-      break;  // ShapeHypotheses refuses them
+      break;  // have a field
   }
 }
 

@@ -210,7 +210,7 @@ void ShapeObserver::reset() {
 void ShapeObserver::update(const Percept& percept) {
   const Query query = make_query(percept, settings_);
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
-    visit_line_class(shape.kind, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
+    visit_line_class(shape, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
       update_shape<ShapeLine>(*hypotheses_, shape, query, settings_, log_posterior_.data());
     });
   }

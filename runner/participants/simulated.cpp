@@ -2,11 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <glm/geometric.hpp>
+#include <numbers>
 
 #include "runner/scene_builder.h"
 
 namespace palpate::runner {
+namespace {
+
+constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
+
+}  // namespace
 
 SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
                                            const ShapeHypotheses& hypotheses,
@@ -15,6 +22,7 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
                                            int number)
     : settings_(own),
       stylus_(stylus),
+      protocol_(protocol),
       wall_stiffness_(protocol.material.stiffness),
       period_(1 / protocol.servo_rate),
       low_pass_(1 - std::exp(-period_ / own.percept.force_low_pass)),
@@ -31,6 +39,8 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
         seed_, {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
                 static_cast<std::uint64_t>(trial.trial), use});
   };
+  trial_ = trial;
+  ticks_before_ = 0;
   random_ = stream(1);
   stylus_.reset(in_device(explorer_.begin(stream(2))));
   heading_random_ = stream(3);  // its own, so that the hand's and the percepts' stay as they are
@@ -44,7 +54,10 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
 }
 
 std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
-  if (sample.phase != Phase::feeling) return std::nullopt;  // rests in the home zone
+  if (sample.phase != Phase::feeling) {
+    wait_for_time_zero(sample);
+    return std::nullopt;  // rests in the home zone
+  }
   const double time = sample.tick * period_;
   const TouchState touch = sense_touch(sample);
   stylus_.set_target(in_device(explorer_.step(touch, sample.probe)));
@@ -59,6 +72,29 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
   }
   if (explorer_.wants_heading()) choose_heading(sample, touch);
   return std::nullopt;
+}
+
+// The hand rests where the trial's first approach begins: what is not in the home zone at once will
+// never be.
+void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
+  const double waited = static_cast<double>(++ticks_before_) * period_;
+  if (waited < kLongestWait + protocol_.home.rest) return;
+  char text[600];
+  std::snprintf(
+      text, sizeof text,
+      "participant %d, session %d, trial %d (%s, %s): time zero has not come within %.0f s of "
+      "simulated time, because the stylus %s. It begins %.3g m from the centre "
+      "(/motor/approach_distance_m), tilted by %.0f degrees, sd %.0f (/stylus/tilt_deg, "
+      "/stylus/tilt_sd_deg), in a direction that rises by at least %.2g "
+      "(/motor/approach_min_rise): "
+      "with other settings, a smaller /home/margin_m or smaller stimuli in the protocol it begins "
+      "in the home zone",
+      number_, trial_.session, trial_.trial, protocols::to_string(trial_.renderer),
+      protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str(), waited,
+      sample.waiting == Waiting::for_rest ? "does not come to rest" : "is not in the home zone",
+      settings_.motor.approach_distance, settings_.stylus.tilt * 180 / std::numbers::pi,
+      settings_.stylus.tilt_sd * 180 / std::numbers::pi, settings_.motor.approach_min_rise);
+  throw StuckParticipant(text);
 }
 
 HandTarget SimulatedParticipant::in_device(HandTarget target) const {

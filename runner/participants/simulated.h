@@ -2,7 +2,10 @@
 // A simulated participant: explores, perceives with noise, decides and answers. A model that is not
 // fitted to any person; all data that it produces are labelled as simulated.
 
+#include <cstdint>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 
 #include "runner/participants/explorer.h"
 #include "runner/participants/heading_choice.h"
@@ -11,11 +14,17 @@
 
 namespace palpate::runner {
 
+/// A trial does not begin: the stylus rests where it is not in the home zone. what() names
+/// participant, trial and settings.
+class StuckParticipant : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 class SimulatedParticipant final : public Respondent {
  public:
   /// \param own  settings of this individual. \param number  its number. Every trial has a random
   /// stream of its own, seeded with `seed`, number, session and trial, so that a trial is the same
-  /// whatever ran before. \param hypotheses, stylus  must outlive it
+  /// whatever ran before. \param hypotheses, stylus, protocol  must outlive it
   SimulatedParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                        SimulatedStylus& stylus, const protocols::Protocol& protocol,
                        std::uint64_t seed, int number);
@@ -23,9 +32,11 @@ class SimulatedParticipant final : public Respondent {
   void read(const std::string&) override {}
   void feedback(bool) override {}  // without effect: it does not learn
   void begin_trial(const protocols::Trial& trial) override;
+  /// \throws StuckParticipant
   std::optional<Answer> step(const Sample& sample) override;
 
  private:
+  void wait_for_time_zero(const Sample& sample);
   HandTarget in_device(HandTarget target) const;
   TouchState sense_touch(const Sample& sample);
   Vec3 perceived_shift() const;
@@ -34,6 +45,7 @@ class SimulatedParticipant final : public Respondent {
 
   SimulatedSettings settings_;
   SimulatedStylus& stylus_;
+  const protocols::Protocol& protocol_;
   double wall_stiffness_, period_, low_pass_;
   std::uint64_t seed_;
   int number_;
@@ -43,8 +55,10 @@ class SimulatedParticipant final : public Respondent {
   HeadingChoice heading_choice_;
   stimuli::Random random_{0}, heading_random_{0};
   bool ray_ = false;
-  Vec3 centre_error_;         ///< m; error of the believed centre
-  Vec3 force_, torque_;       ///< low-passed: N on the hand, N m about the tip
+  protocols::Trial trial_;
+  std::int64_t ticks_before_ = 0;  ///< of this trial, before time zero
+  Vec3 centre_error_;              ///< m; error of the believed centre
+  Vec3 force_, torque_;            ///< low-passed: N on the hand, N m about the tip
   bool along_known_ = false;  ///< force and stylus are not parallel, so that torque gives `along`
   double next_percept_ = 0;   ///< s from time zero
   std::optional<double> answer_at_;    ///< s from time zero

@@ -56,14 +56,19 @@ std::map<std::string, json> keys_of_a_protocol() {
   return keys;
 }
 
-/// As keys of a stimulus that has them: see kThreeShapes.
+/// As keys of a stimulus that has them: see kShapes.
 std::map<std::string, json> keys_of_an_object() {
   const json root = schema("scene.schema.json");
   std::map<std::string, json> keys, out;
   collect(root.at("$defs").at("object"), root, "", keys);
   for (const auto& [place, key] : keys) {
     const bool cylinder = place == "/segments" || place == "/height_m";
-    out[(cylinder ? "/stimuli/1" : place == "/edge_m" ? "/stimuli/2" : "/stimuli/0") + place] = key;
+    const bool box = place.rfind("/size_m", 0) == 0;
+    const char* stimulus = cylinder             ? "/stimuli/1"
+                           : place == "/edge_m" ? "/stimuli/2"
+                           : box                ? "/stimuli/3"
+                                                : "/stimuli/0";
+    out[stimulus + place] = key;
   }
   return out;
 }
@@ -84,6 +89,7 @@ json values(const stimuli::ObjectSpec& o) {
           o.radius,
           o.height,
           o.edge,
+          values(o.size),
           o.segments,
           o.subdivisions,
           parts,
@@ -153,16 +159,17 @@ json other_value(const json& key) {
   return usual.get<double>() / 2;
 }
 
-const json kThreeShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
+const json kShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
   "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02},
               {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03},
-              {"name": "c", "shape": "cube", "edge_m": 0.02}],
+              {"name": "c", "shape": "cube", "edge_m": 0.02},
+              {"name": "d", "shape": "box", "size_m": [0.02, 0.02, 0.02]}],
   "repetitions": 10, "practice": {"repetitions": 1}, "masking_noise": {},
-  "response": {"keys": {"1": "a", "2": "b", "3": "c"}}})");
+  "response": {"keys": {"1": "a", "2": "b", "3": "c", "4": "d"}}})");
 
 void expect_default(const std::string& place, const json& key) {
   const json::json_pointer pointer(place);
-  json missing = kThreeShapes, written = kThreeShapes, other = kThreeShapes;
+  json missing = kShapes, written = kShapes, other = kShapes;
   written[pointer] = key["default"];
   other[pointer] = other_value(key);
   missing[pointer] = 0;  // so that the section is there
@@ -198,14 +205,14 @@ TEST(Defaults, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_an_o
 TEST(Defaults, OfASectionThatIsLeftOutAreThoseOfAnEmptyOne) {
   for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
                               "servo", "home", "texts"}) {
-    json empty = kThreeShapes;
+    json empty = kShapes;
     empty[section] = json::object();
-    EXPECT_EQ(parsed(kThreeShapes), parsed(empty)) << section;
+    EXPECT_EQ(parsed(kShapes), parsed(empty)) << section;
   }
 }
 
 TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
-  json document = kThreeShapes;
+  json document = kShapes;
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 1);
   document["practice"]["criterion"] = 0.8;
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 5);
@@ -214,7 +221,7 @@ TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
 /// What the parser says of this value at this place (of three numbers, of the first); none: it
 /// takes it.
 std::optional<std::string> refusal(const std::string& place, const json& value) {
-  json document = kThreeShapes;
+  json document = kShapes;
   document["no such key"] = 1;  // so that nothing is looked at but the values themselves
   document["stylus"] = {{"length_m", 10}};
   const json::json_pointer pointer(place);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -91,7 +92,22 @@ TEST(Primitives, PolygonsOfPassesTheSizesOn) {
   spec.shape = ShapeKind::cube;
   spec.edge = 0.01;
   EXPECT_EQ(polygons_of(spec).vertices, cube(0.01).vertices);
+  spec.shape = ShapeKind::box;
+  spec.size = Vec3(0.01);
+  EXPECT_EQ(polygons_of(spec).vertices, cube(0.01).vertices);
+  EXPECT_EQ(polygons_of(spec).faces, cube(0.01).faces);
   EXPECT_THROW(polygons_of(spec_of(ShapeKind::compound)), std::invalid_argument);
+}
+
+TEST(Primitives, ABoxHasItsEdgesAlongTheAxes) {
+  const ConvexMesh mesh(box(Vec3(0.02, 0.04, 0.07)));
+  ASSERT_EQ(mesh.facets().size(), 6U);
+  for (const Facet& facet : mesh.facets()) {
+    const Vec3 size = 2 * facet.offset * glm::abs(facet.normal);
+    const bool one =
+        size == Vec3(0.02, 0, 0) || size == Vec3(0, 0.04, 0) || size == Vec3(0, 0, 0.07);
+    EXPECT_TRUE(one) << size.x << ' ' << size.y << ' ' << size.z;
+  }
 }
 
 TEST(Primitives, ImpossibleSizesAreRefused) {
@@ -104,6 +120,8 @@ TEST(Primitives, ImpossibleSizesAreRefused) {
     EXPECT_THROW(cylinder(bad, 1, 8), std::invalid_argument);
     EXPECT_THROW(cylinder(1, bad, 8), std::invalid_argument);
     EXPECT_THROW(cube(bad), std::invalid_argument);
+    EXPECT_THROW(box(Vec3(1, 1, bad)), std::invalid_argument);
+    EXPECT_THROW(box(Vec3(bad, 1, 1)), std::invalid_argument);
   }
   EXPECT_THROW(icosphere(1, -1), std::invalid_argument);
   EXPECT_THROW(icosphere(1, 9), std::invalid_argument);

@@ -31,6 +31,7 @@ void for_block(const stimuli::ObjectSpec& object, const ShapeHypotheses& hypothe
       return check(CubeLine(hypotheses, shape, 0, line));
     case stimuli::ShapeKind::sphere:
       return check(SphereLine(hypotheses, shape, 0, line));
+    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;

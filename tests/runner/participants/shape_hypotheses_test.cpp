@@ -130,14 +130,32 @@ std::string message_of(const std::vector<stimuli::ObjectSpec>& stimuli) {
 TEST(ShapeHypotheses, NamesEveryStimulusThatCannotBeSimulated) {
   stimuli::ObjectSpec flat = spec(stimuli::ShapeKind::cylinder);
   flat.height = 0;
-  const std::string message =
-      message_of({spec(stimuli::ShapeKind::mesh), spec(stimuli::ShapeKind::sphere),
-                  spec(stimuli::ShapeKind::compound), flat});
-  EXPECT_NE(message.find("stimulus 1: a simulated participant knows sphere"), std::string::npos);
+  stimuli::ObjectSpec air = spec(stimuli::ShapeKind::box);
+  air.material.stiffness = 0;
+  stimuli::ObjectSpec airy = spec(stimuli::ShapeKind::compound);
+  airy.parts = {air, air};
+  const std::string message = message_of({air, spec(stimuli::ShapeKind::sphere), airy, flat});
+  EXPECT_NE(message.find("stimulus 1: it has no stiffness anywhere"), std::string::npos);
   EXPECT_EQ(message.find("stimulus 2"), std::string::npos);
-  EXPECT_NE(message.find("stimulus 3: a simulated participant knows"), std::string::npos);
+  EXPECT_NE(message.find("stimulus 3: it has no stiffness"), std::string::npos);
   EXPECT_NE(message.find("stimulus 4: its height"), std::string::npos);
   EXPECT_NE(message_of({}).find("no stimuli"), std::string::npos);
+}
+
+// What has a formula is known by it; anything placed off the centre, or felt below its surface, is
+// not what the formula says.
+TEST(ShapeHypotheses, OnlyCentredPlainShapesAreKnownByFormula) {
+  stimuli::ObjectSpec moved = spec(stimuli::ShapeKind::cube);
+  moved.pose.position = Vec3(0.01, 0, 0);
+  const ShapeHypotheses hypotheses(
+      {spec(stimuli::ShapeKind::cube), moved, spec(stimuli::ShapeKind::box)});
+  EXPECT_FALSE(hypotheses.shapes()[0].field);
+  EXPECT_EQ(hypotheses.shapes()[0].count, 384);
+  ASSERT_TRUE(hypotheses.shapes()[1].field);
+  EXPECT_NEAR(hypotheses.shapes()[1].field->distance(0.05F, 0, 0), 0.01, 1e-4);
+  EXPECT_EQ(hypotheses.shapes()[1].count, 9120 / 4) << "four turns about x";
+  ASSERT_TRUE(hypotheses.shapes()[2].field) << "a box of 0.06 m";
+  EXPECT_EQ(hypotheses.shapes()[2].count, 384) << "as the cube of that edge";
 }
 
 }  // namespace

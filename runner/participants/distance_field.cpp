@@ -1,0 +1,280 @@
+#include "runner/participants/distance_field.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+namespace palpate::runner {
+namespace {
+
+constexpr double kNodesAcross = 72;     // the object's longest side and its margins
+constexpr double kLeastMargin = 0.012;  // m
+constexpr int kBand = 6;                // nodes from the surface up to which distances are exact
+constexpr float kUnknown = std::numeric_limits<float>::max();
+
+// Ericson 2005, "Real-Time Collision Detection", 5.1.5.
+Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return a;
+  const Vec3 bp = p - b;
+  const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return b;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
+  const Vec3 cp = p - c;
+  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return c;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
+    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
+  return a + (vb * ab + vc * ac) / (va + vb + vc);
+}
+
+/// The nodes while they are worked out.
+class Filling {
+ public:
+  Filling(const Vec3& low, double spacing, const std::array<std::size_t, 3>& count)
+      : low_(low),
+        spacing_(spacing),
+        count_{static_cast<int>(count[0]), static_cast<int>(count[1]), static_cast<int>(count[2])},
+        inside_(count[0] * count[1] * count[2], 0),
+        distance_(inside_.size(), kUnknown),
+        depth_(inside_.size(), kUnknown) {}
+
+  std::vector<float> run(const std::vector<PlacedPart>& parts) {
+    for (const PlacedPart& part : parts) mark_inside(part);
+    for (const PlacedPart& part : parts) measure(part);
+    march(distance_, 0);
+    find_depths();
+    march(depth_, 1);
+    for (std::size_t i = 0; i < inside_.size(); ++i) {
+      if (inside_[i] != 0) distance_[i] = -depth_[i];
+    }
+    return std::move(distance_);
+  }
+
+ private:
+  using Range = std::array<int, 2>;  // nodes, first and last
+
+  std::size_t index(int x, int y, int z) const {
+    return static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x);
+  }
+  Vec3 place(int x, int y, int z) const { return low_ + spacing_ * Vec3(x, y, z); }
+  Range range(double low, double high, std::size_t axis) const {
+    const double from = low_[static_cast<int>(axis)];
+    return {std::max(0, static_cast<int>(std::ceil((low - from) / spacing_))),
+            std::min(count_[axis] - 1, static_cast<int>(std::floor((high - from) / spacing_)))};
+  }
+
+  // Each line of nodes crosses a convex part in one interval.
+  void mark_inside(const PlacedPart& part) {
+    std::vector<std::pair<Vec3, double>> planes;
+    for (const stimuli::Facet& facet : part.mesh->facets()) {
+      const Vec3 normal = part.pose.orientation * facet.normal;
+      // A hair wider: nodes on a seam must not be outside both of its parts.
+      planes.emplace_back(normal,
+                          facet.offset + glm::dot(normal, part.pose.position) + 1e-3 * spacing_);
+    }
+    for (int z = 0; z < count_[2]; ++z) {
+      for (int y = 0; y < count_[1]; ++y) {
+        const Vec3 start = place(0, y, z);
+        double from = 0, to = spacing_ * (count_[0] - 1);
+        for (const auto& [normal, offset] : planes) {
+          const double above = glm::dot(normal, start) - offset;
+          if (normal.x > 0) {
+            to = std::min(to, -above / normal.x);
+          } else if (normal.x < 0) {
+            from = std::max(from, -above / normal.x);
+          } else if (above > 0) {
+            to = -1;
+          }
+          if (from > to) break;
+        }
+        if (from > to) continue;
+        const Range x = range(start.x + from, start.x + to, 0);
+        for (int i = x[0]; i <= x[1]; ++i) inside_[index(i, y, z)] = 1;
+      }
+    }
+  }
+
+  void measure(const PlacedPart& part) {
+    const stimuli::ConvexMesh& mesh = *part.mesh;
+    for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+      const stimuli::Facet& facet = mesh.facets()[f];
+      const auto corner = [&](std::uint32_t k) {
+        const stimuli::Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
+        return part.pose.orientation * (edge.left == f ? edge.from : edge.to) + part.pose.position;
+      };
+      for (std::uint32_t k = 2; k < facet.side_count; ++k)
+        measure(corner(0), corner(k - 1), corner(k));
+    }
+  }
+
+  void measure(const Vec3& a, const Vec3& b, const Vec3& c) {
+    const Vec3 low = glm::min(a, glm::min(b, c)) - Vec3(kBand * spacing_);
+    const Vec3 high = glm::max(a, glm::max(b, c)) + Vec3(kBand * spacing_);
+    const Range xs = range(low.x, high.x, 0), ys = range(low.y, high.y, 1),
+                zs = range(low.z, high.z, 2);
+    const Vec3 across = glm::cross(b - a, c - a);
+    const double twice_area = glm::length(across);
+    const Vec3 normal = twice_area > 0 ? across / twice_area : Vec3(0);
+    for (int z = zs[0]; z <= zs[1]; ++z) {
+      for (int y = ys[0]; y <= ys[1]; ++y) {
+        for (int x = xs[0]; x <= xs[1]; ++x) {
+          const std::size_t i = index(x, y, z);
+          if (inside_[i] != 0) continue;
+          const Vec3 p = place(x, y, z);
+          const double least = std::min<double>(distance_[i], kBand * spacing_);
+          if (std::abs(glm::dot(normal, p - a)) >= least) continue;
+          const double apart = glm::distance(p, nearest_on_triangle(p, a, b, c));
+          if (apart < least) distance_[i] = static_cast<float>(apart);
+        }
+      }
+    }
+  }
+
+  // Inside, the parts know distances to seams only. A node outside at distance s has a ball of that
+  // radius free of the solid, so |p - q| - s bounds the depth of p; for a node beside the surface
+  // the best of them is all but exact.
+  void find_depths() {
+    for (int z = 1; z + 1 < count_[2]; ++z) {
+      for (int y = 1; y + 1 < count_[1]; ++y) {
+        for (int x = 1; x + 1 < count_[0]; ++x) {
+          if (inside_[index(x, y, z)] != 0 && beside_surface(x, y, z))
+            depth_[index(x, y, z)] = depth_by_balls(x, y, z);
+        }
+      }
+    }
+  }
+
+  bool beside_surface(int x, int y, int z) const {
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          if (inside_[index(x + dx, y + dy, z + dz)] == 0) return true;
+        }
+      }
+    }
+    return false;
+  }
+
+  float depth_by_balls(int x, int y, int z) const {
+    constexpr int kWindow = 3;
+    float least = kUnknown;
+    for (int dz = -kWindow; dz <= kWindow; ++dz) {
+      for (int dy = -kWindow; dy <= kWindow; ++dy) {
+        for (int dx = -kWindow; dx <= kWindow; ++dx) {
+          const int a = x + dx, b = y + dy, c = z + dz;
+          if (a < 0 || b < 0 || c < 0 || a >= count_[0] || b >= count_[1] || c >= count_[2])
+            continue;
+          const std::size_t i = index(a, b, c);
+          if (inside_[i] != 0) continue;
+          const double apart = spacing_ * std::sqrt(double(dx * dx + dy * dy + dz * dz));
+          least = std::min(least, static_cast<float>(apart) - distance_[i]);
+        }
+      }
+    }
+    return std::max(least, 0.0F);
+  }
+
+  // From known distances on, by the eikonal equation (Zhao 2005, "A fast sweeping method for
+  // eikonal equations"): one sweep in each of the eight directions.
+  void march(std::vector<float>& values, char side) const {
+    std::vector<char> known(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) known[i] = values[i] < kUnknown ? 1 : 0;
+    const auto order = [&](int k, int sweep, std::size_t axis) {
+      return (sweep >> axis & 1) != 0 ? count_[axis] - 1 - k : k;
+    };
+    for (int sweep = 0; sweep < 8; ++sweep) {
+      for (int k = 0; k < count_[2]; ++k) {
+        for (int j = 0; j < count_[1]; ++j) {
+          for (int i = 0; i < count_[0]; ++i) {
+            const int x = order(i, sweep, 0), y = order(j, sweep, 1), z = order(k, sweep, 2);
+            const std::size_t here = index(x, y, z);
+            if (inside_[here] != side || known[here] != 0) continue;
+            values[here] = std::min(values[here], from_neighbours(values, x, y, z));
+          }
+        }
+      }
+    }
+  }
+
+  float from_neighbours(const std::vector<float>& values, int x, int y, int z) const {
+    const auto less = [&](int before, int after, std::size_t step, std::size_t here) {
+      const float a = before >= 0 ? values[here - step] : kUnknown;
+      const float b = after > 0 ? values[here + step] : kUnknown;
+      return std::min(a, b);
+    };
+    const std::size_t here = index(x, y, z);
+    const auto row = static_cast<std::size_t>(count_[0]);
+    std::array<float, 3> least{
+        less(x - 1, count_[0] - 1 - x, 1, here), less(y - 1, count_[1] - 1 - y, row, here),
+        less(z - 1, count_[2] - 1 - z, row * static_cast<std::size_t>(count_[1]), here)};
+    std::sort(least.begin(), least.end());
+    if (least[0] == kUnknown) return kUnknown;
+    const auto h = static_cast<float>(spacing_);
+    const float one = least[0] + h;
+    if (one <= least[1]) return one;
+    const float sum = least[0] + least[1], difference = least[0] - least[1];
+    const float two = 0.5F * (sum + std::sqrt(std::max(2 * h * h - difference * difference, 0.0F)));
+    if (two <= least[2]) return two;
+    const float all = sum + least[2];
+    const float squares = least[0] * least[0] + least[1] * least[1] + least[2] * least[2] - h * h;
+    return (all + std::sqrt(std::max(all * all - 3 * squares, 0.0F))) / 3;
+  }
+
+  const Vec3 low_;
+  const double spacing_;
+  const std::array<int, 3> count_;
+  std::vector<char> inside_;
+  std::vector<float> distance_, depth_;  // m; where outside and inside
+};
+
+}  // namespace
+
+DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const PlacedPart& part : parts) {
+    for (const Vec3& vertex : part.mesh->vertices()) {
+      const Vec3 place = part.pose.orientation * vertex + part.pose.position;
+      low = glm::min(low, place);
+      high = glm::max(high, place);
+    }
+  }
+  const Vec3 size = high - low;
+  const double longest = std::max({size.x, size.y, size.z});
+  margin_ = kLeastMargin + 0.1 * longest;
+  spacing_ = (longest + 2 * margin_) / kNodesAcross;
+  low_ = low - Vec3(margin_);
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto axis = static_cast<int>(a);
+    count_[a] = static_cast<std::size_t>(std::ceil((size[axis] + 2 * margin_) / spacing_)) + 1;
+    origin_[a] = static_cast<float>(low_[axis]);
+    last_[a] = static_cast<float>(count_[a] - 1);
+    high_[axis] = low_[axis] + spacing_ * static_cast<double>(count_[a] - 1);
+  }
+  per_spacing_ = static_cast<float>(1 / spacing_);
+  step_ = static_cast<float>(spacing_);
+  nodes_ = Filling(low_, spacing_, count_).run(parts);
+}
+
+DistanceField::Value DistanceField::value(float x, float y, float z) const {
+  const Place at = place(x, y, z);
+  const std::array<float, 8> v = corners(at);
+  const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
+  const float x00 = mix(v[0], v[1], at.x), x10 = mix(v[2], v[3], at.x);
+  const float x01 = mix(v[4], v[5], at.x), x11 = mix(v[6], v[7], at.x);
+  const float y0 = mix(x00, x10, at.y), y1 = mix(x01, x11, at.y);
+  const float dx =
+      mix(mix(v[1] - v[0], v[3] - v[2], at.y), mix(v[5] - v[4], v[7] - v[6], at.y), at.z);
+  const float dy = mix(x10 - x00, x11 - x01, at.z);
+  return {mix(y0, y1, at.z) + at.beyond, dx * per_spacing_, dy * per_spacing_,
+          (y1 - y0) * per_spacing_};
+}
+
+}  // namespace palpate::runner

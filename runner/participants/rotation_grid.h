@@ -1,0 +1,25 @@
+#pragma once
+// Orientations that a stimulus can be told apart in.
+
+#include <vector>
+
+#include "runner/participants/distance_field.h"
+#include "stimuli/vec.h"
+
+namespace palpate::runner {
+
+/// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
+/// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
+Quat super_fibonacci(int i, int n);
+
+/// The rotations about the origin that leave a solid as it is, the identity first: its field then
+/// differs by at most a fifth of its spacing (root mean square, near the surface). An axis of
+/// symmetry runs through a corner, or the middle of an edge or a facet, of the convex hull; turns
+/// by 360 degrees over 2 to 32 are tried about each.
+std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field);
+
+/// Rotations some 11 to 14 degrees apart, one of each set that a symmetry makes alike: the
+/// smallest.
+std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group);
+
+}  // namespace palpate::runner

@@ -1,0 +1,134 @@
+#include "runner/participants/distance_field.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "runner/participants/felt_parts.h"
+#include "runner/participants/solid_line.h"
+#include "stimuli/primitives.h"
+#include "stimuli/random.h"
+#include "stimuli/signed_distance.h"
+#include "tests/runner/participants/solids.h"
+
+namespace palpate::runner {
+namespace {
+
+const stimuli::solids::Outline kEll{{0, 0},       {0.06, 0},    {0.06, 0.02},
+                                    {0.02, 0.02}, {0.02, 0.06}, {0, 0.06}};
+
+Vec3 point_around(stimuli::Random& random, const Vec3& middle, double reach) {
+  Vec3 point = middle;
+  for (int axis = 0; axis < 3; ++axis) point[axis] += reach * (2 * random.unit() - 1);
+  return point;
+}
+
+TEST(DistanceField, OfAnEllIsExactToASpacing) {
+  const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
+  stimuli::Random random(1);
+  double squares = 0, count = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 p = point_around(random, Vec3(0.03, 0.03, 0.015), 0.06);
+    const double exact = test::distance_to_prism(kEll, 0.03, p);
+    const double off = test::distance_at(field, p) - exact;
+    // Beyond the grid it is an upper bound.
+    const double slack = exact < field.margin() ? 0.06 * std::abs(exact) : 0.3 * exact;
+    ASSERT_LT(off, 0.6 * field.spacing() + slack) << exact;
+    ASSERT_GT(off, -0.6 * field.spacing() - 0.06 * std::abs(exact)) << exact;
+    if (std::abs(exact) > 0.006) continue;
+    squares += off * off;
+    ++count;
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.12 * field.spacing());
+}
+
+// Where two parts of a solid meet there is no surface.
+TEST(DistanceField, ASeamIsNotASurface) {
+  const DistanceField whole(test::placed(stimuli::box(Vec3(0.06, 0.04, 0.04))));
+  for (const double at : {0.0, 0.0071, -0.02}) {
+    std::vector<PlacedPart> halves =
+        test::placed(stimuli::box(Vec3(0.03 + at, 0.04, 0.04)), Vec3((at - 0.03) / 2, 0, 0));
+    halves.push_back(
+        test::placed(stimuli::box(Vec3(0.03 - at, 0.04, 0.04)), Vec3((at + 0.03) / 2, 0, 0))[0]);
+    const DistanceField cut(halves);
+    stimuli::Random random(2);
+    for (int i = 0; i < 5000; ++i) {
+      const Vec3 p = point_around(random, Vec3(0), 0.03);
+      ASSERT_NEAR(test::distance_at(cut, p), test::distance_at(whole, p), 0.1 * whole.spacing())
+          << at;
+    }
+  }
+}
+
+TEST(DistanceField, ItsGradientIsTheNormal) {
+  stimuli::ObjectSpec ball;
+  ball.subdivisions = 3;
+  const DistanceField field(felt_parts(ball));
+  stimuli::Random random(3);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 out = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+    const Vec3 p = (0.026 + 0.008 * random.unit()) * out;
+    const DistanceField::Value v =
+        field.value(static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z));
+    const Vec3 slope(v.slope_x, v.slope_y, v.slope_z);
+    EXPECT_GT(glm::dot(glm::normalize(slope), out), std::cos(0.15));
+    EXPECT_NEAR(glm::length(slope), 1, 0.15);
+    EXPECT_FLOAT_EQ(v.distance, static_cast<float>(test::distance_at(field, p)));
+  }
+}
+
+TEST(DistanceField, FarAwayItGrowsByAMetreAMetre) {
+  const DistanceField field(test::placed(stimuli::cube(0.06)));
+  for (const double far : {0.2, 1.0, 50.0}) {
+    EXPECT_NEAR(test::distance_at(field, Vec3(far, 0, 0)), far - 0.03, 0.03 * far);
+    EXPECT_NEAR(test::distance_at(field, Vec3(0, far, -far)), std::sqrt(2) * (far - 0.03),
+                0.03 * far);
+  }
+  // A number that is none must not read beyond the grid.
+  test::distance_at(field, Vec3(std::nan(""), 0, std::numeric_limits<double>::infinity()));
+}
+
+// The least distance along a stylus, by looking everywhere.
+TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
+  stimuli::ObjectSpec ell;
+  ell.shape = stimuli::ShapeKind::compound;
+  stimuli::ObjectSpec arm;
+  arm.shape = stimuli::ShapeKind::box;
+  arm.size = Vec3(0.06, 0.02, 0.03);
+  arm.pose.position = Vec3(0.03, 0.01, 0);
+  ell.parts.push_back(arm);
+  arm.size = Vec3(0.02, 0.06, 0.03);
+  arm.pose.position = Vec3(0.01, 0.03, 0);
+  ell.parts.push_back(arm);
+  const ShapeHypotheses hypotheses({ell});
+  const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
+  ASSERT_TRUE(shape.field);
+  stimuli::Random random(4);
+  for (int trial = 0; trial < 60; ++trial) {
+    const Vec3 tip = point_around(random, Vec3(0), 0.06);
+    const Vec3 along = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+    const Line line{to_float(tip), to_float(along), 0.12F, to_float(along)};
+    const int block = ShapeHypotheses::kBlock * static_cast<int>(random.below(20));
+    const SolidLine to_shape(hypotheses, shape, shape.first + block, line);
+    Deepest deepest;
+    find_along_line(to_shape, line.length, deepest);
+    for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+      const Mat3 r = hypotheses.rotation(shape.first + block + i);
+      double least = std::numeric_limits<double>::infinity();
+      for (int k = 0; k <= 1000; ++k) {
+        least = std::min(least, test::distance_at(*shape.field,
+                                                  glm::transpose(r) * (tip + 0.00012 * k * along)));
+      }
+      ASSERT_NEAR(deepest.distance[i], least, 0.0006);
+      const Vec3 n(deepest.x[i], deepest.y[i], deepest.z[i]);
+      ASSERT_NEAR(glm::length(n), 1, 1e-3);
+      const FloatVec world = to_shape.world(i, {deepest.x[i], deepest.y[i], deepest.z[i]});
+      ASSERT_LT(glm::distance(Vec3(world.x, world.y, world.z), r * n), 1e-5);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::runner
