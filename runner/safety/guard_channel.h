@@ -39,7 +39,7 @@ struct FixedCapabilities {
   int sensed_freedom = 0, actuated_freedom = 0;
   double max_force = 0, max_stiffness = 0, max_rate = 0, workspace_radius = 0, resolution = 0;
   double damping = 0, friction = 0;
-  bool simulated = false;
+  bool simulated = false, any_rate = false;
 };
 
 enum class GuardState : std::uint32_t { opening, ready, failed, ended };

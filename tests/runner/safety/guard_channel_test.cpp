@@ -1,0 +1,83 @@
+// What passes through the memory that the runner and its guard process share.
+
+#include "runner/safety/guard_channel.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace palpate::runner {
+namespace {
+
+/// Every member differs from its default and from the others.
+DeviceCapabilities some_capabilities() {
+  DeviceCapabilities device;
+  device.name = "falcon2";
+  device.sensed_freedom = 5;
+  device.actuated_freedom = 4;
+  device.max_force = 8.5;
+  device.max_stiffness = 1500;
+  device.max_rate = 900;
+  device.workspace_radius = 0.05;
+  device.resolution = 6e-5;
+  device.simulated = true;
+  device.serial = "A1,B2";
+  device.calibration = "of 2026-05-01";
+  device.damping = 0.7;
+  device.friction = 0.3;
+  device.any_rate = true;
+  return device;
+}
+
+TEST(GuardChannel, CapabilitiesComeThroughWhole) {
+  const DeviceCapabilities sent = some_capabilities();
+  FixedCapabilities fixed;
+  fixed.set(sent);
+  const DeviceCapabilities got = fixed.numbers();
+  EXPECT_EQ(got.name, sent.name);
+  EXPECT_EQ(got.sensed_freedom, sent.sensed_freedom);
+  EXPECT_EQ(got.actuated_freedom, sent.actuated_freedom);
+  EXPECT_EQ(got.max_force, sent.max_force);
+  EXPECT_EQ(got.max_stiffness, sent.max_stiffness);
+  EXPECT_EQ(got.max_rate, sent.max_rate);
+  EXPECT_EQ(got.workspace_radius, sent.workspace_radius);
+  EXPECT_EQ(got.resolution, sent.resolution);
+  EXPECT_EQ(got.simulated, sent.simulated);
+  EXPECT_EQ(got.serial, sent.serial);
+  EXPECT_EQ(got.calibration, sent.calibration);
+  EXPECT_EQ(got.damping, sent.damping);
+  EXPECT_EQ(got.friction, sent.friction);
+  EXPECT_EQ(got.any_rate, sent.any_rate);
+}
+
+TEST(GuardChannel, LongTextsAreCutAndShorterOnesLeaveNothingBehind) {
+  DeviceCapabilities device = some_capabilities();
+  device.name = std::string(1000, 'n');
+  device.calibration = std::string(1000, 'c');
+  FixedCapabilities fixed;
+  fixed.set(device);
+  EXPECT_EQ(fixed.numbers().name, std::string(63, 'n')) << "room for 64 with the end";
+  EXPECT_EQ(fixed.numbers().calibration, std::string(255, 'c'));
+  fixed.set(some_capabilities());
+  EXPECT_EQ(fixed.numbers().name, "falcon2");
+}
+
+TEST(GuardChannel, ReadingsComeThroughWhole) {
+  DeviceReading sent;
+  sent.stylus = {{0.01, 0.02, 0.03}, {0.04, 0.05, 0.06}};
+  sent.buttons = 5;
+  sent.lost = true;
+  sent.trouble = DeviceTrouble::apart;
+  const GuardedReading guarded(sent, 17, 3);
+  EXPECT_EQ(guarded.request, 17U);
+  EXPECT_EQ(guarded.trips, 3U);
+  const DeviceReading got = guarded.reading();
+  EXPECT_EQ(got.stylus.tip, sent.stylus.tip);
+  EXPECT_EQ(got.stylus.tail, sent.stylus.tail);
+  EXPECT_EQ(got.buttons, 5);
+  EXPECT_TRUE(got.lost);
+  EXPECT_EQ(got.trouble, DeviceTrouble::apart);
+}
+
+}  // namespace
+}  // namespace palpate::runner
