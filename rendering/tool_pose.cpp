@@ -36,6 +36,17 @@ bool perpendicular(const Vec3& v, const Vec3& axis, Vec3& out) {
   return true;
 }
 
+/// Turned by the smallest rotation, its length changing in proportion.
+Vec3 turned_between(const Vec3& from, const Vec3& to, double fraction) {
+  const double length = glm::length(from), other = glm::length(to);
+  const Vec3 across = glm::cross(from, to);
+  const double sine = glm::length(across);
+  if (sine <= 1e-12 * length * other) return from + fraction * (to - from);
+  const double angle = fraction * std::atan2(sine, glm::dot(from, to));
+  const Vec3 u = from / length, v = glm::cross(across / sine, u);
+  return (length + fraction * (other - length)) * (std::cos(angle) * u + std::sin(angle) * v);
+}
+
 }  // namespace
 
 Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured) {
@@ -63,9 +74,12 @@ PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose) {
 }
 
 ToolPose between(const ToolPose& from, const ToolPose& to, double fraction) {
+  const Vec3 tip = from.tip + fraction * (to.tip - from.tip);
+  if (from.frame == to.frame) return {tip, turned_between(from.d, to.d, fraction), to.frame};
   const Quat a = glm::quat_cast(from.frame), b = glm::quat_cast(to.frame);
-  return {from.tip + fraction * (to.tip - from.tip), from.d + fraction * (to.d - from.d),
-          glm::mat3_cast(glm::normalize(glm::slerp(a, b, fraction)))};
+  const Mat3 frame = glm::mat3_cast(glm::normalize(glm::slerp(a, b, fraction)));
+  const double length = glm::length(from.d), change = glm::length(to.d) - length;
+  return {tip, (length + fraction * change) * frame[2], frame};
 }
 
 double angle_between(const Tool* tool, const ToolPose& a, const ToolPose& b) {

@@ -41,7 +41,8 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured);
 /// \param sides  false: the tip alone touches
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose);
 
-/// A pose between two: the tip and, without a tool, d move linearly; a tool turns about one axis.
+/// A pose between two: the tip moves linearly; the stylus turns about one axis, with the tool where
+/// there is one. Its length changes in proportion.
 /// \param fraction  0: `from`, 1: `to`
 ToolPose between(const ToolPose& from, const ToolPose& to, double fraction);
 
