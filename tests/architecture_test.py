@@ -75,8 +75,8 @@ PUBLIC = {
     "stimuli": "convex_mesh grid_hull input_file large_array mesh_file object_spec orientation parts/convex_parts parts/triangulate "
                "primitives printable random shapes vec",
     "rendering": "first_contact probe render_fault renderer scene",
-    "rendering/verification": "explain extreme_cases reference search",
-    "rendering/accuracy": "paper_first_contact peers study",
+    "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
+    "rendering/accuracy": "paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space",
     "data": "record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "

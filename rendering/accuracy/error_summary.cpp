@@ -7,7 +7,13 @@
 namespace palpate::rendering {
 namespace {
 
-ErrorSpread spread(std::vector<double> errors) {
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+}  // namespace
+
+ErrorSpread error_spread(std::vector<double> errors) {
   ErrorSpread s;
   s.count = errors.size();
   if (errors.empty()) return s;
@@ -20,12 +26,6 @@ ErrorSpread spread(std::vector<double> errors) {
   s.worst = errors.back();
   return s;
 }
-
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
-
-}  // namespace
 
 void ErrorTally::add(const LineProbe& probe, const std::vector<LocalDepth>& truth,
                      const ContactEstimate& estimate) {
@@ -67,11 +67,11 @@ void ErrorTally::add(const LineProbe& probe, const std::vector<LocalDepth>& trut
 
 ErrorSummary ErrorTally::summary() const {
   ErrorSummary s = counts_;
-  s.depth = spread(depth_);
-  s.normal = spread(normal_);
-  s.point = spread(point_);
-  s.force = spread(force_);
-  s.torque = spread(torque_);
+  s.depth = error_spread(depth_);
+  s.normal = error_spread(normal_);
+  s.point = error_spread(point_);
+  s.force = error_spread(force_);
+  s.torque = error_spread(torque_);
   return s;
 }
 

@@ -14,6 +14,8 @@ struct ErrorSpread {
   double rms = 0, p999 = 0, worst = 0;  ///< p999: 99.9 % are no larger
 };
 
+ErrorSpread error_spread(std::vector<double> errors);
+
 struct ErrorSummary {
   std::size_t ticks = 0;    ///< that were compared
   std::size_t lost = 0;     ///< false negatives: touching, but not by the method; its force is 0

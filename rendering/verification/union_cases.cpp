@@ -22,6 +22,8 @@ Vec3 random_direction(stimuli::Random& random) {
   return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
+constexpr double kClear = 2e-3;  // m, off the object at the start of a path
+
 struct Corner {
   double x, z;
 };
@@ -167,19 +169,21 @@ std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OraclePa
       radius = std::max(radius, glm::length(part.pose.orientation * v + part.pose.position));
     }
   }
-  constexpr double kFar = 0.5;       // m
   constexpr double kMostTurn = 0.6;  // rad from place to place
   Quat orientation = stimuli::uniform_rotation(random);
-  OraclePose at{random_direction(random) * kFar, glm::mat3_cast(orientation)};
-  std::vector<OraclePose> path{at};
-  while (path.size() < ticks) {
+  const auto next_tip = [&](const Quat& turned) {
     const OracleSegment& segment = tool[random.below(tool.size())];
     const Vec3 led = segment.from + random.unit() * (segment.to - segment.from);
-    const Quat turned = glm::normalize(
-        glm::angleAxis(between(random, 0, kMostTurn), random_direction(random)) * orientation);
-    const Vec3 next = between(random, 0.3, 1.2) * radius * random_direction(random) - turned * led;
-    // The first way is long: it is cut short, as nothing is near.
-    const Vec3 from = path.size() == 1 ? next + 0.2 * glm::normalize(at.tip - next) : at.tip;
+    return between(random, 0.3, 1.2) * radius * random_direction(random) - turned * led;
+  };
+  // It comes in straight, from just off the object.
+  const UnionOracle oracle(parts, tool);
+  const Vec3 first = next_tip(orientation), outwards = random_direction(random);
+  OraclePose at{first, glm::mat3_cast(orientation)};
+  while (oracle.depth(at) > -kClear) at.tip += kClear * outwards;
+  std::vector<OraclePose> path{at};
+  const auto lead_to = [&](const Vec3& next, const Quat& turned) {
+    const Vec3 from = at.tip;
     const double steps = std::ceil(std::max(1.0, glm::length(next - from) / speed));
     for (double step = 1; step <= steps && path.size() < ticks; ++step) {
       path.push_back({from + step / steps * (next - from),
@@ -187,6 +191,12 @@ std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OraclePa
     }
     at = path.back();
     orientation = turned;
+  };
+  lead_to(first, orientation);
+  while (path.size() < ticks) {
+    const Quat turned = glm::normalize(
+        glm::angleAxis(between(random, 0, kMostTurn), random_direction(random)) * orientation);
+    lead_to(next_tip(turned), turned);
   }
   return path;
 }

@@ -38,7 +38,7 @@ OracleParts random_cluster(stimuli::Random& random, int parts);
 OracleTool random_tool(stimuli::Random& random, int segments);
 
 /// A hand that leads some point of the tool from place to place about and through the object, at
-/// `speed` (m per tick) and turning as well; starts outside, far away.
+/// `speed` (m per tick) and turning as well; starts outside, 2 mm or more off.
 std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OracleParts& parts,
                                          const OracleTool& tool, double speed, std::size_t ticks);
 

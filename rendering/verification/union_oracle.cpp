@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "rendering/verification/nearest_point.h"
+#include "rendering/verification/union_descent.h"
 
 namespace palpate::rendering {
 namespace {
@@ -26,138 +27,7 @@ constexpr double kStep = 0.25;
 constexpr int kMostSteps = 1000;  // of a turn
 constexpr int kHalvings = 8;      // of the step at which the turn gets stuck
 
-// Fraction of what counts as touching by which a goal may lie below a plane.
-constexpr double kRounding = 1e-2;
-
-// Sine of half the opening of the narrowest groove that a tool can be in.
-constexpr double kNarrowest = 1e-5;
-
 constexpr int kMostRounds = 5000;  // of a descent
-
-struct Choice {
-  std::vector<const OracleSum*> touched;
-  std::vector<HalfSpace> planes;  // a facet of each
-  NearestPoint goal;              // above them
-};
-
-/// The facets of the sum that the tip touches; empty where it does not touch the sum.
-std::vector<std::size_t> touched_facets(const OracleSum& sum, const Vec3& tip, double touching) {
-  const double height = sum.height(tip);
-  std::vector<std::size_t> facets;
-  if (height > touching) return facets;
-  for (std::size_t i = 0; i < sum.planes.size(); ++i) {
-    if (sum.planes[i].height(tip) >= std::min(height, -touching)) facets.push_back(i);
-  }
-  return facets;
-}
-
-/// Steepest descent of the distance from the virtual tip. Near the tip the free space is what lies
-/// above one touched facet of every touched sum, any of them: of all the choices that is steepest
-/// whose nearest point to the virtual tip is nearest.
-class Descent {
- public:
-  Descent(const std::vector<OracleSum>& sums, const Vec3& virtual_tip, double touching)
-      : sums_(sums), virtual_tip_(virtual_tip), touching_(touching) {}
-
-  /// Where the tip would go if the facets that it touches had no end and nothing else were in the
-  /// way. \return false when rounding leaves no such point
-  bool goal(const Vec3& tip, Choice& best) {
-    touched_.clear();
-    for (const OracleSum& sum : sums_) {
-      std::vector<std::size_t> facets = touched_facets(sum, tip, touching_);
-      if (!facets.empty()) touched_.push_back({&sum, std::move(facets)});
-    }
-    best_distance_ = kInfinity;
-    std::vector<HalfSpace> planes;
-    choose(0, planes, best);
-    return best_distance_ < kInfinity;
-  }
-
-  /// How much of the straight way to the goal lies outside all sums, with the facets of the choice
-  /// bounding those that are touched. In [0, 1].
-  double free_way(const Vec3& tip, const Vec3& goal) const {
-    double way = 1;
-    for (const OracleSum& sum : sums_) {
-      if (sum.height(tip) > touching_) {
-        way = std::min(way, entry(sum, tip, goal));
-      } else {
-        way = std::min(way, slides_off(sum, tip, goal));
-      }
-    }
-    return way;
-  }
-
- private:
-  struct Touched {
-    const OracleSum* sum;
-    std::vector<std::size_t> facets;
-  };
-
-  /// Tries every choice of one facet of each touched sum from `next` on.
-  void choose(std::size_t next, std::vector<HalfSpace>& planes, Choice& best) {
-    const auto nearest = nearest_point(virtual_tip_, planes, kRounding * touching_);
-    if (!nearest) return;
-    const double distance = glm::length(nearest->point - virtual_tip_);
-    if (distance >= best_distance_) return;
-    if (next == touched_.size()) {
-      best_distance_ = distance;
-      best = {{}, planes, *nearest};
-      for (const Touched& touched : touched_) best.touched.push_back(touched.sum);
-      return;
-    }
-    const Touched& touched = touched_[next];
-    for (const std::size_t facet : touched.facets) {
-      planes.push_back({touched.sum->planes[facet].normal, touched.sum->planes[facet].offset});
-      if (leaves_room(planes)) choose(next + 1, planes, best);
-      planes.pop_back();
-    }
-  }
-
-  /// Between two parts that abut, the plane of their common face is above a facet of both: a crack
-  /// without room is not free space.
-  static bool leaves_room(const std::vector<HalfSpace>& planes) {
-    std::vector<HalfSpace> raised;  // the cone of directions, out of each plane by 1
-    raised.reserve(planes.size());
-    for (const HalfSpace& plane : planes) raised.push_back({plane.normal, 1});
-    const auto out = nearest_point(Vec3(0), raised, 1e-6);
-    return out && glm::length(out->point) < 1 / kNarrowest;
-  }
-
-  /// Where the way enters a sum from outside; 1 where it does not.
-  static double entry(const OracleSum& sum, const Vec3& tip, const Vec3& goal) {
-    double enters = 0, leaves = kInfinity;
-    for (const OraclePlane& plane : sum.planes) {
-      const double before = plane.height(tip), after = plane.height(goal);
-      if (before > 0 && after >= before) return 1;
-      if (before > 0) {
-        enters = std::max(enters, before / (before - after));
-      } else if (after > before) {
-        leaves = std::min(leaves, before / (before - after));
-      }
-    }
-    return enters < leaves ? std::min(enters, 1.0) : 1.0;
-  }
-
-  /// Where the way leaves the touched facets of a sum over a side; 1 where it does not.
-  double slides_off(const OracleSum& sum, const Vec3& tip, const Vec3& goal) const {
-    double way = 1;
-    for (const OraclePlane& plane : sum.planes) {
-      const double before = plane.height(tip), after = plane.height(goal);
-      if (before >= -touching_) {
-        if (after > touching_) return 1;  // it leaves the sum
-      } else if (after > 0) {
-        way = std::min(way, before / (before - after));
-      }
-    }
-    return way;
-  }
-
-  const std::vector<OracleSum>& sums_;
-  Vec3 virtual_tip_;
-  double touching_;
-  std::vector<Touched> touched_;
-  double best_distance_ = kInfinity;
-};
 
 /// Pushes the tip out of the sums, each time along the nearest facet of the deepest one, to the
 /// nearest point above all facets met so far. \return false when it stays inside
@@ -178,7 +48,7 @@ bool push_out(const std::vector<OracleSum>& sums, Vec3& tip, double touching) {
     if (nearest == nullptr) break;
     if (met.size() == kMostFacets) return false;
     met.push_back({nearest->normal, nearest->offset});
-    const auto out = nearest_point(tip, met, kRounding * touching);
+    const auto out = nearest_point(tip, met, kRoundingOfTouching * touching);
     if (!out) return false;
     at = out->point;
   }
@@ -322,7 +192,8 @@ OracleTick UnionOracle::tick(const OraclePose& last_ideal, const OraclePose& vir
       touching_portion(result.ideal, contact);
       result.contacts.push_back(contact);
     }
-    result.unique_shares = result.contacts.size() == choice.touched.size();
+    result.unique_shares =
+        result.contacts.size() == choice.touched.size() && choice.on_one_facet_each;
     break;
   }
   return result;
@@ -350,6 +221,9 @@ OracleAudit UnionOracle::audit(const OraclePose& ideal, const Vec3& virtual_tip,
   }
   Choice choice;
   Descent descent(all, virtual_tip, touching);
+  const auto above = descent.above_all_touched(ideal.tip);
+  audit.unbalanced =
+      above ? glm::length(above->point - ideal.tip) : std::numeric_limits<double>::quiet_NaN();
   audit.descent = descent.goal(ideal.tip, choice) ? glm::length(choice.goal.point - ideal.tip)
                                                   : std::numeric_limits<double>::quiet_NaN();
   return audit;

@@ -61,7 +61,8 @@ struct OracleContact {
 struct OracleTick {
   OraclePose ideal;
   std::vector<OracleContact> contacts;
-  /// Every sum that is touched carries a share: there is no other way to split the displacement.
+  /// Every sum that is touched carries a share, and is touched on one facet: there is no other way
+  /// to split the displacement.
   bool unique_shares = true;
   bool lagged = false;  ///< the ideal tool could not take the whole turn
   bool failed = false;  ///< no descent ended within the limit of rounds: ideal is not one
@@ -71,8 +72,12 @@ struct OracleTick {
 /// How an ideal tool keeps to the definition. Lengths in m; all are 0 where it does.
 struct OracleAudit {
   double penetration = 0;  ///< the deepest that the ideal tip is inside a sum
+  /// Of the displacement, what is no sum of non-negative multiples of the normals of touched
+  /// facets.
+  double unbalanced = 0;
   /// How far steepest descent would move it at once: 0 at a local minimum of its distance from the
-  /// virtual tip, where that displacement is a sum of non-negative multiples of touching normals.
+  /// virtual tip. On an edge exactly, what one facet holds may slide off along the other: there it
+  /// is not 0, although nothing is unbalanced.
   double descent = 0;
 };
 

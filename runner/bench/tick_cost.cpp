@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "rendering/renderer.h"
-#include "runner/bench/allocation_count.h"
-#include "runner/servo/tick_clock.h"
+#include "runner/bench/tick_timer.h"
+#include "runner/bench/union_cost.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 
@@ -19,65 +19,9 @@ namespace {
 constexpr double kRadius = 0.03;  // m
 constexpr double kLength = 0.12;  // m, of the stylus
 constexpr double kSpeed = 0.1;    // m/s
-constexpr double kTick = 1e-3;    // s
 constexpr int kWarm = 1000;       // ticks
 constexpr double kContactTarget = 100, kFreeTarget = 100, kFirstTarget = 2000,
                  kThousandTarget = 1000;  // ns
-
-/// Times ticks one by one.
-class Timer {
- public:
-  Timer() : ns_(nanoseconds_per_count()) {
-    std::vector<std::uint64_t> empty(100'000);
-    for (auto& count : empty) {
-      const std::uint64_t start = begin_count();
-      count = end_count() - start;
-    }
-    empty_ns_ = at(empty, 0.5);
-  }
-
-  /// Runs one tick; its time is recorded if its state of contact is the wanted one.
-  rendering::Rendering tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
-                            rendering::RenderState& state, const rendering::LineProbe& probe,
-                            bool touching_wanted) {
-    const std::uint64_t allocated = allocations();
-    const std::uint64_t start = begin_count();
-    rendering::Rendering rendering = renderer.tick(scene, state, probe, kTick);
-    const std::uint64_t count = end_count() - start;
-    allocations_ += allocations() - allocated;
-    if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
-    return rendering;
-  }
-
-  std::size_t ticks() const { return counts_.size(); }
-
-  /// The statistics of the row; starts a new one.
-  TickCost take() {
-    TickCost cost;
-    cost.ticks = counts_.size();
-    if (!counts_.empty()) {
-      cost.median_ns = at(counts_, 0.5);
-      cost.p99_ns = at(counts_, 0.99);
-      cost.max_ns = at(counts_, 1);
-    }
-    cost.allocations = allocations_;
-    cost.empty_loop_ns = empty_ns_;
-    counts_.clear();
-    allocations_ = 0;
-    return cost;
-  }
-
- private:
-  double at(std::vector<std::uint64_t>& counts, double quantile) const {
-    const auto k = static_cast<std::ptrdiff_t>(quantile * static_cast<double>(counts.size() - 1));
-    std::nth_element(counts.begin(), counts.begin() + k, counts.end());
-    return static_cast<double>(counts[static_cast<std::size_t>(k)]) * ns_;
-  }
-
-  double ns_, empty_ns_ = 0;
-  std::vector<std::uint64_t> counts_;
-  std::size_t allocations_ = 0;
-};
 
 /// A random (seeded) path over a solid about the origin, 0.1 mm a tick. With the point renderer the
 /// tip slides; with the ray the contact moves between the tip and 40 mm along the side.
@@ -91,11 +35,12 @@ class ScriptedHand {
   rendering::LineProbe next(double depth) {
     const double turn = 0.02 * random_.normal();
     heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(normal_, heading_);
-    normal_ = glm::normalize(normal_ + kSpeed * kTick / kRadius * heading_);
+    normal_ = glm::normalize(normal_ + kSpeed * TickTimer::kTick / kRadius * heading_);
     heading_ = glm::normalize(heading_ - glm::dot(heading_, normal_) * normal_);
     ++tick_;
     const double wanted = 1.5e-3 + 0.5e-3 * std::sin(2 * std::numbers::pi * tick_ / 700.0);
-    radius_ += std::clamp(depth - sign_ * wanted, -kSpeed * kTick, kSpeed * kTick);
+    radius_ +=
+        std::clamp(depth - sign_ * wanted, -kSpeed * TickTimer::kTick, kSpeed * TickTimer::kTick);
     double along =
         side_contact_ ? 0.01 + 0.03 * std::sin(2 * std::numbers::pi * tick_ / 3100.0) : -0.02;
     const double tilt = along < 0 ? -along / 0.02 * 0.8 : 0;
@@ -132,19 +77,19 @@ double depth_below(const rendering::Scene& scene, const rendering::LineProbe& pr
   return -gap;
 }
 
-TickCost time_contact(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+TickCost time_contact(TickTimer& timer, const rendering::Renderer& renderer, const Bench& bench,
                       std::size_t ticks) {
   rendering::RenderState state = bench.scene.initial_state();
   ScriptedHand hand(renderer, true);
   double depth = 0;
   for (int i = 0; i < kWarm; ++i)
-    depth = renderer.tick(bench.scene, state, hand.next(depth), kTick).deepest.depth;
+    depth = renderer.tick(bench.scene, state, hand.next(depth), TickTimer::kTick).deepest.depth;
   for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i)
     depth = timer.tick(renderer, bench.scene, state, hand.next(depth), true).deepest.depth;
   return timer.take();
 }
 
-TickCost time_free_space(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
+TickCost time_free_space(TickTimer& timer, const rendering::Renderer& renderer, const Bench& bench,
                          std::size_t ticks) {
   rendering::RenderState state = bench.scene.initial_state();
   ScriptedHand hand(renderer, false);
@@ -152,7 +97,7 @@ TickCost time_free_space(Timer& timer, const rendering::Renderer& renderer, cons
   for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i) {
     const rendering::LineProbe probe = hand.next(depth);
     if (i < kWarm) {
-      renderer.tick(bench.scene, state, probe, kTick);
+      renderer.tick(bench.scene, state, probe, TickTimer::kTick);
     } else {
       timer.tick(renderer, bench.scene, state, probe, false);
     }
@@ -163,8 +108,8 @@ TickCost time_free_space(Timer& timer, const rendering::Renderer& renderer, cons
 
 /// From a random direction and 10 mm away, drifting along the surface; with the ray every second
 /// time the side first.
-TickCost time_first_contact(Timer& timer, const rendering::Renderer& renderer, const Bench& bench,
-                            std::size_t approaches) {
+TickCost time_first_contact(TickTimer& timer, const rendering::Renderer& renderer,
+                            const Bench& bench, std::size_t approaches) {
   stimuli::Random random(2);
   const auto any = [&] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
@@ -179,8 +124,9 @@ TickCost time_first_contact(Timer& timer, const rendering::Renderer& renderer, c
     const std::size_t before = timer.ticks();
     for (int t = 0; t < 500 && timer.ticks() == before; ++t) {
       const Vec3 at =
-          (1.2 * bench.scene.parts()[0].sphere_radius + 0.01 - t * kSpeed * kTick) * out +
-          0.5 * t * kSpeed * kTick * glm::cross(out, level);
+          (1.2 * bench.scene.parts()[0].sphere_radius + 0.01 - t * kSpeed * TickTimer::kTick) *
+              out +
+          0.5 * t * kSpeed * TickTimer::kTick * glm::cross(out, level);
       const Vec3 tip = at - along * axis;
       timer.tick(renderer, bench.scene, state, {tip, tip + kLength * axis}, true);
     }
@@ -234,7 +180,7 @@ std::vector<Bench> benches() {
 
 std::vector<TickCost> measure_tick_costs(
     const TickCostSettings& settings, const std::function<void(std::size_t, std::size_t)>& done) {
-  Timer timer;
+  TickTimer timer;
   const std::vector<Bench> all = benches();
   std::vector<TickCost> rows;
   for (const Bench& bench : all) {
@@ -247,7 +193,7 @@ std::vector<TickCost> measure_tick_costs(
         cost.state = state;
         cost.target_ns = target_ns;
         rows.push_back(std::move(cost));
-        if (done) done(rows.size(), 6 * all.size());
+        if (done) done(rows.size(), 6 * all.size() + kUnionCosts);
       };
       keep(time_contact(timer, *renderer, bench, settings.ticks), "contact", bench.target_ns);
       keep(time_free_space(timer, *renderer, bench, settings.ticks), "free",
@@ -256,6 +202,10 @@ std::vector<TickCost> measure_tick_costs(
            kFirstTarget);
     }
   }
+  measure_union_costs(timer, settings.ticks, [&](TickCost cost) {
+    rows.push_back(std::move(cost));
+    if (done) done(rows.size(), 6 * all.size() + kUnionCosts);
+  });
   return rows;
 }
 

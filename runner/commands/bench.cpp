@@ -31,7 +31,7 @@ std::string table(const std::vector<TickCost>& rows) {
       std::snprintf(line, sizeof line, "%-24s%10zu  %-7s%-14s%8.0f%8.0f%8.1f%9.0f%7.0f%8zu%s\n",
                     r.mesh.c_str(), r.triangles, r.renderer.c_str(), r.state.c_str(), r.median_ns,
                     r.p99_ns, r.max_ns / 1000, r.net_ns(), r.target_ns, r.allocations,
-                    r.net_ns() > r.target_ns ? "  over" : "");
+                    r.judged_ns() > r.target_ns ? "  over" : "");
     }
     out += line;
   }
@@ -49,6 +49,33 @@ const TickCost* find(const std::vector<TickCost>& rows, std::size_t triangles,
   return nullptr;
 }
 
+const TickCost* find_union(const std::vector<TickCost>& rows, std::size_t triangles,
+                           std::size_t parts) {
+  for (const TickCost& r : rows) {
+    if (r.target_is_p99 && r.near_parts == 10 && r.segments == 3 && r.triangles == triangles &&
+        r.parts == parts && r.ticks > 0) {
+      return &r;
+    }
+  }
+  return nullptr;
+}
+
+/// Ten near parts and three segments: the cost, and with what it grows.
+std::string growth_of_unions(const std::vector<TickCost>& rows) {
+  const TickCost* const ten = find_union(rows, 1280, 10);
+  const TickCost* const many = find_union(rows, 1280, 1000);
+  const TickCost* const fine = find_union(rows, 327680, 10);
+  if (ten == nullptr || many == nullptr || fine == nullptr) return "";
+  char text[300];
+  std::snprintf(text, sizeof text,
+                "Ten near parts and a tool of three segments: median %.2f us, p99 %.2f us; %.2fx "
+                "with 990 parts more out of reach, %.2fx with 327,680 triangles a part (medians "
+                "without the empty tick).\n",
+                ten->median_ns / 1000, ten->p99_ns / 1000, many->net_ns() / ten->net_ns(),
+                fine->net_ns() / ten->net_ns());
+  return text;
+}
+
 /// What the numbers mean for a lab.
 std::string conclusions(const std::vector<TickCost>& rows) {
   std::string out;
@@ -63,6 +90,7 @@ std::string conclusions(const std::vector<TickCost>& rows) {
                   renderer, large->median_ns / small->median_ns, large->net_ns() / small->net_ns());
     out += text;
   }
+  out += growth_of_unions(rows);
   double p99 = 0;
   for (const TickCost& r : rows) p99 = std::max(p99, r.p99_ns);
   const double percent = p99 / 100'000 * 100;
@@ -94,6 +122,10 @@ nlohmann::ordered_json to_json(const std::vector<TickCost>& rows) {
     row["allocations"] = r.allocations;
     row["empty_loop_ns"] = r.empty_loop_ns;
     row["target_ns"] = r.target_ns;
+    row["target_of"] = r.target_is_p99 ? "p99" : "median";
+    row["parts"] = r.parts;
+    row["near_parts"] = r.near_parts;
+    row["tool_segments"] = r.segments;
     list.push_back(std::move(row));
   }
   return {{"program_version", PALPATE_VERSION}, {"build", PALPATE_BUILD}, {"rows", list}};
@@ -134,7 +166,7 @@ int bench_command(const std::vector<std::string>& args) {
       << ", which is subtracted in the net median. The maximum is mostly due to the operating "
          "system.\n"
          "Stylus at 0.1 m/s; contact 1 to 2 mm deep; free: 1 to 2 mm off the bounding sphere; "
-         "first_contact: in a new trial each.\n\n"
+         "first_contact: in a new trial each. Where a tool is named, the target is that of p99.\n\n"
       << table(rows) << "\n"
       << conclusions(rows);
   outputs.put("json", to_json(rows).dump(2) + "\n");

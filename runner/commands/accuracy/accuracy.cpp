@@ -40,17 +40,21 @@ void check_ticks(std::uint64_t ticks, bool searching) {
 int accuracy_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate accuracy [--quick | --search TICKS] [--report FILE.html] [--figure FILE.svg] "
+      "palpate accuracy [--quick | --search TICKS [--unions]] [--report FILE.html] [--figure "
+      "FILE.svg] "
       "[--json FILE]";
   line.summary =
       "Error of the rendered forces against run time: every method over every tessellation of\n"
-      "every analytic shape, and which tessellation to choose. Takes two minutes, with --quick "
+      "every analytic shape, and which tessellation to choose; contact with concave objects and "
+      "with\n"
+      "tools of several segments, beside simpler ways to do it. Takes two minutes, with --quick "
       "ten\n"
       "seconds. Status 1 when a tick of the search is wrong or an extreme case fails.";
   line.example =
       "  palpate accuracy --quick\n"
       "  palpate accuracy --report accuracy.html --json accuracy.json\n"
-      "  palpate accuracy --search 10000000   (random solids and paths against brute force)";
+      "  palpate accuracy --search 10000000   (random solids and paths against brute force)\n"
+      "  palpate accuracy --search 10000000 --unions --seed 2";
   std::string json, figure, page;
   std::uint64_t search_ticks = 0, seed = 1;
   rendering::AccuracySettings settings;
@@ -69,6 +73,7 @@ int accuracy_command(const std::vector<std::string>& args) {
       "write all of it, with the figure, as one HTML page");
   add("search", po::value(&search_ticks)->value_name("TICKS"),
       "instead of all that: search this many random ticks for wrong ones");
+  add("unions", "search clusters of 3 to 8 convex parts with tools of 1 to 3 segments");
   add("seed", po::value(&seed)->value_name("N")->default_value(1), "of the search");
   add("jobs", po::value(&jobs)->value_name("J"),
       "threads of the search; default: one for each core");
@@ -87,6 +92,8 @@ int accuracy_command(const std::vector<std::string>& args) {
   take("ticks", settings.contact_ticks, 1, 1000000);
   take("most-triangles", settings.most_triangles, 20, 1310720);
   if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
+  const bool unions = values->count("unions") > 0;
+  if (unions && !searching) throw UsageError("--unions: goes with --search");
   if (searching && !figure.empty()) throw UsageError("--figure: a search has no figure");
   Outputs outputs(*values, {"json", "figure", "report"}, {});
 
@@ -94,7 +101,11 @@ int accuracy_command(const std::vector<std::string>& args) {
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (searching) {
     report.search_seed = seed;
-    report.search = search_in_threads(search_ticks, seed, jobs);
+    if (unions) {
+      report.union_search = search_unions_in_threads(search_ticks, seed, jobs);
+    } else {
+      report.search = search_in_threads(search_ticks, seed, jobs);
+    }
   } else {
     report.settings = settings;
     measure_accuracy(report, values->count("quick") > 0, jobs, seed);
@@ -107,7 +118,9 @@ int accuracy_command(const std::vector<std::string>& args) {
   std::cout << accuracy_text(report);
   const bool extremes_hold = std::all_of(report.extremes.begin(), report.extremes.end(),
                                          [](const ExtremeRow& row) { return row.result.passed; });
-  return extremes_hold && report.search->wrong() == 0 ? 0 : 1;
+  const std::uint64_t wrong = (report.search ? report.search->wrong() : 0) +
+                              (report.union_search ? report.union_search->wrong() : 0);
+  return extremes_hold && wrong == 0 ? 0 : 1;
 }
 
 }  // namespace palpate::runner

@@ -130,6 +130,51 @@ Json search_json(const rendering::SearchCounts& c, std::uint64_t seed) {
           {"wrong", c.wrong()}};
 }
 
+Json unions_json(const AccuracyReport& report) {
+  Json json = {{"seeds", report.union_settings.seeds}, {"ticks", report.union_settings.ticks}};
+  for (const rendering::UnionMethod& method : rendering::union_methods()) {
+    json["methods"].push_back({{"name", method.name}, {"description", method.description}});
+  }
+  for (const rendering::UnionRow& row : report.unions) {
+    json["rows"].push_back({{"case", row.name},
+                            {"truth", row.truth},
+                            {"segments", row.segments},
+                            {"method", row.method},
+                            {"ns_per_tick", row.ns_per_tick},
+                            {"ticks", row.ticks},
+                            {"in_contact", row.in_contact},
+                            {"inside", row.one_ideal_tool ? Json(row.inside) : Json()},
+                            {"off_by_a_tenth", row.off_by_a_tenth},
+                            {"force", spread_json(row.force, "n")}});
+  }
+  return json;
+}
+
+Json union_search_json(const rendering::UnionCounts& c, std::uint64_t seed) {
+  return {{"seed", seed},
+          {"ticks", c.ticks},
+          {"walks", c.walks},
+          {"in_contact", c.in_contact},
+          {"several_contacts", c.several},
+          {"inside", c.inside},
+          {"worst_penetration_of_size", c.worst_penetration},
+          {"not_minimal", c.not_minimal},
+          {"worst_descent_of_size", c.worst_descent},
+          {"wrong_force", c.wrong_force},
+          {"wrong_torque", c.wrong_torque},
+          {"off_place", c.off_place},
+          {"not_finite", c.not_finite},
+          {"faulted", c.faulted},
+          {"wrong", c.wrong()},
+          {"lagged", c.lagged},
+          {"capped", c.capped},
+          {"released", c.released},
+          {"on_edge", c.on_edge},
+          {"torques_compared", c.torques},
+          {"compared_with_oracle", c.compared},
+          {"at_another_minimum", c.elsewhere}};
+}
+
 }  // namespace
 
 Json accuracy_json(const AccuracyReport& report) {
@@ -144,8 +189,11 @@ Json accuracy_json(const AccuracyReport& report) {
   json["rows"] = Json::array();
   for (const rendering::AccuracyRow& row : report.rows) json["rows"].push_back(row_json(row));
   if (!report.first_contacts.empty()) json["first_contact"] = first_contact_json(report);
+  if (!report.unions.empty()) json["unions"] = unions_json(report);
   for (const ExtremeRow& row : report.extremes) json["extremes"].push_back(extreme_json(row));
   if (report.search) json["search"] = search_json(*report.search, report.search_seed);
+  if (report.union_search)
+    json["union_search"] = union_search_json(*report.union_search, report.search_seed);
   return json;
 }
 

@@ -94,28 +94,39 @@ void run_extreme_cases(AccuracyReport& report, bool quick) {
   }
 }
 
-}  // namespace
-
-rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+/// \param search  of (seed, first walk, walks)
+template <class Counts>
+Counts in_threads(Counts (*search)(std::uint64_t, std::uint64_t, std::uint64_t),
+                  std::uint64_t ticks, std::uint64_t seed, int jobs) {
   const std::uint64_t walks = (ticks + rendering::kTicksPerWalk - 1) / rendering::kTicksPerWalk;
   constexpr std::uint64_t kBatch = 20;  // walks a thread takes at a time
-  rendering::SearchCounts all;
+  Counts all;
   ProgressLine progress("search");
   for (std::uint64_t first = 0; first < walks;) {
     progress.show(static_cast<double>(first) / static_cast<double>(walks));
-    std::vector<rendering::SearchCounts> parts(static_cast<std::size_t>(jobs));
+    std::vector<Counts> parts(static_cast<std::size_t>(jobs));
     std::vector<std::thread> threads;
-    for (rendering::SearchCounts& part : parts) {
+    for (Counts& part : parts) {
       const std::uint64_t count = std::min(kBatch, walks - first);
       threads.emplace_back(
-          [&part, seed, first, count] { part = rendering::search_walks(seed, first, count); });
+          [&part, search, seed, first, count] { part = search(seed, first, count); });
       first += count;
       if (first == walks) break;
     }
     for (std::thread& thread : threads) thread.join();
-    for (const rendering::SearchCounts& part : parts) all += part;
+    for (const Counts& part : parts) all += part;
   }
   return all;
+}
+
+}  // namespace
+
+rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  return in_threads(rendering::search_walks, ticks, seed, jobs);
+}
+
+rendering::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  return in_threads(rendering::search_unions, ticks, seed, jobs);
 }
 
 void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
@@ -128,10 +139,17 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
   study_first_contacts(report,
                        std::max(10, report.settings.paths * report.settings.contact_ticks / 2));
   time_first_contact(report);
+  {
+    ProgressLine progress("unions");
+    if (quick) report.union_settings = {2, 500, 1};
+    report.unions = rendering::union_study(report.union_settings, now_ns,
+                                           [&](double done) { progress.show(done); });
+  }
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;
   report.search_seed = seed;
   report.search = search_in_threads(kShortSearch, seed, jobs);
+  report.union_search = search_unions_in_threads(kShortSearch, seed, jobs);
 }
 
 }  // namespace palpate::runner

@@ -11,8 +11,10 @@
 #include "analysis/report/tables.h"
 #include "rendering/accuracy/paper_first_contact.h"
 #include "rendering/accuracy/study.h"
+#include "rendering/accuracy/union_study.h"
 #include "rendering/verification/extreme_cases.h"
 #include "rendering/verification/search.h"
+#include "rendering/verification/union_search.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner {
@@ -34,9 +36,12 @@ struct AccuracyReport {
   std::vector<rendering::AccuracyRow> rows;
   std::vector<FirstContactStudy> first_contacts;
   double paper_test_ns = 0, exact_test_ns = 0;  ///< of a test for first contact with a cube
+  rendering::UnionSettings union_settings;
+  std::vector<rendering::UnionRow> unions;
   std::vector<ExtremeRow> extremes;
   std::optional<rendering::SearchCounts> search;
-  std::uint64_t search_seed = 0;
+  std::optional<rendering::UnionCounts> union_search;
+  std::uint64_t search_seed = 0;  ///< of both
 };
 
 /// Errors that a hand cannot feel, and that a device does not resolve.
@@ -52,6 +57,8 @@ bool is_flat_sided(const std::string& shape);
 
 /// Three significant figures, plain where that is short: "0.0345", "1.2e-17".
 std::string significant(double value);
+/// Percent of all, "0" where there are none.
+std::string share(std::size_t part, std::size_t all);
 /// "327,680"
 std::string thousands(long long n);
 /// For a terminal.
@@ -60,6 +67,9 @@ void put_table(std::ostream& out, const analysis::Table& table);
 /// "sphere: ...", the tessellation to choose.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);
 std::vector<std::string> recommendations(const AccuracyReport& report);
+/// Contact with unions of convex parts, and its search.
+analysis::Table union_table(const AccuracyReport& report);
+analysis::Table union_search_table(const rendering::UnionCounts& counts, std::uint64_t seed);
 /// All that was measured, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 

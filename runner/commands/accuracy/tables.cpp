@@ -25,6 +25,11 @@ std::string thousands(long long n) {
   return digits;
 }
 
+std::string share(std::size_t part, std::size_t all) {
+  return part == 0 ? "0"
+                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
+}
+
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -32,11 +37,6 @@ constexpr double kDegree = std::numbers::pi / 180;
 /// A dash where there was nothing to compare.
 std::string known(const rendering::ErrorSpread& spread, double value) {
   return spread.count > 0 ? significant(value) : "-";
-}
-
-std::string share(std::size_t part, std::size_t all) {
-  return part == 0 ? "0"
-                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
 }
 
 std::string setting_of(const rendering::AccuracyRow& row) {
@@ -275,8 +275,11 @@ std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
     }
   }
   if (!report.first_contacts.empty()) tables.push_back(first_contact_table(report));
+  if (!report.unions.empty()) tables.push_back(union_table(report));
   if (!report.extremes.empty()) tables.push_back(extreme_table(report));
   if (report.search) tables.push_back(search_table(*report.search, report.search_seed));
+  if (report.union_search)
+    tables.push_back(union_search_table(*report.union_search, report.search_seed));
   return tables;
 }
 

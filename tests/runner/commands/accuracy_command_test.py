@@ -83,6 +83,20 @@ class Accuracy(unittest.TestCase):
         self.assertGreaterEqual(len(result["extremes"]), 30)
         self.assertEqual(result["search"]["wrong"], 0)
         self.assertEqual(result["search"]["ticks"], 100000)
+        self.assertEqual((result["union_search"]["wrong"], result["union_search"]["ticks"]), (0, 100000))
+        # Unions: the renderers are right where the truth is a closed form, on every case one row for each method.
+        unions = result["unions"]
+        names = [m["name"] for m in unions["methods"]]
+        self.assertEqual(names, ["law", "one per part", "penalties"])
+        cases = list(dict.fromkeys(r["case"] for r in unions["rows"]))
+        self.assertEqual([(r["case"], r["method"]) for r in unions["rows"]], [(c, m) for c in cases for m in names])
+        for row in unions["rows"]:
+            if row["method"] == "law":
+                self.assertEqual(row["inside"], 0, row)
+                if row["truth"] != "oracle":
+                    self.assertLess(row["force"]["worst_n"], 1e-9, row)
+            else:
+                self.assertIsNone(row["inside"], row)
 
     def test_the_search_counts_the_same_with_any_number_of_threads(self):
         one, three = self.dir / "1.json", self.dir / "3.json"
@@ -93,7 +107,12 @@ class Accuracy(unittest.TestCase):
             wrong = json.loads(path.read_text())["search"]["wrong"]
             self.assertEqual(done.returncode, 1 if wrong else 0, done.stderr)
             self.assertIn("31,000 ticks in 62 walks", done.stdout)
+            unions = self.dir / f"u{jobs}.json"
+            self.accuracy("--search", "15000", "--unions", "--jobs", jobs, "--json", unions)
+            self.assertNotIn("search", json.loads(unions.read_text()))
+            self.assertEqual(json.loads(unions.read_text())["union_search"]["walks"], 30)
         self.assertEqual(one.read_text(), three.read_text())
+        self.assertEqual((self.dir / "u1.json").read_text(), (self.dir / "u3.json").read_text())
         other = self.dir / "s.json"
         subprocess.run([PALPATE, "accuracy", "--search", "31000", "--seed", "2", "--json", other],
                        capture_output=True, timeout=300)
@@ -111,7 +130,7 @@ class Accuracy(unittest.TestCase):
 
     def test_wrong_usage_is_status_2(self):
         for args in (["--search", "0"], ["--search", "-5"], ["--search", "x"], ["--paths", "0"], ["--ticks", "0"],
-                     ["--most-triangles", "19"], ["--jobs", "0", "--search", "500"], ["extra"],
+                     ["--most-triangles", "19"], ["--unions"], ["--jobs", "0", "--search", "500"], ["extra"],
                      ["--search", "500", "--figure", self.dir / "f.json"], ["--json", self.dir]):
             done = self.accuracy(*args, status=2)
             self.assertEqual(done.stdout, "")

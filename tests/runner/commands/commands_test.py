@@ -374,6 +374,10 @@ class Bench(FromOutside):
             self.assertLessEqual(r["median_ns"], r["p99_ns"])
             self.assertLessEqual(r["p99_ns"], r["max_ns"])
             self.assertGreater(r["empty_loop_ns"], 0)
+        # Ten near parts and three segments, of every fineness, and with parts out of reach.
+        ten = {(r["triangles"], r["parts"]) for r in rows if r["near_parts"] == 10 and r["tool_segments"] == 3}
+        self.assertEqual(ten, {(20, 10), (1280, 10), (20480, 10), (327680, 10), (1280, 1000)})
+        self.assertIn("Ten near parts and a tool of three segments: median", shown)
 
     def test_wrong_numbers_of_ticks_are_refused(self):
         for ticks in (0, -5, "many"):

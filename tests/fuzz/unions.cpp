@@ -1,0 +1,17 @@
+// Whatever coincides: the ideal tool of an object of several convex parts is outside of all of
+// them, and its force is that of its displacement.
+
+#include <cstdlib>
+#include <iostream>
+
+#include "rendering/verification/union_search.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace palpate::rendering;
+  const UnionCounts counts = search_union(ray_renderer(), grid_walk({data, size}, 300));
+  if (counts.wrong() == 0) return 0;
+  for (const SearchFault& fault : counts.faults) {
+    std::cerr << "tick " << fault.tick << ": " << fault.what << "\n";
+  }
+  std::abort();
+}

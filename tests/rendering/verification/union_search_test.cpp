@@ -1,0 +1,159 @@
+// The search over unions of convex parts: it finds nothing wrong in the renderer, and it finds what
+// is wrong in broken ones.
+
+#include "rendering/verification/union_search.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+namespace palpate::rendering {
+namespace {
+
+std::string told(const UnionCounts& counts) {
+  std::string text;
+  for (const SearchFault& fault : counts.faults) {
+    text += "seed " + std::to_string(fault.seed) + " walk " + std::to_string(fault.walk) +
+            " tick " + std::to_string(fault.tick) + ": " + fault.what + "\n";
+  }
+  return text;
+}
+
+TEST(UnionSearch, FindsNothingWrong) {
+  const UnionCounts counts = search_unions(1, 0, 60);
+  EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+  EXPECT_GT(counts.ticks, 50 * kTicksPerWalk);
+  // And it has covered what can go wrong.
+  EXPECT_GT(counts.in_contact, counts.ticks / 5);
+  EXPECT_GT(counts.several, counts.ticks / 20);
+  EXPECT_GT(counts.torques, counts.ticks / 20);
+  EXPECT_LE(counts.worst_penetration, 1e-12);
+  // What is not wrong, but should be rare.
+  EXPECT_LE(100 * counts.lagged, counts.in_contact);
+  EXPECT_LE(1000 * counts.capped, counts.in_contact);
+  EXPECT_LE(1000 * counts.released, counts.in_contact);
+  EXPECT_LE(50 * counts.elsewhere, counts.compared);
+}
+
+TEST(UnionSearch, DoesNotDependOnWhoWalks) {
+  const UnionCounts whole = search_unions(7, 0, 9);
+  UnionCounts shared = search_unions(7, 0, 4);
+  shared += search_unions(7, 4, 5);
+  EXPECT_EQ(shared.in_contact, whole.in_contact);
+  EXPECT_EQ(shared.compared, whole.compared);
+  EXPECT_EQ(shared.worst_penetration, whole.worst_penetration);
+  EXPECT_NE(search_unions(8, 0, 9).in_contact, whole.in_contact);
+}
+
+TEST(UnionSearch, DrawsAllKindsOfWalks) {
+  std::set<std::size_t> parts, segments;
+  int still = 0;
+  double slowest = 1, fastest = 0;
+  for (std::uint64_t walk = 0; walk < 100; ++walk) {
+    const UnionWalk drawn = random_union_walk(5, walk, kTicksPerWalk);
+    parts.insert(drawn.parts.size());
+    segments.insert(drawn.tool.size());
+    ASSERT_LE(drawn.path.size(), kTicksPerWalk);
+    ASSERT_GE(drawn.path.size(), 200u);
+    EXPECT_LT(UnionOracle(drawn.parts, drawn.tool).depth(drawn.path[0]), 0) << walk;
+    bool turns = false;
+    double longest = 0;
+    for (std::size_t i = 2; i < drawn.path.size(); ++i) {
+      turns |= drawn.path[i].axes != drawn.path[1].axes;
+      longest = std::max(longest, glm::length(drawn.path[i].tip - drawn.path[i - 1].tip));
+    }
+    still += !turns;
+    if (!turns) continue;
+    slowest = std::min(slowest, longest);
+    fastest = std::max(fastest, longest);
+  }
+  EXPECT_EQ(parts, (std::set<std::size_t>{2, 3, 4, 5, 6, 7, 8}));
+  EXPECT_EQ(segments, (std::set<std::size_t>{1, 2, 3}));
+  EXPECT_GT(still, 5);  // along the axes
+  EXPECT_LT(slowest, 2e-4);
+  EXPECT_GT(fastest, 4e-3);
+}
+
+/// A renderer that goes wrong in contact.
+class Broken final : public Renderer {
+ public:
+  enum class How { sunk, floating, weak, twisted, aside, infinite, apart };
+  explicit Broken(How how) : how_(how) {}
+
+  const char* name() const override { return "broken"; }
+  bool side_contact() const override { return true; }
+  Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override {
+    Rendering r = ray_renderer().tick(scene, state, probe, dt);
+    if (r.contacts == 0) return r;
+    switch (how_) {
+      case How::sunk:
+        move(r, -1e-10);
+        break;
+      case How::floating:
+        move(r, 1e-6);
+        break;
+      case How::weak:
+        r.force *= 1 - 1e-7;
+        break;
+      case How::twisted:
+        r.torque += 1e-3 * glm::length(r.force) * Vec3(0, 0, 1);
+        break;
+      case How::aside:
+        r.deepest.point += Vec3(0, 0, 1e-6);
+        break;
+      case How::infinite:
+        r.torque.y = std::numeric_limits<double>::infinity();
+        break;
+      case How::apart:
+        r.device1 *= 0.999;
+        break;
+    }
+    return r;
+  }
+
+ private:
+  static void move(Rendering& r, double out) {
+    r.ideal.tip += out * r.deepest.normal;
+    r.ideal.tail += out * r.deepest.normal;
+  }
+
+  How how_;
+};
+
+UnionCounts search_with(Broken::How how) {
+  const Broken broken(how);
+  UnionCounts counts;
+  for (std::uint64_t walk = 0; walk < 9; ++walk) counts += search_union(broken, 3, walk);
+  return counts;
+}
+
+TEST(UnionSearch, FindsIdealToolsThatPenetrate) {
+  EXPECT_GT(search_with(Broken::How::sunk).inside, 100u);
+}
+
+TEST(UnionSearch, FindsIdealToolsThatFloat) {
+  EXPECT_GT(search_with(Broken::How::floating).not_minimal, 100u);
+}
+
+TEST(UnionSearch, FindsWrongForces) {
+  EXPECT_GT(search_with(Broken::How::weak).wrong_force, 100u);
+  EXPECT_GT(search_with(Broken::How::apart).wrong_force, 100u);
+}
+
+TEST(UnionSearch, FindsWrongTorques) {
+  EXPECT_GT(search_with(Broken::How::twisted).wrong_torque, 100u);
+}
+
+TEST(UnionSearch, FindsContactsOffTheirPlace) {
+  EXPECT_GT(search_with(Broken::How::aside).off_place, 100u);
+}
+
+TEST(UnionSearch, FindsWhatIsNotFinite) {
+  EXPECT_GT(search_with(Broken::How::infinite).not_finite, 3u);
+}
+
+}  // namespace
+}  // namespace palpate::rendering
