@@ -33,7 +33,7 @@ TEST(UnionSearch, FindsNothingWrong) {
   // What is not wrong, but should be rare.
   EXPECT_LE(100 * counts.lagged, counts.in_contact);
   EXPECT_LE(1000 * counts.capped, counts.in_contact);
-  EXPECT_LE(1000 * counts.released, counts.in_contact);
+  EXPECT_LE(200 * counts.released, counts.in_contact);
   EXPECT_LE(50 * counts.elsewhere, counts.compared);
 }
 
