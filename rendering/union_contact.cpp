@@ -34,7 +34,7 @@ struct Plane {
   Vec3 normal;            ///< world, out of the part
   double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
   double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
-  bool stays = false;     ///< came back where it had let go: rounding, it is not let go again
+  bool stays = false;     ///< came back where it had let go: rounding, it is not let go there again
 };
 
 class Planes {
@@ -160,6 +160,7 @@ class IdealTool {
   void move_to_hit(const Vec3& goal, std::uint32_t near, const PairCast& hit);
   bool let_go_of_planes();
   bool slid_off(const Plane& plane) const;
+  bool parted_here(const NearPair& near) const;
   void add_contacts();
   void add_contact(const Plane& plane, const Vec3& shift);
   void spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
@@ -476,19 +477,25 @@ bool IdealTool::slid_off(const Plane& plane) const {
   return distance_off(mesh, plane.feature, local(near, at_), near.d) > slack;
 }
 
+/// Whether the pair let go of the ideal tool where that is now, within rounding.
+bool IdealTool::parted_here(const NearPair& near) const {
+  const double same = kSamePlace * group_.skin;
+  const Vec3 apart = at_ - near.parted_at;
+  return near.parted && glm::dot(apart, apart) <= same * same;
+}
+
 /// Lets go of planes that hold nothing, and of those whose facet the tool has slid off. True when
 /// there is one of the latter.
 bool IdealTool::let_go_of_planes() {
   bool slid = false;
   planes_.remove_if([&](const Plane& plane) {
-    const bool off = plane.multiplier > 0 && !plane.stays && slid_off(plane);
-    if (plane.multiplier > 0 && !off) return false;
     NearPair& near = all_.near[plane.near];
+    const bool off =
+        plane.multiplier > 0 && !(plane.stays && parted_here(near)) && slid_off(plane);
+    if (plane.multiplier > 0 && !off) return false;
     near.carries = false;
     if (off) {
-      const double same = kSamePlace * group_.skin;
-      const Vec3 apart = at_ - near.parted_at;
-      near.parted = glm::dot(apart, apart) <= same * same ? near.parted + 1 : 1;
+      near.parted = true;
       near.parted_at = at_;
       slid = true;
     }
@@ -507,9 +514,7 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   at_ += time * way;
   if (time * glm::length(way) > kSamePlace * group_.skin) let_go_of_planes();
   NearPair& near = all_.near[index];
-  const double same = kSamePlace * group_.skin;
-  const Vec3 apart = at_ - near.parted_at;
-  plane.stays = near.parted > 0 && glm::dot(apart, apart) <= same * same;
+  plane.stays = parted_here(near);
   near.carries = true;
   state_of(near).feature = plane.feature;
   if (planes_.full())

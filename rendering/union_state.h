@@ -65,7 +65,7 @@ struct NearPair {
   Vec3 tip, d;
   Vec3 true_tip, true_d;  ///< the same without the margin
   Vec3 parted_at;         ///< m, where it last let go of the ideal tool in this tick
-  int parted = 0;         ///< how often it did there
+  bool parted = false;    ///< it did
   bool carries = false;   ///< has a plane in use
 };
 
