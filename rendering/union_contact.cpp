@@ -653,7 +653,9 @@ void IdealTool::remember(std::size_t first_contact) {
     const double lower = std::min(glm::dot(at.normal, tip), glm::dot(at.normal, tip + near.true_d));
     state.plane = {at.normal, lower + at.depth, at.depth < 0};
   }
-  const double angle = angle_between(carried_, pose_, tick_.tool);
+  // Mostly it has taken the whole turn.
+  const bool behind = pose_.d != tick_.tool.d || pose_.frame != tick_.tool.frame;
+  const double angle = behind ? angle_between(carried_, pose_, tick_.tool) : 0;
   memory_.touching = !planes_.empty() || stuck_ || angle > 0 || at_ != Vec3(0);
   memory_.ideal = pose_;
   memory_.ideal.tip = tick_.tool.tip + at_;
