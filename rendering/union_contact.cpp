@@ -490,8 +490,7 @@ bool IdealTool::let_go_of_planes() {
   bool slid = false;
   planes_.remove_if([&](const Plane& plane) {
     NearPair& near = all_.near[plane.near];
-    const bool off =
-        plane.multiplier > 0 && !(plane.stays && parted_here(near)) && slid_off(plane);
+    const bool off = plane.multiplier > 0 && !(plane.stays && parted_here(near)) && slid_off(plane);
     if (plane.multiplier > 0 && !off) return false;
     near.carries = false;
     if (off) {

@@ -401,12 +401,15 @@ TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
   stimuli::Random random(12);
   int in_contact = 0, same = 0;
   for (const std::size_t pieces : {1u, 2u, 5u, 16u}) {
-    const auto mesh = testing::mesh_of(testing::random_polyhedron(random, 16, Vec3(0.03, 0.025, 0.02)));
+    const auto mesh =
+        testing::mesh_of(testing::random_polyhedron(random, 16, Vec3(0.03, 0.025, 0.02)));
     Tool tool;
     for (std::size_t j = 0; j < pieces; ++j)
-      tool.segments.push_back({{0, 0, 0.1 * static_cast<double>(j) / static_cast<double>(pieces)},
-                               {0, 0, 0.1 * static_cast<double>(j + 1) / static_cast<double>(pieces)}});
-    const Scene plain({testing::placed_object(mesh)}), carried({testing::placed_object(mesh)}, true, tool);
+      tool.segments.push_back(
+          {{0, 0, 0.1 * static_cast<double>(j) / static_cast<double>(pieces)},
+           {0, 0, 0.1 * static_cast<double>(j + 1) / static_cast<double>(pieces)}});
+    const Scene plain({testing::placed_object(mesh)}),
+        carried({testing::placed_object(mesh)}, true, tool);
     RenderState of_plain = plain.initial_state(), of_carried = carried.initial_state();
     for (const LineProbe& probe : testing::sliding_path(random, *mesh, 0.1, 300, 0.01, 0.1)) {
       const Rendering a = ray_renderer().tick(plain, of_plain, probe, kTick),
