@@ -40,6 +40,8 @@ class FaultList {
   void set_line(PointerHash pointer, int line) { lines_[pointer.value()] = line; }
 
   bool empty() const { return faults_.empty(); }
+  /// How many there are so far, to see whether some were added since.
+  std::size_t count() const { return faults_.size() + unlisted_; }
   /// Whether further faults are only counted: then their texts need not be made.
   bool full() const { return faults_.size() >= kMostListed; }
   const std::string& file() const { return file_; }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocols/protocol.h"
+#include "protocols/scene_spec.h"
 
 namespace palpate::protocols {
 
@@ -39,8 +40,9 @@ Protocol parse_protocol(const std::string& path);
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
                              const StoredFiles& stored = {});
 
-/// Reads and checks a scene file: {"objects": [...]}. Mesh files are resolved relative to it.
+/// Reads and checks a scene file: {"objects": [...], "tool": ..., "reach": ...}. Mesh files are
+/// resolved relative to it.
 /// \throws InputError with every fault.
-std::vector<stimuli::ObjectSpec> parse_scene(const std::string& path);
+SceneSpec parse_scene(const std::string& path);
 
 }  // namespace palpate::protocols

@@ -19,7 +19,9 @@ using nlohmann::json;
 constexpr NumberRange kLength{0, 1000, "m", true};
 constexpr NumberRange kPosition{-1000, 1000, "m"};
 // Ten times stiffer than the stiffest haptic devices: beyond it a decimal point has slipped.
-constexpr NumberRange kStiffness{0, 1e5, "N/m", true};
+constexpr NumberRange kStiffness{0, 1e5, "N/m"};
+constexpr NumberRange kLayerStiffness{0, 1e5, "N/m", true};
+constexpr NumberRange kBreakForce{0, 1000, "N", true};
 constexpr NumberRange kDamping{0, 1000, "N s/m"};
 constexpr NumberRange kFriction{0, 10};
 constexpr std::size_t kMaxLayers = 16;
@@ -106,7 +108,12 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   if (traits.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
   if (traits.segments) reader.integer("segments", spec.segments, kSegments);
   if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);
-  if (spec.shape == stimuli::ShapeKind::compound) read_parts(reader, files, compounds, spec);
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    read_parts(reader, files, compounds, spec);
+  } else if (spec.material.stiffness == 0 && spec.material.layers.empty()) {
+    reader.faults().add(reader.pointer("layers"),
+                        "expected layers under a surface of stiffness 0: there is nothing to feel");
+  }
   return spec;
 }
 
@@ -135,7 +142,9 @@ void read_layers(ObjectReader& reader, stimuli::Material& material) {
     ObjectReader layer((*list)[i], child_pointer(reader.pointer("layers"), i), reader.faults());
     stimuli::Layer read;
     layer.number("depth_m", read.depth, kLength, Presence::required);
-    layer.number("stiffness_n_per_m", read.stiffness, kStiffness, Presence::required);
+    layer.number("stiffness_n_per_m", read.stiffness, kLayerStiffness, Presence::required);
+    layer.number("damping_ns_per_m", read.damping, kDamping);
+    layer.number("break_n", read.break_force, kBreakForce);
     layer.refuse_unknown_keys();
     if (layer.has("depth_m") && read.depth <= above && read.depth > 0) {
       reader.faults().add(layer.pointer("depth_m"), "expected to be deeper than the layer above");

@@ -6,6 +6,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/parse_object.h"
+#include "protocols/parse_tool.h"
 #include "protocols/schedule.h"
 #include "protocols/sha256.h"
 
@@ -242,6 +243,8 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
     section.vector("centre_m", protocol.workspace.centre, {-10, 10, "m"});
     section.number("scale", protocol.workspace.scale, {0.001, 1000});
   });
+  read_tool(reader, protocol.tool);
+  read_reach(reader, protocol.reach);
   reader.section("servo", [&](ObjectReader& section) {
     section.number("rate_hz", protocol.servo_rate, {100, 10000, "Hz"});
     section.boolean("passivity_controller", protocol.passivity_controller);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "protocols/scene_spec.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::protocols {
@@ -81,6 +82,8 @@ struct Protocol {
     Vec3 centre{0, 0, 0};  ///< m, in the device's frame: where the stimuli's origin stands
     double scale = 1;      ///< virtual metres per device metre
   } workspace;
+  ToolSpec tool;                   ///< on the virtual stylus
+  std::optional<ReachSpec> reach;  ///< the virtual stylus is longer than the real one
   stimuli::Material material;
   double servo_rate = 1000;           ///< Hz
   bool passivity_controller = false;  ///< dissipates the energy that sampling would generate

@@ -10,26 +10,40 @@
 #include "protocols/schedule.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
+#include "rendering/tool.h"
+#include "runner/workspace_map.h"
 
 namespace palpate::runner {
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 
-/// Builds a scene of the convex parts of objects; equal shapes share one mesh and its search trees.
+rendering::Tool tool_of(const protocols::ToolSpec& spec);
+/// \param length  m, of the real stylus. \param grip  m from its tip; beyond the tail: the tail
+rendering::Reach reach_of(const protocols::ReachSpec& spec, double length, double grip);
+WorkspaceMap workspace_of(const protocols::Protocol& protocol);
+/// m, virtual frame: how far along the stylus the hand is from the virtual tip.
+double grip_from_virtual_tip(const protocols::Protocol& protocol);
+
+/// Builds a scene of the convex parts of objects and of their layers; equal shapes share one mesh
+/// and its search trees.
 class SceneBuilder {
  public:
-  /// \throws MeshError where a shape is no solid that falls into convex parts, with the place as a
-  /// JSON pointer.
-  rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact);
+  /// \throws MeshError where a shape is no solid that falls into convex parts, or where nothing of
+  /// it is left for a layer, with the place as a JSON pointer.
+  rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
+                         const rendering::Tool& tool = {});
 
  private:
   struct Prepared {
     std::shared_ptr<const stimuli::ConvexMesh> mesh;
     std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, bool side_contact);
-  void place(const stimuli::ObjectSpec& spec, const Pose& parent, int object, bool side_contact,
-             std::vector<rendering::SceneObject>& out);
+  /// Its convex parts. \param depth  m, by which their surfaces are moved inwards: parts may be gone
+  const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, double depth,
+                                       bool side_contact);
+  struct Placing;
+  void place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing);
+  void place_layers(const stimuli::ObjectSpec& spec, const Pose& pose, Placing& placing);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };
@@ -48,6 +62,7 @@ class StimulusLibrary {
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
   std::vector<double> reaches_;
+  rendering::Tool tool_;
 };
 
 }  // namespace palpate::runner

@@ -235,6 +235,7 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
       if (number[corner] == kNone) {
         number[corner] = static_cast<Index>(result.soup.vertices.size());
         const GridPoint& grid_point = grid_points[corner];
+        result.point.push_back(corner);
         result.soup.vertices.push_back(origin + step * Vec3(static_cast<double>(grid_point[0]),
                                                             static_cast<double>(grid_point[1]),
                                                             static_cast<double>(grid_point[2])));

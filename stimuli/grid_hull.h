@@ -1,6 +1,7 @@
 #pragma once
 // Convex hull in exact arithmetic.
 
+#include <cstdint>
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
@@ -11,6 +12,7 @@ namespace palpate::stimuli {
 struct GridHull {
   /// Triangles, exactly convex; some may be coplanar. Empty where the points span no volume.
   PolygonSoup soup;
+  std::vector<std::uint32_t> point;  ///< of each vertex, its index in the points
   double depth = 0;  ///< m; the largest distance of a point below the surface
 };
 

@@ -47,10 +47,11 @@ void PointerControl::step(const PointerMotion& pointer, const Camera& camera,
   const bool entered = !was_over_;
   if (entered) pointer_offset_ = {0, 0};
   was_over_ = true;
-  const auto tip = [&] { return glm::vec3(workspace_.to_virtual(target_.tip)); };
+  const auto virtual_tip = [&] { return workspace_.to_virtual(target_.stylus()).tip; };
+  const auto tip = [&] { return glm::vec3(virtual_tip()); };
   const auto follow = [&] {
-    const Vec3 to = workspace_.to_device(wanted(pointer.at - pointer_offset_, camera, object));
-    const Vec3 by = to - target_.tip;
+    const Vec3 to = wanted(pointer.at - pointer_offset_, camera, object);
+    const Vec3 by = (to - virtual_tip()) / workspace_.shift_gain();
     target_.move(by.x, by.y, by.z);
   };
   const double notches =

@@ -13,6 +13,43 @@ namespace {
 
 constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
 
+/// Where the grip is while the device is at its centre, virtual frame: the hand of a stylus that
+/// reaches farther stays about there. m.
+Vec3 hand_place(const WorkspaceMap& map) {
+  const Vec3 centre = map.to_virtual(Vec3(0));
+  return map.reach->in_world ? stretched(*map.reach, {centre, centre}).tip : centre;
+}
+
+bool is_far(const WorkspaceMap& map) {
+  return map.reach && glm::length(hand_place(map)) > 1e-6;
+}
+
+/// Turns +z to `direction`, by the smallest rotation.
+Quat turn_up_to(const Vec3& direction) {
+  const Vec3 to = glm::normalize(direction), up(0, 0, 1);
+  const Vec3 axis = glm::cross(up, to);
+  const double w = 1 + glm::dot(up, to);
+  return w > 1e-9 ? glm::normalize(Quat(w, axis)) : Quat(0, 1, 0, 0);
+}
+
+/// How a hand far from the object explores: it comes from its own side, and leans the stylus as far
+/// as its workspace lets it.
+SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& protocol) {
+  const WorkspaceMap map = workspace_of(protocol);
+  if (!is_far(map)) return own;
+  const double length = grip_from_virtual_tip(protocol);
+  const double radius =
+      own.device.workspace_radius * map.scale * (map.reach->in_world ? map.reach->factor : 1);
+  const double room = radius - own.motor.approach_distance -
+                      std::abs(glm::length(hand_place(map)) - length);
+  constexpr double kLeast = 0.1;  // rad: what is out of the workspace, the device holds back
+  const double lean = 2 * std::asin(std::clamp(room / (2 * length), 0.0, 1.0));
+  own.motor.approach_min_rise =
+      std::max(own.motor.approach_min_rise, std::cos(std::max(lean, kLeast)));
+  own.stylus.tilt = own.stylus.tilt_sd = 0;
+  return own;
+}
+
 }  // namespace
 
 SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
@@ -28,8 +65,11 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
       low_pass_(1 - std::exp(-period_ / own.percept.force_low_pass)),
       seed_(seed),
       number_(number),
-      workspace_{protocol.workspace.centre, protocol.workspace.scale},
-      explorer_(own, protocol.stylus.grip * protocol.workspace.scale, wall_stiffness_, period_),
+      workspace_(workspace_of(protocol)),
+      far_(is_far(workspace_)),
+      hand_side_(far_ ? turn_up_to(hand_place(workspace_)) : Quat(1, 0, 0, 0)),
+      explorer_(as_far_hand(own, protocol), grip_from_virtual_tip(protocol), wall_stiffness_,
+                period_),
       observer_(hypotheses, own.observer),
       heading_choice_(hypotheses, own.observer, own.heading) {}
 
@@ -60,7 +100,11 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
   }
   const double time = sample.tick * period_;
   const TouchState touch = sense_touch(sample);
-  stylus_.set_target(in_device(explorer_.step(touch, sample.probe)));
+  TouchState known = touch;
+  known.normal = explored(touch.normal);
+  known.surface = explored(touch.surface);
+  stylus_.set_target(in_device(
+      explorer_.step(known, {explored(sample.probe.tip), explored(sample.probe.tail)})));
   if (answer_at_) {
     if (time < *answer_at_) return std::nullopt;
     return Answer{observer_.best(), sample.time_ns};
@@ -97,16 +141,34 @@ void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
   throw StuckParticipant(text);
 }
 
+/// A vector of the world in the explorer's frame.
+Vec3 SimulatedParticipant::explored(const Vec3& world) const {
+  return far_ ? glm::conjugate(hand_side_) * world : world;
+}
+
+Vec3 SimulatedParticipant::explored_in_world(const Vec3& explored) const {
+  return far_ ? hand_side_ * explored : explored;
+}
+
 HandTarget SimulatedParticipant::in_device(HandTarget target) const {
+  target.grip = explored_in_world(target.grip);
+  target.velocity = explored_in_world(target.velocity);
+  target.axis = explored_in_world(target.axis);
+  if (workspace_.reach && workspace_.reach->in_world)
+    target.grip = unstretched(*workspace_.reach, {target.grip, target.grip}).tip;
   target.grip = workspace_.to_device(target.grip);
-  target.velocity /= workspace_.scale;
+  target.velocity /= workspace_.shift_gain();
   return target;
 }
 
 TouchState SimulatedParticipant::sense_touch(const Sample& sample) {
   const Vec3 stylus = sample.probe.tail - sample.probe.tip;
-  force_ += low_pass_ * (sample.device1 + sample.device2 - force_);
-  torque_ += low_pass_ * (glm::cross(stylus, sample.device2) - torque_);
+  // Who holds a stylus knows its lever, and tells from the hand what happens at its ends.
+  const rendering::EndForces ends{sample.device1, sample.device2};
+  const rendering::EndForces forces =
+      workspace_.reach ? rendering::on_virtual(*workspace_.reach, ends) : ends;
+  force_ += low_pass_ * (forces.tip + forces.tail - force_);
+  torque_ += low_pass_ * (glm::cross(stylus, forces.tail) - torque_);
   TouchState touch;
   const double strength = glm::length(force_);
   touch.contact = strength > settings_.percept.force_threshold;
@@ -130,8 +192,9 @@ Vec3 SimulatedParticipant::perceived_shift() const {
 void SimulatedParticipant::choose_heading(const Sample& sample, const TouchState& touch) {
   const Vec3 shift = (touch.contact ? perceived_shift() : Vec3(0)) - centre_error_;
   const SlidingStylus stylus{ray_, sample.probe.tip + shift, sample.probe.tail + shift,
-                             explorer_.known_normal(), explorer_.heading()};
-  explorer_.turn_to(heading_choice_.choose(observer_, stylus, heading_random_));
+                             explored_in_world(explorer_.known_normal()),
+                             explored_in_world(explorer_.heading())};
+  explorer_.turn_to(explored(heading_choice_.choose(observer_, stylus, heading_random_)));
 }
 
 Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& touch) {

@@ -38,6 +38,8 @@ class SimulatedParticipant final : public Respondent {
  private:
   void wait_for_time_zero(const Sample& sample);
   HandTarget in_device(HandTarget target) const;
+  Vec3 explored(const Vec3& world) const;
+  Vec3 explored_in_world(const Vec3& explored) const;
   TouchState sense_touch(const Sample& sample);
   Vec3 perceived_shift() const;
   Percept perceive(const Sample& sample, const TouchState& touch);
@@ -50,6 +52,8 @@ class SimulatedParticipant final : public Respondent {
   std::uint64_t seed_;
   int number_;
   WorkspaceMap workspace_;
+  bool far_;        ///< the hand is far from the object, beyond a stylus that reaches farther
+  Quat hand_side_;  ///< turns the explorer's up to where the hand is, as seen from the object
   Explorer explorer_;
   ShapeObserver observer_;
   HeadingChoice heading_choice_;

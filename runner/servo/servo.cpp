@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <utility>
+
+#include "rendering/tool_pose.h"
 
 namespace palpate::runner {
 namespace {
@@ -13,6 +17,22 @@ double distance_of_segment(const rendering::LineProbe& probe) {  // from the ori
   const double d2 = glm::dot(d, d);
   const double t = d2 > 0 ? std::clamp(-glm::dot(probe.tip, d) / d2, 0.0, 1.0) : 0;
   return glm::length(probe.tip + t * d);
+}
+
+/// From the origin to the nearest point of what touches, m. A trial's tool begins with the roll
+/// that its first pose gives it.
+double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
+  const rendering::Tool* const tool = shown.scene.tool();
+  if (tool == nullptr || !shown.renderer->side_contact()) return distance_of_segment(probe);
+  const Vec3 d = probe.tail - probe.tip;
+  const rendering::PlacedTool placed = rendering::place(
+      tool, true, {probe.tip, d, rendering::tool_frame(d, nullptr, Vec3(0))});
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < placed.count; ++k) {
+    const Vec3 from = probe.tip + placed.segments[k].from;
+    least = std::min(least, distance_of_segment({from, from + placed.segments[k].along}));
+  }
+  return least;
 }
 
 }  // namespace
@@ -62,12 +82,14 @@ void Servo::clear_fault() noexcept {
 
 bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
   const HomeZone& home = shown_->home;
-  const bool still = rested_ > 0 && glm::length(probe.tip - rest_tip_) <= home.stillness;
+  // It is the hand that rests: a long virtual stylus trembles more.
+  const Vec3 tip = workspace_.reach ? unstretched(*workspace_.reach, probe).tip : probe.tip;
+  const bool still = rested_ > 0 && glm::length(tip - rest_tip_) <= home.stillness;
   if (!still) {
     rested_ = 0;
-    rest_tip_ = probe.tip;
+    rest_tip_ = tip;
   }
-  if (!(distance_of_segment(probe) >= home.radius)) {
+  if (!(distance_of(*shown_, probe) >= home.radius)) {
     rested_ = 0;
     sample_.waiting = Waiting::for_distance;
     return false;
@@ -104,8 +126,7 @@ void Servo::check(const DeviceReading& reading) noexcept {
     sample_.faults |= servo_fault::kDeviceLost;
     limiter_.trip();
   } else {
-    sample_.probe = {workspace_.to_virtual(reading.stylus.tip),
-                     workspace_.to_virtual(reading.stylus.tail)};
+    sample_.probe = workspace_.to_virtual(reading.stylus);
   }
   if (reading.trouble == DeviceTrouble::late) sample_.faults |= servo_fault::kOldReading;
   sample_.trouble = reading.trouble;
@@ -137,9 +158,9 @@ DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexc
     return limiter_.apply(device1, device2);
   }
   ForceLimiter preview = limiter_;  // what the limits leave of the scene's forces alone
-  const DeviceForces damping = passivity_->damping(
-      {workspace_.to_device(sample_.probe.tip), workspace_.to_device(sample_.probe.tail)},
-      preview.apply(device1, device2));
+  const rendering::LineProbe ends = workspace_.to_device(sample_.probe);
+  const DeviceForces damping =
+      passivity_->damping({ends.tip, ends.tail}, preview.apply(device1, device2));
   DeviceForces forces = limiter_.apply(device1 + damping.device1, device2 + damping.device2);
   passivity_->commanded(forces);
   return forces;
@@ -165,6 +186,8 @@ const Sample& Servo::tick() noexcept {
   }
   sample_.rendering = shown_->renderer->tick(shown_->scene, shown_->state, sample_.probe,
                                              static_cast<double>(sample_.period_ns) * 1e-9);
+  if (workspace_.reach)
+    sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
   sample_.faults |= sample_.rendering.faults;
   if (sample_.rendering.faults & rendering::render_fault::kNonFinite) limiter_.trip();
   command(sample_.rendering.device1, sample_.rendering.device2);

@@ -13,17 +13,9 @@
 #include "runner/servo/passivity.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/tick_source.h"
+#include "runner/workspace_map.h"
 
 namespace palpate::runner {
-
-/// Where the virtual world stands in the device's frame: virtual = scale * (device - centre).
-struct WorkspaceMap {
-  Vec3 centre;       ///< m, device frame
-  double scale = 1;  ///< virtual metres per device metre
-
-  Vec3 to_virtual(const Vec3& device) const { return scale * (device - centre); }
-  Vec3 to_device(const Vec3& virtual_point) const { return virtual_point / scale + centre; }
-};
 
 /// The scene of one trial with its renderer and the renderer's state.
 struct TrialScene {

@@ -20,10 +20,17 @@ std::string sentence(const Values&... values) {
   return text.str();
 }
 
-/// The stiffest that the probe can meet in it, N/m.
-double stiffest(const stimuli::Material& material) {
+/// Of the surface and all layers together: whoever presses deep feels them all. N/m.
+double whole_stiffness(const stimuli::Material& material) {
   double out = material.stiffness;
-  for (const stimuli::Layer& layer : material.layers) out = std::max(out, layer.stiffness);
+  for (const stimuli::Layer& layer : material.layers) out += layer.stiffness;
+  return out;
+}
+
+/// N s/m; likewise.
+double whole_damping(const stimuli::Material& material) {
+  double out = material.damping;
+  for (const stimuli::Layer& layer : material.layers) out += layer.damping;
   return out;
 }
 
@@ -37,7 +44,10 @@ void visit_materials(Object& object, const Visit& visit) {
 void scale_down(stimuli::Material& material, double fraction) {
   material.stiffness *= fraction;
   material.damping *= fraction;
-  for (stimuli::Layer& layer : material.layers) layer.stiffness *= fraction;
+  for (stimuli::Layer& layer : material.layers) {
+    layer.stiffness *= fraction;
+    layer.damping *= fraction;
+  }
 }
 
 /// \throws std::invalid_argument
@@ -68,34 +78,95 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
                              const DeviceCapabilities& device, const ShowableMaterial& without) {
   if (protocol.passivity_controller) return "";
   const double with =
-      showable(material, device, shown_rate(protocol, device), protocol.workspace.scale, true)
+      showable(material, device, shown_rate(protocol, device), felt_gain(protocol), true)
           .fraction;
   if (with <= without.fraction) return "(/servo/passivity_controller would not help here) ";
   return sentence("set /servo/passivity_controller to true (",
-                  with < 1 ? sentence("then up to ", stiffest(material) * with, " N/m")
+                  with < 1 ? sentence("then up to ", whole_stiffness(material) * with, " N/m")
                            : std::string("then it can be shown"),
                   "), ");
 }
 
+/// Why the virtual tip cannot get all round a stimulus of this radius about the workspace's origin
+/// (m, device frame); empty: it can.
+std::string workspace_fault(const protocols::Protocol& protocol, double radius,
+                            const DeviceCapabilities& device) {
+  constexpr double kRounding = 1e-9;  // m: sums of decimals are no whole decimals
+  const WorkspaceMap map = workspace_of(protocol);
+  const double far = glm::length(protocol.workspace.centre), held = device.workspace_radius;
+  if (!map.reach) {
+    const double needed = far + radius;
+    if (needed <= held + kRounding) return "";
+    return sentence(" with its home zone needs ", needed, " m about the centre of '", device.name,
+                    "', which reaches ", held,
+                    " m: move /workspace/centre_m or raise /workspace/scale");
+  }
+  const rendering::Reach& reach = *map.reach;
+  double nearest = 0, farthest = 0, distance = far;
+  if (reach.in_world) {  // all places of the tip, stretched about the pivot
+    const Vec3 centre = stretched(reach, {map.to_virtual(Vec3(0)), Vec3(0)}).tip / map.scale;
+    distance = glm::length(centre);
+    farthest = reach.factor * held;
+  } else {  // the stylus may point anywhere from a grip that is anywhere in the workspace
+    const double length = grip_from_virtual_tip(protocol) / map.scale;
+    nearest = std::max(0.0, length - held);
+    farthest = length + held;
+  }
+  if (distance + radius <= farthest + kRounding &&
+      std::max(0.0, distance - radius) >= nearest - kRounding)
+    return "";
+  return sentence(" with its home zone stands from ", std::max(0.0, distance - radius), " to ",
+                  distance + radius, " m from ",
+                  reach.in_world ? "where the virtual tip is while the device is at its centre"
+                                 : "the device's centre",
+                  "; with /reach the virtual tip gets from ", nearest, " to ", farthest,
+                  " m with '", device.name, "': move /workspace/centre_m or change /reach/factor");
+}
+
 }  // namespace
 
+double felt_gain(const protocols::Protocol& protocol) {
+  const WorkspaceMap map = workspace_of(protocol);
+  const rendering::Reach reach = map.reach.value_or(rendering::Reach{});
+  const double length = protocol.stylus.length * protocol.workspace.scale;  // m, virtual frame
+  bool sides = false;
+  for (const protocols::RendererKind kind : protocol.renderers)
+    sides = sides || renderer_for(kind).side_contact();
+  double lever2 = std::max(reach.factor * reach.factor, stiffness_gain(reach, 0));
+  if (!sides) return map.scale * lever2;
+  if (protocol.tool.segments.empty())
+    return map.scale * std::max(lever2, stiffness_gain(reach, 1));
+  for (const protocols::ToolSegmentSpec& segment : protocol.tool.segments) {
+    for (const Vec3& at : {segment.from, segment.to}) {
+      // Beside the stylus, a force along it turns the stylus as well.
+      const double aside = std::hypot(at.x, at.y) / length;
+      lever2 = std::max(lever2, stiffness_gain(reach, at.z / (reach.factor * length)) +
+                                    2 * aside * aside);
+    }
+  }
+  return map.scale * lever2;
+}
+
 ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
-                          double rate, double scale, bool passivity_controller) {
+                          double rate, double gain, bool passivity_controller) {
   ShowableMaterial out;
-  const double stiffness = stiffest(material) * scale, damping = std::abs(material.damping) * scale;
+  const double whole = whole_stiffness(material), stiffness = whole * gain;
+  const double damping = std::abs(whole_damping(material)) * gain;
   const auto bound = [&out](double fraction, const auto&... reason) {
     // A hair of rounding does not refuse a material that stands at the bound.
     if (fraction >= out.fraction || fraction >= 1 - 1e-9) return;
     out = {std::max(0.0, fraction), sentence(reason...)};
   };
-  const std::string shown = scale == 1 ? "" : sentence(" (", stiffness, " N/m at the hand)");
+  const std::string shown =
+      sentence(material.layers.empty() ? "" : " with its layers",
+               gain == 1 ? "" : sentence(" (", stiffness, " N/m at the hand)"));
   if (stiffness > 0) {
     const double most = device.max_stiffness * rate / device.max_rate;
-    bound(most / stiffness, stiffest(material), " N/m", shown, ", and '", device.name,
+    bound(most / stiffness, whole, " N/m", shown, ", and '", device.name,
           "' shows up to ", most, " N/m at ", rate, " Hz");
     if (device.friction > 0 && device.resolution > 0) {
       const double held = 2 * device.friction / device.resolution;
-      bound(held / stiffness, stiffest(material), " N/m", shown, ", and the friction of '",
+      bound(held / stiffness, whole, " N/m", shown, ", and the friction of '",
             device.name, "', ", device.friction, " N, holds up to ", held, " N/m against steps of ",
             device.resolution, " m");
     }
@@ -103,7 +174,7 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
   const double needed = stiffness / rate / 2 + damping;
   if (device.damping > 0 && needed > 0) {
     const double b = device.damping * (passivity_controller ? kPassivityExtension : 1);
-    bound(b / needed, stiffest(material), " N/m and ", material.damping, " N s/m", shown, " at ",
+    bound(b / needed, whole, " N/m and ", whole_damping(material), " N s/m", shown, " at ",
           rate, " Hz, which need ", needed, " N s/m of physical damping, and '", device.name,
           "' has ", device.damping,
           passivity_controller ? " with the passivity controller on" : "");
@@ -121,14 +192,15 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
     visit_materials(stimulus.object, [&](stimuli::Material& material) {
       ++part;
       const ShowableMaterial can =
-          showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
+          showable(material, device, shown_rate(protocol, device), felt_gain(protocol),
                    protocol.passivity_controller);
       if (can.reason.empty() || can.fraction == 0) return;  // nothing to show: incompatible
       const double shown = can.fraction * (1 - 1e-12);      // rounding stays below the bound
       out.push_back(
           {stimulus.name, part, shown, material.stiffness, material.damping,
            sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
-                    material.stiffness * shown, " N/m and ", material.damping * shown, " N s/m")});
+                    whole_stiffness(material) * shown, " N/m and ",
+                    whole_damping(material) * shown, " N s/m")});
       scale_down(material, shown);
     });
   }
@@ -187,6 +259,11 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
           " degrees of freedom; '", device.name, "' senses ", device.sensed_freedom);
     }
   }
+  if (protocol.reach && protocol.reach->pivot != protocols::ReachSpec::Pivot::point &&
+      device.sensed_freedom < 5) {
+    add("/reach about a point of the stylus needs a device that senses 5 degrees of freedom; '",
+        device.name, "' senses ", device.sensed_freedom, ": give /reach/pivot a point [x, y, z]");
+  }
   if (protocol.servo_rate > device.max_rate) {
     add("/servo/rate_hz is ", protocol.servo_rate, "; '", device.name, "' runs at up to ",
         device.max_rate, " Hz");
@@ -195,23 +272,18 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
     const auto check_material = [&](const stimuli::Material& material) {
       const ShowableMaterial can =
-          showable(material, device, shown_rate(protocol, device), protocol.workspace.scale,
+          showable(material, device, shown_rate(protocol, device), felt_gain(protocol),
                    protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
       add("stimulus '", stimulus.name, "' has ", can.reason, ": soften /material, raise ",
-          "/servo/rate_hz, ", passivity_advice(protocol, material, device, can),
+          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "", passivity_advice(protocol, material, device, can),
           "or have it limited by /servo/material_limit \"limit\"");
     };
     visit_materials(stimulus.object, check_material);
-    const double needed =
-        glm::length(protocol.workspace.centre) +
+    const double radius =
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
-    constexpr double kRounding = 1e-9;  // m: sums of decimals are no whole decimals
-    if (needed > device.workspace_radius + kRounding) {
-      add("stimulus '", stimulus.name, "' with its home zone needs ", needed,
-          " m about the centre of '", device.name, "', which reaches ", device.workspace_radius,
-          " m: move /workspace/centre_m or raise /workspace/scale");
-    }
+    const std::string fault = workspace_fault(protocol, radius, device);
+    if (!fault.empty()) add("stimulus '", stimulus.name, "'", fault);
   }
   return out;
 }

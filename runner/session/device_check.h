@@ -26,9 +26,16 @@ struct ShowableMaterial {
 /// the stiffness that its maker gives for its highest rate, in proportion to the rate. Bounds of
 /// passivity: no hand can make it buzz. The passivity controller makes up for kPassivityExtension
 /// times what the device's own damping does.
-/// \param scale  virtual metres per device metre: the device shows so many times the stiffness
+/// Of a material with layers the sums count: all of them are felt at once by who presses deep.
+/// \param gain  the hand feels so many times the stiffness and damping: felt_gain
 ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
-                          double rate, double scale, bool passivity_controller);
+                          double rate, double gain, bool passivity_controller);
+
+/// How many times a stimulus's stiffness is felt at the ends of the stylus: once for each virtual
+/// metre in a metre of the device, and by the square of the lever of a reach and of a tool that
+/// goes beyond the stylus. The lever is the larger of the reach's factor (the hand turns about the
+/// pivot) and of what the ends feel of a contact when they move each by itself.
+double felt_gain(const protocols::Protocol& protocol);
 
 /// `palpate stability` measures far more than this on every scene, as long as a force is written in
 /// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).

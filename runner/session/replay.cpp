@@ -1,6 +1,7 @@
 #include "runner/session/replay.h"
 
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "runner/devices/replay.h"
@@ -46,7 +47,13 @@ void replay(const protocols::Protocol& protocol, const data::TrialRecord& record
   constexpr HomeZone kAnywhere{0, 0};
   servo.prepare(library.scene(trial_of(protocol, recorded, renderer)), renderer_for(renderer),
                 kAnywhere);
-  for (const data::SampleRecord& sample : recorded.samples) visit(sample, servo.tick());
+  // Of an extended probe, the record has the virtual stylus; what the hand got of it follows.
+  const std::optional<rendering::Reach> reach = workspace_of(protocol).reach;
+  for (const data::SampleRecord& sample : recorded.samples) {
+    Sample again = servo.tick();
+    if (reach) again.rendering = rendering::felt(*reach, again.rendering);
+    visit(sample, again);
+  }
   servo.stop();
 }
 

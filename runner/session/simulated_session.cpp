@@ -74,8 +74,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
                          1 / protocol.servo_rate);
   VirtualClock clock(session.clock_ns);
-  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{},
-              {protocol.workspace.centre, protocol.workspace.scale});
+  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{}, workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
   SimulatedParticipant participant(own, study.hypotheses, stylus, protocol, study.seed,
                                    session.participant);

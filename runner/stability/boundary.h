@@ -14,6 +14,8 @@ struct LoopCase {
   protocols::RendererKind renderer = protocols::RendererKind::point;
   LoopSettings settings;       ///< its damping is ignored
   double virtual_damping = 0;  ///< N s/m, of the material
+  /// Of a layer half as deep as the contact, as a share of the surface's stiffness; 0: none.
+  double layer_share = 0;
   /// The mass of each end is chosen so that it oscillates 60 times more slowly than the sampling
   /// rate: the case of the theory, which is independent of the mass. Else settings.mass.
   bool heavy = false;
@@ -30,7 +32,8 @@ struct BoundaryPoint {
   bool unsafe() const { return promised && measured > 1.001 * theory; }
 };
 
-/// K (T/2 + t_d) + |B|. Colgate & Schenkel 1997.
+/// K (T/2 + t_d) + |B|, with K and B as they are felt: of surface and layer together, and through
+/// the lever of a reach, touched at the virtual tip. Colgate & Schenkel 1997.
 double passive_damping(const LoopCase& loop, double stiffness);
 
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);

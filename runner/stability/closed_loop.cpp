@@ -6,9 +6,12 @@
 #include <memory>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
+#include "stimuli/inset.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner {
@@ -16,7 +19,7 @@ namespace {
 
 constexpr double kDepth = 1e-3;          // m, at rest
 constexpr double kLength = 0.12;         // m
-constexpr double kRestAmplitude = 1e-9;  // m, peak to peak: counts as rest
+constexpr double kAtRest = 0.01;         // of the swing it is released with: less counts as rest
 constexpr double kDiverged = 0.02;       // m, from rest: diverged
 constexpr int kMaxDelay = 16;            // ticks
 
@@ -64,6 +67,25 @@ std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ra
     }
   }
   throw std::invalid_argument("no such situation");
+}
+
+/// Puts the layers that materials have beside the objects.
+std::vector<rendering::SceneObject> with_layers(std::vector<rendering::SceneObject> objects) {
+  std::vector<rendering::SceneObject> out;
+  for (rendering::SceneObject& surface : objects) {
+    const std::vector<stimuli::Layer> layers = std::exchange(surface.material.layers, {});
+    out.push_back(surface);
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+      rendering::SceneObject under = surface;
+      under.mesh = stimuli::inset(*surface.mesh, layers[i].depth);
+      under.material = {};
+      under.material.stiffness = layers[i].stiffness;
+      under.material.damping = layers[i].damping;
+      under.layer = static_cast<int>(i) + 1;
+      out.push_back(std::move(under));
+    }
+  }
+  return out;
 }
 
 /// The stylus at height 0, with its lowest point near the origin.
@@ -138,6 +160,7 @@ class End {
   Matrix step_{};
 };
 
+/// A swing's limits.
 struct Range {
   double low = HUGE_VAL, high = -HUGE_VAL;
   void add(double x) {
@@ -145,6 +168,111 @@ struct Range {
     high = std::max(high, x);
   }
   double size() const { return high > low ? high - low : 0; }
+};
+
+/// A hand, two devices and a renderer in a loop, tick by tick.
+class Loop {
+ public:
+  Loop(const LoopSettings& s, const LoopScene& scene)
+      : s_(s),
+        scene_(scene),
+        state_(scene.scene().initial_state()),
+        rest_(s.reach ? unstretched(*s.reach, scene.rest()) : scene.rest()),
+        balance_(on_hand({Vec3(0, 0, scene.force_tip()), Vec3(0, 0, scene.force_tail())})),
+        stiffness_((scene.force_tip() + scene.force_tail()) / kDepth),
+        tip_(s, kReleasedTip),
+        tail_(s, kReleasedTail),
+        controller_({0.5 * s.mass * s.rate}, 1 / s.rate) {
+    // From above, so that the renderer finds a first contact.
+    scene.renderer().tick(scene.scene(), state_, lowered(scene.rest(), -5e-3, -5e-3), 1 / s.rate);
+    for (auto& forces : under_way_) forces = {balance_.tip.z, balance_.tail.z};
+    const double felt_stiffness = stiffness_ * (s.reach ? stiffness_gain(*s.reach, 0) : 1);
+    const double period =
+        std::max(16.0, 2 * std::numbers::pi *
+                           std::sqrt((s.mass + s.hand.mass) / (felt_stiffness + s.hand.stiffness)) *
+                           s.rate);
+    block_ = static_cast<std::uint64_t>(10 * period);
+  }
+
+  /// Goes on until there are so many blocks of ten periods, a multiple of four.
+  LoopOutcome run(std::uint64_t blocks) {
+    while (swings_.size() < blocks && !diverged_) {
+      swings_.emplace_back();
+      for (std::uint64_t i = 0; i < block_ && !diverged_; ++i) swings_.back().add(tick());
+    }
+    LoopOutcome out;
+    out.ticks = ticks_;
+    out.initial_swing = 2 * std::abs(first_ - balance_height());
+    out.floor = std::max(3 * s_.resolution, kAtRest * out.initial_swing);
+    out.early_swing = over(blocks / 4, blocks / 2);
+    out.late_swing = diverged_ ? HUGE_VAL : over(3 * blocks / 4, blocks);
+    return out;
+  }
+
+ private:
+  static constexpr double kReleasedTip = 1e-4, kReleasedTail = 0.6e-4;  // m, from rest
+
+  rendering::EndForces on_hand(const rendering::EndForces& forces) const {
+    return s_.reach ? felt(*s_.reach, forces) : forces;
+  }
+
+  double over(std::uint64_t first, std::uint64_t end) const {
+    Range all;
+    for (std::uint64_t i = first; i < std::min<std::uint64_t>(end, swings_.size()); ++i) {
+      all.add(swings_[i].low);
+      all.add(swings_[i].high);
+    }
+    return all.size();
+  }
+
+  /// Force over stiffness, m: a rotation about the contact is not an oscillation of the contact.
+  double height_of(double tip_force, double tail_force) const {
+    return (tip_force + 0.7 * tail_force) / stiffness_;
+  }
+  double balance_height() const { return height_of(scene_.force_tip(), scene_.force_tail()); }
+
+  double read(double z) const {
+    return s_.resolution > 0 ? s_.resolution * std::round(z / s_.resolution) : z;
+  }
+
+  /// \return height_of
+  double tick() {
+    const rendering::LineProbe held = lowered(rest_, -read(tip_.z()), -read(tail_.z()));
+    const rendering::Rendering r = scene_.renderer().tick(
+        scene_.scene(), state_, s_.reach ? stretched(*s_.reach, held) : held, 1 / s_.rate);
+    const rendering::EndForces shown = on_hand({r.device1, r.device2});
+    DeviceForces forces{shown.tip, shown.tail, false};
+    if (s_.passivity_controller) {
+      const DeviceForces damping = controller_.damping({held.tip, held.tail}, forces);
+      forces.device1 += damping.device1;
+      forces.device2 += damping.device2;
+      controller_.commanded(forces);
+    }
+    under_way_[ticks_ % under_way_.size()] = {forces.device1.z, forces.device2.z};
+    const auto& now = under_way_[(ticks_ + under_way_.size() - static_cast<std::size_t>(s_.delay)) %
+                                 under_way_.size()];
+    tip_.advance(now[0] - balance_.tip.z);
+    // Through a reach, a contact at the tip is felt at both ends.
+    if (scene_.renderer().side_contact() || s_.reach) tail_.advance(now[1] - balance_.tail.z);
+    const double height = height_of(r.device1.z, r.device2.z);
+    if (ticks_++ == 0) first_ = height;
+    diverged_ = !(std::max(std::abs(tip_.z()), std::abs(tail_.z())) < kDiverged);
+    return height;
+  }
+
+  const LoopSettings& s_;
+  const LoopScene& scene_;
+  rendering::RenderState state_;
+  rendering::LineProbe rest_;      // of the real stylus
+  rendering::EndForces balance_;   // of the hand, at rest
+  double stiffness_;               // N/m, of the contact
+  End tip_, tail_;
+  PassivityController controller_;
+  std::array<std::array<double, 2>, kMaxDelay + 1> under_way_{};
+  std::uint64_t block_ = 0, ticks_ = 0;  // ticks
+  double first_ = 0;                     // m
+  bool diverged_ = false;
+  std::vector<Range> swings_;  // of each block
 };
 
 }  // namespace
@@ -166,7 +294,7 @@ const char* to_string(ContactCase contact_case) {
 LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
                      const stimuli::Material& material)
     : renderer_(&renderer_for(kind)),
-      scene_(objects_of(contact_case, renderer_->side_contact(), material),
+      scene_(with_layers(objects_of(contact_case, renderer_->side_contact(), material)),
              renderer_->side_contact()) {
   const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
   rendering::RenderState state = scene_.initial_state();
@@ -184,59 +312,34 @@ LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
   contacts_ = static_cast<int>(r.contacts);
 }
 
+namespace {
+
+bool has_grown(const LoopOutcome& o) {
+  constexpr double kGrown = 2;  // times the initial swing: no rounding and no second mode
+  return !(o.late_swing <= kGrown * std::max(o.initial_swing, o.floor));
+}
+
+}  // namespace
+
+Verdict verdict_on(const LoopOutcome& o, bool linear) {
+  constexpr double kShrunk = 0.9;  // from the second quarter to the last: more is chance
+  if (has_grown(o)) return Verdict::unstable;
+  if (o.late_swing <= o.floor) return Verdict::stable;
+  if (linear) return o.late_swing <= o.early_swing ? Verdict::stable : Verdict::unstable;
+  return o.late_swing <= kShrunk * o.early_swing ? Verdict::open : Verdict::unstable;
+}
+
 LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
-  const rendering::Renderer& renderer = loop.renderer();
-  rendering::RenderState state = loop.scene().initial_state();
-  const double tick = 1 / s.rate;
-  // From above, so that the renderer finds a first contact.
-  renderer.tick(loop.scene(), state, lowered(loop.rest(), -5e-3, -5e-3), tick);
-  End tip(s, 1e-4), tail(s, 0.6e-4);
-  const double stiffness = loop.force_tip() + loop.force_tail() > 0
-                               ? (loop.force_tip() + loop.force_tail()) / kDepth
-                               : 1;
-  const double mass = s.mass + s.hand.mass;
-  const double period = std::max(
-      16.0, 2 * std::numbers::pi * std::sqrt(mass / (stiffness + s.hand.stiffness)) * s.rate);
-  const auto ticks = static_cast<std::uint64_t>(40 * period);
-  PassivityController controller({0.5 * s.mass * s.rate}, tick);
-  std::array<std::array<double, 2>, kMaxDelay + 1> under_way{};
-  for (auto& forces : under_way) forces = {loop.force_tip(), loop.force_tail()};
-  const auto read = [&](double z) {
-    return s.resolution > 0 ? s.resolution * std::round(z / s.resolution) : z;
-  };
+  Loop running(s, loop);
+  constexpr int kDoublings = 6;
   LoopOutcome outcome;
-  Range early, late;
-  for (std::uint64_t i = 0; i < ticks; ++i) {
-    const rendering::LineProbe probe = lowered(loop.rest(), -read(tip.z()), -read(tail.z()));
-    const rendering::Rendering r = renderer.tick(loop.scene(), state, probe, tick);
-    DeviceForces forces{r.device1, r.device2, false};
-    if (s.passivity_controller) {
-      const DeviceForces damping = controller.damping({probe.tip, probe.tail}, forces);
-      forces.device1 += damping.device1;
-      forces.device2 += damping.device2;
-      controller.commanded(forces);
-    }
-    under_way[i % under_way.size()] = {forces.device1.z, forces.device2.z};
-    const auto& now =
-        under_way[(i + under_way.size() - static_cast<std::size_t>(s.delay)) % under_way.size()];
-    tip.advance(now[0] - loop.force_tip());
-    if (renderer.side_contact()) tail.advance(now[1] - loop.force_tail());
-    ++outcome.ticks;
-    const double z = std::abs(tip.z()) > std::abs(tail.z()) ? tip.z() : tail.z();
-    if (!(std::abs(z) < kDiverged)) {
-      outcome.late_amplitude = HUGE_VAL;
-      return outcome;
-    }
-    // Force over stiffness, m: a rotation about the contact is not an oscillation of the contact.
-    Range* const part = i >= ticks / 4 && i < ticks / 2 ? &early
-                        : i >= 3 * ticks / 4            ? &late
-                                                        : nullptr;
-    if (part) part->add((r.device1.z + 0.7 * r.device2.z) / stiffness);
+  for (int doubling = 0; doubling <= kDoublings; ++doubling) {
+    outcome = running.run(std::uint64_t{4} << doubling);
+    const Verdict verdict = verdict_on(outcome, s.linear());
+    outcome.stable = verdict != Verdict::unstable;
+    // What hardly shrinks in a short run may do so in a longer one.
+    if (verdict == Verdict::stable || s.linear() || has_grown(outcome)) break;
   }
-  outcome.early_amplitude = early.size();
-  outcome.late_amplitude = late.size();
-  outcome.stable = outcome.late_amplitude <=
-                   std::max({outcome.early_amplitude, 3 * s.resolution, kRestAmplitude});
   return outcome;
 }
 

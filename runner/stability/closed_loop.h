@@ -2,9 +2,12 @@
 // Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
 // does a contact come to rest or oscillate? For studies, not for the servo.
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "protocols/protocol.h"
+#include "rendering/reach.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 
@@ -26,6 +29,10 @@ struct LoopSettings {
   int delay = 0;          ///< ticks from a reading to its force; 0: within the same tick
   EndImpedance hand;
   bool passivity_controller = false;
+  std::optional<rendering::Reach> reach = std::nullopt;  ///< of the virtual stylus
+
+  /// Forces are linear in the motion while the contact lasts: a swing grows or shrinks for ever.
+  bool linear() const { return friction == 0 && resolution == 0 && !passivity_controller; }
 };
 
 /// The contact that is pressed along -z; each end of the stylus moves along z only.
@@ -61,16 +68,30 @@ class LoopScene {
   int contacts_ = 0;
 };
 
+/// Swings are of the contact (its force over its stiffness), peak to peak, m.
 struct LoopOutcome {
   bool stable = false;
-  double early_amplitude = 0;  ///< m, peak to peak, in the second quarter of the run
-  double late_amplitude = 0;   ///< m, the same in the last quarter
+  double initial_swing = 0;  ///< when it is released
+  double early_swing = 0;    ///< in the second quarter of the run
+  double late_swing = 0;     ///< in the last quarter; infinite where it diverged
+  double floor = 0;          ///< a smaller swing counts as rest
   std::uint64_t ticks = 0;
 };
 
+/// Whether a swing has come to rest, by what remains of it. A limit cycle does not grow any more,
+/// and is no rest: unstable.
+enum class Verdict {
+  stable,
+  unstable,
+  open,  ///< it shrinks, and has to be watched for longer
+};
+Verdict verdict_on(const LoopOutcome& so_far, bool linear);
+
 /// Released 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force that holds
-/// it there. Each end is integrated exactly (matrix exponential) under a force stylus_at_height_0
-/// over the tick. Unstable: the amplitude grows beyond the effect of quantisation.
+/// it there. Each end is integrated exactly (matrix exponential) under a force that is held over
+/// the tick. Stable: what swings in the end is within three steps of the resolution, or within a
+/// hundredth of the initial swing, or still shrinks. It runs 40 periods, and where that does not
+/// tell, up to 64 times as long.
 LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
 
 }  // namespace palpate::runner

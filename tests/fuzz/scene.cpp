@@ -22,7 +22,7 @@ bool small(const palpate::stimuli::ObjectSpec& spec) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const palpate::testing::InputFile file("scene.json");
   try {
-    const auto objects = palpate::protocols::parse_scene(file.write(data, size));
+    const auto objects = palpate::protocols::parse_scene(file.write(data, size)).objects;
     if (objects.size() > 50 || !std::all_of(objects.begin(), objects.end(), small)) return 0;
     palpate::runner::SceneBuilder builder;
     for (const palpate::rendering::Renderer* renderer :

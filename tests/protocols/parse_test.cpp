@@ -59,7 +59,7 @@ std::vector<Fault> faults_of(const std::string& text) {
 
 TEST(Parse, AcceptsGoodFiles) {
   const std::vector<fs::path> files = json_files(kFolder + "good");
-  EXPECT_EQ(files.size(), 3u);
+  EXPECT_EQ(files.size(), 4u);
   for (const fs::path& file : files) EXPECT_NO_THROW(parse(file)) << file;
 }
 
@@ -116,6 +116,10 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(ball.material.friction_static, 0.5);
   EXPECT_EQ(ball.material.friction_dynamic, 0.25);
   ASSERT_EQ(ball.material.layers.size(), 2u);
+  EXPECT_EQ(ball.material.layers[0].damping, 0.5);
+  EXPECT_EQ(ball.material.layers[0].break_force, std::nullopt);
+  EXPECT_EQ(ball.material.layers[1].break_force, 3);
+  EXPECT_EQ(ball.material.layers[1].damping, 0);
   EXPECT_EQ(ball.material.layers[1].depth, 0.002);
   EXPECT_EQ(ball.material.layers[1].stiffness, 900);
   const stimuli::ObjectSpec& hat = p.stimuli[1].object;
@@ -166,6 +170,13 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(p.stylus.grip, 0.05);
   EXPECT_EQ(p.workspace.centre, Vec3(0, 0.01, 0.02));
   EXPECT_EQ(p.workspace.scale, 1.5);
+  ASSERT_EQ(p.tool.segments.size(), 2u);
+  EXPECT_EQ(p.tool.segments[0].to, Vec3(0, 0, 0.1));
+  EXPECT_EQ(p.tool.segments[1].from, Vec3(0));
+  EXPECT_EQ(p.tool.segments[1].to, Vec3(0.01, 0, -0.02));
+  ASSERT_TRUE(p.reach);
+  EXPECT_EQ(p.reach->factor, 5);
+  EXPECT_EQ(p.reach->pivot, ReachSpec::Pivot::tail);
   EXPECT_EQ(p.material.stiffness, 400);
   EXPECT_EQ(p.servo_rate, 2000);
   EXPECT_EQ(p.home.rest, 0.25);
@@ -190,15 +201,36 @@ TEST(Parse, LeavesDefaultsAlone) {
   EXPECT_EQ(p.stimuli[0].object.material.stiffness, 800);
   EXPECT_EQ(p.seed, 0u);
   EXPECT_FALSE(p.order.max_run);
+  EXPECT_TRUE(p.tool.segments.empty());
+  EXPECT_FALSE(p.reach);
 }
 
 TEST(Parse, ReadsAScene) {
-  const std::vector<stimuli::ObjectSpec> objects = parse_scene(kFolder + "good/scene.json");
+  const SceneSpec scene = parse_scene(kFolder + "good/scene.json");
+  EXPECT_TRUE(scene.tool.segments.empty());
+  EXPECT_FALSE(scene.reach);
+  const std::vector<stimuli::ObjectSpec>& objects = scene.objects;
   ASSERT_EQ(objects.size(), 3u);
   EXPECT_EQ(objects[0].shape, stimuli::ShapeKind::cube);
   EXPECT_EQ(objects[0].edge, 0.05);
   EXPECT_EQ(objects[1].file, kFolder + "good/tetrahedron.obj");
   EXPECT_EQ(objects[2].parts.size(), 1u);
+}
+
+TEST(Parse, ReadsASceneWithToolReachAndLayers) {
+  const SceneSpec scene = parse_scene(kFolder + "good/scene-tool.json");
+  ASSERT_EQ(scene.objects.size(), 1u);
+  const stimuli::Material& material = scene.objects[0].material;
+  EXPECT_EQ(material.stiffness, 0);  // felt underneath only
+  ASSERT_EQ(material.layers.size(), 2u);
+  EXPECT_EQ(material.layers[0].break_force, std::nullopt);  // null: it holds
+  EXPECT_EQ(material.layers[1].break_force, 2.5);
+  ASSERT_EQ(scene.tool.segments.size(), 2u);
+  EXPECT_EQ(scene.tool.segments[1].to, Vec3(0.02, 0, -0.01));
+  ASSERT_TRUE(scene.reach);
+  EXPECT_EQ(scene.reach->factor, 5);
+  EXPECT_EQ(scene.reach->pivot, ReachSpec::Pivot::point);
+  EXPECT_EQ(scene.reach->point, Vec3(0, 0.1, 0));
 }
 
 TEST(Parse, SaysWhereAndWhat) {

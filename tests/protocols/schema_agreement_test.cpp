@@ -49,6 +49,15 @@ void collect(const json& object, const json& root, const std::string& place,
   if (element.contains("properties")) collect(element, root, place + "/0", out);
 }
 
+/// Keys beside the objects: at the top of a scene, and likewise of a protocol.
+std::map<std::string, json> keys_of_tool_and_reach() {
+  const json root = schema("scene.schema.json");
+  std::map<std::string, json> keys;
+  for (const char* key : {"tool", "reach"})
+    collect(root.at("$defs").at(key), root, std::string("/") + key, keys);
+  return keys;
+}
+
 std::map<std::string, json> keys_of_a_protocol() {
   const json root = schema("protocol.schema.json");
   std::map<std::string, json> keys;
@@ -75,9 +84,16 @@ std::map<std::string, json> keys_of_an_object() {
 
 json values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
+template <class T>
+json value_or_null(const std::optional<T>& value) {
+  return value ? json(*value) : json();
+}
+
 json values(const stimuli::Material& m) {
   json layers;
-  for (const stimuli::Layer& layer : m.layers) layers.push_back({layer.depth, layer.stiffness});
+  for (const stimuli::Layer& layer : m.layers)
+    layers.push_back(
+        {layer.depth, layer.stiffness, layer.damping, value_or_null(layer.break_force)});
   return {m.stiffness, m.damping, m.friction_static, m.friction_dynamic, layers};
 }
 
@@ -96,11 +112,6 @@ json values(const stimuli::ObjectSpec& o) {
           values(o.pose.position),
           {q.w, q.x, q.y, q.z},
           values(o.material)};
-}
-
-template <class T>
-json value_or_null(const std::optional<T>& value) {
-  return value ? json(*value) : json();
 }
 
 json values(const Protocol& p) {
@@ -138,6 +149,9 @@ json values(const Protocol& p) {
               p.texts.other_key,
               p.samples,
               p.seed};
+  if (p.reach) all.push_back({p.reach->factor, p.reach->pivot, values(p.reach->point)});
+  for (const ToolSegmentSpec& segment : p.tool.segments)
+    all.push_back({values(segment.from), values(segment.to)});
   if (p.masking_noise) all.push_back({p.masking_noise->kind, p.masking_noise->level_db});
   for (const StimulusSpec& stimulus : p.stimuli) all.push_back(values(stimulus.object));
   return all;
@@ -150,8 +164,11 @@ json other_value(const json& key) {
   const json& usual = key["default"];
   for (const json& word : key.value("enum", json::array()))
     if (word != usual) return word;
+  if (key.contains("anyOf"))
+    for (const json& word : key["anyOf"][0]["enum"])
+      if (word != usual) return word;
   if (usual.is_boolean()) return !usual.get<bool>();
-  if (usual.is_string()) return key.contains("anyOf") ? "fixed" : "another text";
+  if (usual.is_string()) return "another text";
   if (usual.is_null()) return std::min(2, key.value("maximum", 2));
   if (usual == json::array()) return json::parse(R"([{"depth_m": 0.001, "stiffness_n_per_m": 9}])");
   if (usual.is_array()) return usual.size() == 4 ? json{0, 1, 0, 0} : json{0.5, 0, 0};
@@ -160,11 +177,12 @@ json other_value(const json& key) {
 }
 
 const json kShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
-  "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02},
+  "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02,
+               "layers": [{"depth_m": 0.001, "stiffness_n_per_m": 100}]},
               {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03},
               {"name": "c", "shape": "cube", "edge_m": 0.02},
               {"name": "d", "shape": "box", "size_m": [0.02, 0.02, 0.02]}],
-  "repetitions": 10, "practice": {"repetitions": 1}, "masking_noise": {},
+  "repetitions": 10, "reach": {"factor": 2}, "practice": {"repetitions": 1}, "masking_noise": {},
   "response": {"keys": {"1": "a", "2": "b", "3": "c", "4": "d"}}})");
 
 void expect_default(const std::string& place, const json& key) {
@@ -200,7 +218,11 @@ int expect_defaults(const std::map<std::string, json>& keys) {
 
 TEST(Defaults, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_a_protocol()), 33); }
 
-TEST(Defaults, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_an_object()), 8); }
+TEST(Defaults, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_an_object()), 10); }
+
+TEST(Defaults, OfToolAndReachAreTheSchemas) {
+  EXPECT_GE(expect_defaults(keys_of_tool_and_reach()), 1);
+}
 
 TEST(Defaults, OfASectionThatIsLeftOutAreThoseOfAnEmptyOne) {
   for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
@@ -293,7 +315,11 @@ int expect_bounds(const std::map<std::string, json>& keys) {
 
 TEST(Bounds, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_a_protocol()), 40); }
 
-TEST(Bounds, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_an_object()), 16); }
+TEST(Bounds, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_an_object()), 24); }
+
+TEST(Bounds, OfToolAndReachAreTheSchemas) {
+  EXPECT_GE(expect_bounds(keys_of_tool_and_reach()), 6);
+}
 
 }  // namespace
 }  // namespace palpate::protocols

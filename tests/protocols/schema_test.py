@@ -14,8 +14,8 @@ import jsonschema
 PROGRAM_ONLY = {
     "compounds-too-deep", "friction-static-below-dynamic", "grip-off-the-stylus", "key-for-unknown",
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
-    "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key",
-    "too-many-trials", "two-keys",
+    "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
+    "too-many-trials", "tool-segment-without-length", "two-keys",
 }
 # The same, of sweep spaces.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "values-set-twice"}

@@ -1,6 +1,9 @@
+#include <glm/geometric.hpp>
 #include <iostream>
+#include <optional>
 
 #include "protocols/parse.h"
+#include "protocols/protocol.h"
 #include "runner/commands/render/explain.h"
 #include "runner/commands/render/trajectory_csv.h"
 #include "runner/commands/shared/command.h"
@@ -13,11 +16,10 @@ namespace {
 
 namespace po = boost::program_options;
 
-rendering::Scene build_scene(const std::string& path,
-                             const std::vector<stimuli::ObjectSpec>& objects,
+rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
                              const rendering::Renderer& renderer) {
   try {
-    return SceneBuilder().build(objects, renderer.side_contact());
+    return SceneBuilder().build(spec.objects, renderer.side_contact(), tool_of(spec.tool));
   } catch (const stimuli::MeshError& error) {
     std::vector<std::string> faults;
     for (const std::string& fault : error.faults()) {
@@ -42,13 +44,27 @@ void explain_scene(Outputs& outputs, const rendering::Scene& scene,
   outputs.write();
 }
 
-ForceTable forces_along(const rendering::Scene& scene, const rendering::Renderer& renderer,
-                        const std::vector<TimedPose>& poses) {
+/// One tick of a stylus that reaches farther than it is long.
+rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
+                                   const rendering::Renderer& renderer,
+                                   const protocols::ReachSpec& spec,
+                                   const rendering::LineProbe& real, double dt) {
+  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
+  const rendering::Reach reach = reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
+  return felt(reach, renderer.tick(scene, state, stretched(reach, real), dt));
+}
+
+ForceTable forces_along(const rendering::Scene& scene,
+                        const std::optional<protocols::ReachSpec>& reach,
+                        const rendering::Renderer& renderer, const std::vector<TimedPose>& poses) {
   rendering::RenderState state = scene.initial_state();
-  ForceTable table;
+  ForceTable table(scene.tool() != nullptr);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
-    table.add(poses[i], renderer.tick(scene, state, poses[i].probe, dt));
+    state.measured_side = poses[i].side;
+    table.add(poses[i], reach
+                            ? extended_tick(scene, state, renderer, *reach, poses[i].probe, dt)
+                            : renderer.tick(scene, state, poses[i].probe, dt));
   }
   return table;
 }
@@ -73,7 +89,7 @@ int render_command(const std::vector<std::string>& args) {
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
        (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
-        " (s, m); at most " + std::to_string(kMostPoses) + " rows")
+        " (s, m), and for a tool's +x " + (kSideHeader + 1) + "; at most " + std::to_string(kMostPoses) + " rows")
            .c_str())                                                                              //
       ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
       ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
@@ -94,18 +110,18 @@ int render_command(const std::vector<std::string>& args) {
   const std::string scene_path = (*values)["scene"].as<std::string>();
   Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
-    const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
-    for (const stimuli::ObjectSpec& object : objects) outputs.protect(object);
-    explain_scene(outputs, build_scene(scene_path, objects, renderer), renderer);
+    const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
+    for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
+    explain_scene(outputs, build_scene(scene_path, spec, renderer), renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
   given(*values, "out", "unless --explain is given");
-  const std::vector<stimuli::ObjectSpec> objects = protocols::parse_scene(scene_path);
-  for (const stimuli::ObjectSpec& object : objects) outputs.protect(object);
+  const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
+  for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
   const ForceTable table =
-      forces_along(build_scene(scene_path, objects, renderer), renderer, poses);
+      forces_along(build_scene(scene_path, spec, renderer), spec.reach, renderer, poses);
   outputs.put("out", table.text());
   outputs.write();
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));

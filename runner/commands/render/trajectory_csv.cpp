@@ -18,7 +18,8 @@ constexpr const char* kForceHeader =
     "t,force_x,force_y,force_z,torque_x,torque_y,torque_z,ideal_tip_x,ideal_tip_y,ideal_tip_z,"
     "ideal_tail_x,ideal_tail_y,ideal_tail_z,contact_x,contact_y,contact_z,device1_x,device1_y,"
     "device1_z,"
-    "device2_x,device2_y,device2_z,depth,contacts,contact_type,object,faults";
+    "device2_x,device2_y,device2_z,depth,contacts,contact_type,object,";
+constexpr const char* kToolHeader = "segment,ideal_side_x,ideal_side_y,ideal_side_z,";
 
 analysis::CsvReader open(const std::string& path) {
   try {
@@ -38,11 +39,14 @@ std::string joined(const std::vector<std::string_view>& fields) {
   return line;
 }
 
-/// The seven numbers of a row. Empty where it holds anything else.
-std::optional<std::array<double, 7>> seven_numbers(const std::vector<std::string_view>& fields) {
-  std::array<double, 7> out{};
-  if (fields.size() != out.size()) return std::nullopt;
-  for (std::size_t i = 0; i < out.size(); ++i) {
+constexpr std::size_t kPoseColumns = 7, kSideColumns = 3;
+
+/// The numbers of a row, zero beyond the first `count`. Empty where it holds anything else.
+std::optional<std::array<double, kPoseColumns + kSideColumns>> numbers_of(
+    const std::vector<std::string_view>& fields, std::size_t count) {
+  std::array<double, kPoseColumns + kSideColumns> out{};
+  if (fields.size() != count) return std::nullopt;
+  for (std::size_t i = 0; i < count; ++i) {
     const char* const end = fields[i].data() + fields[i].size();
     const auto [stop, error] = std::from_chars(fields[i].data(), end, out[i]);
     if (error != std::errc{} || stop != end) return std::nullopt;
@@ -77,24 +81,30 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
   analysis::CsvReader reader = open(path);
   std::vector<TimedPose> poses;
   std::vector<protocols::Fault> faults;
-  bool header = false;
+  std::size_t columns = 0;  // known from the header on
   while (faults.size() < kFaultsShown && reader.next()) {
     const std::string place = "line " + std::to_string(reader.line());
     if (!reader.fault().empty()) {
       faults.push_back({path, place, reader.fault()});
       continue;
     }
-    if (!header) {
-      if (joined(reader.fields()) != kTrajectoryHeader) {
+    if (columns == 0) {
+      const std::string header = joined(reader.fields());
+      const bool sides = header == std::string(kTrajectoryHeader) + kSideHeader;
+      if (header != kTrajectoryHeader && !sides) {
         throw protocols::InputError(
-            {{path, place, std::string("expected the header ") + kTrajectoryHeader}});
+            {{path, place,
+              std::string("expected the header ") + kTrajectoryHeader +
+                  (header.find("side") == std::string::npos
+                       ? ""
+                       : std::string(", with or without ") + kSideHeader + " after it")}});
       }
-      header = true;
+      columns = kPoseColumns + (sides ? kSideColumns : 0);
       continue;
     }
-    const auto values = seven_numbers(reader.fields());
+    const auto values = numbers_of(reader.fields(), columns);
     if (!values) {
-      faults.push_back({path, place, "expected seven numbers"});
+      faults.push_back({path, place, columns == kPoseColumns ? "expected seven numbers" : "expected ten numbers"});
       continue;
     }
     const auto& v = *values;
@@ -108,7 +118,8 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
                             " rows; split the path into several files"});
       break;
     } else {
-      poses.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}, reader.line()});
+      poses.push_back(
+          {v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}, {v[7], v[8], v[9]}, reader.line()});
     }
   }
   if (faults.size() == kFaultsShown) {
@@ -121,8 +132,10 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
   return poses;
 }
 
-ForceTable::ForceTable()
-    : text_(std::string(kForceHeader) + '\n'), seen_(rendering::kRenderFaults.size()) {}
+ForceTable::ForceTable(bool tool)
+    : tool_(tool),
+      text_(std::string(kForceHeader) + (tool ? kToolHeader : "") + "faults\n"),
+      seen_(rendering::kRenderFaults.size()) {}
 
 void ForceTable::add(const TimedPose& pose, const rendering::Rendering& r) {
   ++rows_;
@@ -134,7 +147,12 @@ void ForceTable::add(const TimedPose& pose, const rendering::Rendering& r) {
   text_ += ',';
   append(text_, r.deepest.depth);
   text_ += ',' + std::to_string(r.contacts) + ',' + rendering::to_string(r.deepest.type) + ',' +
-           std::to_string(r.object) + ',' + names_of(r.faults) + '\n';
+           std::to_string(r.object);
+  if (tool_) {
+    text_ += ',' + std::to_string(r.segment);
+    append(text_, r.ideal_side);
+  }
+  text_ += ',' + names_of(r.faults) + '\n';
   for (std::size_t i = 0; i < rendering::kRenderFaults.size(); ++i) {
     if ((r.faults & rendering::kRenderFaults[i].bit) == 0) continue;
     if (seen_[i].ticks++ == 0) seen_[i].first_line = pose.line;

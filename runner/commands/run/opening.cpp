@@ -94,7 +94,7 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
       window.texts.push_back(protocols::answer_label(protocol, name));
     window.emergency = emergency;
     window.mouse = dynamic_cast<MouseStylus*>(&device);
-    window.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+    window.workspace = workspace_of(protocol);
     window.clock = &clock;
     try {
       auto windows = make_windows(window);

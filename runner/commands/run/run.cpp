@@ -60,7 +60,7 @@ class ZeroOnSignal {
 ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
   ServoSettings settings;
   settings.rate = protocol.servo_rate;
-  settings.workspace = {protocol.workspace.centre, protocol.workspace.scale};
+  settings.workspace = workspace_of(protocol);
   settings.passivity_controller = protocol.passivity_controller;
   return settings;
 }

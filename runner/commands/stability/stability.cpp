@@ -77,6 +77,15 @@ std::vector<BoundaryCurve> map_curves() {
     loop.settings.hand = hand.impedance;
     out.push_back(curve("hand, wall", hand.name, loop));
   }
+  LoopCase layered;
+  layered.layer_share = 1;
+  out.push_back(curve("layers and reach, wall", "a layer as stiff as the surface", layered));
+  for (const double fraction : {1.0, 0.5}) {
+    LoopCase far;
+    far.settings.reach = rendering::Reach{.factor = 5, .fraction = fraction};
+    out.push_back(curve("layers and reach, wall",
+                        fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle", far));
+  }
   struct Device {
     const char* name;
     double friction, resolution;

@@ -217,6 +217,45 @@ class Render(FromOutside):
             self.assertEqual([float(row["force_z"]) > 0 for row in rows], [False, False, False, False, True])
             self.assertIn("non-finite in 3 of 5 rows, first on line 3", done.stderr)
 
+    def test_the_extended_probe_does_the_work_of_its_contact(self):
+        cube = self.CUBE[:-1]
+        real = [[0, 0.3, 0, 0.046, 0.42, 0, 0.05], [0.001, 0.3, 0, 0.0345, 0.42, 0, 0.0385]]
+        plain, far = (self.render(cube + more + "}", "ray", real)[1]
+                      for more in ("", ', "reach": {"factor": 5, "pivot": "tail"}'))
+        self.assertEqual(plain["contacts"], 0)
+        self.assertEqual(far["contacts"], 1)
+        # The same with the virtual stylus given: five times as long, from the same tail.
+        virtual = [[t, *(t5 - 5 * (t5 - t1) for t1, t5 in zip(row[:3], row[3:])), *row[3:]] for t, *row in real]
+        held = self.render(cube + "}", "ray", virtual)[1]
+        for k in "xyz":
+            for name in ("force", "torque", "ideal_tip", "contact"):
+                self.assertAlmostEqual(far[f"{name}_{k}"], held[f"{name}_{k}"], 12)
+            self.assertAlmostEqual(far[f"device1_{k}"], 5 * held[f"device1_{k}"], 12)
+            self.assertAlmostEqual(far[f"device2_{k}"], held[f"device2_{k}"] - 4 * held[f"device1_{k}"], 12)
+        # About the grip, 0.06 m from the tip along the stylus where nothing else is said.
+        grip = self.render(cube + ', "reach": {"factor": 7}}', "ray", real)[0]
+        length = (0.12 ** 2 + 0.004 ** 2) ** 0.5
+        at = 0.3 + 0.06 * 0.12 / length
+        self.assertAlmostEqual(grip["ideal_tip_x"], at - 7 * (at - 0.3), 12)
+        self.assertAlmostEqual(grip["ideal_tail_x"], at + 7 * (0.42 - at), 12)
+
+    def test_sides_come_with_three_columns_or_none(self):
+        scene, out = self.write("scene.json", self.CUBE), self.dir / "out.csv"
+        for header, row, words in (("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z,side_x,side_y", "0,0,0,1,0,0,2,1,0", "side_z"),
+                                   (self.HEADER.strip() + ",side_x,side_y,side_z", "0,0,0,1,0,0,2", "ten numbers"),
+                                   (self.HEADER.strip(), "0,0,0,1,0,0,2,1,0,0", "seven numbers")):
+            path = self.write("path.csv", f"{header}\n{row}\n")
+            done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", out, status=2)
+            self.assertIn(words, done.stderr)
+
+    def test_a_layer_that_nothing_is_left_for_is_refused_with_the_depth_that_is_possible(self):
+        layers = '[{"depth_m": 0.02, "stiffness_n_per_m": 100}, {"depth_m": 0.025, "stiffness_n_per_m": 100}]'
+        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": 0.05, "layers": ' + layers + "}]}")
+        done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain", status=2)
+        self.assertIn("/objects/0/layers/1/depth_m: nothing of the object is left at a depth of 0.025 m", done.stderr)
+        self.assertIn("expected less than 0.025 m", done.stderr)
+        self.assertNotIn("layers/0", done.stderr)
+
     def test_forty_objects_are_felt_and_no_fault(self):
         cube = '{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 100}'
         scene = '{"objects": [' + ", ".join([cube] * 40) + "]}"

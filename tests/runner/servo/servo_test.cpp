@@ -281,6 +281,46 @@ TEST(Servo, TheWorkspaceMapMovesAndScales) {
   EXPECT_NEAR(device.force.z, 0.8, 1e-9);
 }
 
+TEST(Servo, AReachStretchesTheStylusAndGivesTheHandTheWorkOfTheContact) {
+  // The real stylus stays 0.4 m above: its tip is 0.48 m nearer to the cube, at twice its height.
+  FakeDevice device([](int tick) {
+    DeviceReading r = come_down(tick, 0.029);
+    r.stylus.tip.z += 0.48;
+    r.stylus.tail.z += 0.48;
+    return r;
+  });
+  VirtualClock clock;
+  const rendering::Reach by_tail{.factor = 5, .fraction = 1};
+  Servo servo(device, clock, 1000, ForceLimits{}, {{}, 1, by_tail});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
+  Sample sample;
+  for (int tick = 0; tick < 3000; ++tick) sample = servo.tick();
+  EXPECT_NEAR(sample.probe.tip.z, 0.029, 1e-12);
+  EXPECT_NEAR(sample.probe.tail.z, 0.629, 1e-12);
+  EXPECT_NEAR(device.last1.z, 5 * 0.8, 1e-9);
+  EXPECT_NEAR(device.last2.z, -4 * 0.8, 1e-9);
+  EXPECT_NEAR(sample.rendering.force.z, 0.8, 1e-9);
+}
+
+TEST(Servo, AToolWaitsForTheHomeZoneWithAllOfItself) {
+  rendering::Tool hook{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, 0, 0}, {0, 0, -0.05}}}};
+  const auto first_force = [&](const rendering::Tool& tool, double height) {
+    FakeDevice device([&](int) { return stylus_at(height); });
+    VirtualClock clock;
+    Servo servo(device, clock, 1000, ForceLimits{});
+    const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
+                                   Pose{}, stimuli::Material{}, 0, nullptr}},
+                                 true, tool);
+    servo.prepare(scene, rendering::ray_renderer(), HomeZone{});
+    for (int tick = 0; tick < 1000; ++tick)
+      if (servo.tick().phase == Phase::feeling) return tick;
+    return -1;
+  };
+  EXPECT_EQ(first_force({}, 0.1), 499);
+  EXPECT_EQ(first_force(hook, 0.1), -1);  // its hook reaches down to 0.05 m, and the zone to 0.062
+  EXPECT_EQ(first_force(hook, 0.112), 499);
+}
+
 TEST(ForceLimiter, RampsUpCutsSizeAndChange) {
   ForceLimiter limiter({6, 0.5, 0.2}, 1e-3);
   DeviceForces out;

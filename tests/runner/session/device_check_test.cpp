@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "stimuli/object_spec.h"
 
 namespace palpate::runner {
@@ -80,10 +82,85 @@ TEST(DeviceCheck, WhatIsNotKnownOfADeviceDoesNotBound) {
   EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
 }
 
+/// Of a layer with 2 N s/m that a device shows by a quarter.
+double limited_layer_damping() {
+  stimuli::Material material = of(1000);
+  material.layers = {{1e-3, 3000, 2}};
+  protocols::Protocol protocol = some_protocol(material);
+  protocol.material_limit = protocols::MaterialLimit::limit;
+  limit_materials(protocol, some_device());
+  return std::round(1e9 * protocol.stimuli[0].object.material.layers[0].damping) / 1e9;
+}
+
+TEST(DeviceCheck, WhatAReachMakesTheHandFeelIsWhatIsLimited) {
+  protocols::Protocol protocol = some_protocol(of(100));
+  EXPECT_EQ(felt_gain(protocol), 1);
+  protocol.reach = {.factor = 5, .pivot = protocols::ReachSpec::Pivot::point};
+  EXPECT_DOUBLE_EQ(felt_gain(protocol), 25);
+  protocol.workspace.scale = 2;
+  EXPECT_DOUBLE_EQ(felt_gain(protocol), 50);
+  protocol.workspace.scale = 1;
+  protocol.reach->pivot = protocols::ReachSpec::Pivot::grip;  // a hand that turns about the grip
+  EXPECT_DOUBLE_EQ(felt_gain(protocol), 25);
+  protocol.reach->pivot = protocols::ReachSpec::Pivot::tail;  // 5 of the tip less 4 of the tail
+  EXPECT_DOUBLE_EQ(felt_gain(protocol), 41);
+  protocol.workspace.centre = {0, 0.5, 0};
+  const auto refused = incompatibilities(protocol, StimulusLibrary(protocol), some_device());
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_NE(refused[0].find("100 N/m (4100 N/m at the hand)"), std::string::npos)
+      << refused[0];
+  EXPECT_NE(refused[0].find("lessen /reach/factor"), std::string::npos) << refused[0];
+  protocol.material_limit = protocols::MaterialLimit::limit;
+  ASSERT_EQ(limit_materials(protocol, some_device()).size(), 1u);
+  EXPECT_NEAR(protocol.stimuli[0].object.material.stiffness, 2000 / 41.0, 1e-9);
+  EXPECT_TRUE(incompatibilities(protocol, StimulusLibrary(protocol), some_device()).empty());
+}
+
+TEST(DeviceCheck, AToolBeyondTheStylusIsALeverToo) {
+  protocols::Protocol protocol = some_protocol(of(100));
+  protocol.tool.segments = {{{0, 0, 0}, {0, 0, 0.12}}};
+  EXPECT_EQ(felt_gain(protocol), 1);
+  protocol.tool.segments.push_back({{0, 0, 0}, {0, 0, -0.12}});
+  EXPECT_EQ(felt_gain(protocol), 1) << "a point is touched at the tip";
+  protocol.renderers = {protocols::RendererKind::ray};
+  EXPECT_DOUBLE_EQ(felt_gain(protocol), 4 + 1);  // as far beyond the tip as the tail is behind it
+}
+
+TEST(DeviceCheck, AStimulusStandsWhereTheVirtualTipGets) {
+  protocols::Protocol protocol = some_protocol(of(1));
+  protocol.reach = {.factor = 5, .pivot = protocols::ReachSpec::Pivot::tail};
+  DeviceCapabilities device = some_device();
+  device.workspace_radius = 0.1;
+  const StimulusLibrary library(protocol);
+  const double radius = library.reach(0) + protocol.home.margin;  // 0.04 m
+  const auto fits = [&](double distance) {
+    protocol.workspace.centre = {0, distance, 0};
+    return incompatibilities(protocol, library, device).empty();
+  };
+  // The virtual stylus of 0.6 m has its tail in the hand, 0.06 m behind the grip.
+  EXPECT_TRUE(fits(0.54));
+  EXPECT_TRUE(fits(0.64 - radius));
+  EXPECT_FALSE(fits(0.64 - radius + 1e-6));
+  EXPECT_TRUE(fits(0.44 + radius));
+  EXPECT_FALSE(fits(0.44 + radius - 1e-6));
+  EXPECT_FALSE(fits(0));
+  protocol.reach->pivot = protocols::ReachSpec::Pivot::point;
+  protocol.reach->point = {0, 0, 0};  // the stimulus itself: the workspace is five times as wide
+  EXPECT_TRUE(fits(0.1 - radius / 5));
+  EXPECT_FALSE(fits(0.1 - radius / 5 + 1e-6));
+  device.sensed_freedom = 3;
+  EXPECT_TRUE(fits(0));
+  protocol.reach->pivot = protocols::ReachSpec::Pivot::grip;
+  EXPECT_FALSE(fits(0.3)) << "without its direction no stylus can be stretched about its grip";
+}
+
 TEST(DeviceCheck, LayersAndPartsCount) {
   stimuli::Material layered = of(1000);
-  layered.layers = {{1e-3, 4000}};
-  EXPECT_NEAR(share(layered, some_device()), 0.5, 1e-12);
+  layered.layers = {{1e-3, 2000}, {2e-3, 1000}};
+  EXPECT_NEAR(share(layered, some_device()), 0.5, 1e-12) << "who presses deep feels the sum";
+  layered.layers[0].damping = 2;
+  EXPECT_NEAR(share(layered, some_device()), 0.25, 1e-12);
+  EXPECT_EQ(limited_layer_damping(), 0.5);
 
   protocols::Protocol protocol = some_protocol(of(500));
   stimuli::ObjectSpec part;

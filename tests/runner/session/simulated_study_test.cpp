@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +18,7 @@
 #include "data/export/csv.h"
 #include "protocols/parse.h"
 #include "protocols/sha256.h"
+#include "runner/session/replay_comparison.h"
 #include "stimuli/random.h"
 
 namespace palpate::runner {
@@ -225,6 +227,59 @@ TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
       },
       true);
   EXPECT_GE(trials, 48);
+}
+
+// Through a stylus that reaches five times as far as it is long.
+TEST_F(SimulatedStudy, ExploresAnObjectHalfAMetreAwayAndReplaysItToTheBit) {
+  protocols::Protocol p = protocol(
+      R"(, "samples": true, "reach": {"factor": 5, "pivot": "tail"},
+      "stylus": {"length_m": 0.1, "grip_m": 0.05}, "workspace": {"centre_m": [0, 0.45, 0]},
+      "servo": {"material_limit": "limit"})");
+  limit_for_simulation(p, load_simulated_settings(""));
+  EXPECT_LT(p.stimuli[0].object.material.stiffness, 800 / 25.0) << "a lever of 5 is felt 25 times";
+  simulate(p, folder_ / "far.db", 2);
+  data::Store store = data::Store::open(folder_ / "far.db", data::Store::Mode::read_only);
+  int trials = 0, touched = 0;
+  store.for_each_trial(
+      [&](const data::StoredTrial& trial) {
+        ++trials;
+        touched += trial.record.first_contact_time.has_value();
+        const data::SampleRecord& first = trial.record.samples.front();
+        const auto& a = first.tip;
+        const auto& b = first.tail;
+        // The virtual stylus is on record: half a metre long, its tail within the hand's workspace.
+        EXPECT_NEAR(std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]), 0.5, 1e-3);
+        EXPECT_LT(std::hypot(b[0], b[1] + 0.45, b[2]), 0.25 + 0.06);
+        if (trial.record.trial % 5 == 0) {
+          const ReplayComparison again = compare_with_record(p, trial.record, false);
+          EXPECT_EQ(again.equal_ticks, trial.record.samples.size());
+        }
+      },
+      true);
+  EXPECT_GE(trials, 48);
+  EXPECT_GT(touched, trials / 2);
+}
+
+// The roll of a tool is carried along from tick to tick, and is not on record: a replay finds it.
+TEST_F(SimulatedStudy, ReplaysABentToolAndLayersToTheBit) {
+  const protocols::Protocol p = protocol(
+      R"(, "samples": true, "tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.12]},
+      {"from_m": [0, 0, 0], "to_m": [0.015, 0, -0.005]}]},
+      "material": {"stiffness_n_per_m": 300, "layers":
+        [{"depth_m": 0.001, "stiffness_n_per_m": 200, "break_n": 0.2}, {"depth_m": 0.002, "stiffness_n_per_m": 300}]})");
+  simulate(p, folder_ / "bent.db", 2);
+  data::Store store = data::Store::open(folder_ / "bent.db", data::Store::Mode::read_only);
+  int trials = 0, contacts = 0;
+  store.for_each_trial(
+      [&](const data::StoredTrial& trial) {
+        if (++trials % 4 != 0) return;
+        const ReplayComparison again = compare_with_record(p, trial.record, false);
+        EXPECT_EQ(again.equal_ticks, trial.record.samples.size());
+        for (const data::SampleRecord& sample : trial.record.samples) contacts += sample.contacts;
+      },
+      true);
+  EXPECT_GE(trials, 48);
+  EXPECT_GT(contacts, 1000);
 }
 
 TEST_F(SimulatedStudy, RefusesWhatTheDeviceOrTheParticipantCannotDo) {

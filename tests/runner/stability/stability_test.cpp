@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "runner/servo/passivity.h"
 #include "runner/stability/boundary.h"
@@ -65,6 +66,77 @@ TEST(Stability, HoldsWhereTheoryPromisesPassivity) {
                                << " of " << p.theory;
     }
   }
+}
+
+// What the hand feels of a layer and of a lever is what theory asks damping for: K is the sum of
+// the stiffnesses at the depth of the contact, times the square of the lever at both ends.
+TEST(Stability, LayersAndLeversBecomeUnstableWhereTheFeltStiffnessDoes) {
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
+    LoopCase layered;
+    layered.renderer = renderer;
+    layered.heavy = true;
+    layered.layer_share = 2;
+    const BoundaryPoint deep = boundary_at(layered, 1000);
+    EXPECT_DOUBLE_EQ(deep.theory, 3000 * 1e-3 / 2);
+    EXPECT_NEAR(deep.measured / deep.theory, 1, 0.02);
+  }
+  for (const auto& [fraction, gain] : {std::pair(1.0, 25.0 + 16.0), std::pair(0.5, 9.0 + 4.0)}) {
+    LoopCase far;
+    far.heavy = true;
+    far.settings.reach = rendering::Reach{.factor = 5, .fraction = fraction};
+    const BoundaryPoint p = boundary_at(far, 100);
+    EXPECT_NEAR(p.theory, 100 * gain * 1e-3 / 2, 1e-12);
+    EXPECT_NEAR(p.measured / p.theory, 1, 0.02) << fraction;
+  }
+}
+
+// A constructed loop that neither grows nor shrinks in the end: no rest, however long it lasts.
+TEST(Stability, ALimitCycleIsUnstableWhateverItsAmplitude) {
+  LoopOutcome cycle;
+  cycle.initial_swing = 2e-4;
+  cycle.floor = 2e-6;
+  for (const double amplitude : {3e-6, 1e-4, 3.26e-3}) {
+    cycle.early_swing = cycle.late_swing = amplitude;
+    EXPECT_EQ(verdict_on(cycle, false), Verdict::unstable) << amplitude;
+    cycle.late_swing = 0.999 * amplitude;  // a hair less is chance
+    EXPECT_EQ(verdict_on(cycle, false), Verdict::unstable) << amplitude;
+  }
+  cycle.early_swing = cycle.late_swing = 1.9e-6;
+  EXPECT_EQ(verdict_on(cycle, false), Verdict::stable) << "within the floor";
+  cycle.early_swing = 1e-4;
+  cycle.late_swing = 1e-5;
+  EXPECT_EQ(verdict_on(cycle, false), Verdict::open) << "it shrinks, and may stop at a cycle";
+  EXPECT_EQ(verdict_on(cycle, true), Verdict::stable) << "what is linear shrinks for ever";
+  cycle.early_swing = cycle.late_swing = 3.26e-3;
+  EXPECT_EQ(verdict_on(cycle, true), Verdict::unstable) << "the contact is lost and found again";
+}
+
+// The swing of 3.26 mm that once counted as stable, and what lies about it.
+TEST(Stability, TheControllersLoopSwingsOnAboveItsBoundaryAndNowhereBelow) {
+  LoopSettings settings;
+  settings.passivity_controller = true;
+  const auto run = [&](double stiffness) {
+    stimuli::Material material;
+    material.stiffness = stiffness;
+    return run_loop(settings,
+                    LoopScene(ContactCase::wall, protocols::RendererKind::point, material));
+  };
+  const LoopOutcome swinging = run(1.19e5);
+  EXPECT_FALSE(swinging.stable);
+  EXPECT_GT(swinging.late_swing, 1e-3);
+  int changes = 0;
+  bool before = true;
+  for (double stiffness = 500; stiffness < 3e5; stiffness *= 1.07) {
+    const LoopOutcome outcome = run(stiffness);
+    changes += outcome.stable != before;
+    before = outcome.stable;
+    if (outcome.stable) {
+      EXPECT_LE(outcome.late_swing, outcome.floor);
+    }
+  }
+  EXPECT_FALSE(before);
+  EXPECT_EQ(changes, 1) << "stable up to a stiffness, unstable from it on";
 }
 
 TEST(Stability, EachCaseTouchesItsObjects) {
