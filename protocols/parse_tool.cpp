@@ -44,8 +44,7 @@ void read_tool(ObjectReader& reader, ToolSpec& tool) {
       const std::size_t before = faults.count();
       ObjectReader item((*list)[i], pointer, faults);
       const ToolSegmentSpec segment = read_segment(item);
-      if (faults.count() == before &&
-          !(glm::distance(segment.from, segment.to) >= kShortest)) {
+      if (faults.count() == before && !(glm::distance(segment.from, segment.to) >= kShortest)) {
         faults.add(item.pointer("to_m"),
                    "expected another point than from_m, at least 1e-6 m from it: a segment has a "
                    "length");
@@ -69,9 +68,9 @@ void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach) {
                   {{"grip", ReachSpec::Pivot::grip}, {"tail", ReachSpec::Pivot::tail}},
                   section.faults());
     } else {
-      section.faults().add(section.pointer("pivot"),
-                           "expected 'grip', 'tail' or a point [x, y, z] of the world" +
-                               found_text(*pivot));
+      section.faults().add(
+          section.pointer("pivot"),
+          "expected 'grip', 'tail' or a point [x, y, z] of the world" + found_text(*pivot));
     }
   });
 }

@@ -15,8 +15,8 @@ namespace palpate::rendering {
 struct Reach {
   double factor = 1;      ///< virtual length by real length, above 0
   bool in_world = false;  ///< the pivot stands still in the world; else it is carried by the stylus
-  double fraction = 0;    ///< of the stylus, where it carries the pivot: 0 at the tip, 1 at the tail
-  Vec3 point{0, 0, 0};    ///< m, of a pivot in the world
+  double fraction = 0;  ///< of the stylus, where it carries the pivot: 0 at the tip, 1 at the tail
+  Vec3 point{0, 0, 0};  ///< m, of a pivot in the world
 
   Vec3 pivot(const LineProbe& real) const {
     return in_world ? point : (1 - fraction) * real.tip + fraction * real.tail;
@@ -54,8 +54,8 @@ inline EndForces felt(const Reach& reach, const EndForces& on_virtual) {
 
 /// The inverse of felt: which forces on the virtual ends are felt as these.
 inline EndForces on_virtual(const Reach& reach, const EndForces& felt_at_ends) {
-  const Vec3 pivot = reach.in_world ? Vec3(0)
-                                    : (1 - reach.factor) * (felt_at_ends.tip + felt_at_ends.tail);
+  const Vec3 pivot =
+      reach.in_world ? Vec3(0) : (1 - reach.factor) * (felt_at_ends.tip + felt_at_ends.tail);
   return {(felt_at_ends.tip - (1 - reach.fraction) * pivot) / reach.factor,
           (felt_at_ends.tail - reach.fraction * pivot) / reach.factor};
 }

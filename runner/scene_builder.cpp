@@ -70,8 +70,7 @@ double grip_from_virtual_tip(const protocols::Protocol& protocol) {
   const double grip = protocol.stylus.grip * map.scale;
   if (!map.reach) return grip;
   if (map.reach->in_world) return map.reach->factor * grip;
-  return grip +
-         (map.reach->factor - 1) * map.reach->fraction * protocol.stylus.length * map.scale;
+  return grip + (map.reach->factor - 1) * map.reach->fraction * protocol.stylus.length * map.scale;
 }
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind) {

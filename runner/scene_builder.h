@@ -38,7 +38,8 @@ class SceneBuilder {
     std::shared_ptr<const stimuli::ConvexMesh> mesh;
     std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  /// Its convex parts. \param depth  m, by which their surfaces are moved inwards: parts may be gone
+  /// Its convex parts. \param depth  m, by which their surfaces are moved inwards: parts may be
+  /// gone
   const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, double depth,
                                        bool side_contact);
   struct Placing;

@@ -13,7 +13,7 @@ struct GridHull {
   /// Triangles, exactly convex; some may be coplanar. Empty where the points span no volume.
   PolygonSoup soup;
   std::vector<std::uint32_t> point;  ///< of each vertex, its index in the points
-  double depth = 0;  ///< m; the largest distance of a point below the surface
+  double depth = 0;                  ///< m; the largest distance of a point below the surface
 };
 
 /// Points are rounded to a grid finer than `error` (m, of each coordinate), on which every

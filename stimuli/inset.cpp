@@ -112,8 +112,8 @@ std::vector<std::vector<Index>> fans_of(const PolygonSoup& triangles) {
   std::sort(spokes.begin(), spokes.end());
   std::vector<std::vector<Index>> fans(triangles.vertices.size());
   for (auto first = spokes.begin(); first != spokes.end();) {
-    const auto end = std::find_if(first, spokes.end(),
-                                  [&](const Spoke& s) { return s.from != first->from; });
+    const auto end =
+        std::find_if(first, spokes.end(), [&](const Spoke& s) { return s.from != first->from; });
     std::vector<Index>& fan = fans[first->from];
     auto spoke = first;
     do {
@@ -199,8 +199,7 @@ std::shared_ptr<const ConvexMesh> inset(const ConvexMesh& mesh, double depth) {
     return std::make_shared<const ConvexMesh>(soup);
   } catch (const MeshError&) {
     // A corner of many facets comes apart when they move by little, too little for a mesh.
-    return std::make_shared<const ConvexMesh>(
-        without_short_edges(soup, kLeastEdge * mesh.size()));
+    return std::make_shared<const ConvexMesh>(without_short_edges(soup, kLeastEdge * mesh.size()));
   }
 }
 

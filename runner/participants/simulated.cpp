@@ -20,9 +20,7 @@ Vec3 hand_place(const WorkspaceMap& map) {
   return map.reach->in_world ? stretched(*map.reach, {centre, centre}).tip : centre;
 }
 
-bool is_far(const WorkspaceMap& map) {
-  return map.reach && glm::length(hand_place(map)) > 1e-6;
-}
+bool is_far(const WorkspaceMap& map) { return map.reach && glm::length(hand_place(map)) > 1e-6; }
 
 /// Turns +z to `direction`, by the smallest rotation.
 Quat turn_up_to(const Vec3& direction) {
@@ -40,8 +38,8 @@ SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& 
   const double length = grip_from_virtual_tip(protocol);
   const double radius =
       own.device.workspace_radius * map.scale * (map.reach->in_world ? map.reach->factor : 1);
-  const double room = radius - own.motor.approach_distance -
-                      std::abs(glm::length(hand_place(map)) - length);
+  const double room =
+      radius - own.motor.approach_distance - std::abs(glm::length(hand_place(map)) - length);
   constexpr double kLeast = 0.1;  // rad: what is out of the workspace, the device holds back
   const double lean = 2 * std::asin(std::clamp(room / (2 * length), 0.0, 1.0));
   own.motor.approach_min_rise =
@@ -103,8 +101,8 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
   TouchState known = touch;
   known.normal = explored(touch.normal);
   known.surface = explored(touch.surface);
-  stylus_.set_target(in_device(
-      explorer_.step(known, {explored(sample.probe.tip), explored(sample.probe.tail)})));
+  stylus_.set_target(
+      in_device(explorer_.step(known, {explored(sample.probe.tip), explored(sample.probe.tail)})));
   if (answer_at_) {
     if (time < *answer_at_) return std::nullopt;
     return Answer{observer_.best(), sample.time_ns};

@@ -25,8 +25,8 @@ double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
   const rendering::Tool* const tool = shown.scene.tool();
   if (tool == nullptr || !shown.renderer->side_contact()) return distance_of_segment(probe);
   const Vec3 d = probe.tail - probe.tip;
-  const rendering::PlacedTool placed = rendering::place(
-      tool, true, {probe.tip, d, rendering::tool_frame(d, nullptr, Vec3(0))});
+  const rendering::PlacedTool placed =
+      rendering::place(tool, true, {probe.tip, d, rendering::tool_frame(d, nullptr, Vec3(0))});
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < placed.count; ++k) {
     const Vec3 from = probe.tip + placed.segments[k].from;
@@ -186,8 +186,7 @@ const Sample& Servo::tick() noexcept {
   }
   sample_.rendering = shown_->renderer->tick(shown_->scene, shown_->state, sample_.probe,
                                              static_cast<double>(sample_.period_ns) * 1e-9);
-  if (workspace_.reach)
-    sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
+  if (workspace_.reach) sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
   sample_.faults |= sample_.rendering.faults;
   if (sample_.rendering.faults & rendering::render_fault::kNonFinite) limiter_.trip();
   command(sample_.rendering.device1, sample_.rendering.device2);

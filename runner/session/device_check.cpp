@@ -78,8 +78,7 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
                              const DeviceCapabilities& device, const ShowableMaterial& without) {
   if (protocol.passivity_controller) return "";
   const double with =
-      showable(material, device, shown_rate(protocol, device), felt_gain(protocol), true)
-          .fraction;
+      showable(material, device, shown_rate(protocol, device), felt_gain(protocol), true).fraction;
   if (with <= without.fraction) return "(/servo/passivity_controller would not help here) ";
   return sentence("set /servo/passivity_controller to true (",
                   with < 1 ? sentence("then up to ", whole_stiffness(material) * with, " N/m")
@@ -134,14 +133,13 @@ double felt_gain(const protocols::Protocol& protocol) {
     sides = sides || renderer_for(kind).side_contact();
   double lever2 = std::max(reach.factor * reach.factor, stiffness_gain(reach, 0));
   if (!sides) return map.scale * lever2;
-  if (protocol.tool.segments.empty())
-    return map.scale * std::max(lever2, stiffness_gain(reach, 1));
+  if (protocol.tool.segments.empty()) return map.scale * std::max(lever2, stiffness_gain(reach, 1));
   for (const protocols::ToolSegmentSpec& segment : protocol.tool.segments) {
     for (const Vec3& at : {segment.from, segment.to}) {
       // Beside the stylus, a force along it turns the stylus as well.
       const double aside = std::hypot(at.x, at.y) / length;
-      lever2 = std::max(lever2, stiffness_gain(reach, at.z / (reach.factor * length)) +
-                                    2 * aside * aside);
+      lever2 = std::max(lever2,
+                        stiffness_gain(reach, at.z / (reach.factor * length)) + 2 * aside * aside);
     }
   }
   return map.scale * lever2;
@@ -162,22 +160,21 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
                gain == 1 ? "" : sentence(" (", stiffness, " N/m at the hand)"));
   if (stiffness > 0) {
     const double most = device.max_stiffness * rate / device.max_rate;
-    bound(most / stiffness, whole, " N/m", shown, ", and '", device.name,
-          "' shows up to ", most, " N/m at ", rate, " Hz");
+    bound(most / stiffness, whole, " N/m", shown, ", and '", device.name, "' shows up to ", most,
+          " N/m at ", rate, " Hz");
     if (device.friction > 0 && device.resolution > 0) {
       const double held = 2 * device.friction / device.resolution;
-      bound(held / stiffness, whole, " N/m", shown, ", and the friction of '",
-            device.name, "', ", device.friction, " N, holds up to ", held, " N/m against steps of ",
-            device.resolution, " m");
+      bound(held / stiffness, whole, " N/m", shown, ", and the friction of '", device.name, "', ",
+            device.friction, " N, holds up to ", held, " N/m against steps of ", device.resolution,
+            " m");
     }
   }
   const double needed = stiffness / rate / 2 + damping;
   if (device.damping > 0 && needed > 0) {
     const double b = device.damping * (passivity_controller ? kPassivityExtension : 1);
-    bound(b / needed, whole, " N/m and ", whole_damping(material), " N s/m", shown, " at ",
-          rate, " Hz, which need ", needed, " N s/m of physical damping, and '", device.name,
-          "' has ", device.damping,
-          passivity_controller ? " with the passivity controller on" : "");
+    bound(b / needed, whole, " N/m and ", whole_damping(material), " N s/m", shown, " at ", rate,
+          " Hz, which need ", needed, " N s/m of physical damping, and '", device.name, "' has ",
+          device.damping, passivity_controller ? " with the passivity controller on" : "");
   }
   return out;
 }
@@ -191,16 +188,14 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
     int part = -1;
     visit_materials(stimulus.object, [&](stimuli::Material& material) {
       ++part;
-      const ShowableMaterial can =
-          showable(material, device, shown_rate(protocol, device), felt_gain(protocol),
-                   protocol.passivity_controller);
+      const ShowableMaterial can = showable(material, device, shown_rate(protocol, device),
+                                            felt_gain(protocol), protocol.passivity_controller);
       if (can.reason.empty() || can.fraction == 0) return;  // nothing to show: incompatible
       const double shown = can.fraction * (1 - 1e-12);      // rounding stays below the bound
-      out.push_back(
-          {stimulus.name, part, shown, material.stiffness, material.damping,
-           sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
-                    whole_stiffness(material) * shown, " N/m and ",
-                    whole_damping(material) * shown, " N s/m")});
+      out.push_back({stimulus.name, part, shown, material.stiffness, material.damping,
+                     sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
+                              whole_stiffness(material) * shown, " N/m and ",
+                              whole_damping(material) * shown, " N s/m")});
       scale_down(material, shown);
     });
   }
@@ -271,12 +266,12 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
     const auto check_material = [&](const stimuli::Material& material) {
-      const ShowableMaterial can =
-          showable(material, device, shown_rate(protocol, device), felt_gain(protocol),
-                   protocol.passivity_controller);
+      const ShowableMaterial can = showable(material, device, shown_rate(protocol, device),
+                                            felt_gain(protocol), protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
       add("stimulus '", stimulus.name, "' has ", can.reason, ": soften /material, raise ",
-          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "", passivity_advice(protocol, material, device, can),
+          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
+          passivity_advice(protocol, material, device, can),
           "or have it limited by /servo/material_limit \"limit\"");
     };
     visit_materials(stimulus.object, check_material);

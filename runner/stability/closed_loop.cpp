@@ -17,11 +17,11 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kDepth = 1e-3;          // m, at rest
-constexpr double kLength = 0.12;         // m
-constexpr double kAtRest = 0.01;         // of the swing it is released with: less counts as rest
-constexpr double kDiverged = 0.02;       // m, from rest: diverged
-constexpr int kMaxDelay = 16;            // ticks
+constexpr double kDepth = 1e-3;     // m, at rest
+constexpr double kLength = 0.12;    // m
+constexpr double kAtRest = 0.01;    // of the swing it is released with: less counts as rest
+constexpr double kDiverged = 0.02;  // m, from rest: diverged
+constexpr int kMaxDelay = 16;       // ticks
 
 Quat turned_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
 
@@ -187,10 +187,9 @@ class Loop {
     scene.renderer().tick(scene.scene(), state_, lowered(scene.rest(), -5e-3, -5e-3), 1 / s.rate);
     for (auto& forces : under_way_) forces = {balance_.tip.z, balance_.tail.z};
     const double felt_stiffness = stiffness_ * (s.reach ? stiffness_gain(*s.reach, 0) : 1);
-    const double period =
-        std::max(16.0, 2 * std::numbers::pi *
-                           std::sqrt((s.mass + s.hand.mass) / (felt_stiffness + s.hand.stiffness)) *
-                           s.rate);
+    const double period = std::max(
+        16.0, 2 * std::numbers::pi *
+                  std::sqrt((s.mass + s.hand.mass) / (felt_stiffness + s.hand.stiffness)) * s.rate);
     block_ = static_cast<std::uint64_t>(10 * period);
   }
 
@@ -263,9 +262,9 @@ class Loop {
   const LoopSettings& s_;
   const LoopScene& scene_;
   rendering::RenderState state_;
-  rendering::LineProbe rest_;      // of the real stylus
-  rendering::EndForces balance_;   // of the hand, at rest
-  double stiffness_;               // N/m, of the contact
+  rendering::LineProbe rest_;     // of the real stylus
+  rendering::EndForces balance_;  // of the hand, at rest
+  double stiffness_;              // N/m, of the contact
   End tip_, tail_;
   PassivityController controller_;
   std::array<std::array<double, 2>, kMaxDelay + 1> under_way_{};

@@ -317,9 +317,7 @@ TEST(Bounds, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_a_proto
 
 TEST(Bounds, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_an_object()), 24); }
 
-TEST(Bounds, OfToolAndReachAreTheSchemas) {
-  EXPECT_GE(expect_bounds(keys_of_tool_and_reach()), 6);
-}
+TEST(Bounds, OfToolAndReachAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_tool_and_reach()), 6); }
 
 }  // namespace
 }  // namespace palpate::protocols

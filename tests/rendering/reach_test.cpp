@@ -34,8 +34,7 @@ TEST(Reach, StretchesAboutThePivot) {
   const LineProbe by_grip = stretched({.factor = 3, .fraction = 0.5}, real);
   EXPECT_NEAR(glm::distance(by_grip.tip, Vec3(0, 0, -0.1)), 0, 1e-16);
   EXPECT_NEAR(glm::distance(by_grip.tail, Vec3(0, 0, 0.2)), 0, 1e-16);
-  const LineProbe in_world =
-      stretched({.factor = 2, .in_world = true, .point = {0.3, 0, 0}}, real);
+  const LineProbe in_world = stretched({.factor = 2, .in_world = true, .point = {0.3, 0, 0}}, real);
   EXPECT_NEAR(glm::distance(in_world.tip, Vec3(-0.3, 0, 0)), 0, 1e-16);
   EXPECT_NEAR(glm::distance(in_world.tail, Vec3(-0.3, 0, 0.2)), 0, 1e-16);
 }
@@ -105,8 +104,7 @@ TEST(Reach, AContactsForceDoesTheSameWorkAtItsPlaceAndAtTheHand) {
     const Vec3 d = r.ideal.tail - r.ideal.tip;
     const double place = glm::dot(r.deepest.point - r.ideal.tip, d) / glm::dot(d, d);
     const double done = glm::dot(r.force, (1 - place) * moved.tip + place * moved.tail);
-    const double given =
-        glm::dot(hand.device1, motion.tip) + glm::dot(hand.device2, motion.tail);
+    const double given = glm::dot(hand.device1, motion.tip) + glm::dot(hand.device2, motion.tail);
     EXPECT_NEAR(given, done, 1e-12 * glm::length(r.force));
     EXPECT_EQ(hand.torque, r.torque);
     EXPECT_LT(glm::distance(hand.force, r.force), 1e-14);

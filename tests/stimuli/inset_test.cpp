@@ -50,7 +50,8 @@ double brute_force_support(const std::vector<HalfSpace>& planes, const Vec3& u, 
         const glm::dmat3 rows =
             glm::transpose(glm::dmat3(planes[i].normal, planes[j].normal, planes[k].normal));
         if (std::abs(glm::determinant(rows)) < 1e-9) continue;
-        const Vec3 x = glm::inverse(rows) * Vec3(planes[i].offset, planes[j].offset, planes[k].offset);
+        const Vec3 x =
+            glm::inverse(rows) * Vec3(planes[i].offset, planes[j].offset, planes[k].offset);
         if (furthest_outside(planes, x) < 1e-9 * size) best = std::max(best, glm::dot(u, x));
       }
     }
@@ -70,7 +71,8 @@ ConvexMesh random_body(Random& random, int points) {
   std::vector<Vec3> cloud;
   const Vec3 stretch(0.01 + 0.05 * random.unit(), 0.01 + 0.05 * random.unit(),
                      0.01 + 0.05 * random.unit());
-  for (int i = 0; i < points; ++i) cloud.push_back(stretch * random_vector(random) + Vec3(0.3, 0, 0));
+  for (int i = 0; i < points; ++i)
+    cloud.push_back(stretch * random_vector(random) + Vec3(0.3, 0, 0));
   return ConvexMesh(grid_hull(cloud, 0).soup);
 }
 

@@ -62,9 +62,8 @@ ForceTable forces_along(const rendering::Scene& scene,
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
     state.measured_side = poses[i].side;
-    table.add(poses[i], reach
-                            ? extended_tick(scene, state, renderer, *reach, poses[i].probe, dt)
-                            : renderer.tick(scene, state, poses[i].probe, dt));
+    table.add(poses[i], reach ? extended_tick(scene, state, renderer, *reach, poses[i].probe, dt)
+                              : renderer.tick(scene, state, poses[i].probe, dt));
   }
   return table;
 }
@@ -89,7 +88,8 @@ int render_command(const std::vector<std::string>& args) {
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
        (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
-        " (s, m), and for a tool's +x " + (kSideHeader + 1) + "; at most " + std::to_string(kMostPoses) + " rows")
+        " (s, m), and for a tool's +x " + (kSideHeader + 1) + "; at most " +
+        std::to_string(kMostPoses) + " rows")
            .c_str())                                                                              //
       ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
       ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //

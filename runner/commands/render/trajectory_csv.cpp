@@ -104,7 +104,9 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
     }
     const auto values = numbers_of(reader.fields(), columns);
     if (!values) {
-      faults.push_back({path, place, columns == kPoseColumns ? "expected seven numbers" : "expected ten numbers"});
+      faults.push_back(
+          {path, place,
+           columns == kPoseColumns ? "expected seven numbers" : "expected ten numbers"});
       continue;
     }
     const auto& v = *values;

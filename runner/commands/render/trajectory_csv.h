@@ -11,13 +11,13 @@ namespace palpate::runner {
 
 inline constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
 inline constexpr const char* kSideHeader = ",side_x,side_y,side_z";  ///< may follow
-inline constexpr std::size_t kMostPoses = 4'000'000;  // more than an hour at 1 kHz
+inline constexpr std::size_t kMostPoses = 4'000'000;                 // more than an hour at 1 kHz
 
 struct TimedPose {
-  double t = 0;  ///< s
+  double t = 0;                ///< s
   rendering::LineProbe probe;  ///< as it is held
-  Vec3 side{0, 0, 0};  ///< of the tool, its +x; zero: not measured
-  std::size_t line = 0;  ///< of the file
+  Vec3 side{0, 0, 0};          ///< of the tool, its +x; zero: not measured
+  std::size_t line = 0;        ///< of the file
 };
 
 /// Coordinates that are not finite are accepted: the renderer reports them in the faults column.

@@ -84,7 +84,8 @@ std::vector<BoundaryCurve> map_curves() {
     LoopCase far;
     far.settings.reach = rendering::Reach{.factor = 5, .fraction = fraction};
     out.push_back(curve("layers and reach, wall",
-                        fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle", far));
+                        fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle",
+                        far));
   }
   struct Device {
     const char* name;

@@ -107,8 +107,7 @@ TEST(DeviceCheck, WhatAReachMakesTheHandFeelIsWhatIsLimited) {
   protocol.workspace.centre = {0, 0.5, 0};
   const auto refused = incompatibilities(protocol, StimulusLibrary(protocol), some_device());
   ASSERT_EQ(refused.size(), 1u);
-  EXPECT_NE(refused[0].find("100 N/m (4100 N/m at the hand)"), std::string::npos)
-      << refused[0];
+  EXPECT_NE(refused[0].find("100 N/m (4100 N/m at the hand)"), std::string::npos) << refused[0];
   EXPECT_NE(refused[0].find("lessen /reach/factor"), std::string::npos) << refused[0];
   protocol.material_limit = protocols::MaterialLimit::limit;
   ASSERT_EQ(limit_materials(protocol, some_device()).size(), 1u);
