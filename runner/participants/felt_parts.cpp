@@ -1,12 +1,23 @@
 #include "runner/participants/felt_parts.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
+#include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner {
 namespace {
+
+/// m, below the surface; none: nothing of the object has a stiffness.
+std::optional<double> felt_depth(const stimuli::Material& material) {
+  if (material.stiffness > 0) return 0;
+  for (const stimuli::Layer& layer : material.layers) {
+    if (layer.stiffness > 0) return layer.depth;
+  }
+  return std::nullopt;
+}
 
 void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<PlacedPart>& out) {
   const Pose pose{parent.orientation * spec.pose.position + parent.position,
@@ -15,20 +26,19 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
     for (const stimuli::ObjectSpec& part : spec.parts) add(part, pose, out);
     return;
   }
-  for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec))
-    out.push_back({std::make_shared<const stimuli::ConvexMesh>(std::move(part)), pose});
-}
-
-bool is_stiff(const stimuli::Material& material) {
-  return material.stiffness > 0 ||
-         std::any_of(material.layers.begin(), material.layers.end(),
-                     [](const stimuli::Layer& layer) { return layer.stiffness > 0; });
+  const std::optional<double> depth = felt_depth(spec.material);
+  if (!depth) return;
+  for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec)) {
+    auto mesh = std::make_shared<const stimuli::ConvexMesh>(std::move(part));
+    if (*depth > 0) mesh = stimuli::inset(*mesh, *depth);
+    if (mesh) out.push_back({std::move(mesh), pose});
+  }
 }
 
 }  // namespace
 
 bool can_be_felt(const stimuli::ObjectSpec& stimulus) {
-  if (stimulus.shape != stimuli::ShapeKind::compound) return is_stiff(stimulus.material);
+  if (stimulus.shape != stimuli::ShapeKind::compound) return felt_depth(stimulus.material).has_value();
   return std::any_of(stimulus.parts.begin(), stimulus.parts.end(), can_be_felt);
 }
 

@@ -62,6 +62,24 @@ TEST(DistanceField, ASeamIsNotASurface) {
   }
 }
 
+// Where the surface has no stiffness, the first layer that has some is what is felt.
+TEST(DistanceField, IsThatOfTheLayerThatIsFeltFirst) {
+  stimuli::ObjectSpec cube;
+  cube.shape = stimuli::ShapeKind::cube;
+  cube.material.layers = {{0.004, 0, 0, {}}, {0.008, 500, 0, {}}, {0.016, 900, 0, {}}};
+  const auto side = [](const stimuli::ObjectSpec& spec) {
+    return -test::distance_at(DistanceField(felt_parts(spec)), Vec3(0)) * 2;
+  };
+  EXPECT_NEAR(side(cube), 0.06, 0.002);
+  cube.material.stiffness = 0;
+  EXPECT_NEAR(side(cube), 0.044, 0.002);
+  cube.material.layers[1].stiffness = 0;
+  EXPECT_NEAR(side(cube), 0.028, 0.002);
+  EXPECT_TRUE(can_be_felt(cube));
+  cube.material.layers[2].stiffness = 0;
+  EXPECT_FALSE(can_be_felt(cube));
+}
+
 TEST(DistanceField, ItsGradientIsTheNormal) {
   stimuli::ObjectSpec ball;
   ball.subdivisions = 3;

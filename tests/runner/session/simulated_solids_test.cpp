@@ -63,6 +63,17 @@ TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndNamed) {
   EXPECT_GE(found.right, 5) << "2 would be chance";
 }
 
+// Alike outside: told apart by where the first layer that is felt lies.
+TEST_F(SimulatedSolids, LayersAreFeltWhereTheyLie) {
+  protocols::Protocol protocol =
+      protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/layered.json");
+  protocol.repetitions = 1;
+  EXPECT_EQ(simulate(protocol, load_simulated_settings(""), 2).recorded, 12);
+  const Count found = count();
+  EXPECT_GE(found.touched, 10);
+  EXPECT_GE(found.right, 8) << "4 would be chance";
+}
+
 // Approaches begin where the home zone of the cube does not: it begins 62 mm from the centre, those
 // of the other shapes at most 53 mm.
 TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsWhatWasDone) {
