@@ -38,7 +38,8 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
 }  // namespace
 
 bool can_be_felt(const stimuli::ObjectSpec& stimulus) {
-  if (stimulus.shape != stimuli::ShapeKind::compound) return felt_depth(stimulus.material).has_value();
+  if (stimulus.shape != stimuli::ShapeKind::compound)
+    return felt_depth(stimulus.material).has_value();
   return std::any_of(stimulus.parts.begin(), stimulus.parts.end(), can_be_felt);
 }
 

@@ -118,7 +118,8 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
         (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
   } else {
     const std::vector<PlacedPart> parts = felt_parts(stimulus);
-    if (parts.empty()) throw std::invalid_argument("nothing is left of a stimulus where it is felt");
+    if (parts.empty())
+      throw std::invalid_argument("nothing is left of a stimulus where it is felt");
     shape.field = std::make_shared<const DistanceField>(parts);
     rotations = distinct_rotations(symmetries(parts, *shape.field));
   }
