@@ -22,12 +22,15 @@ bool small(const palpate::stimuli::ObjectSpec& spec) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const palpate::testing::InputFile file("scene.json");
   try {
-    const auto objects = palpate::protocols::parse_scene(file.write(data, size)).objects;
+    const auto scene = palpate::protocols::parse_scene(file.write(data, size));
+    const auto& objects = scene.objects;
     if (objects.size() > 50 || !std::all_of(objects.begin(), objects.end(), small)) return 0;
     palpate::runner::SceneBuilder builder;
     for (const palpate::rendering::Renderer* renderer :
          {&palpate::rendering::point_renderer(), &palpate::rendering::ray_renderer()}) {
-      palpate::testing::feel(builder.build(objects, renderer->side_contact()), *renderer);
+      palpate::testing::feel(
+          builder.build(objects, renderer->side_contact(), palpate::runner::tool_of(scene.tool)),
+          *renderer);
     }
   } catch (const palpate::protocols::InputError& error) {
     if (error.faults().empty()) std::abort();

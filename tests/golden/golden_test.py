@@ -45,7 +45,7 @@ class Golden(unittest.TestCase):
             if stored.stem in ("point", "ray"):
                 self.check(stored.parent, stored.stem)
                 seen += 1
-        self.assertGreaterEqual(seen, 4)
+        self.assertGreaterEqual(seen, 5)
 
 
 if __name__ == "__main__":
