@@ -136,8 +136,7 @@ class IdealTool {
 
   template <class Visit>
   void visit_near_parts(const Visit& visit) const;
-  bool separated(const NearPair& near, const ToolPose& a, const PlacedTool& at_a, const ToolPose& b,
-                 const PlacedTool& at_b, double by);
+  void take_up_plane(NearPair& near);
   void collect(const ToolPose& from, const PlacedTool& placed_from, double motion, double reach);
   void orient(const PlacedTool& oriented);
   Vec3 local(const NearPair& near, const Vec3& y) const {
@@ -199,21 +198,27 @@ LineProbe IdealTool::shrunk(const NearPair& near, const Vec3& tip,
   return {start, start + part.shrink * part.local_vector(segment.along)};
 }
 
-/// Whether the plane of an earlier tick keeps the segment, and all between two poses of it, by more
-/// than `by` away from the part.
-bool IdealTool::separated(const NearPair& near, const ToolPose& a, const PlacedTool& at_a,
-                          const ToolPose& b, const PlacedTool& at_b, double by) {
+/// Takes up the plane of an earlier tick.
+void IdealTool::take_up_plane(NearPair& near) {
   const SeparatingPlane& plane = state_of(near).plane;
-  if (!plane.valid) return false;
+  near.has_plane = plane.valid;
+  if (!plane.valid) return;
   const ScenePart& part = part_of(near);
-  const Vec3 normal = part.world_vector(plane.normal);
-  const double offset =
-      plane.offset + glm::dot(normal, part.position) + 2 * (part.margin + part.tolerance);
-  const auto above = [&](const ToolPose& pose, const PlacedSegment& segment, double height) {
-    const double from = glm::dot(normal, pose.tip + segment.from) - offset;
-    return from > height && from + glm::dot(normal, segment.along) > height;
-  };
-  return above(a, at_a.segments[near.segment], 0) && above(b, at_b.segments[near.segment], by);
+  near.normal = part.world_vector(plane.normal);
+  near.offset =
+      plane.offset + glm::dot(near.normal, part.position) + 2 * (part.margin + part.tolerance);
+}
+
+/// m, of a segment above the plane of a pair.
+double height_above(const NearPair& near, const Vec3& tip, const PlacedSegment& segment) {
+  return glm::dot(near.normal, tip + segment.from) - near.offset +
+         std::min(0.0, glm::dot(near.normal, segment.along));
+}
+
+/// Whether the pair's plane keeps the segment from the part all the way between two translations.
+bool apart(const NearPair& near, const Vec3& from, const Vec3& to) {
+  return near.has_plane && glm::dot(near.normal, from) + near.height > 0 &&
+         glm::dot(near.normal, to) + near.height > 0;
 }
 
 /// Sets the pairs that the tool can touch while it comes from `from` and then stays within `reach`
@@ -243,7 +248,12 @@ void IdealTool::collect(const ToolPose& from, const PlacedTool& placed_from, dou
         const double far =
             part.sphere_radius + std::max(motion, reach) + 2 * part.margin + part.tolerance;
         if (glm::dot(apart, apart) > far * far) continue;
-        if (separated(near, from, placed_from, tick_.tool, now, reach)) continue;
+        take_up_plane(near);
+        near.was_apart =
+            near.has_plane && height_above(near, from.tip, placed_from.segments[j]) > 0;
+        if (near.was_apart &&
+            height_above(near, tick_.tool.tip, now.segments[j]) > reach)
+          continue;
       }
       all_.near.push_back(near);
     }
@@ -260,6 +270,7 @@ void IdealTool::orient(const PlacedTool& oriented) {
     near.true_d = part.local_vector(segment.along);
     near.tip = part.inside + part.shrink * (near.true_tip - part.inside);
     near.d = part.shrink * near.true_d;
+    if (near.has_plane) near.height = height_above(near, tick_.tool.tip, segment);
   }
 }
 
@@ -399,7 +410,8 @@ bool IdealTool::settle(const ToolPose& from, const PlacedTool& placed_from, cons
     ContactFeature start = state.feature;
     const Vec3 tip = local(near, at_);
     if (!state.carries) {
-      if (separated(near, from, placed_from, to, placed_, 0)) continue;
+      if (near.was_apart && apart(near, at_, at_)) continue;
+      near.was_cast = true;
       const Entry entry = sweep(near, shrunk(near, from.tip, placed_from.segments[near.segment]),
                                 {tip, tip + near.d});
       if (!entry.entered) continue;
@@ -424,6 +436,8 @@ bool IdealTool::push_out(const Vec3& from, double most_push) {
       if (near.carries) {
         inside = locate(mesh_of(near), state_of(near).feature, local(near, at_), near.d).feature;
       } else {
+        if (apart(near, from, at_)) continue;
+        near.was_cast = true;
         const PairCast hit = cast(mesh_of(near), state_of(near).feature, local(near, from), near.d,
                                   part_of(near).shrink * part_of(near).local_vector(moved));
         state_of(near).feature = hit.feature;
@@ -460,6 +474,8 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
   for (std::uint32_t i = 0; i < all_.near.size(); ++i) {
     NearPair& near = all_.near[i];
     if (near.carries) continue;  // convex, and behind a plane that the way stays beyond
+    if (apart(near, at_, goal)) continue;
+    near.was_cast = true;
     const PairCast found = cast(mesh_of(near), state_of(near).feature, local(near, at_), near.d,
                                 part_of(near).shrink * part_of(near).local_vector(way));
     state_of(near).feature = found.feature;
@@ -644,8 +660,9 @@ void IdealTool::remember(std::size_t first_contact) {
   for (const NearPair& near : all_.near) {
     PairState& state = state_of(near);
     state.carries = near.carries;
-    state.plane.valid = false;
+    if (near.carries) state.plane.valid = false;
     if (near.carries || state.feature.kind == Kind::none) continue;
+    if (near.has_plane && !near.was_cast) continue;
     const ScenePart& part = part_of(near);
     const Vec3 tip = near.true_tip + part.local_vector(at_);
     const WalkResult at = measure(*part.mesh, state.feature, tip, near.true_d);

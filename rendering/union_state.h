@@ -64,6 +64,13 @@ struct NearPair {
   /// larger by its margin (ScenePart::shrink), m.
   Vec3 tip, d;
   Vec3 true_tip, true_d;  ///< the same without the margin
+  /// World frame: the plane of an earlier tick, where there is one. With its tip at the virtual one
+  /// plus y, the segment is dot(normal, y) + height above it, m, and apart where that is positive.
+  Vec3 normal;
+  double offset = 0, height = 0;
+  bool has_plane = false;
+  bool was_apart = false;  ///< by that plane, at the pose that the tool comes from
+  bool was_cast = false;   ///< the plane did not do: it is renewed
   Vec3 parted_at;         ///< m, where it last let go of the ideal tool in this tick
   bool parted = false;    ///< it did
   bool carries = false;   ///< has a plane in use
