@@ -251,9 +251,7 @@ void IdealTool::collect(const ToolPose& from, const PlacedTool& placed_from, dou
         take_up_plane(near);
         near.was_apart =
             near.has_plane && height_above(near, from.tip, placed_from.segments[j]) > 0;
-        if (near.was_apart &&
-            height_above(near, tick_.tool.tip, now.segments[j]) > reach)
-          continue;
+        if (near.was_apart && height_above(near, tick_.tool.tip, now.segments[j]) > reach) continue;
       }
       all_.near.push_back(near);
     }

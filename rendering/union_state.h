@@ -71,9 +71,9 @@ struct NearPair {
   bool has_plane = false;
   bool was_apart = false;  ///< by that plane, at the pose that the tool comes from
   bool was_cast = false;   ///< the plane did not do: it is renewed
-  Vec3 parted_at;         ///< m, where it last let go of the ideal tool in this tick
-  bool parted = false;    ///< it did
-  bool carries = false;   ///< has a plane in use
+  Vec3 parted_at;          ///< m, where it last let go of the ideal tool in this tick
+  bool parted = false;     ///< it did
+  bool carries = false;    ///< has a plane in use
 };
 
 /// A contact of several, with where it is.
