@@ -41,6 +41,7 @@ struct SessionProgress {
   std::optional<RunEnd> last_end;      ///< of its latest run; none: never begun
   int cut_off = 0;                     ///< attempts that were cut off
   ClockStamp clock;                    ///< of its first run; a simulated session continues it
+  std::string observer_sha256;         ///< settings of the simulated participant, else ""
   std::int64_t latest_ns = 0;          ///< session clock: latest response, 0 if there is none
 };
 

@@ -146,14 +146,28 @@ class Reference(unittest.TestCase):
         self.assertEqual(keys - named, set())
 
     def test_settings_of_the_simulated_participant(self):
-        settings = json.loads((ROOT / "runner/participants/simulated_v2.json").read_text())
+        def value_of(text):
+            return json.loads(text) if re.fullmatch(r"[-0-9.e]+|true|false", text) else text
+
+        frozen = {version: json.loads((ROOT / f"runner/participants/simulated_v{version}.json").read_text())
+                  for version in (1, 2, 3)}
+        page = PAGES["runner/participants/README.md"]
         group, documented = "", {}
-        for row in cells(PAGES["runner/participants/README.md"].section("Reference: the model")):
+        for row in cells(page.section("Reference: the model")):
             group = codes(row[0])[0] if codes(row[0]) else group
-            names, values = codes(row[1]), [float(value) for value in row[2].split(", ")]
+            names, values = codes(row[1]), [value_of(value) for value in row[2].split(", ")]
             self.assertEqual(len(names), len(values), row)
             documented.setdefault(group, {}).update(zip(names, values))
-        self.assertEqual(documented, {key: value for key, value in settings.items() if key not in ("version", "note")})
+        self.assertEqual(documented, {key: value for key, value in frozen[3].items() if key not in ("version", "note")})
+        rows = cells(page.section("Reference: the versions"))
+        differ = {f"{name}/{key}" for name, keys in frozen[3].items() if isinstance(keys, dict)
+                  for key, value in keys.items()
+                  if isinstance(value, (str, bool)) and frozen[2].get(name, {}).get(key) != value}
+        self.assertLessEqual(differ, {codes(row[0])[0] for row in rows})
+        for row in rows:
+            name, key = codes(row[0])[0].split("/")
+            for version, value in enumerate(row[1:], 1):
+                self.assertEqual(frozen[version].get(name, {}).get(key, value_of(value)), value_of(value), row)
 
     def test_faults_of_meshes(self):
         given = set()

@@ -9,6 +9,7 @@ import os
 import pathlib
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import tempfile
@@ -354,6 +355,26 @@ class Simulate(FromOutside):
         patch = self.write("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')
         self.simulate(self.dir / "other.db", "--participants", 3, "--settings", patch)
         self.assertNotEqual(self.csv_of(db), self.csv_of(self.dir / "other.db"))
+
+    def test_versions_are_chosen_and_do_not_mix_into_one_database(self):
+        seen = {}
+        for version in (1, 2, 3):
+            db = self.dir / f"{version}.db"
+            text = self.simulate(db, "--participants", 1, "--participant-version", version).stdout
+            self.assertIn(f"settings version {version}, ", text)
+            with sqlite3.connect(db) as connection:
+                (seen[version],) = connection.execute("SELECT DISTINCT observer_sha256 FROM sessions").fetchone()
+            connection.close()
+        self.assertEqual(len(set(seen.values())), 3)
+        # Neither a session that is complete nor one more participant takes other settings.
+        for people in (1, 2):
+            refused = self.simulate(self.dir / "3.db", "--participants", people, "--participant-version", 2, status=2)
+            self.assertIn("S001 was simulated with other settings", refused.stderr)
+        self.simulate(self.dir / "3.db", "--participants", 2, "--participant-version", 3)
+        for wrong in ("0", "4", "-1", "two", "2.5"):
+            done = self.simulate(self.dir / "none.db", "--participant-version", wrong, status=2)
+            self.assertIn("participant-version", done.stderr)
+        self.assertFalse((self.dir / "none.db").exists())
 
     def test_a_second_writer_is_refused(self):
         db = self.dir / "busy.db"
