@@ -17,7 +17,8 @@ SessionProgress Store::progress(const Participant& participant, int session) {
     SessionProgress progress;
     SQLite::Statement runs(
         db,
-        "SELECT r.end_reason, r.started_utc_ns, r.started_ns, s.observer_sha256 FROM sessions s JOIN "
+        "SELECT r.end_reason, r.started_utc_ns, r.started_ns, s.observer_sha256 FROM sessions s "
+        "JOIN "
         "runs r ON r.session_id = s.id WHERE s.participant_id = ? AND s.number = ? "
         "ORDER BY r.id");
     Binder(runs) << participant.id << session;

@@ -115,9 +115,9 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       work.session = session;
       const data::SessionProgress before = store.progress(participant, session);
       if (before.last_end && before.observer_sha256 != settings.sha256) {
-        throw data::StoreRefused(store.path() + ": session " + std::to_string(session) +
-                                 " of participant " + participant.code +
-                                 " was simulated with other settings; use those or another database");
+        throw data::StoreRefused(
+            store.path() + ": session " + std::to_string(session) + " of participant " +
+            participant.code + " was simulated with other settings; use those or another database");
       }
       for (const data::TrialRecord& record : before.completed)
         work.answers.push_back(record.correct);
