@@ -37,6 +37,7 @@ constexpr Command kCommands[] = {
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
      palpate::runner::analyze_command},
     {"bench", "run time of the renderers' ticks on this machine", palpate::runner::bench_command},
+    {"cluster", "a sweep as one array job on Slurm", palpate::runner::cluster_command},
     {"devices", "connected devices and their limits; timing of this machine; calibration",
      palpate::runner::devices_command},
     {"export", "a database's trials as CSV, BIDS or Psych-DS", palpate::runner::export_command},

@@ -8,18 +8,16 @@
 #include <exception>
 #include <iostream>
 #include <mutex>
-#include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "data/store/sweep_file.h"
-#include "protocols/sha256.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
+#include "runner/commands/sweep/planned.h"
 #include "runner/commands/sweep/point.h"
 #include "runner/commands/sweep/shard.h"
-#include "runner/session/protocol_info.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -28,16 +26,14 @@ namespace {
 namespace po = boost::program_options;
 using nlohmann::json;
 
-struct SweepSettings {
-  std::string protocol, space, database, patch, design, shard;
-  std::int64_t points = 0;
+struct RunSettings {
+  SweepSettings sweep;
+  std::string database, shard;
   std::int64_t print_point = 0;  ///< 0: none, the sweep runs
-  std::uint64_t seed = 1;
-  int version = kDefaultParticipantVersion;         ///< of the simulated participant
-  int participants = 7, repetitions = 0, jobs = 1;  ///< repetitions 0: the protocol's
+  int jobs = 1;
 };
 
-void add_options(CommandLine& line, SweepSettings& settings) {
+void add_options(CommandLine& line, RunSettings& settings) {
   line.usage =
       "palpate sweep PROTOCOL.json --space SPACE.json --points N --db FILE [--design NAME]\n"
       "       [--seed S] [--participants N] [--repetitions R] [--jobs J] [--shard K/N|auto]";
@@ -60,33 +56,12 @@ void add_options(CommandLine& line, SweepSettings& settings) {
       "parts\n"
       "  palpate sweep ... --print-point 17                                 what point 17 is, as "
       "JSON";
+  add_sweep_options(line, settings.sweep);
   line.options.add_options()  //
-      ("space", po::value(&settings.space)->required()->value_name("FILE"),
-       "what varies, and how (JSON)")  //
-      ("points", po::value(&settings.points)->required()->value_name("N"),
-       "studies; a grid and saltelli have the greatest number up to it that they can")  //
-      ("design",
-       po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
-       "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "
-       "samples "
-       "for Sobol indices")  //
-      ("seed", po::value(&settings.seed)->default_value(settings.seed)->value_name("S"),
-       "of the design and, with its number, of every point")  //
-      ("participants",
-       po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
-       "simulated participants at each point")  //
-      ("repetitions", po::value(&settings.repetitions)->value_name("R"),
-       "of each shape with each renderer, in place of the protocol's")  //
       ("jobs", po::value(&settings.jobs)->default_value(settings.jobs)->value_name("J"),
        "points simulated at a time")  //
       ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
        "only the K-th of N parts of the points; auto: the task of a Slurm array")  //
-      ("participant-version",
-       po::value(&settings.version)->default_value(settings.version)->value_name("1|2|3"),
-       "which of the frozen settings of the simulated participant")  //
-      ("settings", po::value(&settings.patch)->value_name("FILE"),
-       "JSON merge patch on the frozen settings of the simulated participant, before anything "
-       "varies")  //
       ("db", po::value(&settings.database)->value_name("FILE"),
        "the sweep's file; created or continued")  //
       ("print-point", po::value(&settings.print_point)->value_name("P"),
@@ -95,23 +70,14 @@ void add_options(CommandLine& line, SweepSettings& settings) {
 }
 
 /// None where --help was asked for and printed. \throws UsageError
-std::optional<SweepSettings> parse_sweep_settings(const std::vector<std::string>& args) {
-  SweepSettings settings;
+std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args) {
+  RunSettings settings;
   settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   CommandLine line;
   add_options(line, settings);
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
-  constexpr std::int64_t kMostPoints = 100'000'000;
-  if (settings.points < 1 || settings.points > kMostPoints)
-    throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
-  if (settings.participants < 1 || settings.participants > 100000)
-    throw UsageError("--participants: must be 1 to 100000");
-  if (values->count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
-    throw UsageError("--repetitions: must be 1 to 1000000");
-  const std::vector<int> versions = participant_versions();
-  if (std::find(versions.begin(), versions.end(), settings.version) == versions.end())
-    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+  check_sweep_options(*values, settings.sweep);
   if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
   if (values->count("print-point") && settings.print_point < 1)
     throw UsageError("--print-point: must be the number of a point, from 1");
@@ -119,67 +85,7 @@ std::optional<SweepSettings> parse_sweep_settings(const std::vector<std::string>
     throw UsageError("missing --db FILE, the sweep's file\nUsage: " + line.usage +
                      "\nMore: add --help");
   }
-  settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
   return settings;
-}
-
-/// The protocol with --repetitions; no more blocks than those.
-json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
-  json out = json::parse(protocol.source_text);
-  if (settings.repetitions == 0) return out;
-  out["repetitions"] = settings.repetitions;
-  if (protocol.blocks_per_renderer > settings.repetitions) {
-    out["blocks_per_renderer"] = settings.repetitions;
-    std::cerr << "blocks_per_renderer: " << settings.repetitions << " instead of "
-              << protocol.blocks_per_renderer << ", as there are " << settings.repetitions
-              << " repetitions\n";
-  }
-  return out;
-}
-
-std::string sha256_of_files(const protocols::Protocol& protocol) {
-  std::string all;
-  for (const data::ProtocolFile& file : info_of(protocol).files)
-    all += file.name + '\n' + protocols::sha256_hex(file.bytes) + '\n';
-  return all.empty() ? "" : protocols::sha256_hex(all);
-}
-
-data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& study,
-                              const Design& design, const protocols::Protocol& protocol) {
-  data::SweepPlan plan;
-  plan.protocol = study.protocol().dump();
-  plan.files_sha256 = sha256_of_files(protocol);
-  plan.settings = study.settings().dump();
-  plan.space = json::parse(study.space().source_text).dump();
-  plan.design = settings.design;
-  plan.points = design.size();
-  plan.seed = settings.seed;
-  plan.participants = settings.participants;
-  plan.program_version = PALPATE_VERSION;
-  for (const protocols::SweepParameter& one : study.space().parameters)
-    plan.parameters.push_back(one.name);
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    plan.shapes.push_back(stimulus.name);
-  // The analysis' order: gains are of the ray against the point, whichever is listed first.
-  for (const protocols::RendererKind kind :
-       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    if (std::count(protocol.renderers.begin(), protocol.renderers.end(), kind) > 0)
-      plan.renderers.emplace_back(to_string(kind));
-  }
-  if (const auto alike = data::columns_alike(plan)) {
-    throw UsageError(settings.space + ": the parameter '" + alike->first +
-                     "' has the name of another column, '" + alike->second +
-                     "'; give it another one");
-  }
-  return plan;
-}
-
-Design design_of(const SweepSettings& settings, const SweptStudy& study) {
-  try {
-    return {design_kind(settings.design), settings.points, settings.seed, study.space().parameters};
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--design, --points: ") + error.what());
-  }
 }
 
 /// The points that workers take, and the rows that they give to the thread that owns the file.
@@ -281,7 +187,7 @@ void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std
       << "the reasons stand in the column 'reason' of: palpate export --db FILE --format csv\n";
 }
 
-int run_shard(const Sweep& sweep, const SweepSettings& settings, const Shard& shard,
+int run_shard(const Sweep& sweep, const RunSettings& settings, const Shard& shard,
               const std::string& name) {
   data::SweepFile file = data::SweepFile::open(settings.database, sweep.plan);
   warn_of_exposure(settings.database);
@@ -319,27 +225,17 @@ void print_point(const Sweep& sweep, std::int64_t point) {
 }  // namespace
 
 int sweep_command(const std::vector<std::string>& args) {
-  const std::optional<SweepSettings> given = parse_sweep_settings(args);
-  if (!given) return 0;
-  const SweepSettings& settings = *given;
+  const std::optional<RunSettings> settings = parse_run_settings(args);
+  if (!settings) return 0;
   const Shard shard =
-      parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
-  const protocols::Protocol protocol = protocols::parse_protocol(settings.protocol);
-  const SweptStudy study(base_protocol(protocol, settings), settings.protocol,
-                         json::parse(simulated_settings_text(settings.patch, settings.version)),
-                         protocols::parse_sweep_space(settings.space), settings.space);
-  const Design design = design_of(settings, study);
-  const data::SweepPlan plan = plan_of_sweep(settings, study, design, protocol);
-  const Sweep sweep{study, design, plan};
-  if (settings.print_point > 0) {
-    print_point(sweep, settings.print_point);
+      parse_shard(settings->shard, [](const char* name) { return std::getenv(name); });
+  const PlannedSweep planned(settings->sweep);
+  const Sweep sweep{planned.study, planned.design, planned.plan};
+  if (settings->print_point > 0) {
+    print_point(sweep, settings->print_point);
     return 0;
   }
-  if (design.size() < settings.points) {
-    std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
-              << " asked for\n";
-  }
-  return run_shard(sweep, settings, shard, protocol.name);
+  return run_shard(sweep, *settings, shard, planned.protocol.name);
 }
 
 }  // namespace palpate::runner

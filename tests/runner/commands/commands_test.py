@@ -17,7 +17,7 @@ import time
 import unittest
 
 PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
-COMMANDS = ["accuracy", "analyze", "bench", "devices", "export", "forget", "merge", "plan", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate"]
+COMMANDS = ["accuracy", "analyze", "bench", "cluster", "devices", "export", "forget", "merge", "plan", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate"]
 
 
 class FromOutside(unittest.TestCase):

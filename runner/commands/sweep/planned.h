@@ -1,0 +1,39 @@
+#pragma once
+// A sweep as it was asked for: the options that its results depend on, checked, and its plan.
+
+#include <cstdint>
+#include <string>
+
+#include "data/sweep_record.h"
+#include "protocols/protocol.h"
+#include "runner/commands/shared/command.h"
+#include "runner/sweep/design.h"
+#include "runner/sweep/swept_study.h"
+
+namespace palpate::runner {
+
+struct SweepSettings {
+  std::string protocol, space, design;
+  std::string patch;  ///< file of a JSON merge patch on the participant's settings; "": none
+  std::int64_t points = 0;
+  std::uint64_t seed = 1;
+  int version = kDefaultParticipantVersion;  ///< of the simulated participant
+  int participants = 7, repetitions = 0;     ///< repetitions 0: the protocol's
+};
+
+void add_sweep_options(CommandLine& line, SweepSettings& settings);
+/// To be called with what CommandLine::parse gave. \throws UsageError
+void check_sweep_options(const boost::program_options::variables_map& values,
+                         SweepSettings& settings);
+
+struct PlannedSweep {
+  /// \throws UsageError; protocols::InputError with every fault of protocol or space
+  explicit PlannedSweep(const SweepSettings& settings);
+
+  protocols::Protocol protocol;  ///< as its file has it
+  SweptStudy study;
+  Design design;
+  data::SweepPlan plan;
+};
+
+}  // namespace palpate::runner

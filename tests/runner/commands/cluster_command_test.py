@@ -1,0 +1,131 @@
+"""palpate cluster with a Slurm of a few lines: sbatch runs the tasks of an array at once, squeue tells what a file says.
+Usage: cluster_command_test.py PALPATE PROTOCOLS"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE, PROTOCOLS = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+
+SBATCH = """#!/usr/bin/env python3
+import os, pathlib, subprocess, sys
+here = pathlib.Path(__file__).parent
+calls = here / "calls"
+job = 100 + len(calls.read_text().splitlines() if calls.exists() else [])
+with open(calls, "a") as file:
+    print("\\t".join(sys.argv[1:]), file=file)
+if (here / "refuse").exists():
+    sys.exit("sbatch: error: invalid partition")
+options = dict(a.lstrip("-").split("=", 1) for a in sys.argv[1:-1] if "=" in a)
+tasks = [None]
+if "array" in options:
+    tasks = []
+    for part in options["array"].split(","):
+        first, _, last = part.partition("-")
+        tasks += range(int(first), int(last or first) + 1)
+skip = (here / "kill").read_text().split() if (here / "kill").exists() else []
+for task in tasks:
+    if str(task) in skip:
+        continue
+    if task is None and skip:
+        break  # afterok: not all are done
+    env = {**os.environ, **({} if task is None else {"SLURM_ARRAY_TASK_ID": str(task)})}
+    subprocess.run([sys.argv[-1]], cwd=options["chdir"], env=env, check=True, stdout=subprocess.DEVNULL)
+print(f"{job};somewhere")
+"""
+SQUEUE = """#!/bin/sh
+cat "$(dirname "$0")/queue" 2> /dev/null || { echo "slurm_load_jobs error: Invalid job id specified" >&2; exit 1; }
+"""
+
+
+class Cluster(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.slurm = self.folder / "slurm"
+        self.slurm.mkdir()
+        for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE)):
+            (self.slurm / name).write_text(text)
+            (self.slurm / name).chmod(0o755)
+        (self.folder / "s.json").write_text(json.dumps({"version": 1, "parameters": [
+            {"name": "noise", "of": "participant", "path": "/percept/direction_sd_deg", "distribution": "uniform",
+             "low": 10, "high": 20}]}))
+
+    def palpate(self, *arguments, status=0, slurm=True):
+        path = f"{self.slurm}:{os.environ['PATH']}" if slurm else "/usr/bin:/bin"
+        done = subprocess.run([PALPATE, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=300,
+                              env={**os.environ, "PATH": path})
+        self.assertEqual(done.returncode, status, f"{arguments}\n{done.stdout}{done.stderr}")
+        return done.stdout + done.stderr
+
+    PLAN = [PROTOCOLS / "quick.json", "--space", "s.json", "--points", 5, "--participants", 1, "--repetitions", 1]
+
+    def single(self):
+        self.palpate("sweep", *self.PLAN, "--db", "one.sweep")
+        return (self.folder / "one.sweep").read_bytes()
+
+    def calls(self):
+        return [line.split("\t") for line in (self.slurm / "calls").read_text().splitlines()]
+
+    def test_an_array_of_shards_and_a_job_that_finishes_make_the_file_of_one_machine(self):
+        said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 3, "--dir", "a b", "--time", "01:00:00", "--partition", "all")
+        self.assertIn("job 100: shards 1-3", said)
+        self.assertIn("ten minutes", said)
+        self.assertEqual((self.folder / "a b/all.sweep").read_bytes(), self.single())
+        self.assertIn("SIMULATED", (self.folder / "a b/analysis.txt").read_text())
+        self.assertIn("gains", json.loads((self.folder / "a b/analysis.json").read_text()))
+        array, finish = self.calls()
+        for option in ("--parsable", "--array=1-3", "--requeue", "--time=01:00:00", "--partition=all"):
+            self.assertIn(option, array)
+        self.assertIn("--dependency=afterok:100", finish)
+        status = self.palpate("cluster", "status", "a b")
+        self.assertIn("shards: 3 done, 0 running, 0 waiting, 0 not done", status)
+        self.assertIn("points: 5 of 5", status)
+        self.assertIn("report.html", status)
+
+    def test_shards_that_were_killed_go_on_and_the_result_is_the_same(self):
+        (self.slurm / "kill").write_text("2 3")
+        self.palpate("cluster", "sweep", *self.PLAN, "--shards", 4, "--dir", "d")
+        self.assertFalse((self.folder / "d/all.sweep").exists())
+        (self.slurm / "queue").write_text("3 RUNNING\n")
+        status = self.palpate("cluster", "status", "d")
+        self.assertIn("shards: 2 done, 1 running, 0 waiting, 1 not done", status)
+        self.assertIn("not done: shards 2;", status)
+        self.assertIn("still in the queue", self.palpate("cluster", "submit", "d", status=2))
+        (self.slurm / "queue").write_text("[2-3] PENDING\n3 PENDING\n")
+        self.assertIn("1 waiting", self.palpate("cluster", "status", "d"))
+        (self.slurm / "queue").unlink()
+        (self.slurm / "kill").unlink()
+        self.palpate("cluster", "submit", "d")
+        self.assertIn("--array=2-3", self.calls()[2])
+        self.assertEqual((self.folder / "d/all.sweep").read_bytes(), self.single())
+
+    def test_without_slurm_the_scripts_do_it(self):
+        said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "d", status=1, slurm=False)
+        self.assertIn("there is no Slurm here", said)
+        said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "e", "--no-submit", slurm=False)
+        self.assertIn("ready", said)
+        for shard in ("2", "1"):
+            subprocess.run([self.folder / "e/shard.sh", shard], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([self.folder / "e/finish.sh"], check=True, stdout=subprocess.DEVNULL)
+        self.assertEqual((self.folder / "e/all.sweep").read_bytes(), self.single())
+        self.assertIn("2 done", self.palpate("cluster", "status", "e", slurm=False))
+
+    def test_wrong_usage(self):
+        for arguments, said in (([], "expected sweep, status or submit"), (["run"], "found 'run'"), (["status"], "one folder"),
+                                (["status", "none"], "cluster.json"), (["sweep", *self.PLAN, "--dir", "x"], "shards"),
+                                (["sweep", *self.PLAN, "--shards", 2], "--dir"), (["sweep", *self.PLAN, "--shards", 6, "--dir", "x"], "--shards"),
+                                (["sweep", *self.PLAN, "--shards", 2, "--dir", "slurm"], "not empty")):
+            self.assertIn(said, self.palpate("cluster", *arguments, status=2))
+        self.assertFalse((self.folder / "x").exists())
+        (self.slurm / "refuse").touch()
+        self.assertIn("invalid partition", self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "x", status=1))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0], *sys.argv[3:]])
