@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import pathlib
+import resource
 import signal
 import sqlite3
 import subprocess
@@ -219,6 +220,29 @@ class Sweeps(Files):
         self.assertEqual((self.bytes("a.sweep"), self.bytes("study.db")), before)
         (self.folder / "broken.sweep").write_bytes(before[0][:5000])
         self.assertIn("damaged", self.sweep("broken.sweep", points=1, status=2))
+
+    def test_a_full_disk_loses_nothing_that_was_recorded(self):
+        space = json.loads(json.dumps(SPACE))
+        space["parameters"].append({"name": "grip", "of": "protocol", "path": "/stylus/grip_m", "distribution": "choice",
+                                    "values": [0.05, 0.3]})
+        self.write("s.json", space)
+        command = [PALPATE, "sweep", "p.json", "--space", "s.json", "--points", "60", "--participants", "1", "--repetitions", "1"]
+
+        def little_room():  # a limit of the file's size stands for the disk
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384))
+
+        done = subprocess.run([*command, "--db", "a.sweep"], cwd=self.folder, capture_output=True, text=True,
+                              preexec_fn=little_room)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("not saved", done.stderr)
+        with sqlite3.connect(self.folder / "a.sweep") as file:
+            before = file.execute("SELECT count(*) FROM points").fetchone()[0]
+        file.close()
+        self.assertTrue(0 < before < 60, before)
+        for name in ("a.sweep", "b.sweep"):
+            subprocess.run([*command, "--db", name], cwd=self.folder, check=True, stdout=subprocess.DEVNULL)
+        self.assertEqual(self.bytes("a.sweep"), self.bytes("b.sweep"))
 
     def test_two_writers_at_once_are_refused(self):
         running = subprocess.Popen([PALPATE, *map(str, self.command("a.sweep", points=500))], cwd=self.folder,
