@@ -63,6 +63,25 @@ template <class Probe>
   return hit;
 }
 
+struct SpreadPoint {
+  double probe_fraction;
+  ContactType type;
+};
+
+/// Equation (2) over the faces of a part with shallow ridges. Takes copies: what is passed by
+/// reference stays in memory for the whole tick.
+[[gnu::cold, gnu::noinline]] inline SpreadPoint spread_over_ridges(const ScenePart& part,
+                                                                   WalkResult hit, Vec3 tip, Vec3 d,
+                                                                   double probe_fraction,
+                                                                   ContactType type) {
+  LoadedContact c;
+  c.probe_fraction = probe_fraction;
+  c.contact.type = type;
+  const FacedPart alone{&part, hit.feature, tip + hit.depth * hit.normal, d};
+  spread_over_faces(std::span<const FacedPart>(&alone, 1), hit, part.tolerance, c);
+  return {c.probe_fraction, c.contact.type};
+}
+
 /// One tick in progress: the contacts found so far.
 template <class ProbeKind>
 struct Tick {
@@ -88,8 +107,10 @@ struct Tick {
     c.part = index;
     Probe::classify(*part.mesh, hit, tip, d, length, c);
     if (Probe::kSegment && part.shallow_ridges) [[unlikely]] {
-      const FacedPart alone{&part, hit.feature, tip + hit.depth * hit.normal, d};
-      spread_over_faces(std::span<const FacedPart>(&alone, 1), hit, part.tolerance, c);
+      const SpreadPoint spread =
+          spread_over_ridges(part, hit, tip, d, c.probe_fraction, c.contact.type);
+      c.probe_fraction = spread.probe_fraction;
+      c.contact.type = spread.type;
     }
     c.contact.normal = part.world_vector(hit.normal);
     c.contact.depth = hit.depth;
