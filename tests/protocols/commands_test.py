@@ -62,9 +62,10 @@ class Validate(unittest.TestCase):
             refused = run("simulate", str(path), "--db", str(database))
             self.assertEqual(refused.returncode, 2)
             for text in (simulated, refused.stderr.decode()):
-                for words in ("stimulus 'piece'", "stimulus 'pair'", "stimulus 'hard' has 3000 N/m",
-                              "passivity_controller"):
+                for words in ("stimulus 'hard' has 3000 N/m", "passivity_controller"):
                     self.assertIn(words, text)
+                for explored in ("'ball'", "'piece'", "'pair'"):  # simulated participants know any shape
+                    self.assertNotIn(explored, text)
             self.assertEqual(sorted(p.name for p in pathlib.Path(folder).iterdir()), ["own.json"])
 
     def test_no_text_reaches_the_terminal_as_a_command(self):

@@ -93,13 +93,20 @@ class Reference(unittest.TestCase):
     def test_columns_of_render(self):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
-            (folder / "s.json").write_text('{"objects": [{"shape": "cube", "edge_m": 0.05}]}')
+            tool = '"tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]}]}, '
+            for name, keys in (("plain", ""), ("tool", tool)):
+                (folder / f"{name}.json").write_text(f'{{{keys}"objects": [{{"shape": "cube", "edge_m": 0.05}}]}}')
             (folder / "t.csv").write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,0,0,1,0,0,2\n")
-            output_of("render", "--scene", "s.json", "--renderer", "ray", "--trajectory", "t.csv", "--out", "o.csv",
-                      folder=folder)
-            header = (folder / "o.csv").read_text().split("\n")[0].split(",")
+            headers = {}
+            for name in ("plain", "tool"):
+                output_of("render", "--scene", f"{name}.json", "--renderer", "ray", "--trajectory", "t.csv", "--out",
+                          f"{name}.csv", folder=folder)
+                headers[name] = (folder / f"{name}.csv").read_text().split("\n")[0].split(",")
         section = PAGES["rendering/README.md"].section("Reference: columns of palpate render")
-        self.assertEqual([column for row in cells(section) for column in codes(row[0])], header)
+        told = [column for row in cells(section) for column in codes(row[0])]
+        self.assertEqual(told, headers["tool"])
+        of_tools = {"segment", "ideal_side_x", "ideal_side_y", "ideal_side_z"}
+        self.assertEqual([column for column in told if column not in of_tools], headers["plain"])
 
     def test_fields_of_analysis_json_and_figures(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -171,11 +178,12 @@ class Reference(unittest.TestCase):
 
     def test_faults_of_meshes(self):
         given = set()
-        for path in (ROOT / "stimuli").glob("*.cpp"):
+        for path in (ROOT / "stimuli").rglob("*.cpp"):
             given |= set(re.findall(r'faults_?\.add\("([a-z ]{3,})",', path.read_text()))
         told = {kind for row in cells(PAGES["stimuli/README.md"].section("Reference: what is refused"))
                 for kind in re.findall(r"\*([a-z ]+)\*", row[0])}
-        self.assertEqual(told, given - {"byte "})
+        # Separate pieces of a file become parts: only who builds a ConvexMesh directly is told of them.
+        self.assertEqual(told, given - {"byte ", "separate pieces"})
 
     def test_messages_and_buttons_that_are_quoted(self):
         sources = "".join(path.read_text() for path in sorted((ROOT / "runner").rglob("*.cpp")) +

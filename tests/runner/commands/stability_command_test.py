@@ -34,11 +34,16 @@ class Stability(unittest.TestCase):
         self.assertEqual(rates, {500, 1000, 2000, 5000, 10000})
         self.assertEqual({(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("scenes")},
                          {(s, r) for s in ("wall", "edge", "sphere", "two objects") for r in ("point", "ray")})
-        # Theory, worked out again.
+        # Theory, worked out again, for the stiffness that is felt: of surface and layer together; through a reach of
+        # 5, one end moves the virtual tip by its lever and the other by one less the other way.
+        felt = {"a layer as stiff as the surface": 2, "reach 5 about the tail": 5**2 + 4**2,
+                "reach 5 about the middle": 3**2 + 2**2}
+        self.assertLessEqual(set(felt), {curve["name"] for curve in result["theory"] + result["curves"]})
         for curve in result["theory"] + result["curves"]:
             loop = curve["loop"]
             for point in curve["points"]:
-                theory = point["stiffness_n_per_m"] / loop["rate_hz"] * (0.5 + loop["delay_ticks"]) + loop["virtual_damping_ns_per_m"]
+                stiffness = felt.get(curve["name"], 1) * point["stiffness_n_per_m"]
+                theory = stiffness / loop["rate_hz"] * (0.5 + loop["delay_ticks"]) + loop["virtual_damping_ns_per_m"]
                 self.assertAlmostEqual(point["theory_ns_per_m"] / theory, 1, 12)
         # A dot or a triangle for every point, a dot for every name.
         root = xml.etree.ElementTree.parse(figure).getroot()
