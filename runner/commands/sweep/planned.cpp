@@ -22,8 +22,7 @@ json base_protocol(const protocols::Protocol& protocol, const SweepSettings& set
   if (protocol.blocks_per_renderer > settings.repetitions) {
     out["blocks_per_renderer"] = settings.repetitions;
     std::cerr << "blocks_per_renderer: " << settings.repetitions << " instead of "
-              << protocol.blocks_per_renderer << ", as there are " << settings.repetitions
-              << " repetitions\n";
+              << protocol.blocks_per_renderer << ": no more blocks than repetitions\n";
   }
   return out;
 }
