@@ -256,7 +256,7 @@ TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
 }
 
 TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
-  int in_contact = 0;
+  int in_contact = 0, released = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     stimuli::Random random(seed, {43});
     std::vector<SceneObject> parts;
@@ -274,6 +274,10 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
       const Rendering r = tick(scene, state, probe);
       in_contact += r.contacts > 0;
       if (r.contacts > 0) continue;
+      if ((r.faults & render_fault::kReleased) != 0) {  // hooked for too long: no force until left
+        ++released;
+        continue;
+      }
       for (const SceneObject& part : parts) {
         LineProbe local = testing::to_local(part.pose, probe);
         if (!GetParam()->side_contact()) local.tail = local.tip;
@@ -282,6 +286,7 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
     }
   }
   EXPECT_GT(in_contact, 1000);
+  EXPECT_LT(released, in_contact / 20);
 }
 
 TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
