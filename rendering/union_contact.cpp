@@ -320,7 +320,7 @@ ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   }
   entered = at != nullptr;
   if (!entered) return tick_.tool;
-  const ToolPose pose = between(from, tick_.tool, first.time);
+  ToolPose pose = between(from, tick_.tool, first.time);
   // It turns on about where it touches.
   const PlacedSegment segment = placed(pose).segments[at->segment];
   const LineProbe local = shrunk(*at, pose.tip, segment);

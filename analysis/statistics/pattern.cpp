@@ -111,7 +111,8 @@ class Parser {
       require_truth(first);
       Node second = (this->*part)();
       require_truth(second);
-      first = made(kind, first.place, std::move(first), std::move(second));
+      const std::size_t place = first.place;
+      first = made(kind, place, std::move(first), std::move(second));
     }
     return first;
   }
@@ -148,9 +149,10 @@ class Parser {
     require_number(first);
     Node second = sum();
     require_number(second);
-    const std::size_t place = at_;
-    if (take_comparison()) fail(place, "one comparison at a time: a < b && b < c");
-    return made(*kind, first.place, std::move(first), std::move(second));
+    const std::size_t end = at_;
+    if (take_comparison()) fail(end, "one comparison at a time: a < b && b < c");
+    const std::size_t place = first.place;
+    return made(*kind, place, std::move(first), std::move(second));
   }
 
   Node sum() {
@@ -161,8 +163,8 @@ class Parser {
       require_number(first);
       Node second = product();
       require_number(second);
-      first =
-          made(plus ? Kind::add : Kind::subtract, first.place, std::move(first), std::move(second));
+      const std::size_t place = first.place;
+      first = made(plus ? Kind::add : Kind::subtract, place, std::move(first), std::move(second));
     }
   }
 
@@ -174,8 +176,9 @@ class Parser {
       require_number(first);
       Node second = sign();
       require_number(second);
-      first = made(times ? Kind::multiply : Kind::divide, first.place, std::move(first),
-                   std::move(second));
+      const std::size_t place = first.place;
+      first =
+          made(times ? Kind::multiply : Kind::divide, place, std::move(first), std::move(second));
     }
   }
 

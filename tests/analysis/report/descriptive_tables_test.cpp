@@ -145,7 +145,7 @@ TEST(DescriptiveTables, ReductionsAreOfMeansAndOfMeanLogs) {
   EXPECT_EQ(cube[3], "38.5 %");
   EXPECT_NEAR(std::stod(cube[4]), 2 * p, 0.0006) << "two tests";
   EXPECT_EQ(cube[6], "11 %");
-  const Row& tests = tests_table(two_participants()).rows[1];
+  const Row tests = tests_table(two_participants()).rows[1];
   // t, df, p, p (Holm), dz, gz (none for two pairs), V, p (Wilcoxon), BCa
   EXPECT_NEAR(std::stod("-" + tests[1].substr(3)), -t, 0.006) << tests[1];
   EXPECT_EQ(tests[2], "1");
