@@ -48,6 +48,12 @@ class Candidates {
     return true;
   }
 
+  /// m, by which the plane is above a point that should be on it: rounding, large where planes are
+  /// nearly parallel, which one step of refinement takes away.
+  static double above(const PlaneBound& plane, const Vec3& point) {
+    return plane.bound - glm::dot(plane.normal, point);
+  }
+
   bool try_face(std::size_t a) {
     const PlaneBound& space = spaces_[a];
     if (!(space.bound >= 0) || !accepts(space.bound * space.normal)) return false;
@@ -60,10 +66,13 @@ class Candidates {
     const Vec3 along = glm::cross(p.normal, q.normal);
     const double sine2 = glm::dot(along, along);
     if (!(sine2 > kParallelPair)) return false;
-    const double cosine = glm::dot(p.normal, q.normal);
-    const double of_p = (p.bound - cosine * q.bound) / sine2;
-    const double of_q = (q.bound - cosine * p.bound) / sine2;
-    if (!(of_p >= 0 && of_q >= 0) || !accepts(of_p * p.normal + of_q * q.normal)) return false;
+    const Vec3 up_p = glm::cross(q.normal, along) / sine2;  // up by one over p, along q
+    const Vec3 up_q = glm::cross(along, p.normal) / sine2;
+    Vec3 point = p.bound * up_p + q.bound * up_q;
+    point += above(p, point) * up_p + above(q, point) * up_q;
+    // From the point, whose rounding the multipliers of a narrow wedge, far larger, do not share.
+    const double of_p = glm::dot(point, up_p), of_q = glm::dot(point, up_q);
+    if (!(of_p >= 0 && of_q >= 0) || !accepts(point)) return false;
     result_.multipliers[a] = of_p;
     result_.multipliers[b] = of_q;
     return true;
@@ -75,7 +84,8 @@ class Candidates {
                pq = glm::cross(p.normal, q.normal);
     const double triple = glm::dot(p.normal, qr);
     if (!(triple * triple > kParallelTriple * kParallelTriple)) return false;
-    const Vec3 point = (p.bound * qr + q.bound * rp + r.bound * pq) / triple;
+    Vec3 point = (p.bound * qr + q.bound * rp + r.bound * pq) / triple;
+    point += (above(p, point) * qr + above(q, point) * rp + above(r, point) * pq) / triple;
     const double of_p = glm::dot(point, qr) / triple, of_q = glm::dot(point, rp) / triple,
                  of_r = glm::dot(point, pq) / triple;
     if (!(of_p >= 0 && of_q >= 0 && of_r >= 0) || !accepts(point)) return false;

@@ -37,6 +37,22 @@ TEST(UnionSearch, FindsNothingWrong) {
   EXPECT_LE(50 * counts.elsewhere, counts.compared);
 }
 
+void expect_nothing_wrong(std::uint64_t seed, std::uint64_t walk) {
+  const UnionCounts counts = search_union(ray_renderer(), seed, walk);
+  EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+  EXPECT_LE(counts.worst_penetration, 1e-12);
+}
+
+TEST(UnionSearch, IdealToolsInNarrowWedgesAreExact) {
+  // Two planes at 0.02 to 0.2 degrees from antiparallel hold the tool.
+  expect_nothing_wrong(1, 6231);
+  expect_nothing_wrong(1, 6301);
+  expect_nothing_wrong(2, 2070);
+  expect_nothing_wrong(2, 4597);
+  expect_nothing_wrong(3, 1280);
+  expect_nothing_wrong(3, 3507);
+}
+
 TEST(UnionSearch, DoesNotDependOnWhoWalks) {
   const UnionCounts whole = search_unions(7, 0, 9);
   UnionCounts shared = search_unions(7, 0, 4);
