@@ -19,7 +19,7 @@ struct Rendering {
   Vec3 device1;      ///< N, for the device at the tip
   Vec3 device2;      ///< N, for the device at the tail
   Contact deepest;   ///< the contact of largest depth; type none in free space
-  LineProbe ideal;   ///< ideal probe of the deepest contact; the virtual probe in free space
+  LineProbe ideal;   ///< ideal probe of the deepest contact; without, the virtual one where no turn is held up
   int contacts = 0;  ///< contact points with force
   int object = -1;   ///< of the deepest contact; -1 in free space
   std::uint32_t faults = 0;  ///< render_fault

@@ -208,6 +208,7 @@ void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
   UnionMemory& all = state.unions;
   all.contacts.clear();
   all.reach = 0;
+  all.most_lag = 0;
   for (std::size_t k = 0; k < state.near_parts.size(); ++k) {
     const std::uint32_t index = state.near_parts[k];
     const std::uint32_t group = scene.parts()[index].group;

@@ -629,6 +629,10 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
 
 /// Contacts from the planes that hold the tool, without the skin.
 void IdealTool::add_contacts() {
+  Vec3& shift = memory_.shift;
+  shift = at_;
+  stuck_ = stuck_ || (!planes_.nearest(Vec3(0), 0, kExact * group_.skin, shift) &&
+                      !planes_.nearest(Vec3(0), 0, group_.skin / 8, shift));
   if (stuck_) {
     // It stays where it is, and all of the force is that of the plane that holds most of it.
     tick_.faults |= render_fault::kContactCapped;
@@ -644,10 +648,6 @@ void IdealTool::add_contacts() {
     add_contact(held, at_);
     return;
   }
-  Vec3 shift = at_;
-  if (!planes_.nearest(Vec3(0), 0, kExact * group_.skin, shift) &&
-      !planes_.nearest(Vec3(0), 0, group_.skin / 8, shift))
-    return;
   for (const Plane& plane : planes_.all()) {
     if (plane.multiplier > 0) add_contact(plane, shift);
   }
@@ -674,6 +674,10 @@ void IdealTool::remember(std::size_t first_contact) {
   memory_.ideal = pose_;
   memory_.ideal.tip = tick_.tool.tip + at_;
   memory_.lag = angle;
+  if (angle > all_.most_lag) {
+    all_.most_lag = angle;
+    all_.most_behind = index_;
+  }
   all_.exceptions |= angle > kMostLag;
   const double size = carried_ != nullptr ? tick_.scene.tool_reach() : glm::length(pose_.d);
   all_.reach = std::max(all_.reach, glm::length(at_) + angle * size);

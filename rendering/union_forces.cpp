@@ -7,6 +7,16 @@
 namespace palpate::rendering {
 namespace {
 
+/// Where no contact has force, an ideal tool that is behind in turning is not the virtual one: that
+/// may be inside of a part.
+void show_behind(const UnionMemory& all, bool tool, const Vec3& tip, Rendering& out) {
+  if (!(all.most_lag > 0)) return;
+  const GroupState& group = all.groups[all.most_behind];
+  out.ideal.tip = tip + group.shift;
+  out.ideal.tail = out.ideal.tip + group.ideal.d;
+  if (tool) out.ideal_side = group.ideal.frame[0];
+}
+
 /// The force for the device at the tail, where contacts may be off the stylus' axis: with u the
 /// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion
 /// about u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's
@@ -46,7 +56,10 @@ Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
   out.device1 = out.force - out.device2;
   out.contacts = static_cast<int>(all.contacts.size());
   out.faults = tick.faults;
-  if (deepest == nullptr) return out;
+  if (deepest == nullptr) {
+    show_behind(all, tool, probe.tip, out);
+    return out;
+  }
   const Vec3 shift = deepest->shift + deepest->loaded.tangential_offset;
   const GroupState& group = all.groups[deepest->group];
   out.deepest = deepest->loaded.contact;

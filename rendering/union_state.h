@@ -41,6 +41,7 @@ struct GroupState {
   ToolPose ideal;  ///< where `touching`; else the ideal tool is the virtual one
   Vec3 grasp;      ///< m, mean contact place in the tool's frame; about it the tool turns
   bool touching = false;
+  Vec3 shift;     ///< m, at the last tick, from the virtual to the ideal tool, without the skin
   double lag = 0;           ///< rad, by which it is behind the virtual tool in turning
   bool giving_way = false;  ///< a layer that broke: its force falls, until the object is left
   double strength = 1;      ///< what is left of its force
@@ -105,6 +106,8 @@ struct UnionMemory {
   ToolPose near_pose;                   ///< the same when the list of near parts was rebuilt
   bool exceptions = false;              ///< some object is off or behind, or some layer broken
   double reach = 0;                     ///< m, from the virtual tool to the farthest ideal tool
+  double most_lag = 0;                  ///< rad, of the ideal tools of this tick
+  std::uint32_t most_behind = 0;        ///< the group whose lag that is
   std::uint64_t full_scans = 0;         ///< looks at all facets of a part, for rounding
 };
 

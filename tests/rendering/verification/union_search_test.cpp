@@ -53,6 +53,14 @@ TEST(UnionSearch, IdealToolsInNarrowWedgesAreExact) {
   expect_nothing_wrong(3, 3507);
 }
 
+TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
+  // The virtual tool has turned into a part; the ideal one, at the same tip, has not.
+  expect_nothing_wrong(2, 2979);
+  expect_nothing_wrong(3, 2904);
+  expect_nothing_wrong(1, 2196);
+  expect_nothing_wrong(3, 5836);
+}
+
 TEST(UnionSearch, DoesNotDependOnWhoWalks) {
   const UnionCounts whole = search_unions(7, 0, 9);
   UnionCounts shared = search_unions(7, 0, 4);
