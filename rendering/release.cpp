@@ -91,7 +91,8 @@ void break_layers(UnionTick& tick) {
 }  // namespace
 
 bool is_off(const UnionTick& tick, const PartGroup& group) {
-  return tick.state.unions.objects[group.object_state].off;
+  const ObjectState& object = tick.state.unions.objects[group.object_state];
+  return object.off || object.just_left;
 }
 
 void update_objects(UnionTick& tick) {
@@ -100,16 +101,18 @@ void update_objects(UnionTick& tick) {
   all.exceptions = false;
   for (std::uint32_t i = 0; i < all.objects.size(); ++i) {
     ObjectState& object = all.objects[i];
+    object.just_left = false;
     if (!tick.state.has_last && !left(tick, i)) {
       object.started_inside = true;
       switch_off(tick, i);
     } else if (object.off && left(tick, i)) {
       object = {};
+      object.just_left = true;
       restore_layers(tick, i);
     }
     if (object.off)
       tick.faults |= object.started_inside ? render_fault::kStartedInside : render_fault::kReleased;
-    all.exceptions |= object.off || object.releasing || object.lagging > 0;
+    all.exceptions |= object.off || object.just_left || object.releasing || object.lagging > 0;
   }
   for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
     const std::uint32_t object = tick.scene.groups()[g].object_state;

@@ -14,14 +14,16 @@ namespace palpate::rendering {
 
 /// The result of a tick. World frame.
 struct Rendering {
-  Vec3 force;        ///< N, on the hand
-  Vec3 torque;       ///< N m, about the virtual tip: sum over contacts of (contact - tip) x force
-  Vec3 device1;      ///< N, for the device at the tip
-  Vec3 device2;      ///< N, for the device at the tail
-  Contact deepest;   ///< the contact of largest depth; type none in free space
-  LineProbe ideal;   ///< ideal probe of the deepest contact; without, the virtual one where no turn is held up
-  int contacts = 0;  ///< contact points with force
-  int object = -1;   ///< of the deepest contact; -1 in free space
+  Vec3 force;       ///< N, on the hand
+  Vec3 torque;      ///< N m, about the virtual tip: sum over contacts of (contact - tip) x force
+  Vec3 device1;     ///< N, for the device at the tip
+  Vec3 device2;     ///< N, for the device at the tail
+  Contact deepest;  ///< the contact of largest depth; type none in free space
+  /// Ideal probe of the deepest contact; in free space the virtual one, or the one behind in
+  /// turning.
+  LineProbe ideal;
+  int contacts = 0;          ///< contact points with force
+  int object = -1;           ///< of the deepest contact; -1 in free space
   std::uint32_t faults = 0;  ///< render_fault
   int segment = -1;          ///< of the tool, where the deepest contact is; -1 in free space
   Vec3 ideal_side{0, 0, 0};  ///< unit, +x of the ideal tool; zero without a tool

@@ -41,8 +41,8 @@ struct GroupState {
   ToolPose ideal;  ///< where `touching`; else the ideal tool is the virtual one
   Vec3 grasp;      ///< m, mean contact place in the tool's frame; about it the tool turns
   bool touching = false;
-  Vec3 shift;     ///< m, at the last tick, from the virtual to the ideal tool, without the skin
-  double lag = 0;           ///< rad, by which it is behind the virtual tool in turning
+  Vec3 shift;      ///< m, at the last tick, from the virtual to the ideal tool, without the skin
+  double lag = 0;  ///< rad, by which it is behind the virtual tool in turning
   bool giving_way = false;  ///< a layer that broke: its force falls, until the object is left
   double strength = 1;      ///< what is left of its force
 };
@@ -51,6 +51,7 @@ struct GroupState {
 struct ObjectState {
   bool off = false;             ///< no force until the object has been left once
   bool started_inside = false;  ///< that is why it is off
+  bool just_left = false;       ///< in this tick: its ideal tools begin at the virtual one
   bool releasing = false;       ///< hooked: its force falls
   double strength = 1;          ///< what is left of its force
   double lag = 0;               ///< rad, of its ideal tools at the last tick, the largest

@@ -61,6 +61,8 @@ TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
   expect_nothing_wrong(3, 5836);
 }
 
+TEST(UnionSearch, WhatWasLetGoOfComesBackOutside) { expect_nothing_wrong(1, 4418); }
+
 TEST(UnionSearch, DoesNotDependOnWhoWalks) {
   const UnionCounts whole = search_unions(7, 0, 9);
   UnionCounts shared = search_unions(7, 0, 4);
