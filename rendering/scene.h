@@ -163,12 +163,17 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
 void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe);
 
 /// The same, unless the last list is still valid.
+/// \tparam kSegment  false: the tip alone touches, so its motion alone counts
+template <bool kSegment = true>
 inline void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
   if (state.clearance == std::numeric_limits<double>::infinity())
     return;  // all parts are always near
   const Vec3 tip = probe.tip - state.near_parts_pose.tip;
-  const Vec3 tail = probe.tail - state.near_parts_pose.tail;
-  const double moved2 = std::max(glm::dot(tip, tip), glm::dot(tail, tail));
+  double moved2 = glm::dot(tip, tip);
+  if constexpr (kSegment) {
+    const Vec3 tail = probe.tail - state.near_parts_pose.tail;
+    moved2 = std::max(moved2, glm::dot(tail, tail));
+  }
   if (moved2 >= state.clearance * state.clearance) rebuild_near_parts(scene, state, probe);
 }
 

@@ -275,7 +275,7 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
     state.has_last = true;
   };
   if constexpr (kFeatures.several_parts) {
-    update_near_parts(scene, state, probe);
+    update_near_parts<Probe::kSegment>(scene, state, probe);
     tick.add_contacts();
     const std::span<LoadedContact> contacts(state.contacts);
     load(contacts);
