@@ -23,7 +23,7 @@ import time
 import unittest
 import unittest.mock
 
-from terminal import Terminal
+from terminal import Terminal, end_if_it_hangs
 
 PALPATE, FAKE_LSL = sys.argv.pop(1), sys.argv.pop(1)
 
@@ -42,6 +42,7 @@ FEELING = "[trial, "
 
 class Live(unittest.TestCase):
     def setUp(self):
+        end_if_it_hangs(self)
         scratch = tempfile.TemporaryDirectory()
         self.addCleanup(scratch.cleanup)
         self.dir = pathlib.Path(scratch.name)
@@ -442,6 +443,7 @@ class Enrolment(Live):
             process = subprocess.Popen([PALPATE, "run", self.protocol(**one), "--db", self.db, "--participant", code,
                                         "--device", "simulated", "--no-window", *options], stdin=subprocess.PIPE,
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.addCleanup(process.kill)
             err = process.stderr.read()  # its input stays open until the time-out has ended the only trial
             process.stdin.close()
             process.stdout.close()
@@ -605,17 +607,18 @@ class Changed(Live):
             """Up to the trial that is due; then the input ends."""
             process = subprocess.Popen([PALPATE, "run", self.protocol(**self.TEXTS), "--db", self.db, "--participant",
                                         "K1", "--device", "simulated", "--no-window", *options], stdin=subprocess.PIPE,
-                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                       stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            self.addCleanup(process.kill)
             said = ""
             while FEELING not in said:
-                said += (line := process.stderr.readline())
+                said += (line := process.stdout.readline())
                 self.assertTrue(line, said)
-                if "[instructions]" in line or "[block begins" in line:
+                if "[space bar: go on]" in line:
                     process.stdin.write(" ")
                     process.stdin.flush()
-            out, err = process.communicate(timeout=60)
-            self.assertIn("1 of 4 trials on record; aborted", out)
-            return said + err
+            said += process.communicate(timeout=60)[0]
+            self.assertIn("1 of 4 trials on record; aborted", said)
+            return said
 
         self.assertIn("resuming with the protocol as it is stored. --changed-protocol texts shows", piped())
         self.assertIn("resuming with the new texts", piped("--changed-protocol", "texts"))

@@ -11,6 +11,19 @@ import termios
 import time
 
 
+def end_if_it_hangs(test, seconds=120):
+    """A `test` that still waits after that long fails, and says where: a session that a fault has stopped, on a machine
+    that stood still, waits for its experimenter for ever."""
+
+    def give_up(*_):
+        raise AssertionError(f"still waiting after {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(seconds)
+    test.addCleanup(signal.signal, signal.SIGALRM, before)
+    test.addCleanup(signal.alarm, 0)
+
+
 class Terminal:
     """Starts `command` with a terminal of its own. Everything it says gathers in `text`."""
 
