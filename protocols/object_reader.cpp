@@ -7,6 +7,8 @@
 #include <sstream>
 #include <vector>
 
+#include "stimuli/edit_distance.h"
+
 namespace palpate::protocols {
 namespace {
 
@@ -70,22 +72,6 @@ bool read_numbers(const json& value, const std::string& pointer, std::array<doub
     good &= read_number(value[i], child_pointer(pointer, i), out[i], range, faults);
   }
   return good;
-}
-
-/// Levenshtein's distance, for suggestions.
-std::size_t edits(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row.back();
 }
 
 constexpr std::size_t kShown = 60;  // characters of a value in a message
@@ -274,7 +260,7 @@ void ObjectReader::refuse_unknown_keys() {
     std::size_t distance = key.size() / 2 + 1;  // with more edits it is another word
     for (const std::string& known : known_) {
       all += (all.empty() ? "" : ", ") + known;
-      if (const std::size_t d = edits(key, known); d < distance) {
+      if (const std::size_t d = stimuli::edit_distance(key, known); d < distance) {
         distance = d;
         nearest = known;
       }

@@ -166,12 +166,12 @@ void draw_mark(Svg& svg, const PlacedPanel& placed, const Palette& palette, cons
 }  // namespace
 
 double left_axis_width(const Panel& panel) {
-  constexpr double kLeast = 58, kBeside = 16, kWithTitle = 44;
+  constexpr double kLeast = 58, kWithoutTitle = 16, kWithTitle = 44;
   double widest = 0;
   for (const Tick& tick : panel.y.ticks) {
     widest = std::max(widest, text_width(tick_text(tick), kTickSize));
   }
-  return std::max(kLeast, widest + (panel.y.title.empty() ? kBeside : kWithTitle));
+  return std::max(kLeast, widest + (panel.y.title.empty() ? kWithoutTitle : kWithTitle));
 }
 
 double draw_axes(Svg& svg, const PlacedPanel& placed, const Palette& palette) {

@@ -76,12 +76,11 @@ class SphereLine {
   float radius_;
 };
 
-/// Works in the cube's frame.
-class CubeLine {
+/// A line in the frames of kBlock rotations of one stimulus.
+class RotatedLine {
  public:
-  CubeLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
-           const Line& line)
-      : hypotheses_(&hypotheses), first_(first), half_(shape.half_size) {
+  RotatedLine(const ShapeHypotheses& hypotheses, int first, const Line& line)
+      : hypotheses_(&hypotheses), first_(first) {
     for (int a = 0; a < 3; ++a) {
       const float* x = hypotheses.axis_component(a, 0) + first;
       const float* y = hypotheses.axis_component(a, 1) + first;
@@ -94,6 +93,40 @@ class CubeLine {
       }
     }
   }
+
+  FloatVec along(int i) const { return {along_[0][i], along_[1][i], along_[2][i]}; }
+  float cosine(int i, const FloatVec& v) const {
+    return v.x * direction_[0][i] + v.y * direction_[1][i] + v.z * direction_[2][i];
+  }
+  FloatVec world(int i, const FloatVec& v) const {
+    const auto component = [&](int c) {
+      return v.x * hypotheses_->axis_component(0, c)[first_ + i] +
+             v.y * hypotheses_->axis_component(1, c)[first_ + i] +
+             v.z * hypotheses_->axis_component(2, c)[first_ + i];
+    };
+    return {component(0), component(1), component(2)};
+  }
+
+ protected:
+  FloatVec at(int i, float s) const {
+    return {start_[0][i] + s * along_[0][i], start_[1][i] + s * along_[1][i],
+            start_[2][i] + s * along_[2][i]};
+  }
+
+ private:
+  const ShapeHypotheses* hypotheses_;
+  int first_;
+  float start_[3][ShapeHypotheses::kBlock];
+  float along_[3][ShapeHypotheses::kBlock];
+  float direction_[3][ShapeHypotheses::kBlock];
+};
+
+/// Works in the cube's frame.
+class CubeLine : public RotatedLine {
+ public:
+  CubeLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
+           const Line& line)
+      : RotatedLine(hypotheses, first, line), half_(shape.half_size) {}
 
   float distance(int i, float s) const {
     const FloatVec e = excess(at(i, s));
@@ -109,24 +142,8 @@ class CubeLine {
     const float scale = 1.0f / std::sqrt(lane::max(dot(g, g), kTinyLength * kTinyLength));
     return {distance(i, s), {g.x * scale, g.y * scale, g.z * scale}};
   }
-  FloatVec along(int i) const { return {along_[0][i], along_[1][i], along_[2][i]}; }
-  float cosine(int i, const FloatVec& v) const {
-    return v.x * direction_[0][i] + v.y * direction_[1][i] + v.z * direction_[2][i];
-  }
-  FloatVec world(int i, const FloatVec& v) const {
-    const auto component = [&](int c) {
-      return v.x * hypotheses_->axis_component(0, c)[first_ + i] +
-             v.y * hypotheses_->axis_component(1, c)[first_ + i] +
-             v.z * hypotheses_->axis_component(2, c)[first_ + i];
-    };
-    return {component(0), component(1), component(2)};
-  }
 
  private:
-  FloatVec at(int i, float s) const {
-    return {start_[0][i] + s * along_[0][i], start_[1][i] + s * along_[1][i],
-            start_[2][i] + s * along_[2][i]};
-  }
   FloatVec excess(const FloatVec& p) const {
     return {std::fabs(p.x) - half_, std::fabs(p.y) - half_, std::fabs(p.z) - half_};
   }
@@ -142,12 +159,7 @@ class CubeLine {
     return {x * lane::sign(p.x), y * lane::sign(p.y), z * lane::sign(p.z)};
   }
 
-  const ShapeHypotheses* hypotheses_;
-  int first_;
   float half_;
-  float start_[3][ShapeHypotheses::kBlock];
-  float along_[3][ShapeHypotheses::kBlock];
-  float direction_[3][ShapeHypotheses::kBlock];
 };
 
 /// Solids of revolution; works in the world frame. Positions on the line are relative to its point

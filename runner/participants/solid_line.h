@@ -9,45 +9,20 @@
 namespace palpate::runner {
 
 /// Works in the stimulus' frame.
-class SolidLine {
+class SolidLine : public RotatedLine {
  public:
   SolidLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
             const Line& line)
-      : hypotheses_(&hypotheses), first_(first), field_(shape.field.get()) {
-    for (int a = 0; a < 3; ++a) {
-      const float* x = hypotheses.axis_component(a, 0) + first;
-      const float* y = hypotheses.axis_component(a, 1) + first;
-      const float* z = hypotheses.axis_component(a, 2) + first;
-      for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-        const FloatVec axis{x[i], y[i], z[i]};
-        start_[a][i] = dot(axis, line.start);
-        along_[a][i] = dot(axis, line.along);
-        direction_[a][i] = dot(axis, line.direction);
-      }
-    }
-  }
+      : RotatedLine(hypotheses, first, line), field_(shape.field.get()) {}
 
   float distance(int i, float s) const {
-    return field_->distance(start_[0][i] + s * along_[0][i], start_[1][i] + s * along_[1][i],
-                            start_[2][i] + s * along_[2][i]);
+    const FloatVec p = at(i, s);
+    return field_->distance(p.x, p.y, p.z);
   }
   SurfacePoint surface(int i, float s) const {
-    const DistanceField::Value v =
-        field_->value(start_[0][i] + s * along_[0][i], start_[1][i] + s * along_[1][i],
-                      start_[2][i] + s * along_[2][i]);
+    const FloatVec p = at(i, s);
+    const DistanceField::Value v = field_->value(p.x, p.y, p.z);
     return {v.distance, unit({v.slope_x, v.slope_y, v.slope_z})};
-  }
-  FloatVec along(int i) const { return {along_[0][i], along_[1][i], along_[2][i]}; }
-  float cosine(int i, const FloatVec& v) const {
-    return v.x * direction_[0][i] + v.y * direction_[1][i] + v.z * direction_[2][i];
-  }
-  FloatVec world(int i, const FloatVec& v) const {
-    const auto component = [&](int c) {
-      return v.x * hypotheses_->axis_component(0, c)[first_ + i] +
-             v.y * hypotheses_->axis_component(1, c)[first_ + i] +
-             v.z * hypotheses_->axis_component(2, c)[first_ + i];
-    };
-    return {component(0), component(1), component(2)};
   }
 
   static FloatVec unit(const FloatVec& v) {
@@ -56,12 +31,7 @@ class SolidLine {
   }
 
  private:
-  const ShapeHypotheses* hypotheses_;
-  int first_;
   const DistanceField* field_;
-  float start_[3][ShapeHypotheses::kBlock];
-  float along_[3][ShapeHypotheses::kBlock];
-  float direction_[3][ShapeHypotheses::kBlock];
 };
 
 /// A solid that is not convex may have several local minima along the line. Steps of at most

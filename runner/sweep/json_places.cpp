@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "stimuli/edit_distance.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -23,22 +25,6 @@ Json* element(Json& array, const std::string& token) {
   const auto read = std::from_chars(token.data(), end, index);
   const bool number = read.ec == std::errc() && read.ptr == end && std::to_string(index) == token;
   return number && index < array.size() ? &array[index] : nullptr;
-}
-
-/// Levenshtein's.
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-    }
-  }
-  return row.back();
 }
 
 }  // namespace
@@ -82,8 +68,9 @@ std::vector<std::string> near_pointers(const json& document, const std::string& 
   const json flat = document.flatten();
   for (const auto& [place, value] : flat.items()) {
     // One that only stands elsewhere is as near as one that is misspelt by two letters.
-    const std::size_t elsewhere = 2 + edit_distance(last, place.substr(place.rfind('/') + 1));
-    const std::size_t edits = std::min(edit_distance(pointer, place), elsewhere);
+    const std::size_t elsewhere =
+        2 + stimuli::edit_distance(last, place.substr(place.rfind('/') + 1));
+    const std::size_t edits = std::min(stimuli::edit_distance(pointer, place), elsewhere);
     if (edits <= 2 + last.size() / 2) found.emplace_back(edits, place);
   }
   std::stable_sort(found.begin(), found.end(),

@@ -1,0 +1,43 @@
+#include "stimuli/edit_distance.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "stimuli/random.h"
+
+namespace palpate::stimuli {
+namespace {
+
+TEST(EditDistance, CountsInsertedDeletedAndReplacedBytes) {
+  EXPECT_EQ(edit_distance("", ""), 0U);
+  EXPECT_EQ(edit_distance("cone", "cone"), 0U);
+  EXPECT_EQ(edit_distance("", "cube"), 4U);
+  EXPECT_EQ(edit_distance("cube", ""), 4U);
+  EXPECT_EQ(edit_distance("radius", "radus"), 1U);
+  EXPECT_EQ(edit_distance("kitten", "sitting"), 3U);
+  EXPECT_EQ(edit_distance("ab", "ba"), 2U);
+}
+
+TEST(EditDistance, IsAMetric) {
+  Random random(3);
+  std::vector<std::string> words;
+  for (int i = 0; i < 12; ++i) {
+    std::string word;
+    for (int n = static_cast<int>(random.unit() * 6); n > 0; --n)
+      word += static_cast<char>('a' + static_cast<int>(random.unit() * 3));
+    words.push_back(word);
+  }
+  for (const std::string& a : words) {
+    for (const std::string& b : words) {
+      EXPECT_EQ(edit_distance(a, b) == 0, a == b);
+      EXPECT_EQ(edit_distance(a, b), edit_distance(b, a));
+      for (const std::string& c : words)
+        EXPECT_LE(edit_distance(a, c), edit_distance(a, b) + edit_distance(b, c));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::stimuli
