@@ -1,0 +1,80 @@
+#pragma once
+// One ideal tool in one tick: it turns (ideal_tool_turn.cpp), translates (ideal_tool_translate.cpp)
+// and says where it touches (ideal_tool_contacts.cpp). Internal to the contact law of unions
+// (union_contact.h). World frame, SI units.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "rendering/near_pairs.h"
+#include "rendering/union_contact.h"
+#include "rendering/union_planes.h"
+
+namespace palpate::rendering {
+
+/// A contact farther off its facet than so many skins has left it.
+inline constexpr double kSlidOff = 4;
+
+/// The ideal tool of one group, in one tick. Translations are relative to the virtual tool's tip.
+class IdealTool {
+ public:
+  IdealTool(UnionTick& tick, std::uint32_t group_index)
+      : tick_(tick),
+        all_(tick.state.unions),
+        index_(group_index),
+        group_(tick.scene.groups()[group_index]),
+        memory_(all_.groups[group_index]),
+        pairs_(tick, group_),
+        carried_(pairs_.carried()) {}
+
+  void follow();
+
+ private:
+  /// Of a point fixed to the tool, from the tip; `grasp` as in GroupState.
+  Vec3 turned(const Vec3& grasp, const ToolPose& pose) const {
+    return carried_ != nullptr ? pose.frame * grasp : grasp.z * pose.d;
+  }
+  Plane plane_of(std::uint32_t near, ContactFeature feature) const;
+
+  // union_contact.cpp
+  ToolPose first_contact(const ToolPose& from, bool& entered);
+
+  // ideal_tool_turn.cpp
+  void turn(const ToolPose& from);
+  bool settle(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
+              double most_push);
+  bool push_out(const Vec3& from, double most_push);
+  bool put_plane(std::uint32_t near, ContactFeature feature);
+
+  // ideal_tool_translate.cpp
+  void resume_planes();
+  void translate();
+  bool next_hit(const Vec3& goal, std::uint32_t& near, PairCast& first);
+  void move_to_hit(const Vec3& goal, std::uint32_t near, const PairCast& hit);
+  bool let_go_of_planes();
+  bool slid_off(const Plane& plane) const;
+  bool parted_here(const NearPair& near) const;
+
+  // ideal_tool_contacts.cpp
+  void add_contacts();
+  void add_contact(const Plane& plane, const Vec3& shift);
+  void spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
+                         LoadedContact& c);
+  void remember(std::size_t first_contact);
+  void remember_planes();
+  void remember_grasp(std::size_t first_contact);
+
+  UnionTick& tick_;
+  UnionMemory& all_;
+  std::uint32_t index_;
+  const PartGroup& group_;
+  GroupState& memory_;
+  NearPairs pairs_;
+  const Tool* carried_;
+  ToolPose pose_;  ///< its orientation; the tip is the virtual one plus at_
+  Vec3 at_;        ///< m, from the virtual tip to the ideal one
+  Planes planes_;
+  bool stuck_ = false;
+};
+
+}  // namespace palpate::rendering

@@ -1,0 +1,131 @@
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "rendering/ideal_tool.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr int kRounds = 96;         // of casts in one tick; then the ideal tool stays where it is
+constexpr double kOnFacet = 1e-11;  // of the size, the same where the skin is thin
+constexpr double kSamePlace = 8;    // skins; within it a contact that comes back never left
+
+}  // namespace
+
+/// Takes up the planes that held the tool at the last tick, where it is still beyond them.
+void IdealTool::resume_planes() {
+  planes_.remove_if([](const Plane& plane) { return plane.multiplier <= 0; });
+  for (NearPair& near : pairs_.all()) near.carries = false;
+  for (const Plane& plane : planes_.all()) pairs_[plane.near].carries = true;
+  for (std::uint32_t i = 0; i < pairs_.size() && !planes_.full(); ++i) {
+    NearPair& near = pairs_[i];
+    if (!pairs_.state_of(near).carries || near.carries) continue;
+    const Plane plane = plane_of(i, pairs_.state_of(near).feature);
+    if (!(glm::dot(plane.normal, at_) - plane.depth > 0)) continue;
+    near.carries = true;
+    planes_.add(plane);
+  }
+}
+
+/// The first part on the straight way to `goal`.
+bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) {
+  first.time = 2;
+  const Vec3 way = goal - at_;
+  for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
+    NearPair& near = pairs_[i];
+    if (near.carries) continue;  // convex, and behind a plane that the way stays beyond
+    if (apart(near, at_, goal)) continue;
+    near.was_cast = true;
+    const PairCast found =
+        cast(pairs_.mesh_of(near), pairs_.state_of(near).feature, pairs_.local(near, at_), near.d,
+             pairs_.part_of(near).shrink * pairs_.part_of(near).local_vector(way));
+    pairs_.state_of(near).feature = found.feature;
+    if (!found.hit || !(found.time < first.time)) continue;
+    first = found;
+    hit = i;
+  }
+  return first.time <= 1;
+}
+
+bool IdealTool::slid_off(const Plane& plane) const {
+  const NearPair& near = pairs_[plane.near];
+  const stimuli::ConvexMesh& mesh = *pairs_.part_of(near).mesh;
+  const double slack = kSlidOff * group_.skin + kOnFacet * (mesh.size() + glm::length(near.d));
+  return distance_off(mesh, plane.feature, pairs_.local(near, at_), near.d) > slack;
+}
+
+/// Whether the pair let go of the ideal tool where that is now, within rounding.
+bool IdealTool::parted_here(const NearPair& near) const {
+  const double same = kSamePlace * group_.skin;
+  const Vec3 apart = at_ - near.parted_at;
+  return near.parted && glm::dot(apart, apart) <= same * same;
+}
+
+/// Lets go of planes that hold nothing, and of those whose facet the tool has slid off. True when
+/// there is one of the latter.
+bool IdealTool::let_go_of_planes() {
+  bool slid = false;
+  planes_.remove_if([&](const Plane& plane) {
+    NearPair& near = pairs_[plane.near];
+    const bool off = plane.multiplier > 0 && !(plane.stays && parted_here(near)) && slid_off(plane);
+    if (plane.multiplier > 0 && !off) return false;
+    near.carries = false;
+    if (off) {
+      near.parted = true;
+      near.parted_at = at_;
+      slid = true;
+    }
+    return true;
+  });
+  return slid;
+}
+
+void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCast& hit) {
+  Plane plane = plane_of(index, hit.feature);
+  // It stops a skin before the plane.
+  const Vec3 way = goal - at_;
+  const double rate = glm::dot(plane.normal, way);
+  const double height = glm::dot(plane.normal, at_) - plane.depth;
+  const double time = rate < 0 ? std::clamp((height - group_.skin) / -rate, 0.0, hit.time) : 0.0;
+  at_ += time * way;
+  if (time * glm::length(way) > kSamePlace * group_.skin) let_go_of_planes();
+  NearPair& near = pairs_[index];
+  plane.stays = parted_here(near);
+  near.carries = true;
+  pairs_.state_of(near).feature = plane.feature;
+  if (planes_.full())
+    planes_.remove_if([&](const Plane& old) {
+      if (old.multiplier > 0) return false;
+      pairs_[old.near].carries = false;
+      return true;
+    });
+  if (planes_.full()) {
+    near.carries = false;
+    stuck_ = true;
+    return;
+  }
+  planes_.add(plane);
+}
+
+/// Moves the ideal tool as near to the virtual one as the parts let it.
+void IdealTool::translate() {
+  const double tolerance = group_.skin / 8;
+  for (int round = 0; round < kRounds && !stuck_; ++round) {
+    Vec3 goal;
+    if (!planes_.nearest(Vec3(0), group_.skin, tolerance, goal) &&
+        !planes_.nearest_from(at_, group_.skin, tolerance, goal)) {
+      break;
+    }
+    std::uint32_t near = 0;
+    PairCast hit;
+    if (next_hit(goal, near, hit)) {
+      move_to_hit(goal, near, hit);
+      continue;
+    }
+    at_ = goal;
+    if (!let_go_of_planes()) return;
+  }
+  stuck_ = true;
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,94 @@
+#pragma once
+// The parts and segments that an ideal tool can bring together within a tick, and where a motion of
+// the tool first enters one of them. Internal to the contact law of unions (union_contact.h). World
+// frame, SI units.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "rendering/facet_walk.h"
+#include "rendering/pair_cast.h"
+#include "rendering/probe.h"
+#include "rendering/scene.h"
+#include "rendering/tool_pose.h"
+#include "rendering/union_contact.h"
+
+namespace palpate::rendering {
+
+/// Where a motion of the tool first enters a pair.
+struct Entry {
+  bool entered = false;
+  double time = 2;  ///< of the motion
+  ContactFeature feature;
+};
+
+/// Whether the pair's plane keeps the segment from the part all the way between two translations.
+inline bool apart(const NearPair& near, const Vec3& from, const Vec3& to) {
+  return near.has_plane && glm::dot(near.normal, from) + near.height > 0 &&
+         glm::dot(near.normal, to) + near.height > 0;
+}
+
+/// The pairs of one group, in one tick. Translations are relative to the virtual tool's tip.
+class NearPairs {
+ public:
+  NearPairs(UnionTick& tick, const PartGroup& group)
+      : tick_(tick),
+        all_(tick.state.unions),
+        group_(group),
+        carried_(tick.sides ? tick.scene.tool() : nullptr) {}
+
+  std::span<NearPair> all() { return all_.near; }
+  std::span<const NearPair> all() const { return all_.near; }
+  std::size_t size() const { return all_.near.size(); }
+  NearPair& operator[](std::size_t i) { return all_.near[i]; }
+  const NearPair& operator[](std::size_t i) const { return all_.near[i]; }
+
+  const ScenePart& part_of(const NearPair& near) const { return tick_.scene.parts()[near.part]; }
+  PairState& state_of(const NearPair& near) { return all_.pairs[near.pair]; }
+  CastMesh mesh_of(const NearPair& near) {
+    const ScenePart& part = part_of(near);
+    return {*part.mesh, *part.trees, part.inside, all_.full_scans};
+  }
+
+  /// The segments' tool; null: the stylus itself.
+  const Tool* carried() const { return carried_; }
+  PlacedTool placed(const ToolPose& pose) const { return place(carried_, tick_.sides, pose); }
+
+  /// Sets the pairs that the tool can touch while it comes from `from` and then stays within
+  /// `reach` of the virtual tool.
+  /// \param motion  m, of any point of the tool from there to the virtual tool
+  void collect(const ToolPose& from, const PlacedTool& placed_from, double motion, double reach);
+
+  /// Puts the pairs' segments where the tool of this orientation has them.
+  void orient(const PlacedTool& oriented);
+  const PlacedTool& oriented() const { return oriented_; }
+
+  /// Mesh frame, m; the segment's tip where the tool, oriented, is moved by y.
+  Vec3 local(const NearPair& near, const Vec3& y) const {
+    return near.tip + part_of(near).shrink * part_of(near).local_vector(y);
+  }
+
+  /// The segment in the part's frame, seen smaller by the part's margin.
+  LineProbe shrunk(const NearPair& near, const Vec3& tip, const PlacedSegment& segment) const;
+
+  /// A segment whose ends move linearly: where it first enters the part. Remembers what separates
+  /// them where it does not.
+  Entry sweep(NearPair& near, const LineProbe& before, const LineProbe& after);
+
+  /// Whether the virtual tool is inside of a part.
+  bool virtual_inside();
+
+ private:
+  template <class Visit>
+  void visit_near_parts(const Visit& visit) const;
+  void take_up_plane(NearPair& near);
+
+  UnionTick& tick_;
+  UnionMemory& all_;
+  const PartGroup& group_;
+  const Tool* carried_;
+  PlacedTool oriented_;
+};
+
+}  // namespace palpate::rendering

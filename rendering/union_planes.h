@@ -1,0 +1,77 @@
+#pragma once
+// The planes that hold an ideal tool. Internal to the contact law of unions (union_contact.h).
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <span>
+
+#include "rendering/active_planes.h"
+#include "rendering/facet_walk.h"
+
+namespace palpate::rendering {
+
+/// A plane that holds an ideal tool. Translations are relative to the virtual tool's tip.
+struct Plane {
+  std::uint32_t near = 0;  ///< index of the pair in UnionMemory::near
+  ContactFeature feature;
+  Vec3 normal;            ///< world, out of the part
+  double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
+  double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
+  bool stays = false;     ///< came back where it had let go: rounding, it is not let go there again
+};
+
+/// Those in use, at most kMostPlanes.
+class Planes {
+ public:
+  std::span<Plane> all() { return {planes_.data(), count_}; }
+  std::span<const Plane> all() const { return {planes_.data(), count_}; }
+  bool full() const { return count_ == planes_.size(); }
+  bool empty() const { return count_ == 0; }
+  void clear() { count_ = 0; }
+  void add(const Plane& plane) { planes_[count_++] = plane; }
+  template <class Drop>
+  void remove_if(const Drop& drop) {
+    count_ = static_cast<std::size_t>(
+        std::remove_if(planes_.begin(), planes_.begin() + static_cast<std::ptrdiff_t>(count_),
+                       drop) -
+        planes_.begin());
+  }
+
+  /// The point nearest to `origin` at least `skin` above all planes; sets the multipliers.
+  bool nearest(const Vec3& origin, double skin, double tolerance, Vec3& point) {
+    std::array<PlaneBound, kMostPlanes> spaces;
+    for (std::size_t i = 0; i < count_; ++i)
+      spaces[i] = {planes_[i].normal,
+                   planes_[i].depth + skin - glm::dot(planes_[i].normal, origin)};
+    return solve(spaces, tolerance, origin, point);
+  }
+
+  /// The same to the virtual tool, from `at`, which is allowed: no plane asks for more than is
+  /// there.
+  bool nearest_from(const Vec3& at, double skin, double tolerance, Vec3& point) {
+    std::array<PlaneBound, kMostPlanes> spaces;
+    for (std::size_t i = 0; i < count_; ++i)
+      spaces[i] = {planes_[i].normal,
+                   std::min(planes_[i].depth + skin, glm::dot(planes_[i].normal, at))};
+    return solve(spaces, tolerance, Vec3(0), point);
+  }
+
+ private:
+  bool solve(const std::array<PlaneBound, kMostPlanes>& spaces, double tolerance,
+             const Vec3& origin, Vec3& point) {
+    const ConstrainedPoint nearest =
+        constrained_point(std::span<const PlaneBound>(spaces.data(), count_), tolerance);
+    if (!nearest.found) return false;
+    for (std::size_t i = 0; i < count_; ++i) planes_[i].multiplier = nearest.multipliers[i];
+    point = origin + nearest.point;
+    return true;
+  }
+
+  std::array<Plane, kMostPlanes> planes_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace palpate::rendering

@@ -1,0 +1,82 @@
+// Forces of the contact law of unions on the hand and on two devices.
+
+#include <gtest/gtest.h>
+
+#include "rendering/force.h"
+#include "rendering/renderer.h"
+#include "tests/shared/random_clusters.h"
+
+namespace palpate::rendering {
+namespace {
+
+using testing::cluster;
+using testing::cluster_path;
+using testing::kTick;
+using testing::random_tool;
+
+TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
+  stimuli::Random random(11);
+  int off_axis = 0;
+  for (int i = 0; i < 300; ++i) {
+    const std::size_t segments = 1 + random.below(Tool::kMostSegments);
+    const Scene scene(cluster(random), true, random_tool(random, segments));
+    RenderState state = scene.initial_state();
+    for (const LineProbe& probe : cluster_path(random, 60, 0.5)) {
+      const Rendering r = ray_renderer().tick(scene, state, probe, kTick);
+      ASSERT_LE(glm::length(r.device1 + r.device2 - r.force), 1e-9 * (1 + glm::length(r.force)));
+      if (r.contacts == 0) {
+        ASSERT_EQ(r.segment, -1);
+        continue;
+      }
+      ASSERT_GE(r.segment, 0);
+      ASSERT_LT(r.segment, static_cast<int>(segments));
+      ASSERT_NEAR(glm::length(r.ideal_side), 1, 1e-9);
+      // The two devices' moment about any point of the stylus, as the contacts' save torsion.
+      const Vec3 axis = glm::normalize(probe.tail - probe.tip);
+      for (const double share : {-0.5, 0.0, 0.4, 1.0}) {
+        const Vec3 hand = probe.tip + share * (probe.tail - probe.tip);
+        Vec3 of_contacts(0);
+        for (const PlacedContact& c : state.unions.contacts)
+          of_contacts += glm::cross(c.place - hand, c.loaded.force * c.loaded.contact.normal);
+        const Vec3 told = torque_about(hand, r.torque, probe.tip, r.force);
+        ASSERT_LE(glm::length(told - of_contacts), 1e-9 * (1 + glm::length(told)));
+        const Vec3 shown =
+            glm::cross(probe.tip - hand, r.device1) + glm::cross(probe.tail - hand, r.device2);
+        const Vec3 missing = shown - told;
+        ASSERT_LE(glm::length(missing - glm::dot(missing, axis) * axis),
+                  1e-9 * (1 + glm::length(told)));
+        off_axis += glm::length(missing) > 1e-6;
+      }
+    }
+  }
+  EXPECT_GT(off_axis, 100);
+}
+
+// One segment from tip to tail is the plain stylus, and so are its pieces.
+TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
+  stimuli::Random random(12);
+  int in_contact = 0, same = 0;
+  for (const std::size_t pieces : {1u, 2u, 5u, 16u}) {
+    const auto mesh =
+        testing::mesh_of(testing::random_polyhedron(random, 16, Vec3(0.03, 0.025, 0.02)));
+    Tool tool;
+    for (std::size_t j = 0; j < pieces; ++j)
+      tool.segments.push_back(
+          {{0, 0, 0.1 * static_cast<double>(j) / static_cast<double>(pieces)},
+           {0, 0, 0.1 * static_cast<double>(j + 1) / static_cast<double>(pieces)}});
+    const Scene plain({testing::placed_object(mesh)}),
+        carried({testing::placed_object(mesh)}, true, tool);
+    RenderState of_plain = plain.initial_state(), of_carried = carried.initial_state();
+    for (const LineProbe& probe : testing::sliding_path(random, *mesh, 0.1, 300, 0.01, 0.1)) {
+      const Rendering a = ray_renderer().tick(plain, of_plain, probe, kTick),
+                      b = ray_renderer().tick(carried, of_carried, probe, kTick);
+      in_contact += a.contacts > 0;
+      same += a.contacts > 0 && glm::length(a.force - b.force) <= 1e-9;
+    }
+  }
+  EXPECT_GT(in_contact, 600);
+  EXPECT_EQ(same, in_contact);
+}
+
+}  // namespace
+}  // namespace palpate::rendering
