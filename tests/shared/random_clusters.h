@@ -16,16 +16,17 @@ namespace palpate::testing {
 inline constexpr double kClusterStiffness = 1000;  // N/m
 
 /// Boxes, slabs and hulls that overlap at random.
-inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, const Pose& pose = {}, double scale = 1) {
+inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, const Pose& pose = {},
+                                                   double scale = 1) {
   std::vector<rendering::SceneObject> parts;
   const std::uint64_t count = 2 + random.below(7);
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto edge = [&] { return 0.01 + 0.03 * random.unit(); };
     Vec3 half = 0.5 * Vec3(edge(), edge(), edge());
     if (random.below(4) == 0) half.z = 5e-4;  // a thin plate
-    stimuli::PolygonSoup soup =
-        random.below(4) == 0 ? random_polyhedron(random, 12, Vec3(0.02, 0.015, 0.01))
-                             : box_soup(-half, half);
+    stimuli::PolygonSoup soup = random.below(4) == 0
+                                    ? random_polyhedron(random, 12, Vec3(0.02, 0.015, 0.01))
+                                    : box_soup(-half, half);
     for (Vec3& v : soup.vertices) v *= scale;
     const Pose at{0.02 * scale * Vec3(random.normal(), random.normal(), random.normal()),
                   stimuli::uniform_rotation(random)};
@@ -37,7 +38,8 @@ inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, cons
   return parts;
 }
 
-inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments, double scale = 1) {
+inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments,
+                                   double scale = 1) {
   rendering::Tool tool;
   for (std::size_t j = 0; j < segments; ++j) {
     const Vec3 from = j == 0 ? Vec3(0) : tool.segments.back().to;
@@ -50,7 +52,7 @@ inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments
 
 /// Through and round a cluster; about `speed` m/s.
 inline ProbePath cluster_path(stimuli::Random& random, std::size_t ticks, double speed,
-                                double scale = 1) {
+                              double scale = 1) {
   const Wave3 place(random), turn(random);
   ProbePath path{{Vec3(scale, 0, 0), Vec3(scale, 0, 0.1 * scale)}};
   double travelled = 0;
