@@ -97,7 +97,7 @@ PUBLIC = {
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display text_display window",
-    "runner/participants": "keyboard respondent simulated simulated_settings",
+    "runner/participants": "keyboard respondent settings_document simulated simulated_settings",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay_comparison session_plan simulated_session simulated_study station",
     "runner/sweep": "design swept_study",

@@ -88,9 +88,12 @@ void Store::Impl::require_usable_path() {
   std::error_code error;
   file = fs::weakly_canonical(fs::absolute(path, error), error).string();
   if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a database");
-  // Reading follows links of other users; writing does not, they could redirect it.
-  const std::string fault = writes() ? resolve_trusted_links(path).fault : "";
-  if (!fault.empty()) refuse(fault);
+  if (writes()) {  // Reading follows links of other users; writing does not, they could redirect
+                   // it.
+    const ResolvedPath resolved = resolve_trusted_links(path);
+    if (!resolved.fault.empty()) refuse(resolved.fault);
+    file = resolved.path;
+  }
   const fs::file_status status = fs::status(file, error);
   if (fs::exists(status) && !fs::is_regular_file(status)) refuse("is not a file; name a file");
   if (!writes() && !fs::exists(status)) {

@@ -90,8 +90,11 @@ struct SweepFile::Impl {
     std::error_code error;
     file = fs::weakly_canonical(fs::absolute(path, error), error).string();
     if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a sweep's file");
-    const std::string fault = writing ? resolve_trusted_links(path).fault : "";
-    if (!fault.empty()) throw StoreRefused(path + ": " + fault);
+    if (writing) {
+      const ResolvedPath resolved = resolve_trusted_links(path);
+      if (!resolved.fault.empty()) throw StoreRefused(path + ": " + resolved.fault);
+      file = resolved.path;
+    }
     const fs::file_status status = fs::status(file, error);
     if (fs::exists(status) && !fs::is_regular_file(status)) {
       throw StoreRefused(path + ": is not a file; name a file");

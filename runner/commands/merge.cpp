@@ -47,6 +47,11 @@ void print(const std::string& out, const data::MergeResult& done) {
 
 /// \throws UsageError: some are, some are not
 bool are_sweeps(const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (!std::filesystem::exists(input, error))
+      throw UsageError(input + ": there is no such file (or its folder may not be read)");
+  }
   const auto sweep = std::find_if(inputs.begin(), inputs.end(), data::is_sweep_file);
   const auto other = std::find_if_not(inputs.begin(), inputs.end(), data::is_sweep_file);
   if (sweep != inputs.end() && other != inputs.end()) {

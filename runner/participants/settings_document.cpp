@@ -8,6 +8,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/sha256.h"
+#include "runner/participants/setting_ranges.h"
 #include "runner/participants/simulated_defaults.h"
 
 namespace palpate::runner {
@@ -55,10 +56,12 @@ json implied_settings(int version) {
   return implied;
 }
 
-/// Why a value cannot stand in the place of another; empty: it can.
-std::string fault_of(const json& value, const json& now, const std::string& pointer) {
+}  // namespace
+
+std::string setting_fault(const std::string& pointer, const json& value, const json& now) {
   if (now.is_number() && !(value.is_number() && std::isfinite(value.get<double>())))
     return "must be a number";
+  if (now.is_number()) return range_fault(pointer, value.get<double>());
   if (now.is_boolean() && !value.is_boolean()) return "must be true or false";
   const auto known = words().find(pointer);
   if (known != words().end()) {
@@ -72,6 +75,8 @@ std::string fault_of(const json& value, const json& now, const std::string& poin
   if (now.is_string() && !value.is_string()) return "must be a text";
   return "";
 }
+
+namespace {
 
 struct Check {
   std::string file;
@@ -90,7 +95,7 @@ struct Check {
         faults.push_back({file, here, "no such setting"});
       } else if (known[key].is_object()) {
         compare(value, known[key], here);
-      } else if (const std::string fault = fault_of(value, known[key], here); !fault.empty()) {
+      } else if (const std::string fault = setting_fault(here, value, known[key]); !fault.empty()) {
         faults.push_back({file, here, fault});
       } else if (key == "version" && !whole) {
         faults.push_back({file, here, "a patch cannot change the version"});

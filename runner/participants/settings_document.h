@@ -15,6 +15,12 @@ nlohmann::json complete_settings(int version);
 /// \throws protocols::InputError naming unknown keys and wrong values
 void patch_settings(nlohmann::json& settings, const std::string& path);
 
+/// Why a setting cannot have that value, as "must be ..."; empty: it can.
+/// \param pointer  JSON pointer into the complete settings
+/// \param now  what stands there: a number stays a number
+std::string setting_fault(const std::string& pointer, const nlohmann::json& value,
+                          const nlohmann::json& now);
+
 /// \throws protocols::InputError where a key is missing, unknown or of a wrong value
 void check_settings(const nlohmann::json& settings);
 

@@ -1,9 +1,11 @@
 #include "runner/sweep/swept_study.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "protocols/object_reader.h"
+#include "runner/participants/settings_document.h"
 #include "runner/sweep/json_places.h"
 #include "stimuli/random.h"
 
@@ -35,14 +37,20 @@ std::string near_text(const json& document, const std::string& pointer) {
   return out.empty() ? "" : "; near to it: " + out;
 }
 
-/// Values to try: all of a choice; of a distribution its middle and, for limits of a kind, no more.
-std::vector<json> typical_values(const SweepParameter& one) {
-  if (!one.values.empty()) return one.values;
-  return {one.value_at(0.5)};
+bool is_whole(const json& value) {
+  return value.is_number() && value.get<double>() == std::floor(value.get<double>());
 }
 
-bool same_kind(const json& a, const json& b) {
-  return (a.is_number() && b.is_number()) || a.type() == b.type();
+/// Values to try: all of a choice; of a distribution its middle and two beside it, without whole
+/// numbers: it hardly ever gives one.
+std::vector<json> typical_values(const SweepParameter& one) {
+  if (!one.values.empty()) return one.values;
+  std::vector<json> values;
+  for (const double share : {0.5, 0.31, 0.77}) {
+    if (const json value = one.value_at(share); !is_whole(value)) values.push_back(value);
+  }
+  if (values.empty()) values.push_back(one.value_at(0.5));
+  return values;
 }
 
 /// Names that columns are made of.
@@ -60,6 +68,19 @@ std::vector<std::string> names_in(const json& protocol) {
   return out;
 }
 
+/// The sweep's file keeps numbers as doubles.
+void check_whole_numbers(const SweepParameter& one, std::size_t number,
+                         protocols::FaultList& faults) {
+  constexpr double kMostExact = 9007199254740992;  // 2^53
+  for (std::size_t i = 0; i < one.values.size(); ++i) {
+    if (!one.values[i].is_number_integer() || std::abs(one.values[i].get<double>()) < kMostExact)
+      continue;
+    faults.add(child_pointer(child_pointer(child_pointer("/parameters", number), "values"), i),
+               "expected a whole number below 2^53, which is told from its neighbours" +
+                   protocols::found_text(one.values[i]));
+  }
+}
+
 }  // namespace
 
 SweptStudy::SweptStudy(json protocol, std::string protocol_path, json settings,
@@ -72,6 +93,7 @@ SweptStudy::SweptStudy(json protocol, std::string protocol_path, json settings,
   protocols::read_json(space_.source_text, faults);  // for the lines of its values
   for (std::size_t i = 0; i < space_.parameters.size(); ++i) {
     const SweepParameter& one = space_.parameters[i];
+    check_whole_numbers(one, i, faults);
     if (one.of == SweptDocument::participant) {
       check_participant(one, i, faults);
     } else {
@@ -93,11 +115,16 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
                             path + near_text(settings_, path));
       continue;
     }
-    for (const json& value : typical_values(one)) {
-      if (same_kind(value, *now)) continue;
-      faults.add(place, "expected values like " + now->dump() + ", which stands at " + path +
-                            " now" + protocols::found_text(value));
-      break;
+    const std::vector<json> values = typical_values(one);
+    std::vector<std::string> refusals;
+    for (const json& value : values) {
+      if (const std::string why = setting_fault(path, value, *now); !why.empty())
+        refusals.push_back(why + protocols::found_text(value));
+    }
+    // All words of a choice must be known; of numbers the space may hold some that fail.
+    if (!refusals.empty() && (values.front().is_string() || refusals.size() == values.size())) {
+      faults.add(place, "expected what " + path + " can be: it " + refusals.front() + "; " +
+                            now->dump() + " stands there now");
     }
   }
 }

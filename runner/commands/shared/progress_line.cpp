@@ -26,8 +26,11 @@ void ProgressLine::begin(std::string what) {
 }
 
 void ProgressLine::show(double done) {
-  if (first_ < 0) first_ = done;
   const double now = now_ns();
+  if (first_ < 0) {  // what was done before took its time before
+    first_ = done;
+    start_ = now;
+  }
   if (!on_terminal_ || now - shown_ < 2e8) return;
   shown_ = now;
   const double gone = (now - start_) / 1e9, since = done - first_;

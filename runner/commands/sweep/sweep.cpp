@@ -155,6 +155,7 @@ std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& q
   ProgressLine line("points");
   std::int64_t done = before;
   const auto all = static_cast<double>(before) + static_cast<double>(queue.size());
+  if (workers > 0) line.show(static_cast<double>(before) / all);
   std::exception_ptr failure;
   for (bool all_done = workers == 0; !all_done;) {
     const std::vector<data::SweepRow> rows = queue.wait(workers, all_done);
@@ -207,7 +208,9 @@ int run_shard(const Sweep& sweep, const RunSettings& settings, const Shard& shar
   }
   file.finish();
   print_summary(file, sweep.plan, name);
-  return 0;
+  const bool all_failed = file.count() > 0 && file.failed() == file.count();
+  if (all_failed) std::cerr << "every point failed: nothing was simulated\n";
+  return all_failed ? 1 : 0;
 }
 
 void print_point(const Sweep& sweep, std::int64_t point) {

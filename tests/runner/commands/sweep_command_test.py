@@ -194,6 +194,55 @@ class Sweeps(Files):
         self.assertIn("name the columns", lines[5])
         self.assertFalse((self.folder / "a.sweep").exists())
 
+    def refused_space(self, *parameters):
+        """The fault lines of a space of these parameters."""
+        self.write("s.json", {"version": 1, "parameters": [dict(name=f"p{i}", **one) for i, one in enumerate(parameters)]})
+        said = self.sweep("a.sweep", status=2)
+        self.assertFalse((self.folder / "a.sweep").exists())
+        return said.strip().splitlines()
+
+    def test_what_is_never_a_value_of_its_place_is_refused(self):
+        lines = self.refused_space(
+            {"of": "participant", "path": "/hand/mass_kg", "distribution": "uniform", "low": -0.2, "high": -0.1},
+            {"of": "participant", "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": -9, "high": -1},
+            {"of": "participant", "path": "/observer/places_along", "distribution": "uniform", "low": 4, "high": 20},
+            {"of": "protocol", "path": "/repetitions", "distribution": "uniform", "low": 1, "high": 3},
+            {"of": "participant", "path": "/percept/place", "distribution": "choice", "values": ["tip", "nose"]})
+        self.assertEqual([line.split(": ")[1] for line in lines], [f"/parameters/{i}/path" for i in range(5)])
+        for line, word in zip(lines, ("must be above 0", "must be 0 to 10", "whole number, 2 to 64", "expected an integer",
+                                      "tip or surface")):
+            self.assertIn(word, line)
+
+    def test_whole_numbers_that_a_double_confuses_are_refused(self):
+        line, = self.refused_space({"of": "protocol", "path": "/seed", "distribution": "choice",
+                                    "values": [2 ** 53 - 1, 2 ** 53 + 1]})
+        self.assertIn("/parameters/0/values/1", line)
+        self.assertIn("2^53", line)
+
+    def test_a_shard_of_which_every_point_failed_is_a_failure(self):
+        self.write("s.json", {"version": 1, "parameters": [
+            {"name": "mass", "of": "participant", "path": "/hand/mass_kg", "distribution": "choice", "values": [-0.1, 0.1]}]})
+        ends = []
+        for shard in ("1/2", "2/2"):  # a point each
+            done = subprocess.run([PALPATE, *map(str, self.command("shard" + shard[0], "--shard", shard, points=2))],
+                                  cwd=self.folder, capture_output=True, text=True, timeout=600)
+            ends.append((done.returncode, "every point failed" in done.stderr))
+        self.assertEqual(sorted(ends), [(0, False), (1, True)])
+
+    def test_a_link_to_a_file_that_is_not_there_yet_leads_to_it(self):
+        os.symlink("later.sweep", self.folder / "link.sweep")
+        os.symlink("later.db", self.folder / "link.db")
+        self.sweep("link.sweep", points=1)
+        self.palpate("simulate", "p.json", "--db", "link.db", "--participants", 1)
+        for name in ("later.sweep", "later.db"):
+            self.assertTrue((self.folder / name).is_file() and not (self.folder / name).is_symlink(), name)
+            self.assertTrue((self.folder / name.replace("later", "link")).is_symlink())
+
+    def test_merging_names_a_file_that_is_not_there(self):
+        self.sweep("a.sweep", points=1)
+        said = self.palpate("merge", "--out", "m.sweep", "a.sweep", "missing.sweep", status=2)
+        self.assertIn("missing.sweep: there is no such file", said)
+
     def test_another_plan_is_refused_with_what_differs(self):
         self.sweep("a.sweep", points=1)
         said = self.sweep("a.sweep", "--seed", 2, points=2, status=2)
