@@ -44,5 +44,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
 /// resolved relative to it.
 /// \throws InputError with every fault.
 SceneSpec parse_scene(const std::string& path);
+/// \param file_name  that faults name; mesh files are in its folder
+SceneSpec parse_scene_text(const std::string& text, const std::string& file_name);
 
 }  // namespace palpate::protocols

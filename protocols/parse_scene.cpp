@@ -6,9 +6,13 @@
 namespace palpate::protocols {
 
 SceneSpec parse_scene(const std::string& path) {
+  return parse_scene_text(read_text_file(path), path);
+}
+
+SceneSpec parse_scene_text(const std::string& text, const std::string& path) {
   constexpr std::size_t kMaxObjects = 1000;
   FaultList faults(path);
-  const nlohmann::json root = read_json(read_text_file(path), faults);
+  const nlohmann::json root = read_json(text, faults);
   ObjectReader reader(root, "", faults);
   reader.member("$schema");
   SceneSpec scene;

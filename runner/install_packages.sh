@@ -3,12 +3,13 @@
 set -euo pipefail
 
 build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libsqlite3-dev
-  libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config zlib1g-dev
+  libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config pybind11-dev python3-dev python3-numpy
+  zlib1g-dev
   fonts-noto-core libasound2-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev libstb-dev libx11-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack
 tests=(imagemagick libbenchmark-dev libbullet-dev libfcl-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
-  libumockdev-dev libxml2-utils man-db python3 python3-jsonschema umockdev xdotool xvfb)
-quality=(chromium clang clang-format clang-tidy devscripts lintian rt-tests valgrind)
+  libumockdev-dev libxml2-utils man-db python3 python3-jsonschema python3-pytest umockdev xdotool xvfb)
+quality=(chromium clang clang-format clang-tidy devscripts lintian munge rt-tests slurm-wlm valgrind)
 
 case "${1:-}" in
   build) wanted=("${build[@]}") ;;

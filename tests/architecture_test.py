@@ -44,8 +44,8 @@ MAY_INCLUDE = {
     "runner/stability": SERVO | {"protocols", "runner/devices"},
     "runner/bench": SERVO | {"runner/safety"},
 }
-# The commands and main() may include everything.
-EVERYTHING = ("runner/commands", "runner/main.cpp")
+# The commands, the Python module and main() may include everything.
+EVERYTHING = ("runner/commands", "runner/main.cpp", "runner/python")
 # Rooms whose every header is for everybody: small types that all of the program is made of.
 OPEN_ROOMS = {"stimuli", "protocols", "data", "analysis", "runner"}
 # rendering/ is pure: no device, clock, thread, file or global.
@@ -78,11 +78,11 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space",
-    "data": "record sweep_record",
+    "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
     "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones",
-    "data/export": "bids csv psychds sweep_csv",
+    "data/export": "bids csv psychds sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table trials",
@@ -103,7 +103,7 @@ PUBLIC = {
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators",
     "runner/bench": "servo_timing tick_cost",
-    "runner/commands": "shared/command",
+    "runner/commands": "render/forces render/trajectory_csv shared/command shared/schedule_rows shared/simulation",
 }
 
 

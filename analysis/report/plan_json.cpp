@@ -1,6 +1,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/paired.h"
@@ -70,7 +72,52 @@ Json curve_json(const Plan& plan, const PlanCurve& curve) {
   return out;
 }
 
+std::size_t count_of(const Json& proportion, std::size_t studies) {
+  return static_cast<std::size_t>(
+      std::llround(proportion.get<double>() * static_cast<double>(studies)));
+}
+
+/// \throws std::invalid_argument
+void require_same(const std::string& what, const Json& found, const Json& expected) {
+  for (const auto& [key, value] : expected.items()) {
+    if (found.contains(key) && found.at(key) == value) continue;
+    throw std::invalid_argument("is of another " + what + ": " + key + " is " +
+                                (found.contains(key) ? found.at(key).dump() : "missing") +
+                                ", expected " + value.dump());
+  }
+}
+
 }  // namespace
+
+std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
+                                        const PlanSettings& settings) {
+  try {
+    const Json in = Json::parse(json);
+    Json simulation = settings_json(settings);
+    for (const char* other : {"power", "goal", "participants"}) simulation.erase(other);
+    require_same("plan", in, {{"version", 1}});
+    require_same("simulation", in.at("settings"), simulation);
+    require_same("model", in.at("model"), model_json(model));
+    std::vector<PlanPoint> points;
+    for (const Json& curve : in.at("curves")) {
+      for (const Json& one : curve.at("points")) {
+        PlanPoint point;
+        point.design = {one.at("participants"), one.at("trials_per_cell")};
+        Power& power = point.power;
+        power.studies = settings.simulation.studies;
+        power.all = count_of(one.at("power_all"), power.studies);
+        power.any = count_of(one.at("power_any"), power.studies);
+        for (const std::string& shape : model.shapes)
+          power.found.push_back(count_of(one.at("power_by_shape").at(shape), power.studies));
+        points.push_back(std::move(point));
+      }
+    }
+    return points;
+  } catch (const Json::exception& error) {
+    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
+                                error.what());
+  }
+}
 
 std::string plan_json(const Plan& plan) {
   Json out;

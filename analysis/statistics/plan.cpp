@@ -41,6 +41,15 @@ std::size_t n_effects(const StudyModel& model) {
   return model.shapes.size() - static_cast<std::size_t>(std::ranges::count(model.log_ratios, 0.0));
 }
 
+/// Null: has to be simulated.
+const PlanPoint* find_known(const PlanSettings& settings, const StudyDesign& design) {
+  for (const PlanPoint& point : settings.known) {
+    if (point.design.participants == design.participants && point.design.trials == design.trials)
+      return &point;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::string goal_text(const Plan& plan) {
@@ -65,9 +74,13 @@ Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string>
     PlanCurve curve;
     curve.trials = trials;
     const auto reaches = [&](std::size_t participants) {
-      if (progress) progress(plan.curves.size() + 1, curve.points.size() + 1);
       PlanPoint point{{participants, trials}, {}};
-      point.power = simulate_power(plan.model, point.design, plan.settings.simulation);
+      if (const PlanPoint* known = find_known(plan.settings, point.design)) {
+        point.power = known->power;
+      } else {
+        if (progress) progress(plan.curves.size() + 1, curve.points.size() + 1);
+        point.power = simulate_power(plan.model, point.design, plan.settings.simulation);
+      }
       const bool enough = goal_power(plan, point.power) >= plan.settings.power;
       curve.points.push_back(std::move(point));
       return enough;

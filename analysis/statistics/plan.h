@@ -14,6 +14,12 @@ namespace palpate::analysis {
 
 enum class Goal { all, any };  ///< significant for every shape with an effect, or for at least one
 
+/// Power of one design.
+struct PlanPoint {
+  StudyDesign design;
+  Power power;
+};
+
 /// Range of designs and the goal.
 struct PlanSettings {
   std::vector<std::size_t> trials;  ///< of each shape with each renderer: a power curve for each
@@ -21,12 +27,8 @@ struct PlanSettings {
   double power = 0.8;                                      ///< wanted probability to reach the goal
   Goal goal = Goal::all;
   PowerSettings simulation;
-};
-
-/// Power of one design.
-struct PlanPoint {
-  StudyDesign design;
-  Power power;
+  /// Simulated before, with the same model and simulation: not simulated again.
+  std::vector<PlanPoint> known = {};
 };
 
 /// Power over the number of participants.

@@ -15,6 +15,7 @@ namespace palpate::data {
 class ExportClock {
  public:
   ExportClock(Store& store, Times times);
+  ExportClock() : times_(Times::absolute) {}
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }

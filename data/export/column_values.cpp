@@ -2,27 +2,6 @@
 
 namespace palpate::data {
 
-void put_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
-  row << trial.participant.code;
-  put_trial_without_participant(row, trial, clock);
-}
-
-void put_trial_without_participant(DelimitedRow& row, const StoredTrial& trial,
-                                   const ExportClock& clock) {
-  const TrialRecord& record = trial.record;
-  row << record.session << record.block << record.trial << record.renderer << record.shape
-      << record.response << record.correct << record.response_time;
-  for (const double q : record.orientation_wxyz) row << q;
-  row << record.practice << record.timed_out << record.first_contact_time << clock.onset_utc(trial)
-      << trial.run.device << trial.participant.simulated << record.missed_ticks << record.attempt
-      << trial.protocol_sha256 << trial.run.program_version << trial.participant.enrolled_number
-      << record.started_inside << record.ticks
-      << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
-      << trial.run.observer_sha256 << (!record.response.empty() && !record.first_contact_time)
-      << trial.run.response_device;
-  if (clock.relative()) row << clock.elapsed(trial);
-}
-
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock) {
   const TrialRecord& record = attempt.record;
   row << attempt.participant.code << record.session << record.block << record.trial

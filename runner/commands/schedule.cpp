@@ -1,44 +1,30 @@
 #include "protocols/schedule.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
-#include <cstdio>
 #include <iomanip>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/csv_text.h"
+#include "runner/commands/shared/schedule_rows.h"
 
 namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
 
-std::string exact(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.17g", value);
-  return text.data();
-}
-
 const std::string& shape_of(const protocols::Protocol& protocol, const protocols::Trial& trial) {
   return protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
 }
 
-// Names are letters, digits and '-', so that no field needs quotes.
 void print_csv(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
                int participant) {
-  std::cout << "participant_id,session,block,trial,renderer,shape,orientation_w,orientation_x,"
-               "orientation_y,orientation_z,practice,protocol_sha256,program_version\r\n";
-  for (const protocols::Trial& trial : trials) {
-    const Quat& q = trial.orientation;
-    std::cout << participant << ',' << trial.session << ',' << trial.block << ',' << trial.trial
-              << ',' << protocols::to_string(trial.renderer) << ',' << shape_of(protocol, trial)
-              << ',' << exact(q.w) << ',' << exact(q.x) << ',' << exact(q.y) << ',' << exact(q.z)
-              << ',' << (trial.practice ? 1 : 0) << ',' << protocol.sha256 << ',' << PALPATE_VERSION
-              << "\r\n";
-  }
+  CsvText table(schedule_columns(), "\r\n");
+  for (const protocols::Trial& trial : trials) put_scheduled(table, protocol, trial, participant);
+  std::cout << table.text();
 }
 
 void print_json(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
@@ -100,9 +86,7 @@ int schedule_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   const int participant = (*values)["participant"].as<int>();
   const auto format = (*values)["format"].as<std::string>();
-  if (participant < 1) {
-    throw UsageError("--participant: expected 1 or more, found " + std::to_string(participant));
-  }
+  check_participant_number(participant);
   if (format != "table" && format != "csv" && format != "json") {
     throw UsageError("--format: expected table, csv or json, found '" + format + "'");
   }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <thread>
@@ -12,7 +13,10 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/shard.h"
+#include "runner/commands/shared/simulation.h"
 #include "runner/commands/shared/stop_signal.h"
+#include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
 #include "stimuli/printable.h"
 
@@ -22,25 +26,26 @@ namespace {
 namespace po = boost::program_options;
 
 struct SimulateSettings {
-  std::string protocol, database;
-  int version = kDefaultParticipantVersion;
-  std::string patch;  ///< file of a JSON merge patch on the simulated participant; empty: none
-  StudyPlan plan;
+  StudyOptions study;
+  std::string database, shard;
+  int jobs = 1;
 };
 
 /// None where --help was asked for and printed. \throws UsageError
 std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::string>& args) {
   SimulateSettings settings;
-  StudyPlan& plan = settings.plan;
-  plan.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   CommandLine line;
-  line.usage = "palpate simulate PROTOCOL.json --db FILE [--participants N] [--seed S] [--jobs J]";
+  line.usage =
+      "palpate simulate PROTOCOL.json --db FILE [--participants N] [--seed S] [--jobs J]\n"
+      "       [--shard K/N|auto]";
   line.summary =
       "Runs the whole study with simulated participants through the renderers, device layer, "
       "session and\n"
       "store that live participants use. Their data is labelled simulated. Run again, it resumes "
       "where it\n"
-      "stopped; the same seed gives the same data, whatever the jobs and interruptions.";
+      "stopped; the same seed gives the same data, whatever the jobs and interruptions, and in\n"
+      "shards: several machines take a part of the participants each, palpate merge has them all.";
   line.example =
       "  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try\n"
       "  palpate simulate protocols/ho2000.json --db study.db                    the paper's "
@@ -49,45 +54,30 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
       "same\n";
   line.options.add_options()  //
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
-       "database; created or resumed")  //
-      ("participants",
-       po::value(&plan.participants)->default_value(plan.participants)->value_name("N"),
-       "simulated participants, numbered from 1")  //
-      ("seed", po::value(&plan.seed)->default_value(plan.seed)->value_name("S"),
-       "of the participants; the order of trials follows the protocol's own seed")  //
-      ("jobs", po::value(&plan.jobs)->default_value(plan.jobs)->value_name("J"),
+       "database; created or resumed");
+  add_study_options(line, settings.study);
+  line.options.add_options()  //
+      ("jobs", po::value(&settings.jobs)->default_value(settings.jobs)->value_name("J"),
        "sessions simulated at a time")  //
-      ("participant-version",
-       po::value(&settings.version)->default_value(settings.version)->value_name("1|2|3"),
-       "of the simulated participant; each is frozen")  //
-      ("settings", po::value(&settings.patch)->value_name("FILE"),
-       "JSON merge patch on the settings of that version, for ablations");
-  line.positional_names = {"PROTOCOL.json"};
+      ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
+       "only the K-th of N parts of the participants; auto: the task of a Slurm array");
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
-  if (plan.participants < 1 || plan.participants > 100000)
-    throw UsageError("--participants: must be 1 to 100000");
-  if (plan.jobs < 1 || plan.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
-  const std::vector<int> versions = participant_versions();
-  if (std::find(versions.begin(), versions.end(), settings.version) == versions.end()) {
-    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
-  }
-  settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
+  check_study_options(*values, settings.study);
+  if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
   return settings;
 }
 
-/// Limits the materials where the protocol says so, which is said; an event for the record goes
-/// into the plan. \throws UsageError: the simulated device or participant cannot do the protocol
-void fit_to_simulation(protocols::Protocol& protocol, const SimulatedSettings& simulated,
-                       StudyPlan& plan) {
-  const LimitedForSimulation limited = limit_for_simulation(protocol, simulated);
-  for (const std::string& text : limited.texts)
-    std::fprintf(stderr, "%s\n", stimuli::printable(text).c_str());
-  plan.event = limited.event;
-  std::string reasons;
-  for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), simulated))
-    reasons += "\n" + fault;
-  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
+/// \throws UsageError: no such shard
+StudyPlan plan_of(const SimulateSettings& settings) {
+  const Shard shard =
+      parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
+  StudyPlan plan;
+  plan.seed = settings.study.seed;
+  plan.jobs = settings.jobs;
+  plan.before = static_cast<int>(shard.first(settings.study.participants));
+  plan.participants = static_cast<int>(shard.last(settings.study.participants));
+  return plan;
 }
 
 /// \param seconds  that it took
@@ -108,12 +98,17 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
 }  // namespace
 
 int simulate_command(const std::vector<std::string>& args) {
-  std::optional<SimulateSettings> given = parse_simulate_settings(args);
+  const std::optional<SimulateSettings> given = parse_simulate_settings(args);
   if (!given) return 0;
-  StudyPlan& plan = given->plan;
-  protocols::Protocol protocol = protocols::parse_protocol(given->protocol);
-  const SimulatedSettings simulated = load_simulated_settings(given->patch, given->version);
-  fit_to_simulation(protocol, simulated, plan);  // first: what is refused leaves no database behind
+  const StudyOptions& options = given->study;
+  StudyPlan plan = plan_of(*given);
+  protocols::Protocol protocol = protocols::parse_protocol(options.protocol);
+  const SimulatedSettings simulated = load_simulated_settings(options.patch, options.version);
+  // First: what is refused leaves no database behind.
+  const LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
+  for (const std::string& text : limited.texts)
+    std::fprintf(stderr, "%s\n", stimuli::printable(text).c_str());
+  plan.event = limited.event;
   data::Store store = data::Store::open(given->database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
 

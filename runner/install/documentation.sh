@@ -7,7 +7,7 @@ here="$(cd "$(dirname "$0")" && pwd)"
 sources="$(cd "$here/../.." && pwd)"
 to="$1/share/doc/palpate"
 
-for page in README.md {analysis,data,protocols,rendering,runner,runner/participants,stimuli,tests}/README.md; do
+for page in README.md {analysis,data,protocols,rendering,runner,runner/participants,runner/python,stimuli,tests}/README.md; do
   mkdir -p "$(dirname "$to/$page")"
   # Not into a folder that nobody sees.
   sed 's#\.github/images/#images/#g' "$sources/$page" > "$to/$page"

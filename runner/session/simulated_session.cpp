@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "runner/build_info.h"
 #include "runner/session/session.h"
 #include "runner/session/simulated_study.h"
 
@@ -90,6 +91,24 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   }
 }
 
+data::RunInfo simulated_run(const protocols::Protocol& protocol, const SimulatedSettings& settings,
+                            int participant, int session) {
+  constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+  constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
+  const std::int64_t day =
+      (participant - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
+  data::RunInfo info;
+  info.session = session;
+  info.clock = {kFirstMorning_ns + day * kDay_ns, 0};
+  info.program_version = PALPATE_VERSION;
+  info.build = build_description();
+  info.device = "simulated";
+  info.response_device = "simulated";
+  info.response_latency = 0;
+  info.observer_sha256 = settings.sha256;
+  return info;
+}
+
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const SimulatedSettings& settings, int participants,
     std::uint64_t seed, const std::atomic<bool>& stop,
@@ -101,8 +120,10 @@ bool simulate_in_memory(
       VisitingLog log(
           [&](const data::TrialRecord& record) { visit(number, record, contact_ticks); });
       run_simulated_session(
-          study, {number, SessionPlan(protocol, number, session), 0, {}}, log,
-          [&stop] { return stop.load(); }, &contact_ticks);
+          study,
+          {number, SessionPlan(protocol, number, session), 0,
+           simulated_run(protocol, settings, number, session).clock},
+          log, [&stop] { return stop.load(); }, &contact_ticks);
       if (stop) return false;
     }
   }

@@ -43,6 +43,11 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
                            TrialLog& log, const std::function<bool()>& halting,
                            std::uint64_t* contact_ticks = nullptr);
 
+/// What is on record of a session of a simulated participant before its first trial. Its clock is
+/// that of a day of its own, from nine in the morning.
+data::RunInfo simulated_run(const protocols::Protocol& protocol, const SimulatedSettings& settings,
+                            int participant, int session);
+
 /// A whole study that is stored nowhere: participants from 1, their sessions in order, in this
 /// thread. \param visit  number of the participant, a trial, its ticks with contact. \return false:
 /// it was stopped before its end. \throws as SimulatedStudy

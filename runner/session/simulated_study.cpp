@@ -11,7 +11,6 @@
 #include <thread>
 #include <utility>
 
-#include "runner/build_info.h"
 #include "runner/participants/simulated.h"
 #include "runner/session/device_check.h"
 #include "runner/session/protocol_info.h"
@@ -20,9 +19,6 @@
 
 namespace palpate::runner {
 namespace {
-
-constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
 
 /// One session of one participant, with what the store already holds of it.
 struct Work {
@@ -106,7 +102,7 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
                                   StudyProgress& progress) {
   std::vector<Work> todo;
   const data::ProtocolInfo info = info_of(protocol);
-  for (int number = 1; number <= plan.participants; ++number) {
+  for (int number = plan.before + 1; number <= plan.participants; ++number) {
     const data::Participant participant =
         store.enrol(info, simulated_code(number), number, true, plan.seed);
     for (int session = 1; session <= protocol.sessions.count; ++session) {
@@ -122,16 +118,7 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       for (const data::TrialRecord& record : before.completed)
         work.answers.push_back(record.correct);
       work.clock_ns = before.latest_ns;
-      const std::int64_t day =
-          (number - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
-      work.info.session = session;
-      work.info.clock = {kFirstMorning_ns + day * kDay_ns, 0};
-      work.info.program_version = PALPATE_VERSION;
-      work.info.build = build_description();
-      work.info.device = "simulated";
-      work.info.response_device = "simulated";
-      work.info.response_latency = 0;
-      work.info.observer_sha256 = settings.sha256;
+      work.info = simulated_run(protocol, settings, number, session);
       const SessionPlan trials = plan_of(protocol, work);
       progress.recorded += static_cast<std::int64_t>(trials.done());
       progress.expected += static_cast<std::int64_t>(trials.size());

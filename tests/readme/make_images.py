@@ -7,6 +7,7 @@ Needs Xvfb, xdotool and ImageMagick, and for live-session a machine that is not 
 study that runner/quickstart.sh simulates: the same ones wherever they are made.
 """
 
+import os
 import pathlib
 import shutil
 import sqlite3
@@ -146,8 +147,19 @@ def power(palpate, folder):
                     "--figure", IMAGES / "power.svg", "--force"], stdout=subprocess.DEVNULL, check=True)
 
 
+def example(name):
+    """By the Python module of the same build, which takes minutes."""
+    def make(palpate, folder):
+        module = pathlib.Path(palpate).parent / "python"
+        subprocess.run(["/usr/bin/python3", ROOT / f"runner/python/examples/{name}.py", "--figure",
+                        folder / f"{name}.png"], env={**os.environ, "PYTHONPATH": str(module)}, check=True)
+        shutil.copyfile(folder / f"{name}.png", IMAGES / f"{name.replace('_', '-')}.png")
+    return make
+
+
 PICTURES = {"live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
-            "speedup": figure("speedup"), "power": power}
+            "speedup": figure("speedup"), "power": power,
+            "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 
 
 def main(arguments):

@@ -6,7 +6,8 @@ import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 ROOMS = ["stimuli", "rendering", "protocols", "data", "analysis", "runner", "tests"]
-READMES = ["README.md"] + [f"{room}/README.md" for room in ROOMS] + ["runner/participants/README.md"]
+READMES = ["README.md"] + [f"{room}/README.md" for room in ROOMS] + ["runner/participants/README.md",
+                                                                               "runner/python/README.md"]
 
 SHELL = ("sh", "bash", "shell", "console")
 RUN, NOT_RUN = "sh test", "sh not tested: "  # marks of blocks

@@ -132,6 +132,41 @@ std::string put_default_effects(analysis::StudyModel& model) {
 
 }  // namespace
 
+void add_plan_options(CommandLine& line, PlanOptions& options) {
+  auto add = line.options.add_options();
+  add("db", po::value(&options.database)->value_name("FILE"), "a pilot's database");
+  add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
+  add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
+      "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
+      "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
+      "where there is neither, 11");
+  add("power", po::value(&options.power)->default_value(0.8, "0.8"), "wanted power");
+  add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05"), "of the tests, after Holm");
+  add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),
+      "find every shape with an effect, or at least one");
+  add("participants", po::value(&options.participants)->default_value("2-100")->value_name("A-B"),
+      "range of the numbers of participants");
+  add("trials", po::value(&options.trials)->default_value("10,20,40,76")->value_name("N,..."),
+      "trials of each shape with each renderer; a power curve for each");
+  add("test", po::value(&options.test)->default_value("paired")->value_name("paired|model"),
+      "paired t-tests, or a mixed model fitted to every study (slow)");
+  add("gain-sd", po::value(&options.gain_sd)->value_name("SD"),
+      "of participants' gains (random slope); a pilot's unless given");
+  add("shape-gain-sd", po::value(&options.shape_gain_sd)->value_name("SD"),
+      "of a participant's gain for a shape beyond that; a pilot's, or 0");
+  add("residual-sd", po::value(&options.residual_sd)->value_name("SD"),
+      "of single trials; a pilot's unless given");
+  add("intercept-sd", po::value(&options.intercept_sd)->value_name("SD"),
+      "of participants; a pilot's, or 0.3 (used by --test model only)");
+  add("correlation", po::value(&options.correlation)->value_name("R"),
+      "of participants' intercepts and gains; a pilot's, or 0");
+  add("share-used", po::value(&options.share_used)->value_name("SHARE"),
+      "of trials that give a time; a pilot's, or 1");
+  add("studies", po::value(&options.studies)->value_name("N"),
+      "simulated for each power; default 10000, with --test model 1000");
+  add("seed", po::value(&options.seed)->default_value(2000), "of the simulation");
+}
+
 analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
   analysis::Pilot pilot;
   if (options.database.empty() && options.csv.empty()) {

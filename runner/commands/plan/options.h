@@ -4,9 +4,11 @@
 #include <boost/program_options.hpp>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
+#include "runner/commands/shared/command.h"
 
 namespace palpate::runner {
 
@@ -17,7 +19,11 @@ struct PlanOptions {
          share_used = 1, power = 0.8, alpha = 0.05;
   std::string studies, jobs;
   std::uint64_t seed = 2000;
+  std::vector<std::string> reuse;  ///< files of earlier plans
 };
+
+/// The options that a plan's powers depend on.
+void add_plan_options(CommandLine& line, PlanOptions& options);
 
 // Each throws UsageError.
 

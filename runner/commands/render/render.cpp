@@ -1,33 +1,16 @@
-#include <glm/geometric.hpp>
 #include <iostream>
-#include <optional>
 
 #include "protocols/parse.h"
-#include "protocols/protocol.h"
 #include "runner/commands/render/explain.h"
-#include "runner/commands/render/trajectory_csv.h"
+#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/scene_builder.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
-
-rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
-                             const rendering::Renderer& renderer) {
-  try {
-    return SceneBuilder().build(spec.objects, renderer.side_contact(), tool_of(spec.tool));
-  } catch (const stimuli::MeshError& error) {
-    std::vector<std::string> faults;
-    for (const std::string& fault : error.faults()) {
-      faults.push_back(std::string(path).append(": ").append(fault));
-    }
-    throw stimuli::MeshError(std::move(faults));
-  }
-}
 
 /// An option's value; \throws UsageError where it was not given.
 std::string given(const po::variables_map& values, const char* option, const char* because) {
@@ -42,30 +25,6 @@ void explain_scene(Outputs& outputs, const rendering::Scene& scene,
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
-}
-
-/// One tick of a stylus that reaches farther than it is long.
-rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
-                                   const rendering::Renderer& renderer,
-                                   const protocols::ReachSpec& spec,
-                                   const rendering::LineProbe& real, double dt) {
-  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
-  const rendering::Reach reach = reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
-  return felt(reach, renderer.tick(scene, state, stretched(reach, real), dt));
-}
-
-ForceTable forces_along(const rendering::Scene& scene,
-                        const std::optional<protocols::ReachSpec>& reach,
-                        const rendering::Renderer& renderer, const std::vector<TimedPose>& poses) {
-  rendering::RenderState state = scene.initial_state();
-  ForceTable table(scene.tool() != nullptr);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
-    state.measured_side = poses[i].side;
-    table.add(poses[i], reach ? extended_tick(scene, state, renderer, *reach, poses[i].probe, dt)
-                              : renderer.tick(scene, state, poses[i].probe, dt));
-  }
-  return table;
 }
 
 }  // namespace
@@ -97,16 +56,11 @@ int render_command(const std::vector<std::string>& args) {
       ("force", "replace an existing file");
   const auto values = line.parse(args);
   if (!values) return 0;
-  const std::string name = (*values)["renderer"].as<std::string>();
-  if (name != "point" && name != "ray") {
-    throw UsageError("--renderer: must be point or ray, not '" + name + "'");
-  }
+  const rendering::Renderer& renderer = renderer_named((*values)["renderer"].as<std::string>());
   const bool explains = (*values)["explain"].as<bool>();
   if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))
     throw UsageError("--explain renders nothing: leave out --trajectory and --out");
   if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
-  const rendering::Renderer& renderer =
-      renderer_for(name == "ray" ? protocols::RendererKind::ray : protocols::RendererKind::point);
   const std::string scene_path = (*values)["scene"].as<std::string>();
   Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
   if (explains) {
@@ -120,8 +74,12 @@ int render_command(const std::vector<std::string>& args) {
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
   for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
-  const ForceTable table =
-      forces_along(build_scene(scene_path, spec, renderer), spec.reach, renderer, poses);
+  const rendering::Scene scene = build_scene(scene_path, spec, renderer);
+  ForceTable table(scene.tool() != nullptr);
+  render_along(scene, spec, renderer, poses,
+               [&table](const TimedPose& pose, const rendering::Rendering& rendering) {
+                 table.add(pose, rendering);
+               });
   outputs.put("out", table.text());
   outputs.write();
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));

@@ -3,7 +3,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 #include <stdexcept>
 
@@ -14,13 +13,6 @@ namespace palpate::runner {
 namespace {
 
 constexpr std::size_t kFaultsShown = 20;
-constexpr const char* kForceHeader =
-    "t,force_x,force_y,force_z,torque_x,torque_y,torque_z,ideal_tip_x,ideal_tip_y,ideal_tip_z,"
-    "ideal_tail_x,ideal_tail_y,ideal_tail_z,contact_x,contact_y,contact_z,device1_x,device1_y,"
-    "device1_z,"
-    "device2_x,device2_y,device2_z,depth,contacts,contact_type,object,";
-constexpr const char* kToolHeader = "segment,ideal_side_x,ideal_side_y,ideal_side_z,";
-
 analysis::CsvReader open(const std::string& path) {
   try {
     return analysis::CsvReader(path);
@@ -54,28 +46,17 @@ std::optional<std::array<double, kPoseColumns + kSideColumns>> numbers_of(
   return out;
 }
 
-void append(std::string& out, double value) {
-  char text[40];
-  out.append(text, static_cast<std::size_t>(std::snprintf(text, sizeof text, "%.17g", value)));
-}
-
-void append(std::string& out, const Vec3& v) {
-  for (int k = 0; k < 3; ++k) {
-    out += ',';
-    append(out, v[k]);
-  }
-}
-
-/// "non-finite+started-inside".
-std::string names_of(std::uint32_t faults) {
-  std::string names;
-  for (const rendering::FaultBit& fault : rendering::kRenderFaults) {
-    if ((faults & fault.bit) != 0) (names += names.empty() ? "" : "+") += fault.name;
-  }
-  return names;
-}
-
 }  // namespace
+
+std::string fault_of(const TimedPose& pose, const std::vector<TimedPose>& before) {
+  if (!std::isfinite(pose.t)) return "expected a finite time";
+  if (!before.empty() && pose.t <= before.back().t)
+    return "expected a time later than the one before";
+  if (before.size() == kMostPoses)
+    return "expected at most " + std::to_string(kMostPoses) +
+           " rows; split the path into several files";
+  return "";
+}
 
 std::vector<TimedPose> read_trajectory(const std::string& path) {
   analysis::CsvReader reader = open(path);
@@ -110,18 +91,13 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
       continue;
     }
     const auto& v = *values;
-    if (!std::isfinite(v[0])) {
-      faults.push_back({path, place, "expected a finite time"});
-    } else if (!poses.empty() && v[0] <= poses.back().t) {
-      faults.push_back({path, place, "expected a time later than that of the line before"});
-    } else if (poses.size() == kMostPoses) {
-      faults.push_back({path, place,
-                        "expected at most " + std::to_string(kMostPoses) +
-                            " rows; split the path into several files"});
-      break;
+    const TimedPose pose{
+        v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}, {v[7], v[8], v[9]}, reader.line()};
+    if (const std::string fault = fault_of(pose, poses); !fault.empty()) {
+      faults.push_back({path, place, fault});
+      if (poses.size() == kMostPoses) break;
     } else {
-      poses.push_back(
-          {v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6]}}, {v[7], v[8], v[9]}, reader.line()});
+      poses.push_back(pose);
     }
   }
   if (faults.size() == kFaultsShown) {
@@ -134,27 +110,37 @@ std::vector<TimedPose> read_trajectory(const std::string& path) {
   return poses;
 }
 
+std::vector<std::string> force_columns(bool tool) {
+  std::vector<std::string> names{"t"};
+  const auto add = [&names](const char* vector) {
+    for (const char* axis : {"_x", "_y", "_z"}) names.push_back(std::string(vector) + axis);
+  };
+  for (const char* vector :
+       {"force", "torque", "ideal_tip", "ideal_tail", "contact", "device1", "device2"})
+    add(vector);
+  names.insert(names.end(), {"depth", "contacts", "contact_type", "object"});
+  if (tool) {
+    names.emplace_back("segment");
+    add("ideal_side");
+  }
+  names.emplace_back("faults");
+  return names;
+}
+
+std::string names_of(std::uint32_t faults) {
+  std::string names;
+  for (const rendering::FaultBit& fault : rendering::kRenderFaults) {
+    if ((faults & fault.bit) != 0) (names += names.empty() ? "" : "+") += fault.name;
+  }
+  return names;
+}
+
 ForceTable::ForceTable(bool tool)
-    : tool_(tool),
-      text_(std::string(kForceHeader) + (tool ? kToolHeader : "") + "faults\n"),
-      seen_(rendering::kRenderFaults.size()) {}
+    : tool_(tool), csv_(force_columns(tool), "\n"), seen_(rendering::kRenderFaults.size()) {}
 
 void ForceTable::add(const TimedPose& pose, const rendering::Rendering& r) {
   ++rows_;
-  append(text_, pose.t);
-  for (const Vec3& v :
-       {r.force, r.torque, r.ideal.tip, r.ideal.tail, r.deepest.point, r.device1, r.device2}) {
-    append(text_, v);
-  }
-  text_ += ',';
-  append(text_, r.deepest.depth);
-  text_ += ',' + std::to_string(r.contacts) + ',' + rendering::to_string(r.deepest.type) + ',' +
-           std::to_string(r.object);
-  if (tool_) {
-    text_ += ',' + std::to_string(r.segment);
-    append(text_, r.ideal_side);
-  }
-  text_ += ',' + names_of(r.faults) + '\n';
+  put_forces(csv_, pose.t, r, tool_);
   for (std::size_t i = 0; i < rendering::kRenderFaults.size(); ++i) {
     if ((r.faults & rendering::kRenderFaults[i].bit) == 0) continue;
     if (seen_[i].ticks++ == 0) seen_[i].first_line = pose.line;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "rendering/renderer.h"
+#include "runner/commands/shared/csv_text.h"
 
 namespace palpate::runner {
 
@@ -20,9 +21,35 @@ struct TimedPose {
   std::size_t line = 0;        ///< of the file
 };
 
+/// Why a pose cannot follow those before it: what is expected; "": it can.
+std::string fault_of(const TimedPose& pose, const std::vector<TimedPose>& before);
+
 /// Coordinates that are not finite are accepted: the renderer reports them in the faults column.
 /// \throws InputError with the faults, the first of many
 std::vector<TimedPose> read_trajectory(const std::string& path);
+
+/// Of the forces along a path. \param tool  whether the stylus carries one: more columns
+std::vector<std::string> force_columns(bool tool);
+
+/// "non-finite+started-inside".
+std::string names_of(std::uint32_t faults);
+
+/// \param row  a CsvText or a data::ColumnTable with force_columns(tool). \param t  s
+template <class Row>
+void put_forces(Row& row, double t, const rendering::Rendering& r, bool tool) {
+  const auto put = [&row](const Vec3& v) { row << v.x << v.y << v.z; };
+  row << t;
+  for (const Vec3& v :
+       {r.force, r.torque, r.ideal.tip, r.ideal.tail, r.deepest.point, r.device1, r.device2})
+    put(v);
+  row << r.deepest.depth << r.contacts << rendering::to_string(r.deepest.type) << r.object;
+  if (tool) {
+    row << r.segment;
+    put(r.ideal_side);
+  }
+  row << names_of(r.faults);
+  row.end_row();
+}
 
 /// The forces as CSV: a row for each tick.
 class ForceTable {
@@ -30,7 +57,7 @@ class ForceTable {
   /// \param tool  whether the stylus carries one: more columns
   explicit ForceTable(bool tool);
   void add(const TimedPose& pose, const rendering::Rendering& rendering);
-  const std::string& text() const { return text_; }
+  const std::string& text() const { return csv_.text(); }
   /// A line for each kind of fault: in how many ticks, and where first. Empty: no faults.
   std::string warnings(const std::string& path) const;
 
@@ -40,7 +67,7 @@ class ForceTable {
   };
 
   bool tool_;
-  std::string text_;
+  CsvText csv_;
   std::size_t rows_ = 0;
   std::vector<Seen> seen_;  ///< as kRenderFaults
 };

@@ -14,10 +14,10 @@
 #include "data/store/sweep_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/shard.h"
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/sweep/planned.h"
 #include "runner/commands/sweep/point.h"
-#include "runner/commands/sweep/shard.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {

@@ -52,12 +52,17 @@ class Cluster(unittest.TestCase):
         for name, text in (("sbatch", SBATCH), ("squeue", SQUEUE)):
             (self.slurm / name).write_text(text)
             (self.slurm / name).chmod(0o755)
+        self.no_slurm = self.folder / "none"  # what a shell says of a command that is not there
+        self.no_slurm.mkdir()
+        for name in ("sbatch", "squeue"):
+            (self.no_slurm / name).write_text(f"#!/bin/sh\necho 'sh: 1: {name}: not found' >&2\nexit 127\n")
+            (self.no_slurm / name).chmod(0o755)
         (self.folder / "s.json").write_text(json.dumps({"version": 1, "parameters": [
             {"name": "noise", "of": "participant", "path": "/percept/direction_sd_deg", "distribution": "uniform",
              "low": 10, "high": 20}]}))
 
     def palpate(self, *arguments, status=0, slurm=True):
-        path = f"{self.slurm}:{os.environ['PATH']}" if slurm else "/usr/bin:/bin"
+        path = f"{self.slurm if slurm else self.no_slurm}:{os.environ['PATH']}"
         done = subprocess.run([PALPATE, *map(str, arguments)], cwd=self.folder, capture_output=True, text=True, timeout=300,
                               env={**os.environ, "PATH": path})
         self.assertEqual(done.returncode, status, f"{arguments}\n{done.stdout}{done.stderr}")
@@ -105,6 +110,69 @@ class Cluster(unittest.TestCase):
         self.assertIn("--array=2-3", self.calls()[2])
         self.assertEqual((self.folder / "d/all.sweep").read_bytes(), self.single())
 
+    STUDY = [PROTOCOLS / "quick.json", "--participants", 3, "--seed", 4]
+
+    def trials(self, database):
+        self.palpate("export", "--db", database, "--format", "csv", "--out", "trials.csv", "--force")
+        return (self.folder / "trials.csv").read_bytes()
+
+    def test_a_study_in_shards_of_participants_is_that_of_one_machine(self):
+        (self.slurm / "kill").write_text("1")
+        said = self.palpate("cluster", "simulate", *self.STUDY, "--shards", 2, "--dir", "d")
+        self.assertIn("shards 1-2", said)
+        status = self.palpate("cluster", "status", "d")
+        self.assertIn("shards: 1 done", status)
+        self.assertIn("sessions: 2 of 3", status)
+        (self.slurm / "kill").unlink()
+        self.palpate("cluster", "submit", "d")
+        self.assertIn("all.db", self.palpate("cluster", "status", "d"))
+        self.palpate("simulate", *self.STUDY, "--db", "one.db")
+        self.assertEqual(self.trials("d/all.db"), self.trials("one.db"))
+        self.palpate("analyze", "--db", "one.db", "--json", "one.json")
+        mine, ours = (json.loads((self.folder / name).read_text()) for name in ("one.json", "d/analysis.json"))
+        self.assertEqual(mine["paired_by_shape"], ours["paired_by_shape"])
+        self.assertIn("--shards", self.palpate("cluster", "simulate", *self.STUDY, "--shards", 4, "--dir", "e", status=2))
+        self.assertIn("--space", self.palpate("cluster", "simulate", *self.STUDY, "--space", "s.json", "--shards", 2, "--dir", "e", status=2))
+
+    PLAN_OPTIONS = ["--gain-sd", 0.15, "--residual-sd", 0.5, "--effect", "cone=22,cube=11", "--participants", "4-30",
+                    "--studies", 400, "--trials", "5,9,20"]
+
+    def test_a_plan_in_curves_is_that_of_one_machine(self):
+        (self.slurm / "kill").write_text("2")
+        self.assertIn("shards 1-3", self.palpate("cluster", "plan", *self.PLAN_OPTIONS, "--dir", "d"))
+        self.assertIn("curves: 2 of 3", self.palpate("cluster", "status", "d"))
+        (self.slurm / "kill").unlink()
+        self.palpate("cluster", "submit", "d")
+        self.assertIn("result: analysis.txt, analysis.json, power.svg", self.palpate("cluster", "status", "d"))
+        said = self.palpate("plan", *self.PLAN_OPTIONS, "--json", "one.json", "--figure", "one.svg")
+        for mine, ours in (("one.json", "d/analysis.json"), ("one.svg", "d/power.svg")):
+            self.assertEqual((self.folder / mine).read_bytes(), (self.folder / ours).read_bytes())
+        self.assertEqual(said, (self.folder / "d/analysis.txt").read_text())
+
+    def test_a_plan_takes_powers_of_the_same_model_and_simulation_only(self):
+        plan = ["plan", *self.PLAN_OPTIONS]
+        self.palpate(*plan, "--json", "one.json")
+        known = json.loads((self.folder / "one.json").read_text())
+        known["curves"][0]["points"][-1]["power_all"] = known["curves"][0]["points"][-1]["power"] = 0.0125
+        (self.folder / "false.json").write_text(json.dumps(known))
+        self.palpate(*plan, "--reuse", "false.json", "--json", "two.json")
+        found = json.loads((self.folder / "two.json").read_text())
+        self.assertEqual(found["curves"][0]["points"][-1]["power"], 0.0125)  # it was taken, not simulated
+        self.assertEqual(found["curves"][1:], known["curves"][1:])
+        for change, words in ((["--residual-sd", 0.6], "another model: residual_sd"), (["--studies", 500], "another simulation: studies"),
+                              (["--seed", 3], "another simulation: seed"), (["--effect", "cone=22"], "another model")):
+            options = {**dict(zip(self.PLAN_OPTIONS[::2], self.PLAN_OPTIONS[1::2])), **dict([change])}
+            words_now = [word for pair in options.items() for word in pair]
+            self.assertIn(words, self.palpate("plan", *words_now, "--reuse", "one.json", status=2))
+        (self.folder / "bad.json").write_text("{}")
+        self.assertIn("bad.json", self.palpate(*plan, "--reuse", "bad.json", status=2))
+        self.assertIn("none.json", self.palpate(*plan, "--reuse", "none.json", status=2))
+
+    def test_a_folder_of_another_version_is_refused(self):
+        (self.folder / "old").mkdir()
+        (self.folder / "old/cluster.json").write_text('{"version": 1, "shards": 3}')
+        self.assertIn("expected version 2, found 1", self.palpate("cluster", "status", "old", status=2))
+
     def test_without_slurm_the_scripts_do_it(self):
         said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "d", status=1, slurm=False)
         self.assertIn("there is no Slurm here", said)
@@ -117,7 +185,7 @@ class Cluster(unittest.TestCase):
         self.assertIn("2 done", self.palpate("cluster", "status", "e", slurm=False))
 
     def test_wrong_usage(self):
-        for arguments, said in (([], "expected sweep, status or submit"), (["run"], "found 'run'"), (["status"], "one folder"),
+        for arguments, said in (([], "expected sweep, simulate, plan, status or submit"), (["run"], "found 'run'"), (["status"], "one folder"),
                                 (["status", "none"], "cluster.json"), (["sweep", *self.PLAN, "--dir", "x"], "shards"),
                                 (["sweep", *self.PLAN, "--shards", 2], "--dir"), (["sweep", *self.PLAN, "--shards", 6, "--dir", "x"], "--shards"),
                                 (["sweep", *self.PLAN, "--shards", 2, "--dir", "slurm"], "not empty")):

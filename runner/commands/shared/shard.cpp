@@ -1,4 +1,4 @@
-#include "runner/commands/sweep/shard.h"
+#include "runner/commands/shared/shard.h"
 
 #include <charconv>
 #include <optional>
@@ -35,9 +35,9 @@ std::int64_t slurm_number(const char* name,
 
 }  // namespace
 
-std::int64_t Shard::part(std::int64_t points, std::int64_t parts) const {
-  // points * parts / count, without overflow.
-  return points / count * parts + points % count * parts / count;
+std::int64_t Shard::part(std::int64_t items, std::int64_t parts) const {
+  // items * parts / count, without overflow.
+  return items / count * parts + items % count * parts / count;
 }
 
 Shard parse_shard(const std::string& text,

@@ -1,0 +1,156 @@
+#include "runner/commands/cluster/job.h"
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "data/store/store.h"
+#include "data/store/sweep_file.h"
+#include "protocols/json_document.h"
+#include "runner/commands/cluster/slurm.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/shard.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr int kVersion = 2;
+
+fs::path part_of(const fs::path& folder, const ClusterJob& job, std::int64_t shard) {
+  const std::string digits = std::to_string(shard);
+  return folder / "parts" /
+         ("part" + std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits +
+          job.extension());
+}
+
+/// Units in a shard's file.
+std::int64_t recorded_in(const ClusterJob& job, const std::string& path) {
+  if (!fs::exists(path)) return 0;
+  if (job.work == "plan") return 1;  // written whole
+  if (job.work == "sweep") return data::SweepFile::open(path).count();
+  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
+  const std::vector<data::StoredRun> runs = store.runs();
+  return std::count_if(runs.begin(), runs.end(),
+                       [](const data::StoredRun& run) { return run.end == data::RunEnd::done; });
+}
+
+}  // namespace
+
+void write_script(const fs::path& path, const std::string& text) {
+  write_whole(path.string(), "#!/bin/bash\n" + text);
+  ::chmod(path.c_str(), 0700);
+}
+
+std::int64_t seconds_since_1970() {
+  return std::chrono::duration_cast<std::chrono::seconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void write_job(const fs::path& folder, const ClusterJob& job) {
+  const json out{
+      {"version", kVersion},       {"work", job.work},           {"unit", job.unit},
+      {"shards", job.shards},      {"items", job.items},         {"per_item", job.per_item},
+      {"sbatch", job.options},     {"array_job", job.array_job}, {"submitted_s", job.submitted_s},
+      {"done_then", job.done_then}};
+  write_whole((folder / "cluster.json").string(), out.dump(1) + "\n");
+}
+
+ClusterJob read_job(const fs::path& folder) {
+  const std::string path = (folder / "cluster.json").string();
+  try {
+    const json in = json::parse(protocols::read_text_file(path));
+    if (in.at("version") != kVersion) {
+      throw UsageError(path + ": expected version " + std::to_string(kVersion) + ", found " +
+                       in.at("version").dump() + "; go on with the program that wrote it");
+    }
+    ClusterJob job;
+    job.work = in.at("work");
+    job.unit = in.at("unit");
+    job.shards = in.at("shards");
+    job.items = in.at("items");
+    job.per_item = in.at("per_item");
+    job.options = in.at("sbatch").get<std::vector<std::string>>();
+    job.array_job = in.at("array_job");
+    job.submitted_s = in.at("submitted_s");
+    job.done_then = in.at("done_then");
+    return job;
+  } catch (const json::exception& error) {
+    throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
+  }
+}
+
+std::vector<ShardState> shard_states(const fs::path& folder, const ClusterJob& job) {
+  std::vector<ShardState> out;
+  for (std::int64_t number = 1; number <= job.shards; ++number) {
+    const Shard shard{number, job.shards};
+    out.push_back({(shard.last(job.items) - shard.first(job.items)) * job.per_item,
+                   recorded_in(job, part_of(folder, job, number).string())});
+  }
+  return out;
+}
+
+std::int64_t recorded_units(const std::vector<ShardState>& states) {
+  std::int64_t sum = 0;
+  for (const ShardState& state : states) sum += state.recorded;
+  return sum;
+}
+
+void submit_shards(const fs::path& folder, ClusterJob& job) {
+  const std::vector<ShardState> states = shard_states(folder, job);
+  std::vector<std::int64_t> todo;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (!states[i].done()) todo.push_back(static_cast<std::int64_t>(i) + 1);
+  }
+  std::vector<std::string> arguments = job.options;
+  arguments.push_back("--chdir=" + folder.string());
+  std::vector<std::string> finish = arguments;
+  if (!todo.empty()) {
+    std::vector<std::string> array = arguments;
+    array.insert(array.end(), {"--job-name=palpate", "--requeue", "--open-mode=append",
+                               "--output=logs/shard-%a.log", "--array=" + array_text(todo),
+                               (folder / "shard.sh").string()});
+    job.array_job = submit(array);
+    job.submitted_s = seconds_since_1970();
+    job.done_then = recorded_units(states);
+    write_job(folder, job);
+    // Where a shard fails it goes, and comes again with the next 'submit'.
+    finish.push_back("--dependency=afterok:" + job.array_job);
+    finish.push_back("--kill-on-invalid-dep=yes");
+  }
+  finish.insert(finish.end(), {"--job-name=palpate-finish", "--requeue", "--output=logs/finish.log",
+                               (folder / "finish.sh").string()});
+  const std::string last = submit(finish);
+  if (!todo.empty())
+    std::cout << "job " << job.array_job << ": shards " << array_text(todo) << "\n";
+  std::cout << "job " << last << ": merges and analyses when they are done\n";
+}
+
+// "#SBATCH" is not used: what sbatch is called with stands in cluster.json and goes for both jobs.
+void write_scripts(const fs::path& folder, const ClusterJob& job, const std::string& command) {
+  const std::string program = shell_quoted(fs::read_symlink("/proc/self/exe").string());
+  const std::string enter = "cd " + shell_quoted(folder.string());
+  const std::string extension = job.extension();
+  write_script(folder / "shard.sh",
+               "# One shard; started again, it goes on where it was.\n" + enter +
+                   " || exit 1\nexec " + program + " " + command +
+                   " --jobs 1 --shard \"${1:-$SLURM_ARRAY_TASK_ID}/" + std::to_string(job.shards) +
+                   "\" \\\n  --db \"parts/part$(printf %06d \"${1:-$SLURM_ARRAY_TASK_ID}\")" +
+                   extension + "\"\n");
+  const std::string given = job.work == "sweep" ? "--sweep" : "--db";
+  write_script(folder / "finish.sh",
+               "# When all shards are done: one file, and its analysis.\nset -e\n" + enter +
+                   "\n[ -e all" + extension + " ] || " + program + " merge --out all" + extension +
+                   " parts/*" + extension + "\n" + program + " analyze " + given + " all" +
+                   extension +
+                   " --json analysis.json --report report.html --force > analysis.txt\n");
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,26 @@
+#pragma once
+// The work of `palpate render`: forces along a path over a scene.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "protocols/parse.h"
+#include "rendering/renderer.h"
+#include "runner/commands/render/trajectory_csv.h"
+
+namespace palpate::runner {
+
+/// \throws UsageError: neither point nor ray
+const rendering::Renderer& renderer_named(const std::string& name);
+
+/// \param path  that faults name. \throws stimuli::MeshError
+rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
+                             const rendering::Renderer& renderer);
+
+/// A tick for each pose, in order. \param scene  built from `spec`
+void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spec,
+                  const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
+                  const std::function<void(const TimedPose&, const rendering::Rendering&)>& visit);
+
+}  // namespace palpate::runner

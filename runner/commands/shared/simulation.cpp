@@ -1,0 +1,24 @@
+#include "runner/commands/shared/simulation.h"
+
+#include <string>
+
+#include "runner/commands/shared/command.h"
+
+namespace palpate::runner {
+
+void check_simulated_participants(int participants) {
+  if (participants < 1 || participants > 100000)
+    throw UsageError("--participants: must be 1 to 100000");
+}
+
+LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
+                                       const SimulatedSettings& simulated) {
+  LimitedForSimulation limited = limit_for_simulation(protocol, simulated);
+  std::string reasons;
+  for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), simulated))
+    reasons += "\n" + fault;
+  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
+  return limited;
+}
+
+}  // namespace palpate::runner

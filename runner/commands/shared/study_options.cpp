@@ -1,0 +1,35 @@
+#include "runner/commands/shared/study_options.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "runner/commands/shared/simulation.h"
+
+namespace palpate::runner {
+
+namespace po = boost::program_options;
+
+void add_study_options(CommandLine& line, StudyOptions& options) {
+  line.options.add_options()  //
+      ("participants",
+       po::value(&options.participants)->default_value(options.participants)->value_name("N"),
+       "simulated participants, numbered from 1")  //
+      ("seed", po::value(&options.seed)->default_value(options.seed)->value_name("S"),
+       "of the participants; the order of trials follows the protocol's own seed")  //
+      ("participant-version",
+       po::value(&options.version)->default_value(options.version)->value_name("1|2|3"),
+       "of the simulated participant; each is frozen")  //
+      ("settings", po::value(&options.patch)->value_name("FILE"),
+       "JSON merge patch on the settings of that version, for ablations");
+  line.positional_names = {"PROTOCOL.json"};
+}
+
+void check_study_options(const po::variables_map& values, StudyOptions& options) {
+  check_simulated_participants(options.participants);
+  const std::vector<int> versions = participant_versions();
+  if (std::find(versions.begin(), versions.end(), options.version) == versions.end())
+    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+  options.protocol = values["PROTOCOL.json"].as<std::string>();
+}
+
+}  // namespace palpate::runner
