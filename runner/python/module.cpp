@@ -1,0 +1,155 @@
+// The part of the Python module `palpate` that is compiled: what the commands simulate, render and
+// schedule do, in memory. palpate/__init__.py is what users see.
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "data/export/trial_table.h"
+#include "data/store/store.h"
+#include "protocols/json_document.h"
+#include "protocols/parse.h"
+#include "runner/commands/render/forces.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/schedule_rows.h"
+#include "runner/commands/shared/simulation.h"
+#include "runner/python/arrays.h"
+#include "runner/session/simulated_session.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace py = pybind11;
+
+/// A JSON document: its text, and the file that faults name and that files are beside.
+struct Document {
+  std::string text, file;
+};
+
+/// Ctrl-C while the interpreter's lock is released: asks the interpreter every tenth of a second.
+class Interruption {
+ public:
+  /// \throws py::error_already_set: KeyboardInterrupt
+  void check() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - last_ < std::chrono::milliseconds(100)) return;
+    last_ = now;
+    const py::gil_scoped_acquire lock;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+protocols::Protocol parse(const Document& protocol) {
+  return protocols::parse_protocol_text(protocol.text, protocol.file);
+}
+
+/// \return columns, sentences about materials that were limited
+py::tuple simulate(const Document& given, const std::string& settings_text, int participants,
+                   std::uint64_t seed) {
+  data::TrialTable trials;
+  std::vector<std::string> limited;
+  {
+    const py::gil_scoped_release unlocked;
+    check_simulated_participants(participants);
+    protocols::Protocol protocol = parse(given);
+    const SimulatedSettings settings = read_simulated_settings(settings_text);
+    limited = fit_to_simulation(protocol, settings).texts;
+    Interruption interruption;
+    const std::atomic<bool> stop{false};  // an exception ends it
+    simulate_in_memory(protocol, settings, participants, seed, stop,
+                       [&](int number, const data::TrialRecord& record, std::uint64_t) {
+                         data::StoredTrial trial;
+                         trial.participant.code = simulated_code(number);
+                         trial.participant.number = number;
+                         trial.participant.enrolled_number = number;
+                         trial.participant.simulated = true;
+                         trial.participant.seed = seed;
+                         trial.protocol_name = protocol.name;
+                         trial.protocol_sha256 = protocol.sha256;
+                         trial.run = simulated_run(protocol, settings, number, record.session);
+                         trial.record = record;
+                         trials.add(trial);
+                         interruption.check();
+                       });
+  }
+  return py::make_tuple(arrays_of(trials.table()), limited);
+}
+
+py::dict render(const Document& given, const std::vector<TimedPose>& poses,
+                const std::string& renderer_name) {
+  std::unique_ptr<data::ColumnTable> table;
+  {
+    const py::gil_scoped_release unlocked;
+    const rendering::Renderer& renderer = renderer_named(renderer_name);
+    const protocols::SceneSpec spec = protocols::parse_scene_text(given.text, given.file);
+    const rendering::Scene scene = build_scene(given.file, spec, renderer);
+    const bool tool = scene.tool() != nullptr;
+    table = std::make_unique<data::ColumnTable>(force_columns(tool));
+    Interruption interruption;
+    render_along(scene, spec, renderer, poses,
+                 [&](const TimedPose& pose, const rendering::Rendering& rendering) {
+                   put_forces(*table, pose.t, rendering, tool);
+                   interruption.check();
+                 });
+  }
+  return arrays_of(*table);
+}
+
+py::dict schedule(const Document& given, int participant) {
+  check_participant_number(participant);
+  const protocols::Protocol protocol = parse(given);
+  data::ColumnTable table(schedule_columns());
+  for (const protocols::Trial& trial : protocols::schedule(protocol, participant))
+    put_scheduled(table, protocol, trial, participant);
+  return arrays_of(table);
+}
+
+/// The program prints these with status 2; \return false: another kind
+bool is_bad_input(const std::exception& error) {
+  return dynamic_cast<const UsageError*>(&error) != nullptr ||
+         dynamic_cast<const protocols::InputError*>(&error) != nullptr ||
+         dynamic_cast<const stimuli::MeshError*>(&error) != nullptr ||
+         dynamic_cast<const data::StoreRefused*>(&error) != nullptr;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_palpate, module) {
+  module.attr("__version__") = PALPATE_VERSION;
+  module.attr("DEFAULT_VERSION") = kDefaultParticipantVersion;
+  static const py::exception<UsageError> input_error(module, "InputError", PyExc_ValueError);
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const std::exception& error) {
+      if (!is_bad_input(error)) throw;  // pybind11 knows what becomes of it
+      PyErr_SetString(input_error.ptr(), stimuli::printable_lines(error.what()).c_str());
+    }
+  });
+  py::class_<Document>(module, "Document")
+      .def(py::init<std::string, std::string>(), py::arg("text"), py::arg("file"));
+  module.def("simulate", &simulate);
+  module.def("render", [](const Document& scene, const std::vector<Coordinates>& trajectory,
+                          const std::string& renderer) {
+    return render(scene, poses_of(trajectory), renderer);
+  });
+  module.def("render_file",
+             [](const Document& scene, const std::string& trajectory, const std::string& renderer) {
+               return render(scene, read_trajectory(trajectory), renderer);
+             });
+  module.def("schedule", &schedule);
+  module.def("settings", [](int version) { return simulated_settings_text("", version); });
+  module.def("read", &protocols::read_text_file);
+}
+
+}  // namespace palpate::runner

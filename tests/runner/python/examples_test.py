@@ -1,0 +1,89 @@
+"""The examples of runner/python run, and their inference finds what is there: in data whose posterior is known."""
+
+import importlib
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "runner/python/examples"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def on_path():
+    sys.path.insert(0, str(EXAMPLES))
+    yield
+    sys.path.remove(str(EXAMPLES))
+
+
+@pytest.mark.parametrize("name,words", [("recover_parameters", ("slide speed", "correlation")),
+                                        ("choose_sizes", ("standard", "bits"))])
+def test_an_example_runs_and_is_the_same_again(name, words, tmp_path):
+    command = [sys.executable, str(EXAMPLES / f"{name}.py"), "--quick"]
+    said = [subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=1500).stdout
+            for _ in range(2)]
+    assert said[0] == said[1]
+    for word in words:
+        assert word in said[0]
+    assert "nan" not in said[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def linear_labs(random, n):
+    """Figures of labs that are the settings' logits, mixed, with normal noise, and figures that say nothing."""
+    shares = random.random((n, 5))
+    x = np.log(shares / (1 - shares))
+    mixing = np.random.default_rng(5).normal(size=(5, 8))
+    return shares, np.column_stack([x @ mixing + random.normal(size=(n, 8)), random.normal(size=(n, 6))])
+
+
+def test_the_posterior_is_calibrated_and_follows_the_truth():
+    module = importlib.import_module("recover_parameters")
+    random = np.random.default_rng(3)
+    inference = module.Inference(*linear_labs(random, 3000), keep=0.2)
+    shares, figures = linear_labs(random, 600)
+    means, ranks = module.calibrate(inference, shares, figures)
+    for i in range(5):
+        assert module.uniformity(ranks[:, i])[1] > 0.001
+        assert np.corrcoef(means[:, i], shares[:, i])[0, 1] > 0.85
+    # Ranks that are not uniform are found: of a posterior that is too narrow, and of one that is off.
+    for wrong in (0.5 + 1.5 * (ranks - 0.5), ranks**1.5):
+        assert module.uniformity(np.clip(wrong[:, 0], 0, 1))[1] < 0.001
+
+
+def test_the_prior_is_what_it_says_and_is_never_left():
+    module = importlib.import_module("recover_parameters")
+    np.testing.assert_allclose(module.values_of(np.zeros(5)), module.LOW)
+    np.testing.assert_allclose(module.values_of(np.ones(5)), module.HIGH)
+    person = module.person(np.full(5, 0.5))
+    assert person["motor"]["slide_speed_m_per_s"] == pytest.approx(np.sqrt(0.02 * 0.15))
+    assert person["observer"]["threshold"] == pytest.approx((0.7 + 0.99) / 2)
+    random = np.random.default_rng(4)
+    inference = module.Inference(*linear_labs(random, 500), keep=0.2)
+    draws, weights = inference.posterior(np.full(14, 50.0))
+    assert ((draws >= 0) & (draws <= 1)).all()
+    assert weights.sum() == pytest.approx(1)
+
+
+def test_information_is_none_without_a_difference_and_nearly_all_with_a_large_one():
+    module = importlib.import_module("choose_sizes")
+    random = np.random.default_rng(6)
+    is_three = np.arange(200) % 2 == 1
+    noise = random.normal(size=(200, 29))
+    nothing, error = module.information(noise, is_three)
+    assert nothing < 0.05
+    shifted = noise.copy()
+    shifted[is_three, :3] += 4
+    assert module.information(shifted, is_three)[0] > 0.9
+    # One figure that is apart by 1.5 sd: the information of two normal distributions, by integration.
+    half = noise.copy()
+    half[is_three, 0] += 1.5
+    x = np.linspace(-8, 10, 4001)
+    two, three = np.exp(-x**2 / 2), np.exp(-(x - 1.5)**2 / 2)
+    two, three = two / two.sum(), three / three.sum()
+    mixed = (two + three) / 2
+    truth = sum((p * np.log2(p / mixed)).sum() / 2 for p in (two, three))
+    found, error = module.information(half[:, :4], is_three)
+    assert abs(found - truth) < 4 * error + 0.05

@@ -1,0 +1,258 @@
+"""The Python module gives what the program gives, to the bit, and says what it says."""
+
+import ast
+import concurrent.futures
+import csv
+import inspect
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import palpate
+
+QUICK = {"version": 1, "name": "tiny", "renderers": ["point", "ray"], "repetitions": 1,
+         "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 1},
+                     {"name": "cube", "shape": "cube", "edge_m": 0.05}],
+         "practice": {"repetitions": 1}, "sessions": {"count": 2}, "blocks_per_renderer": 1,
+         "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 5}, "seed": 7}
+CUBE = {"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 500}]}
+
+
+def with_(document, **changes):
+    return {**document, **changes}
+
+
+def assert_same(columns, text):
+    """Columns against the program's CSV: names, order and every value, bit for bit."""
+    rows = list(csv.reader(io.StringIO(text)))
+    assert list(columns) == rows[0]
+    assert len(rows) > 1
+    for number, name in enumerate(rows[0]):
+        column, fields = columns[name], [row[number] for row in rows[1:]]
+        assert column.shape == (len(fields),), name
+        if column.dtype.kind == "U":
+            assert column.tolist() == fields, name
+        elif column.dtype.kind == "b":
+            assert [str(int(v)) for v in column] == fields, name
+        elif column.dtype.kind == "i":
+            assert [str(v) for v in column] == fields, name
+        else:
+            expected = np.array([float(field or "nan") for field in fields])
+            assert column.dtype == np.float64
+            assert np.array_equal(column.view(np.int64), expected.view(np.int64)) or np.array_equal(
+                column, expected, equal_nan=True), name
+
+
+def study_csv(program, folder, *options):
+    program(folder, "simulate", *options, "--db", "study.db")
+    program(folder, "export", "--db", "study.db", "--format", "csv", "--out", "trials.csv")
+    return (folder / "trials.csv").read_text()
+
+
+@pytest.mark.parametrize("version,seed", [(1, 1), (2, 5), (3, 18446744073709551615)])
+def test_a_study_is_the_programs_to_the_bit(program, tmp_path, version, seed):
+    (tmp_path / "p.json").write_text(json.dumps(QUICK))
+    text = study_csv(program, tmp_path, "p.json", "--participants", 2, "--seed", seed, "--participant-version", version)
+    columns = palpate.simulate(tmp_path / "p.json", palpate.settings(version), participants=2, seed=seed)
+    assert_same(columns, text)
+    assert set(columns["participant_id"]) == {"S001", "S002"}
+    assert set(columns["session"]) == {1, 2}
+    assert columns["practice"].any() and not columns["practice"].all()
+    from_dict = palpate.simulate(QUICK, palpate.settings(version), participants=2, seed=seed)
+    assert from_dict["response_time"].tobytes() == columns["response_time"].tobytes()
+
+
+def test_changed_settings_are_the_programs_patch(program, tmp_path):
+    (tmp_path / "p.json").write_text(json.dumps(with_(QUICK, sessions={"count": 1})))
+    (tmp_path / "patch.json").write_text(json.dumps({"motor": {"slide_speed_m_per_s": 0.031}, "observer": {"threshold": 0.7}}))
+    text = study_csv(program, tmp_path, "p.json", "--participants", 1, "--settings", "patch.json")
+    person = palpate.settings()
+    person["motor"]["slide_speed_m_per_s"] = np.float64(0.031)
+    person["observer"]["threshold"] = 0.7
+    columns = palpate.simulate(tmp_path / "p.json", person, participants=1)
+    assert_same(columns, text)
+    assert columns["observer_sha256"][0] != palpate.simulate(tmp_path / "p.json", participants=1)["observer_sha256"][0]
+
+
+def test_no_answer_is_nan_and_no_text(program, tmp_path):
+    (tmp_path / "p.json").write_text(json.dumps(with_(QUICK, response={"keys": QUICK["response"]["keys"], "time_out_s": 0.5})))
+    text = study_csv(program, tmp_path, "p.json", "--participants", 1)
+    columns = palpate.simulate(tmp_path / "p.json", participants=1)
+    assert_same(columns, text)
+    assert (columns["response"][columns["timed_out"]] == "").all() and columns["timed_out"].any()
+    assert np.isnan(columns["first_contact_time"]).any()
+
+
+def test_a_schedule_is_the_programs(program, protocols):
+    for number in (1, 2, 11):
+        text = program(protocols, "schedule", "quick.json", "--participant", number, "--format", "csv")
+        assert_same(palpate.schedule(protocols / "quick.json", number), text)
+
+
+def path_of_stylus(side=False):
+    t = np.arange(400) * 0.001
+    columns = {"t": t, "tip_x": 0.001 * np.sin(40 * t), "tip_y": 0.01 + 0.02 * t, "tip_z": 0.05 - 0.1 * t,
+               "tail_x": 0.0 * t + 0.02, "tail_y": 0.05 + 0.0 * t, "tail_z": 0.14 - 0.02 * t}
+    if side:
+        columns.update(side_x=1 + 0 * t, side_y=0.2 * t, side_z=0 * t)
+    return columns
+
+
+def write_csv(file, columns):
+    np.savetxt(file, np.column_stack(list(columns.values())), fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
+
+
+@pytest.mark.parametrize("renderer", ["point", "ray"])
+@pytest.mark.parametrize("extra,side", [({}, False), ({"reach": {"factor": 1.2, "pivot": "grip"}}, False),
+                                        ({"tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]},
+                                                                {"from_m": [0, 0, 0], "to_m": [0.01, 0, 0.02]}]}}, True)])
+def test_forces_are_the_programs_to_the_bit(program, tmp_path, renderer, extra, side):
+    scene, columns = with_(CUBE, **extra), path_of_stylus(side)
+    (tmp_path / "s.json").write_text(json.dumps(scene))
+    write_csv(tmp_path / "t.csv", columns)
+    program(tmp_path, "render", "--scene", "s.json", "--renderer", renderer, "--trajectory", "t.csv", "--out", "o.csv")
+    text = (tmp_path / "o.csv").read_text()
+    for trajectory in (columns, tmp_path / "t.csv", np.genfromtxt(tmp_path / "t.csv", delimiter=",", names=True)):
+        out = palpate.render(scene, trajectory, renderer)
+        assert_same(out, text)
+    assert np.abs(out["force_z"]).max() > 0.1
+    assert ("segment" in out) == ("tool" in scene)
+    assert_same(palpate.render(str(tmp_path / "s.json"), columns, renderer), text)
+
+
+def test_faults_have_the_programs_words(program, tmp_path):
+    bad = with_(QUICK, repetitions=0, colour="red")
+    (tmp_path / "p.json").write_text(json.dumps(bad))
+    (tmp_path / "good.json").write_text(json.dumps(QUICK))
+    (tmp_path / "s.json").write_text(json.dumps({"objects": [{"shape": "cube", "edge_m": -1}]}))
+    (tmp_path / "t.csv").write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,0,0,0,0,0,1\n0,0,0,0,0,0,1\n")
+    stiff = with_(QUICK, material={"stiffness_n_per_m": 100000})
+    (tmp_path / "stiff.json").write_text(json.dumps(stiff))
+    t = {name: np.zeros(1) for name in palpate.POSE_COLUMNS}
+    os.chdir(tmp_path)
+    for call, arguments in (
+            (lambda: palpate.simulate("p.json"), ["simulate", "p.json", "--db", "x.db"]),
+            (lambda: palpate.simulate("none.json"), ["simulate", "none.json", "--db", "x.db"]),
+            (lambda: palpate.simulate("stiff.json"), ["simulate", "stiff.json", "--db", "x.db"]),
+            (lambda: palpate.simulate("good.json", participants=0), ["simulate", "good.json", "--db", "x.db", "--participants", 0]),
+            (lambda: palpate.schedule("p.json", 1), ["schedule", "p.json", "--participant", 1]),
+            (lambda: palpate.schedule("good.json", 0), ["schedule", "good.json", "--participant", 0]),
+            (lambda: palpate.render("s.json", t, "ray"),
+             ["render", "--scene", "s.json", "--renderer", "ray", "--trajectory", "t.csv", "--out", "o.csv"]),
+            (lambda: palpate.render(CUBE, "t.csv", "ray"),
+             ["render", "--scene", "cube.json", "--renderer", "ray", "--trajectory", "t.csv", "--out", "o.csv"]),
+            (lambda: palpate.render(CUBE, t, "both"),
+             ["render", "--scene", "cube.json", "--renderer", "both", "--trajectory", "t.csv", "--out", "o.csv"])):
+        (tmp_path / "cube.json").write_text(json.dumps(CUBE))
+        said = program(tmp_path, *arguments, status=2)
+        with pytest.raises(palpate.InputError) as raised:
+            call()
+        assert str(raised.value).strip()
+        assert str(raised.value) in said
+    assert issubclass(palpate.InputError, ValueError)
+
+
+def test_wrong_settings_are_named():
+    person = palpate.settings(3)
+    del person["motor"]["slide_speed_m_per_s"]
+    person["percept"]["place"] = "elbow"
+    person["mood"] = 3
+    with pytest.raises(palpate.InputError) as raised:
+        palpate.simulate(QUICK, person)
+    for words in ("/motor/slide_speed_m_per_s: is missing", "/percept/place: must be tip or surface", "/mood: no such setting"):
+        assert words in str(raised.value)
+    with pytest.raises(ValueError, match="no version 4"):
+        palpate.settings(4)
+    with pytest.raises(ValueError):
+        palpate.simulate(QUICK, with_(palpate.settings(), note=float("nan")))
+    with pytest.raises(TypeError):
+        palpate.simulate(QUICK, seed=-1)
+    with pytest.raises(TypeError):
+        palpate.simulate(None)
+
+
+def test_wrong_paths_are_named():
+    t = path_of_stylus()
+    for change, words in (({"t": t["t"][::-1]}, "row 1: expected a time later"), ({"t": t["t"] * np.nan}, "row 0: expected a finite time"),
+                          ({"tip_x": t["t"][:-1]}, "one length"), ({"tip_x": np.zeros((400, 1))}, "one length")):
+        with pytest.raises(palpate.InputError, match=words):
+            palpate.render(CUBE, with_(t, **change), "ray")
+    with pytest.raises(palpate.InputError, match="missing: tail_z"):
+        palpate.render(CUBE, {name: t[name] for name in palpate.POSE_COLUMNS[:-1]}, "ray")
+    with pytest.raises(palpate.InputError, match="at least one row"):
+        palpate.render(CUBE, {name: t[name][:0] for name in t}, "ray")
+
+
+def test_threads_simulate_beside_each_other_with_the_same_result():
+    started, together = threading.Barrier(2, timeout=60), []
+
+    def study(seed):
+        started.wait()
+        columns = palpate.simulate(QUICK, participants=1, seed=seed)["response_time"].tobytes()
+        together.append(seed)
+        return columns
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        futures = [pool.submit(study, seed) for seed in (1, 2)]
+        ticks = 0
+        while len(together) < 2 and not any(f.done() and f.exception() for f in futures):
+            ticks += 1  # this thread goes on: the lock is free
+            time.sleep(0.001)
+        found = [f.result() for f in futures]
+    assert ticks > 3
+    assert found == [palpate.simulate(QUICK, participants=1, seed=seed)["response_time"].tobytes() for seed in (1, 2)]
+    assert found[0] != found[1]
+
+
+@pytest.mark.parametrize("call", ["palpate.simulate(%r, participants=100000)" % QUICK,
+                                  "palpate.render(%r, many(), 'ray')" % CUBE])
+def test_ctrl_c_ends_a_long_call(call):
+    code = f"""
+import sys, numpy as np, palpate
+def many():
+    t = np.arange(3000000) * 0.001
+    return {{name: t if name == "t" else 0.02 * np.sin(t + i) + (0.1 if name == "tail_z" else 0)
+            for i, name in enumerate(palpate.POSE_COLUMNS)}}
+print("now", flush=True)
+try:
+    {call}
+    print("came to its end", flush=True)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "now\n"
+    time.sleep(3)
+    child.send_signal(signal.SIGINT)
+    assert child.communicate(timeout=300)[0] == "interrupted\n"
+
+
+def test_no_file_is_written(tmp_path):
+    os.chdir(tmp_path)
+    palpate.simulate(QUICK, participants=1)
+    palpate.render(CUBE, path_of_stylus(), "ray")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_stubs_and_docstrings_fit_the_module():
+    stub = ast.parse((__import__("pathlib").Path(palpate.__file__).parent / "_palpate.pyi").read_text())
+    stated = {node.name for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    stated |= {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
+    found = {name for name in dir(palpate._palpate) if not name.startswith("__") or name == "__version__"}
+    assert stated == found
+    for name in palpate.__all__:
+        assert getattr(palpate, name) is not None
+    for function in (palpate.simulate, palpate.render, palpate.schedule, palpate.settings):
+        signature = inspect.signature(function)
+        assert signature.return_annotation is not inspect.Signature.empty
+        for parameter in signature.parameters.values():
+            assert parameter.annotation is not inspect.Parameter.empty
+            assert parameter.name in function.__doc__ or function is palpate.schedule
