@@ -4,6 +4,7 @@
 #include <boost/math/special_functions/erf.hpp>
 #include <cctype>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <set>
 
@@ -28,19 +29,42 @@ double normal_value(double share) {
   return -std::numbers::sqrt2 * boost::math::erfc_inv(2 * share);
 }
 
-/// Of a normal distribution that is cut off at both limits. Limits above the mean are mirrored:
-/// shares near 1 have no digits left.
+// Beyond, a tail has no digits left in double precision: 6e-300 of the distribution.
+constexpr double kFarthestSd = 37;
+
+/// Standard deviations between the mean and the nearer limit; 0: the mean lies within.
+double sd_from_mean(const SweepParameter& p) {
+  return std::max({(p.low - p.mean) / p.sd, (p.mean - p.high) / p.sd, 0.0});
+}
+
+/// Of a normal distribution that is cut off at both limits. Shares near 1 have no digits left:
+/// there, what lies above is counted instead.
 double cut_normal_value(const SweepParameter& p, double u) {
   if (u <= 0) return p.low;
   if (u >= 1) return p.high;
   const double low = (p.low - p.mean) / p.sd, high = (p.high - p.mean) / p.sd;
-  const bool mirrored = low > 0;
-  const double from = normal_share(mirrored ? -high : low);
-  const double to = normal_share(mirrored ? -low : high);
-  const double share = from + (mirrored ? 1 - u : u) * (to - from);
-  if (!(share > 0) || !(share < 1)) return u < 0.5 ? p.low : p.high;
+  // So narrow that shares within cannot be told apart; the density is constant to 1e-7.
+  if ((high - low) * std::max({1.0, std::fabs(low), std::fabs(high)}) < 1e-7)
+    return std::clamp(p.low + u * (p.high - p.low), p.low, p.high);
+  const auto from_below = [&](double from, double to, double part) {
+    const double left_out = normal_share(from);
+    return left_out + part * (normal_share(to) - left_out);
+  };
+  const double below = from_below(low, high, u);
+  const bool mirrored = low > 0 || !(below < 1);
+  const double share = mirrored ? from_below(-high, -low, 1 - u) : below;
+  if (!(share > 0)) return low > 0 ? p.low : p.high;  // beyond kFarthestSd
   const double z = normal_value(share);
   return std::clamp(p.mean + p.sd * (mirrored ? -z : z), p.low, p.high);
+}
+
+/// The ratio, if it is a number: a plan's points stay the same to the bit.
+double log_uniform_value(const SweepParameter& p, double u) {
+  const double ratio = p.high / p.low;
+  const double value = std::isfinite(ratio)
+                           ? p.low * std::exp(u * std::log(ratio))
+                           : std::exp(std::log(p.low) + u * (std::log(p.high) - std::log(p.low)));
+  return std::clamp(value, p.low, p.high);
 }
 
 bool is_name(const std::string& text) {
@@ -115,6 +139,24 @@ void read_limits(ObjectReader& reader, SweepParameter& out) {
   }
 }
 
+/// Where all four numbers are in order by themselves.
+void check_normal(ObjectReader& reader, const SweepParameter& p) {
+  for (const char* const key : {"low", "high", "mean", "sd"}) {
+    const json* const value = reader.member(key);
+    if (value == nullptr || !value->is_number()) return;
+  }
+  if (!(p.low < p.high) || !(p.sd > 0)) return;
+  const double away = sd_from_mean(p);
+  if (away <= kFarthestSd) return;
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", away);
+  reader.faults().add(reader.pointer(p.low > p.mean ? "low" : "high"),
+                      "expected limits that hold a part of the distribution: at most " +
+                          std::to_string(static_cast<int>(kFarthestSd)) +
+                          " sd from the mean, found both " + text + " sd or more " +
+                          (p.low > p.mean ? "above" : "below") + " it");
+}
+
 SweepParameter read_parameter(ObjectReader& reader) {
   SweepParameter out;
   if (const json* const name = reader.member("name", Presence::required)) {
@@ -144,6 +186,7 @@ SweepParameter read_parameter(ObjectReader& reader) {
   if (out.distribution != DistributionKind::normal) return out;
   reader.number("mean", out.mean, {-kLargest, kLargest}, Presence::required);
   reader.number("sd", out.sd, {0, kLargest, "", true}, Presence::required);
+  check_normal(reader, out);
   return out;
 }
 
@@ -200,7 +243,7 @@ json SweepParameter::value_at(double u) const {
     case DistributionKind::uniform:
       return std::clamp(low + share * (high - low), low, high);
     case DistributionKind::log_uniform:
-      return std::clamp(low * std::exp(share * std::log(high / low)), low, high);
+      return log_uniform_value(*this, share);
     case DistributionKind::normal:
       return cut_normal_value(*this, share);
     case DistributionKind::choice:

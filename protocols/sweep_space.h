@@ -18,7 +18,7 @@ struct SweepParameter {
   std::vector<std::string> paths;  ///< JSON pointers; all get the same value
   DistributionKind distribution = DistributionKind::uniform;
   double low = 0, high = 1;            ///< limits; normal: it is cut off there, not clipped
-  double mean = 0, sd = 1;             ///< normal, before it is cut off
+  double mean = 0, sd = 1;             ///< normal, before it is cut off; a limit within 37 sd
   std::vector<nlohmann::json> values;  ///< choice: numbers, words, true or false; equally likely
 
   /// The value below which a share `u` of the distribution lies, 0 <= u <= 1. choice: the value

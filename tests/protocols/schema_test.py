@@ -18,7 +18,7 @@ PROGRAM_ONLY = {
     "too-many-trials", "tool-segment-without-length", "two-keys",
 }
 # The same, of sweep spaces.
-SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "values-set-twice"}
+SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}
 
 
 def refuse_constant(word):

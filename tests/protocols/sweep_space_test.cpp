@@ -99,6 +99,53 @@ TEST(SweepSpace, NormalDistributionsAreCutOff) {
   }
 }
 
+/// The share of a standard normal distribution cut off at `low` and `high` that lies below z, from
+/// logarithms of the density at steps of its own width: no tail is too far.
+double cut_share(double low, double high, double z) {
+  const double peak = low > 0 ? low : high < 0 ? high : 0;
+  const auto density = [&](double x) { return std::exp((peak - x) * (peak + x) / 2); };
+  // Beyond 40 widths of the peak there is nothing.
+  const double width = 40 / std::max(1.0, std::abs(peak));
+  const double from = std::max(low, peak - width), to = std::min(high, peak + width);
+  constexpr int kSteps = 100000;
+  const double step = (to - from) / kSteps;
+  double below = 0, whole = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = from + (i + 0.5) * step;
+    whole += density(x);
+    below += density(x) * std::clamp((z - x) / step + 0.5, 0.0, 1.0);
+  }
+  return below / whole;
+}
+
+TEST(SweepSpace, TailsOfNormalDistributionsFarFromTheMeanAreRight) {
+  for (const auto& [low, high] :
+       {std::pair(36.9, 60.0), std::pair(20.0, 20.01), std::pair(8.0, 1e6), std::pair(-3.0, 1e300),
+        std::pair(5.0, 5 + 1e-9), std::pair(0.0, 1e-12), std::pair(-1e-13, 1e-13)}) {
+    SweepParameter above = with_limits(DistributionKind::normal, low, high);
+    SweepParameter below = with_limits(DistributionKind::normal, -high, -low);
+    for (const double share : {0.0, 1e-9, 0.001, 0.1, 0.3, 0.5, 0.8, 0.97, 1 - 1e-9, 1.0}) {
+      const auto value = above.value_at(share).get<double>();
+      EXPECT_NEAR(cut_share(low, high, value), share, 2e-5) << low << " " << share;
+      EXPECT_NEAR(cut_share(-high, -low, below.value_at(1 - share).get<double>()), 1 - share, 2e-5);
+    }
+  }
+  // The last share below 1 is not the limit.
+  const SweepParameter wide = with_limits(DistributionKind::normal, -1, 1000);
+  EXPECT_NEAR(wide.value_at(1 - 0x1p-53).get<double>(), 8.2, 0.2);
+}
+
+// A logarithm that is uniform: equal shares are equal ratios, whatever the ratio of the limits.
+TEST(SweepSpace, LogUniformLimitsMayBeAnyNumberOfDecadesApart) {
+  for (const double low : {1e-3, 1e-300, 1e-310}) {
+    const SweepParameter one = with_limits(DistributionKind::log_uniform, low, 1e12);
+    for (const double share : {0.0, 0.01, 0.25, 0.5, 0.75, 0.99, 1.0}) {
+      const double decades = std::log10(one.value_at(share).get<double>());
+      EXPECT_NEAR((decades - std::log10(low)) / (12 - std::log10(low)), share, 1e-9) << low;
+    }
+  }
+}
+
 TEST(SweepSpace, ChoicesHaveEqualParts) {
   SweepParameter one;
   one.distribution = DistributionKind::choice;
