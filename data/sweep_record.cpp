@@ -17,10 +17,38 @@ std::string shown(const nlohmann::json& value) {
   return text;
 }
 
-std::string value_at(const nlohmann::json& document, const std::string& pointer) {
-  const nlohmann::json::json_pointer place(pointer);
-  return document.contains(place) ? shown(document[place]) : "(nothing)";
+std::string in_lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
 }
+
+/// Of a step that turns one document into another (RFC 6902), what it changes: "/seed 1 and 2".
+class DifferenceTexts {
+ public:
+  explicit DifferenceTexts(const nlohmann::json& one) : one_(one) {}
+
+  std::string of(const nlohmann::json& step) {
+    const std::string named = step.at("path").get<std::string>();
+    const nlohmann::json::json_pointer place(named);
+    const bool adds = step.at("op") == "add";
+    return (adds ? place_of_added(place) : named) + " " +
+           (adds ? "(nothing)" : shown(one_.at(place))) + " and " +
+           (step.at("op") == "remove" ? "(nothing)" : shown(step.at("value")));
+  }
+
+ private:
+  /// "-" stands for the place behind a list's last element.
+  std::string place_of_added(const nlohmann::json::json_pointer& place) {
+    const nlohmann::json::json_pointer list = place.parent_pointer();
+    if (place.back() != "-" || !one_.at(list).is_array()) return place.to_string();
+    const std::size_t next = one_.at(list).size() + appended_[list.to_string()]++;
+    return list.to_string() + "/" + std::to_string(next);
+  }
+
+  const nlohmann::json& one_;
+  std::map<std::string, std::size_t> appended_;  // elements of a list, by its pointer
+};
 
 /// "/seed 1 and 2; /stimuli/0/radius_m 0.03 and 0.02"
 std::string json_differences(const std::string& a, const std::string& b) {
@@ -30,13 +58,12 @@ std::string json_differences(const std::string& a, const std::string& b) {
   std::string out;
   std::size_t named = 0;
   const nlohmann::json patch = nlohmann::json::diff(one, two);
+  DifferenceTexts texts(one);
   for (const nlohmann::json& step : patch) {
     if (named++ == kMaxNamed) {
       return out + "; and " + std::to_string(patch.size() - kMaxNamed) + " more";
     }
-    const std::string place = step.at("path").get<std::string>();
-    out += (out.empty() ? "" : "; ") + place + " " + value_at(one, place) + " and " +
-           value_at(two, place);
+    out += (out.empty() ? "" : "; ") + texts.of(step);
   }
   return out.empty() ? "their layout alone" : out;
 }
@@ -93,11 +120,13 @@ std::vector<std::string> sweep_columns(const SweepPlan& plan) {
 std::optional<std::pair<std::string, std::string>> columns_alike(const SweepPlan& plan) {
   std::map<std::string, std::string> seen{{"seed", "seed"}, {"order_seed", "order_seed"}};
   for (const std::string& column : sweep_columns(plan)) {
-    std::string lower = column;
-    std::transform(lower.begin(), lower.end(), lower.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    const auto [found, added] = seen.emplace(lower, column);
+    const auto [found, added] = seen.emplace(in_lower_case(column), column);
     if (!added) return std::pair(found->second, column);
+  }
+  for (const std::string& parameter : plan.parameters) {
+    for (const std::string& shape : plan.shapes) {
+      if (in_lower_case(parameter) == in_lower_case(shape)) return std::pair(parameter, shape);
+    }
   }
   return std::nullopt;
 }

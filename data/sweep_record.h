@@ -47,7 +47,8 @@ struct SweepRow {
 std::vector<std::string> figure_columns(const SweepPlan& plan);
 /// point, status, reason, the parameters, the figures.
 std::vector<std::string> sweep_columns(const SweepPlan& plan);
-/// Two columns of one name, also by upper and lower case alone; none: there are no two.
+/// Two columns of one name, or a parameter and a shape (whose name stands for its gain in a
+/// pattern), also by upper and lower case alone; none: there are no two.
 std::optional<std::pair<std::string, std::string>> columns_alike(const SweepPlan& plan);
 
 }  // namespace palpate::data

@@ -28,7 +28,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kBusyTimeoutMs = 5000;
+// A reader in another program, such as an export, does not end a sweep of hours; nor does a writer
+// that waits for that reader end others.
+constexpr int kBusyTimeoutMs = 60'000;
+constexpr std::size_t kPageRows = 1000;  // that are read at a time
 constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 void sync_path(const std::string& path, const std::string& named) {
@@ -212,10 +215,19 @@ std::int64_t SweepFile::failed() {
 }
 
 void SweepFile::for_each(const std::function<void(const SweepRow&)>& visit) {
-  guarded(impl_->path, [&] {
-    SQLite::Statement find(*impl_->db, "SELECT * FROM points ORDER BY point");
-    while (find.executeStep()) visit(read_sweep_row(find, impl_->plan));
-  });
+  std::vector<SweepRow> rows;
+  std::int64_t last = 0;
+  do {
+    rows.clear();
+    guarded(impl_->path, [&] {
+      SQLite::Statement find(*impl_->db,
+                             "SELECT * FROM points WHERE point > ? ORDER BY point LIMIT ?");
+      Binder(find) << last << static_cast<std::int64_t>(kPageRows);
+      while (find.executeStep()) rows.push_back(read_sweep_row(find, impl_->plan));
+    });
+    for (const SweepRow& row : rows) visit(row);
+    if (!rows.empty()) last = rows.back().point;
+  } while (rows.size() == kPageRows);
 }
 
 void SweepFile::record(const std::vector<SweepRow>& rows) {

@@ -45,7 +45,8 @@ class SweepFile {
   std::vector<bool> recorded();
   std::int64_t count();   ///< points on record
   std::int64_t failed();  ///< of them
-  /// One after the other, by number.
+  /// One after the other, by number. Keeps no writer away: points that are recorded meanwhile are
+  /// there if they come later in this order.
   void for_each(const std::function<void(const SweepRow&)>& visit);
 
   /// On disk when it returns. \throws StoreRefused: one is on record, or does not fit to the plan;

@@ -58,7 +58,7 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   }
   if (const auto alike = data::columns_alike(plan)) {
     throw UsageError(settings.space + ": the parameter '" + alike->first +
-                     "' has the name of another column, '" + alike->second +
+                     "' has the name of another column or of a shape, '" + alike->second +
                      "'; give it another one");
   }
   return plan;

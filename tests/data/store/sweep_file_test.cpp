@@ -1,0 +1,195 @@
+#include "data/store/sweep_file.h"
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/data/store/sweep_fixture.h"
+
+namespace palpate::data {
+namespace {
+
+using namespace palpate::data::testing;
+namespace fs = std::filesystem;
+
+class Sweeps : public ::testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  const std::string path_ = folder_ / "a.sweep";
+};
+
+void expect_refused(const std::function<void()>& what, const std::string& said) {
+  try {
+    what();
+    ADD_FAILURE() << "is not refused: " << said;
+  } catch (const StoreRefused& error) {
+    EXPECT_NE(std::string(error.what()).find(said), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(Sweeps, ReadBackAsTheyWereRecorded) {
+  {
+    SweepFile file = SweepFile::open(path_, a_sweep_plan());
+    file.record({a_sweep_row(7), a_failed_row(3)});
+    file.record({a_sweep_row(20)});
+  }
+  SweepFile file = SweepFile::open(path_);
+  EXPECT_TRUE(is_sweep_file(path_));
+  EXPECT_TRUE(differences(file.plan(), a_sweep_plan()).empty());
+  EXPECT_EQ(file.plan().seed, a_sweep_plan().seed);
+  EXPECT_EQ(file.count(), 3);
+  EXPECT_EQ(file.failed(), 1);
+  const std::vector<bool> recorded = file.recorded();
+  ASSERT_EQ(recorded.size(), 20u);
+  for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(recorded[i], i == 2 || i == 6 || i == 19) << i;
+  const std::vector<SweepRow> rows = rows_of(file);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_TRUE(same(rows[0], a_failed_row(3)));
+  EXPECT_TRUE(same(rows[1], a_sweep_row(7)));
+  EXPECT_TRUE(same(rows[2], a_sweep_row(20)));
+}
+
+TEST_F(Sweeps, EveryPointIsVisitedOnceInOrderHoweverManyThereAre) {
+  for (const std::int64_t points : {1, 999, 1000, 1001, 2000, 2500}) {
+    const std::string path = folder_ / (std::to_string(points) + ".sweep");
+    std::vector<SweepRow> rows;
+    for (std::int64_t point = points; point >= 1; --point) rows.push_back(a_sweep_row(point));
+    SweepFile file = SweepFile::open(path, a_sweep_plan(points));
+    EXPECT_TRUE(rows_of(file).empty());
+    file.record(rows);
+    const std::vector<SweepRow> found = rows_of(file);
+    ASSERT_EQ(found.size(), rows.size());
+    for (std::size_t i = 0; i < found.size(); ++i)
+      ASSERT_EQ(found[i].point, static_cast<std::int64_t>(i) + 1);
+  }
+}
+
+TEST_F(Sweeps, BytesOfAFinishedFileDependOnThePlanAndTheResultsAlone) {
+  make_sweep(path_, {1, 2, 3, 4, 5}, true);
+  make_sweep(folder_ / "b.sweep", {5, 3}, false);
+  make_sweep(folder_ / "b.sweep", {1, 4, 2}, true);
+  EXPECT_EQ(contents_of(path_), contents_of(folder_ / "b.sweep"));
+  EXPECT_FALSE(fs::exists(path_ + "-journal"));
+}
+
+TEST_F(Sweeps, WhatDoesNotFitIsRefusedAndNothingOfItIsRecorded) {
+  SweepFile file = SweepFile::open(path_, a_sweep_plan());
+  file.record({a_sweep_row(1)});
+  EXPECT_THROW(file.record({a_sweep_row(2), a_sweep_row(1)}), StoreError);
+  expect_refused([&] { file.record({a_sweep_row(2), a_sweep_row(21)}); }, "point 21");
+  SweepRow short_row = a_sweep_row(3);
+  short_row.figures.pop_back();
+  expect_refused([&] { file.record({a_sweep_row(2), short_row}); }, "point 3");
+  EXPECT_EQ(file.count(), 1);
+  SweepFile reader = SweepFile::open(path_);
+  expect_refused([&] { reader.record({a_sweep_row(2)}); }, "for reading only");
+}
+
+TEST_F(Sweeps, AnotherPlanIsRefusedWithEveryDifference) {
+  make_sweep(path_, {1});
+  SweepPlan other = a_sweep_plan(21);
+  other.protocol = R"({"name": "two", "stimuli": [{"radius_m": 0.03}]})";
+  other.settings = R"({"motor": {"reaction_delay_s": 0.1, "new": [1]}})";
+  other.shapes = {"ball", "cap"};
+  expect_refused([&] { SweepFile::open(path_, other); }, "points: 20 and 21");
+  expect_refused([&] { SweepFile::open(path_, other); },
+                 R"(protocol: /stimuli/1 {"radius_m":0.02} and (nothing))");
+  expect_refused([&] { SweepFile::open(path_, other); },
+                 "settings of the participant: /motor/new (nothing) and [1]");
+  expect_refused([&] { SweepFile::open(path_, other); },
+                 R"(shapes: ["ball","hat"] and ["ball","cap"])");
+}
+
+TEST_F(Sweeps, ElementsAppendedToAListAreNamedWithTheirPlaceAndValue) {
+  SweepPlan one = a_sweep_plan(), two = one;
+  one.space = R"({"parameters": [{"name": "a"}], "-": 1})";
+  two.space = R"({"parameters": [{"name": "b"}, {"name": "c"}, 5], "-": 2})";
+  const std::vector<std::string> found = differences(one, two);
+  ASSERT_EQ(found.size(), 1u);
+  for (const char* const text :
+       {"/- 1 and 2", R"(/parameters/0/name "a" and "b")",
+        R"(/parameters/1 (nothing) and {"name":"c"})", "/parameters/2 (nothing) and 5"}) {
+    EXPECT_NE(found[0].find(text), std::string::npos) << found[0];
+  }
+  two.space = one.space;
+  one.space = R"([])";
+  two.space = R"({})";
+  EXPECT_EQ(differences(one, two)[0], "space:  [] and {}");
+  one.space = "[1,2,3,4,5,6,7,8]";
+  two.space = "[]";
+  EXPECT_NE(differences(one, two)[0].find("and 3 more"), std::string::npos);
+  two.space = "[1, 2, 3, 4, 5, 6, 7, 8]";
+  EXPECT_EQ(differences(one, two)[0], "space: their layout alone");
+}
+
+TEST_F(Sweeps, NamesOfParametersColumnsAndShapesAreToldApart) {
+  SweepPlan plan = a_sweep_plan();
+  EXPECT_FALSE(columns_alike(plan));
+  for (const char* const taken :
+       {"Hat", "ball", "gain_ball", "TIME_ray_hat", "seed", "point", "order"}) {
+    plan.parameters = {taken, "order"};
+    EXPECT_TRUE(columns_alike(plan)) << taken;
+  }
+  plan.parameters = {"hats", "ray"};
+  EXPECT_FALSE(columns_alike(plan));
+}
+
+TEST_F(Sweeps, OneWriterAnyNumberOfReaders) {
+  SweepFile writer = SweepFile::open(path_, a_sweep_plan());
+  expect_refused([&] { SweepFile::open(path_, a_sweep_plan()); }, "process");
+  expect_refused([&] { SweepFile::open(path_, SweepFile::Writers::none); }, "process");
+  SweepFile reader = SweepFile::open(path_);
+  writer.record({a_sweep_row(2)});
+  EXPECT_EQ(reader.count(), 1);
+}
+
+// Whatever a reader does with the rows that it gets: an export to a slow disk, an analysis.
+TEST_F(Sweeps, PointsAreRecordedWhileAReaderGoesThroughThem) {
+  SweepFile writer = SweepFile::open(path_, a_sweep_plan(3000));
+  std::vector<SweepRow> rows;
+  for (std::int64_t point = 1; point <= 1500; ++point) rows.push_back(a_sweep_row(point));
+  writer.record(rows);
+  SweepFile reader = SweepFile::open(path_);
+  std::int64_t visited = 0;
+  reader.for_each([&](const SweepRow& row) {
+    EXPECT_EQ(row.point, ++visited);
+    if (row.point == 1 || row.point == 1400) writer.record({a_sweep_row(row.point + 1500)});
+  });
+  EXPECT_GE(visited, 1500);
+  EXPECT_EQ(writer.count(), 1502);
+}
+
+// Longer than the five seconds after which SQLite's users often give up.
+TEST_F(Sweeps, AReaderOfAnotherProgramThatTakesSecondsDoesNotEndTheWriter) {
+  SweepFile writer = SweepFile::open(path_, a_sweep_plan());
+  writer.record({a_sweep_row(1), a_sweep_row(2)});
+  SQLite::Database other(path_, SQLite::OPEN_READONLY);
+  SQLite::Statement held(other, "SELECT * FROM points");
+  ASSERT_TRUE(held.executeStep());
+  std::jthread reader([&] {
+    std::this_thread::sleep_for(std::chrono::seconds(7));
+    held.reset();
+  });
+  EXPECT_NO_THROW(writer.record({a_sweep_row(3)}));
+  EXPECT_EQ(writer.count(), 3);
+}
+
+TEST_F(Sweeps, OtherFilesAreNoSweeps) {
+  std::ofstream(path_) << "text";
+  EXPECT_FALSE(is_sweep_file(path_));
+  EXPECT_FALSE(is_sweep_file(folder_ / "none"));
+  expect_refused([&] { SweepFile::open(path_); }, "is no sweep's file");
+  expect_refused([&] { SweepFile::open(folder_ / "none"); }, "no such file");
+  expect_refused([&] { SweepFile::open(folder_.path()); }, "is not a file");
+  make_sweep(folder_ / "b.sweep", {1, 2});
+  SQLite::Database(folder_ / "b.sweep", SQLite::OPEN_READWRITE).exec("CREATE TABLE more (x)");
+  expect_refused([&] { SweepFile::open(folder_ / "b.sweep"); }, "other tables");
+  make_sweep(folder_ / "c.sweep", {1, 2});
+  fs::resize_file(folder_ / "c.sweep", 5000);
+  expect_refused([&] { SweepFile::open(folder_ / "c.sweep"); }, "damaged");
+}
+
+}  // namespace
+}  // namespace palpate::data
