@@ -10,6 +10,7 @@
 #include "analysis/figures/marks.h"
 #include "analysis/statistics/paper_effects.h"
 #include "analysis/text.h"
+#include "stimuli/random.h"
 
 namespace palpate::analysis {
 
@@ -17,6 +18,12 @@ namespace {
 
 constexpr std::size_t kShownPoints = 400;  // of a scatter
 constexpr double kLowestGain = -100;       // %; a slowing-down has no end: it is cut
+
+/// "" where all points are drawn.
+std::string thinned_note(const SweepAnalysis& analysis) {
+  if (analysis.table.rows() <= kShownPoints) return "";
+  return std::to_string(kShownPoints) + " of the points with a figure are drawn, at random. ";
+}
 
 Figure sweep_figure(const SweepAnalysis& analysis, std::string id, std::string title) {
   Figure figure;
@@ -65,13 +72,30 @@ void add_paper_mark(Panel& panel, const PaperEffect& effect, double x) {
   panel.marks.push_back(std::move(text));
 }
 
+/// Rows with a value, drawn at random where there are more than kShownPoints: each with the same
+/// chance, or a design whose points repeat with a period would show a part of itself. Ascending.
+std::vector<std::size_t> shown_rows(const SweepAnalysis& analysis,
+                                    const std::vector<double>& values) {
+  std::vector<std::size_t> rows;
+  for (std::size_t row = 0; row < values.size(); ++row) {
+    if (!std::isnan(values[row])) rows.push_back(row);
+  }
+  if (rows.size() <= kShownPoints) return rows;
+  stimuli::Random random(analysis.seed, {2});
+  random.shuffle(rows);
+  rows.resize(kShownPoints);
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
 /// Points spread over a strip by the golden section: even, and the same each time.
-void add_strip(Panel& panel, const Drivers& drivers, double centre) {
-  const std::size_t n = drivers.values.size(), step = n / kShownPoints + 1;
-  for (std::size_t i = 0; i < n; i += step) {
-    const double gain = drivers.values[i];
-    if (std::isnan(gain) || gain < panel.y.low || gain > panel.y.high) continue;
-    const double part = std::fmod(static_cast<double>(i / step) * 0.6180339887498949, 1.0);
+void add_strip(Panel& panel, const SweepAnalysis& analysis, const std::vector<double>& values,
+               double centre) {
+  const std::vector<std::size_t> rows = shown_rows(analysis, values);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double gain = values[rows[i]];
+    if (gain < panel.y.low || gain > panel.y.high) continue;
+    const double part = std::fmod(static_cast<double>(i) * 0.6180339887498949, 1.0);
     Mark dot = symbol(Role::ray, MarkerShape::circle, centre + 0.22 * (part - 0.5), gain, 1.8);
     dot.opacity = 0.35;
     panel.marks.push_back(std::move(dot));
@@ -111,7 +135,7 @@ Figure gains_figure(const SweepAnalysis& analysis) {
                                " %, half of the settings " + fixed(*spread.q25, 1) + " to " +
                                fixed(*spread.q75, 1) + " %, nine in ten " + fixed(*spread.q05, 1) +
                                " to " + fixed(*spread.q95, 1) + " %";
-      add_strip(panel, analysis.drivers[s], at + 0.3);
+      add_strip(panel, analysis, analysis.drivers[s].values, at + 0.3);
       add_box(panel, spread, text, at + 0.53);
       figure.description += text + ". ";
     }
@@ -126,7 +150,9 @@ Figure gains_figure(const SweepAnalysis& analysis) {
   if (with_paper) figure.legend.push_back({"Ho et al. 2000", Role::paper, MarkerShape::diamond});
   figure.notes.insert(
       figure.notes.begin(),
-      "Each small mark is a study at one point of the space; box: half of them; bar: nine in ten." +
+      thinned_note(analysis) + "Each small mark is a study at one point of the " +
+          (analysis.table.design == "grid" ? "grid" : "space") +
+          "; box: half of them; bar: nine in ten." +
           std::string(with_paper ? " n.s.: the paper found no significant difference." : ""));
   return figure;
 }
@@ -194,6 +220,17 @@ Panel drivers_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
   return panel;
 }
 
+/// Whether chance within the points is a part of the total indices.
+std::string chance_note(const SweepAnalysis& analysis) {
+  std::string with;
+  for (const Drivers& drivers : analysis.drivers) {
+    if (drivers.strongest.empty() || drivers.sobol->chance) continue;
+    with += (with.empty() ? "" : ", ") + title_of(drivers.output);
+  }
+  return with.empty() ? "Chance within the points belongs to no index."
+                      : "Chance within the points is a part of the totals of: " + with + ".";
+}
+
 Figure drivers_figure(const SweepAnalysis& analysis) {
   Figure figure = sweep_figure(analysis, "drivers", "What the gains depend on");
   for (const Drivers& drivers : analysis.drivers) {
@@ -207,10 +244,8 @@ Figure drivers_figure(const SweepAnalysis& analysis) {
   if (analysis.table.design == "saltelli") {
     figure.legend = {{"with all it acts together with (total)", Role::ink, MarkerShape::circle},
                      {"alone (first order)", Role::ray, MarkerShape::square}};
-    figure.notes = {
-        "Shares of the gain's variance over the space, with 95 % bootstrap intervals. Chance "
-        "within the "
-        "points counts to every total index."};
+    figure.notes = {"Shares of the variance over the space, with 95 % bootstrap intervals. " +
+                    chance_note(analysis)};
   } else {
     figure.legend = {{"partial, the others' part taken out", Role::ink, MarkerShape::circle},
                      {"Spearman", Role::ray, MarkerShape::square}};
@@ -255,10 +290,9 @@ Panel scatter_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
   }
   panel.y = linear_axis(std::max(low, kLowestGain), high, gain_axis_title(table));
   panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
-  const std::size_t n = table.rows(), step = n / kShownPoints + 1;
-  for (std::size_t i = 0; i < n; i += step) {
+  for (const std::size_t i : shown_rows(analysis, drivers.values)) {
     const double gain = drivers.values[i];
-    if (std::isnan(gain) || gain < panel.y.low) continue;
+    if (gain < panel.y.low) continue;
     Mark dot = symbol(Role::ray, MarkerShape::circle, table.values[parameter][i], gain, 2.4,
                       "point " + std::to_string(table.points[i]) + ": " + fixed(gain, 1) + " %");
     dot.opacity = 0.5;
@@ -276,8 +310,7 @@ Figure scatter_figure(const SweepAnalysis& analysis) {
     figure.description += analysis.table.shapes[s] + " over " + figure.panels.back().x.title + ". ";
   }
   figure.legend = {{"a setting", Role::ray, MarkerShape::circle}};
-  figure.notes = {"At most " + std::to_string(kShownPoints) +
-                  " of the points; a loss of more than 100 % is not drawn."};
+  figure.notes = {thinned_note(analysis) + "A loss of more than 100 % is not drawn."};
   return figure;
 }
 

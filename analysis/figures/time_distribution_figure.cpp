@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "analysis/figures/figure_skeleton.h"
+#include "analysis/statistics/quantiles.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -35,15 +36,6 @@ Times used_times(const Analysis& analysis) {
   return times;
 }
 
-double quantile_of(const std::vector<float>& sorted, double p) {
-  const double at = p * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(at);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  const double part = at - static_cast<double>(below);
-  return (1 - part) * static_cast<double>(sorted[below]) +
-         part * static_cast<double>(sorted[above]);
-}
-
 /// Gaussian kernel density on kBins bins from low to high, summing to 1; bandwidth 0.9 (IQR / 1.34)
 /// n^-1/5 (Silverman 1986, eq. 3.31 without the sd), at least 0.6 bins.
 Bins density(const std::vector<float>& sorted, double low, double high) {
@@ -53,7 +45,7 @@ Bins density(const std::vector<float>& sorted, double low, double high) {
     const double bin = (static_cast<double>(time) - low) / step;
     counts[static_cast<std::size_t>(std::clamp(bin, 0.0, kBins - 1.0))] += 1;
   }
-  const double spread = (quantile_of(sorted, 0.75) - quantile_of(sorted, 0.25)) / 1.34;
+  const double spread = (sorted_quantile(sorted, 0.75) - sorted_quantile(sorted, 0.25)) / 1.34;
   const double width =
       std::max(0.9 * spread * std::pow(static_cast<double>(sorted.size()), -0.2) / step, 0.6);
   double total = 0;
@@ -124,9 +116,9 @@ void add_cell(Panel& panel, const RendererStyle& style, const std::vector<float>
   }
   add_violin(panel, style.role, bins, position, limit, text);
   const double at = position.x + position.side * 0.055;
-  panel.marks.push_back(
-      line_mark(style.role, {at, at}, {quantile_of(times, 0.25), quantile_of(times, 0.75)}, 4));
-  const double median = quantile_of(times, 0.5);
+  panel.marks.push_back(line_mark(style.role, {at, at},
+                                  {sorted_quantile(times, 0.25), sorted_quantile(times, 0.75)}, 4));
+  const double median = sorted_quantile(times, 0.5);
   panel.marks.push_back(symbol(style.role, style.shape, at, median, 5.2, text));
   panel.marks.push_back(symbol(Role::page, style.shape, at, median, 3, text));
 }
@@ -250,11 +242,11 @@ Figure times_of(const Analysis& analysis) {
                               " of " + counted(outs.n_trials, "trial", "trials") + ". ";
       }
       if (times[r][s].empty()) continue;
-      std::string text = name + ": median " +
-                         seconds_text(std::pow(10, quantile_of(times[r][s], 0.5))) +
-                         ", middle half " + fixed(std::pow(10, quantile_of(times[r][s], 0.25)), 2) +
-                         " to " + fixed(std::pow(10, quantile_of(times[r][s], 0.75)), 2) + " s, " +
-                         counted(times[r][s].size(), "time", "times");
+      std::string text =
+          name + ": median " + seconds_text(std::pow(10, sorted_quantile(times[r][s], 0.5))) +
+          ", middle half " + fixed(std::pow(10, sorted_quantile(times[r][s], 0.25)), 2) + " to " +
+          fixed(std::pow(10, sorted_quantile(times[r][s], 0.75)), 2) + " s, " +
+          counted(times[r][s].size(), "time", "times");
       add_cell(panel, style, times[r][s], densities[r][s], position,
                std::max(limits.empty()       ? panel.y.high
                         : outs.highest_limit ? std::log10(*outs.highest_limit)

@@ -12,18 +12,11 @@ std::string link_of(const std::string& figure) {
   return figure == "gains" ? "Gains" : figure == "drivers" ? "Drivers" : "Scatter";
 }
 
-void put_pattern(HtmlPage& page, const PatternShare& pattern) {
+void put_pattern(HtmlPage& page, const SweepAnalysis& analysis) {
   page.begin_section("pattern", "The pattern", "Pattern");
-  page.body() +=
-      "<pre tabindex=\"0\">" + escaped(stimuli::printable(pattern.expression, 2000)) + "</pre>\n";
-  page.put_note("It holds in " + std::to_string(pattern.holds) + " of " +
-                std::to_string(pattern.n) + " settings" +
-                (pattern.undefined > 0
-                     ? "; in " + std::to_string(pattern.undefined) + " others it is undefined"
-                     : "") +
-                ". A shape's name stands for its gain in percent. The interval is Wilson's; it is "
-                "about the space that "
-                "was given, with its distributions, not about people.");
+  page.body() += "<pre tabindex=\"0\">" +
+                 escaped(stimuli::printable(analysis.pattern->expression, 2000)) + "</pre>\n";
+  page.put_note("A shape's name stands for its gain in percent. " + pattern_note(analysis));
   page.end_section();
 }
 
@@ -56,7 +49,7 @@ std::string sweep_html(const SweepAnalysis& analysis) {
       "SIMULATED PARTICIPANTS: all numbers below are from a model of a participant, not from "
       "humans.");
   put_list(page.below_title(), analysis.notes);
-  if (analysis.pattern) put_pattern(page, *analysis.pattern);
+  if (analysis.pattern) put_pattern(page, analysis);
   for (const Figure& figure : sweep_figures(analysis))
     page.put_figure_section(figure, link_of(figure.id));
   page.begin_section("numbers", "Numbers", "Numbers");

@@ -37,7 +37,8 @@ Json sweep_source_json(const SweepAnalysis& analysis) {
   return out;
 }
 
-Json pattern_json(const PatternShare& pattern) {
+Json pattern_json(const SweepAnalysis& analysis) {
+  const PatternShare& pattern = *analysis.pattern;
   Json out{{"expression", pattern.expression},
            {"of_the_paper", pattern.of_the_paper},
            {"holds", pattern.holds},
@@ -45,6 +46,7 @@ Json pattern_json(const PatternShare& pattern) {
            {"undefined", pattern.undefined}};
   out["share"] = json_of(pattern.share);
   out["wilson_ci95"] = json_of(pattern.ci95);
+  out["note"] = pattern_note(analysis);
   if (!pattern.share) {
     out["status"] = "undefined";
     out["reason"] = "no setting in which it is defined";
@@ -80,6 +82,8 @@ Json drivers_json(const SweepAnalysis& analysis, const Drivers& drivers) {
     out["base_points"] = drivers.sobol->base_points;
     out["base_points_dropped"] = drivers.sobol->dropped;
     out["variance"] = drivers.sobol->variance;
+    out["chance"] = json_of(drivers.sobol->chance);
+    if (const std::string note = chance_note(drivers); !note.empty()) out["note"] = note;
     put_undefined(out, drivers.sobol->undefined);
   }
   Json& each = out["parameters"] = Json::object();
@@ -112,7 +116,7 @@ std::string sweep_json(const SweepAnalysis& analysis) {
   out["simulated"] = true;
   out["program_version"] = analysis.program_version;
   out["sweep"] = sweep_source_json(analysis);
-  out["pattern"] = analysis.pattern ? pattern_json(*analysis.pattern) : Json(nullptr);
+  out["pattern"] = analysis.pattern ? pattern_json(analysis) : Json(nullptr);
   for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s)
     out["gains"][analysis.table.shapes[s]] = spread_json(analysis.gains[s]);
   for (const Drivers& drivers : analysis.drivers)

@@ -14,6 +14,11 @@ std::vector<Table> sweep_tables(const SweepAnalysis& analysis);
 /// In how many settings the pattern holds, in a sentence; what was run where none was asked for.
 std::string sweep_answer(const SweepAnalysis& analysis);
 
+/// In how many settings the pattern holds, and what its interval is about; "" without a pattern.
+std::string pattern_note(const SweepAnalysis& analysis);
+/// Whether chance is a part of a total index. \return "" where it is not
+std::string chance_note(const Drivers& drivers);
+
 std::string sweep_text(const SweepAnalysis& analysis);
 std::string sweep_json(const SweepAnalysis& analysis);
 std::string sweep_html(const SweepAnalysis& analysis);

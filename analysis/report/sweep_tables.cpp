@@ -83,10 +83,16 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
   }
   if (sobol && !drivers.sobol->undefined.empty())
     table.notes.push_back("None: " + drivers.sobol->undefined + ".");
+  if (sobol && drivers.sobol->chance) {
+    table.notes.push_back("Shares of the variance over the settings, of which " +
+                          fixed(100 * *drivers.sobol->chance, 0) +
+                          " % is chance within the points and belongs to no parameter.");
+  }
   if (sobol && drivers.sobol->dropped > 0) {
     table.notes.push_back(counted(drivers.sobol->dropped, "base point is", "base points are") +
                           " left out, of which a sample has no figure.");
   }
+  if (const std::string note = chance_note(drivers); !note.empty()) table.notes.push_back(note);
   const auto lacks_partial = [](const RankCorrelation& one) {
     return one.spearman && !one.partial;
   };
@@ -134,9 +140,39 @@ std::string sweep_answer(const SweepAnalysis& analysis) {
   const PatternShare& pattern = *analysis.pattern;
   const std::string what = pattern.of_the_paper ? "The paper's pattern" : "The pattern";
   if (!pattern.share) return what + " is defined in none of the settings";
-  return what + " holds in " + fixed(100 * *pattern.share, 1) +
-         " % of the settings (95 % interval " + fixed(100 * pattern.ci95->low, 1) + " to " +
+  const std::string share = what + " holds in " + fixed(100 * *pattern.share, 1) + " % of the ";
+  if (!pattern.ci95) return share + "grid's points";
+  return share + "settings (95 % interval " + fixed(100 * pattern.ci95->low, 1) + " to " +
          fixed(100 * pattern.ci95->high, 1) + " %)";
+}
+
+std::string pattern_note(const SweepAnalysis& analysis) {
+  if (!analysis.pattern) return "";
+  const PatternShare& pattern = *analysis.pattern;
+  const std::string design = analysis.table.design;
+  std::string out = "It holds in " + std::to_string(pattern.holds) + " of " +
+                    std::to_string(pattern.n) +
+                    (design == "saltelli" ? " independent settings (A and B of Saltelli's samples)"
+                     : design == "grid"   ? " points of the grid"
+                                          : " settings");
+  if (pattern.undefined > 0) {
+    out += "; in " + std::to_string(pattern.undefined) +
+           " others it is undefined (failed, or a figure is missing)";
+  }
+  if (!pattern.ci95)
+    return out +
+           ". No interval: a share of a grid's points is no estimate of a share of the space.";
+  return out + ". Wilson's interval" +
+         (design == "saltelli" ? ""
+                               : ", of independent settings: these are more even, so it is "
+                                 "rather too wide") +
+         ". It is about the space that was given, with its distributions, not about people.";
+}
+
+std::string chance_note(const Drivers& drivers) {
+  if (!drivers.sobol || !drivers.sobol->undefined.empty() || drivers.sobol->chance) return "";
+  return "Chance within the points is a part of every total index: it has no standard errors that "
+         "could be subtracted.";
 }
 
 std::string sweep_text(const SweepAnalysis& analysis) {
@@ -153,14 +189,7 @@ std::string sweep_text(const SweepAnalysis& analysis) {
   if (analysis.pattern) {
     const PatternShare& pattern = *analysis.pattern;
     out += "  " + stimuli::printable(pattern.expression, 400) + "\n";
-    out += paragraph_text(
-        "It holds in " + std::to_string(pattern.holds) + " of " + std::to_string(pattern.n) +
-        " settings" +
-        (pattern.undefined > 0 ? "; in " + std::to_string(pattern.undefined) +
-                                     " others it is undefined (failed, or a figure is missing)"
-                               : std::string()) +
-        ". Wilson's interval: it is about the space that was given, with its distributions, "
-        "not about people.");
+    out += paragraph_text(pattern_note(analysis));
   }
   for (const std::string& note : analysis.notes) out += paragraph_text("Note: " + note);
   for (Table one : sweep_tables(analysis)) {

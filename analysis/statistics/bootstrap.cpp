@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/quantiles.h"
 #include "stimuli/random.h"
 
 namespace palpate::analysis {
@@ -11,7 +12,6 @@ namespace palpate::analysis {
 namespace {
 
 double normal_cdf(double z) { return cdf(boost::math::normal(), z); }
-double normal_quantile(double p) { return quantile(boost::math::normal(), p); }
 
 /// Quantile of sorted resamples, interpolated on the scale of normal quantiles
 /// (Davison & Hinkley 1997, eq. 5.8).

@@ -1,15 +1,18 @@
 #pragma once
 // A pattern that is looked for at each point of a sweep: "cone>5 && cube>5 && min(cone,cube)>3".
+// What is a number and what holds or not is told apart when the expression is read.
 //
-//   or      := and { "||" and }                       number or truth, told apart when it is read
+// clang-format off
+//   or      := and { "||" and }
 //   and     := not { "&&" not }
 //   not     := "!" not | compare
 //   compare := sum [ ("<" | "<=" | ">" | ">=" | "==" | "!=") sum ]
 //   sum     := product { ("+" | "-") product }
 //   product := sign { ("*" | "/") sign }
 //   sign    := "-" sign | atom
-//   atom    := number | name | "min" "(" or { "," or } ")" | "max" ... | "abs" "(" or ")" | "(" or
-//   ")" name    := letters, digits and _, or any text in ' or "
+//   atom    := number | name | ("min" | "max") "(" or { "," or } ")" | "abs" "(" or ")" | "(" or ")"
+//   name    := letters, digits and _, not a digit first; or any text in ' or "
+// clang-format on
 
 #include <cstddef>
 #include <functional>
@@ -44,8 +47,8 @@ class Pattern {
 
   const std::string& expression() const { return expression_; }
 
-  /// Whether it holds. None: it hangs on a value that is undefined (not a number); what is false or
-  /// true whatever that value may be, is.
+  /// Whether it holds. None: that depends on an undefined value (not a number). Where it is the
+  /// same for every number that the value could be, it is that: "x > 5 && 1 > 2" does not hold.
   /// \param value  of a column
   std::optional<bool> holds(const std::function<double(std::size_t column)>& value) const;
 

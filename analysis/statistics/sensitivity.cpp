@@ -3,16 +3,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
-#include "analysis/statistics/describe.h"
+#include "analysis/statistics/quantiles.h"
 #include "stimuli/random.h"
 
 namespace palpate::analysis {
 
 namespace {
 
-constexpr double kNormal975 = 1.959963984540054;  // quantile 0.975 of the normal distribution
 constexpr const char* kConstant = "the output is the same at all points";
 
 double square(double x) { return x * x; }
@@ -20,7 +18,9 @@ double square(double x) { return x * x; }
 /// Outputs of base points without gaps, less their mean over A and B.
 struct Samples {
   std::size_t parameters = 0;
-  std::vector<double> values;  // base points times (parameters + 2)
+  std::vector<double> values;          // base points times (parameters + 2)
+  std::vector<double> squared_errors;  // of each base point: sum of those that are known
+  std::vector<double> with_errors;     // of each base point: how many those are
 
   std::size_t size() const { return values.size() / (parameters + 2); }
   const double* at(std::size_t base) const { return &values[base * (parameters + 2)]; }
@@ -28,6 +28,7 @@ struct Samples {
 
 struct Estimates {
   double variance = 0;
+  double noise = 0;  // mean squared standard error
   std::vector<double> first, total;
 };
 
@@ -38,9 +39,11 @@ Estimates estimates(const Samples& samples, const Chosen& chosen) {
   Estimates out;
   out.first.assign(k, 0);
   out.total.assign(k, 0);
-  double sum = 0, squares = 0;
+  double sum = 0, squares = 0, squared_errors = 0, with_errors = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const double* const f = samples.at(chosen(i));
+    squared_errors += samples.squared_errors[chosen(i)];
+    with_errors += samples.with_errors[chosen(i)];
     sum += f[0] + f[1];
     squares += square(f[0]) + square(f[1]);
     for (std::size_t p = 0; p < k; ++p) {
@@ -50,9 +53,10 @@ Estimates estimates(const Samples& samples, const Chosen& chosen) {
   }
   const auto count = static_cast<double>(n);
   out.variance = squares / (2 * count) - square(sum / (2 * count));
+  if (with_errors > 0) out.noise = squared_errors / with_errors;
   for (std::size_t p = 0; p < k; ++p) {
     out.first[p] /= count * out.variance;
-    out.total[p] /= 2 * count * out.variance;
+    out.total[p] = (out.total[p] / (2 * count) - out.noise) / out.variance;
   }
   return out;
 }
@@ -62,9 +66,9 @@ Interval percentiles(std::vector<double> values) {
   return {sorted_quantile(values, 0.025), sorted_quantile(values, 0.975)};
 }
 
-Samples complete_samples(const std::vector<double>& outputs, std::size_t parameters,
-                         std::size_t& dropped) {
-  Samples samples{parameters, {}};
+Samples complete_samples(const std::vector<double>& outputs, const std::vector<double>& errors,
+                         std::size_t parameters, std::size_t& dropped) {
+  Samples samples{parameters, {}, {}, {}};
   const std::size_t each = parameters + 2;
   for (std::size_t from = 0; from + each <= outputs.size(); from += each) {
     const auto begin = outputs.begin() + static_cast<std::ptrdiff_t>(from);
@@ -73,6 +77,13 @@ Samples complete_samples(const std::vector<double>& outputs, std::size_t paramet
       ++dropped;
     } else {
       samples.values.insert(samples.values.end(), begin, end);
+      samples.squared_errors.push_back(0);
+      samples.with_errors.push_back(0);
+      for (std::size_t i = from; i < std::min(from + each, errors.size()); ++i) {
+        if (std::isnan(errors[i])) continue;
+        samples.squared_errors.back() += square(errors[i]);
+        ++samples.with_errors.back();
+      }
     }
   }
   double sum = 0;
@@ -82,9 +93,13 @@ Samples complete_samples(const std::vector<double>& outputs, std::size_t paramet
   return samples;
 }
 
-Interval fisher_interval(double r, double error) {
-  const double z = std::atanh(r);
-  return {std::tanh(z - kNormal975 * error), std::tanh(z + kNormal975 * error)};
+/// None where it is not defined: r is 1 or -1, or there are too few points.
+std::optional<Interval> correlation_interval(double r, double n, double held) {
+  const double freedom = n - held - 3;
+  if (!(std::fabs(r) < 1) || !(freedom > 0)) return std::nullopt;
+  const double z = std::atanh(r),
+               half = normal_quantile(0.975) * std::sqrt((1 + r * r / 2) / freedom);
+  return Interval{std::tanh(z - half), std::tanh(z + half)};
 }
 
 bool constant(const std::vector<double>& values) {
@@ -107,18 +122,11 @@ Eigen::MatrixXd rank_matrix(const std::vector<std::vector<double>>& columns) {
 
 }  // namespace
 
-double sorted_quantile(const std::vector<double>& sorted, double share) {
-  const double place = share * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (place - static_cast<double>(below)) * (sorted[above] - sorted[below]);
-}
-
-SobolIndices sobol_indices(const std::vector<double>& outputs, std::size_t parameters,
-                           std::uint64_t seed, std::size_t resamples) {
+SobolIndices sobol_indices(const std::vector<double>& outputs, const std::vector<double>& errors,
+                           std::size_t parameters, std::uint64_t seed, std::size_t resamples) {
   SobolIndices out;
   out.of.resize(parameters);
-  const Samples samples = complete_samples(outputs, parameters, out.dropped);
+  const Samples samples = complete_samples(outputs, errors, parameters, out.dropped);
   out.base_points = samples.size();
   constexpr std::size_t kFewest = 8;
   if (out.base_points < kFewest) {
@@ -132,6 +140,9 @@ SobolIndices sobol_indices(const std::vector<double>& outputs, std::size_t param
     out.undefined = kConstant;
     return out;
   }
+  if (std::any_of(samples.with_errors.begin(), samples.with_errors.end(),
+                  [](double n) { return n > 0; }))
+    out.chance = all.noise / all.variance;
   std::vector<std::vector<double>> first(parameters), total(parameters);
   stimuli::Random random(seed, {1});
   std::vector<std::size_t> drawn(samples.size());
@@ -152,20 +163,6 @@ SobolIndices sobol_indices(const std::vector<double>& outputs, std::size_t param
     out.of[p].total_ci95 = percentiles(std::move(total[p]));
   }
   return out;
-}
-
-std::vector<double> midranks(const std::vector<double>& values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  std::vector<double> ranks(values.size());
-  for (std::size_t from = 0, to = 0; from < order.size(); from = to) {
-    while (to < order.size() && values[order[to]] == values[order[from]]) ++to;
-    for (std::size_t i = from; i < to; ++i)
-      ranks[order[i]] = static_cast<double>(from + 1 + to) / 2;
-  }
-  return ranks;
 }
 
 std::vector<RankCorrelation> rank_correlations(const std::vector<std::vector<double>>& inputs,
@@ -198,10 +195,9 @@ std::vector<RankCorrelation> rank_correlations(const std::vector<std::vector<dou
   columns.push_back(wanted);
   const Eigen::MatrixXd correlations = rank_matrix(columns);
   const Eigen::Index last = correlations.cols() - 1;
-  const auto n = static_cast<double>(wanted.size());
-  const double freedom = n - static_cast<double>(used.size()) - 2;
+  const auto n = static_cast<double>(wanted.size()), held = static_cast<double>(used.size()) - 1;
   const Eigen::FullPivLU<Eigen::MatrixXd> factors(correlations);
-  const bool separable = freedom > 1 && factors.isInvertible();
+  const bool separable = n - held > 3 && factors.isInvertible();
   const Eigen::MatrixXd inverse =
       separable ? Eigen::MatrixXd(factors.inverse()) : Eigen::MatrixXd();
   for (std::size_t u = 0; u < used.size(); ++u) {
@@ -209,24 +205,23 @@ std::vector<RankCorrelation> rank_correlations(const std::vector<std::vector<dou
     RankCorrelation& one = out[used[u]];
     const double r = std::clamp(correlations(i, last), -1.0, 1.0);
     one.spearman = r;
-    if (std::fabs(r) < 1)
-      one.spearman_ci95 = fisher_interval(r, std::sqrt((1 + r * r / 2) / (n - 3)));
+    one.spearman_ci95 = correlation_interval(r, n, 0);
     if (!separable) continue;
     const double partial = -inverse(i, last) / std::sqrt(inverse(i, i) * inverse(last, last));
     if (!std::isfinite(partial)) continue;
     one.partial = std::clamp(partial, -1.0, 1.0);
-    if (std::fabs(*one.partial) < 1)
-      one.partial_ci95 = fisher_interval(*one.partial, 1 / std::sqrt(freedom - 1));
+    one.partial_ci95 = correlation_interval(*one.partial, n, held);
   }
   return out;
 }
 
 Interval wilson_interval(std::size_t successes, std::size_t n) {
   const auto count = static_cast<double>(n);
-  const double share = static_cast<double>(successes) / count, z2 = kNormal975 * kNormal975;
+  const double share = static_cast<double>(successes) / count, z = normal_quantile(0.975),
+               z2 = z * z;
   const double centre = (share + z2 / (2 * count)) / (1 + z2 / count);
-  const double half = kNormal975 / (1 + z2 / count) *
-                      std::sqrt(share * (1 - share) / count + z2 / (4 * count * count));
+  const double half =
+      z / (1 + z2 / count) * std::sqrt(share * (1 - share) / count + z2 / (4 * count * count));
   return {successes == 0 ? 0 : std::max(0.0, centre - half),
           successes == n ? 1 : std::min(1.0, centre + half)};
 }

@@ -7,6 +7,7 @@
 
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paper_effects.h"
+#include "analysis/statistics/quantiles.h"
 
 namespace palpate::analysis {
 
@@ -34,24 +35,11 @@ Pattern pattern_of(const SweepTable& table, const std::string& expression) {
   return {expression, resolve, known};
 }
 
-PatternShare pattern_share(const SweepTable& table, const std::string& expression) {
-  const Pattern pattern = pattern_of(table, expression);
-  PatternShare out;
-  out.expression = expression;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    std::optional<bool> holds;
-    if (!table.failed[row])
-      holds = pattern.holds([&](std::size_t column) { return table.values[column][row]; });
-    out.at.push_back(holds ? (*holds ? 1 : 0) : kNone);
-    out.undefined += holds ? 0 : 1;
-    out.n += holds ? 1 : 0;
-    out.holds += holds && *holds ? 1 : 0;
-  }
-  if (out.n > 0) {
-    out.share = static_cast<double>(out.holds) / static_cast<double>(out.n);
-    out.ci95 = wilson_interval(out.holds, out.n);
-  }
-  return out;
+/// Of Saltelli's samples: A and B, the first two of each base point.
+bool independent_setting(const SweepTable& table, std::size_t row) {
+  if (table.design != "saltelli") return true;
+  const auto each = static_cast<std::int64_t>(table.parameters.size()) + 2;
+  return (table.points[row] - 1) % each < 2;
 }
 
 Spread spread_of(const std::vector<double>& values, const std::vector<double>& errors) {
@@ -87,6 +75,7 @@ Spread spread_of(const std::vector<double>& values, const std::vector<double>& e
 
 /// In the order of Saltelli's samples from the first, whichever points are on record.
 std::vector<double> all_samples(const SweepTable& table, const std::vector<double>& values) {
+  if (values.empty()) return {};
   std::vector<double> out(static_cast<std::size_t>(table.points.back()), kNone);
   for (std::size_t row = 0; row < table.rows(); ++row)
     out[static_cast<std::size_t>(table.points[row]) - 1] = values[row];
@@ -98,14 +87,15 @@ bool ordered(const SweepTable& table, std::size_t parameter) {
   return table.words[parameter].size() <= 2;
 }
 
+/// \param errors  standard errors of the values; empty: unknown
 Drivers drivers_of(const SweepTable& table, std::string output, std::vector<double> values,
-                   std::uint64_t seed) {
+                   const std::vector<double>& errors, std::uint64_t seed) {
   Drivers out;
   out.output = std::move(output);
   out.values = std::move(values);
   const std::size_t n = table.parameters.size();
   if (table.design == "saltelli") {
-    out.sobol = sobol_indices(all_samples(table, out.values), n, seed);
+    out.sobol = sobol_indices(all_samples(table, out.values), all_samples(table, errors), n, seed);
   } else {
     std::vector<std::vector<double>> inputs(table.values.begin(),
                                             table.values.begin() + static_cast<std::ptrdiff_t>(n));
@@ -136,6 +126,12 @@ void add_notes(SweepAnalysis& analysis) {
                                   ? "a part of the design does not stand for the whole space."
                                   : "estimates are less sure than the whole sweep's."));
   }
+  if (table.design == "grid") {
+    analysis.notes.push_back(
+        "A grid's levels are equally spaced with both ends: they are no sample of the "
+        "distributions. Shares, quantiles and means are of the grid's points, not of the space, "
+        "and have no interval. For those: --design lhs or sobol.");
+  }
   if (analysis.n_failed > 0) {
     analysis.notes.push_back(std::to_string(analysis.n_failed) +
                              " points failed and are in no figure: if that is not by chance, the "
@@ -144,6 +140,27 @@ void add_notes(SweepAnalysis& analysis) {
 }
 
 }  // namespace
+
+PatternShare pattern_share(const SweepTable& table, const std::string& expression) {
+  const Pattern pattern = pattern_of(table, expression);
+  PatternShare out;
+  out.expression = expression;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::optional<bool> holds;
+    if (!table.failed[row])
+      holds = pattern.holds([&](std::size_t column) { return table.values[column][row]; });
+    out.at.push_back(holds ? (*holds ? 1 : 0) : kNone);
+    if (!independent_setting(table, row)) continue;
+    out.undefined += holds ? 0 : 1;
+    out.n += holds ? 1 : 0;
+    out.holds += holds && *holds ? 1 : 0;
+  }
+  if (out.n > 0) {
+    out.share = static_cast<double>(out.holds) / static_cast<double>(out.n);
+    if (table.design != "grid") out.ci95 = wilson_interval(out.holds, out.n);
+  }
+  return out;
+}
 
 double Drivers::strength(std::size_t parameter) const {
   if (sobol) return sobol->of[parameter].total.value_or(0);
@@ -166,11 +183,12 @@ SweepAnalysis analyze_sweep(SweepTable table, const std::string& pattern,
   }
   for (const std::string& shape : out.table.shapes) {
     const std::vector<double>& gains = out.table.values[*out.table.column("gain_" + shape)];
-    out.gains.push_back(spread_of(gains, out.table.values[*out.table.column("gain_se_" + shape)]));
-    out.drivers.push_back(drivers_of(out.table, "gain_" + shape, gains, out.seed));
+    const std::vector<double>& errors = out.table.values[*out.table.column("gain_se_" + shape)];
+    out.gains.push_back(spread_of(gains, errors));
+    out.drivers.push_back(drivers_of(out.table, "gain_" + shape, gains, errors, out.seed));
   }
   if (out.pattern)
-    out.drivers.push_back(drivers_of(out.table, "pattern", out.pattern->at, out.seed));
+    out.drivers.push_back(drivers_of(out.table, "pattern", out.pattern->at, {}, out.seed));
   add_notes(out);
   return out;
 }

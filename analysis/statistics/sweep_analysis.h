@@ -14,27 +14,31 @@
 
 namespace palpate::analysis {
 
+/// In how many settings a pattern holds. Of Saltelli's samples, A and B alone count: the others
+/// share coordinates with them, and are no independent settings.
 struct PatternShare {
   std::string expression;
   bool of_the_paper = false;     ///< not asked for: the paper's pattern, as there are its shapes
-  std::size_t holds = 0, n = 0;  ///< n: points where it is defined
-  std::size_t undefined = 0;     ///< failed, or hangs on an undefined figure
-  std::optional<double> share;   ///< none: n is 0
-  std::optional<Interval> ci95;  ///< Wilson's
-  std::vector<double> at;        ///< of each row: 1, 0, or not a number
+  std::size_t holds = 0, n = 0;  ///< n: settings that count and in which it is defined
+  std::size_t undefined = 0;  ///< the others that count: failed, or a figure that it needs is none
+  std::optional<double> share;  ///< none: n is 0
+  /// Wilson's. None on a grid, whose levels are no sample of the distributions.
+  std::optional<Interval> ci95;
+  std::vector<double> at;  ///< of each row, whether it counts or not: 1, 0, or not a number
 };
 
-/// A figure's values over the space.
+/// A shape's gain over the points, in percent; shares are proportions.
 struct Spread {
-  std::size_t n = 0;  ///< points where it is defined
-  std::optional<double> mean, sd, least, greatest;
-  std::optional<double> q05, q25, q50, q75, q95;  ///< quantiles
+  std::size_t n = 0;                                ///< points where it is defined
+  std::optional<double> mean, sd, least, greatest;  ///< percent
+  std::optional<double> q05, q25, q50, q75, q95;    ///< quantiles, percent
   std::optional<double> share_positive;
   /// Of the variance, how much is chance within the points: mean of squared standard errors.
   std::optional<double> noise_share;
 };
 
-/// What one output depends on; which of the two is filled hangs on the design.
+/// What one output depends on: Sobol indices with the design saltelli, rank correlations with
+/// others.
 struct Drivers {
   std::string output;          ///< "gain_cone", "pattern"
   std::vector<double> values;  ///< of each row
@@ -57,6 +61,9 @@ struct SweepAnalysis {
   std::uint64_t seed = 2000;     ///< of the bootstrap
   std::vector<std::string> notes;
 };
+
+/// \throws PatternError
+PatternShare pattern_share(const SweepTable& table, const std::string& expression);
 
 /// \param pattern  empty: the paper's, where point and ray are compared with its four shapes. In it
 /// a shape's name stands for its gain (percent), other names for columns. \throws PatternError

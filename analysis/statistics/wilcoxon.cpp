@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/quantiles.h"
 
 namespace palpate::analysis {
 
@@ -16,16 +17,6 @@ struct Signed {
   bool positive;
   std::uint64_t twice_rank = 0;  // midranks are multiples of 1/2
 };
-
-/// Assigns midranks; sizes within `tolerance` of the smallest of their group are ties.
-void rank(std::vector<Signed>& values, double tolerance) {
-  std::sort(values.begin(), values.end(),
-            [](const Signed& a, const Signed& b) { return a.size < b.size; });
-  for (std::size_t from = 0, to = 0; from < values.size(); from = to) {
-    while (to < values.size() && values[to].size - values[from].size <= tolerance) ++to;
-    for (std::size_t i = from; i < to; ++i) values[i].twice_rank = from + 1 + to;
-  }
-}
 
 /// P(V <= v) under the null hypothesis (independent signs with probability 1/2), by convolution
 /// over the ranks.
@@ -77,7 +68,13 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
     test.undefined = "every difference is zero";
     return test;
   }
-  rank(values, tolerance);
+  std::sort(values.begin(), values.end(),
+            [](const Signed& a, const Signed& b) { return a.size < b.size; });
+  std::vector<double> sizes;
+  for (const Signed& value : values) sizes.push_back(value.size);
+  const std::vector<double> ranks = midranks(sizes, tolerance);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i].twice_rank = static_cast<std::uint64_t>(2 * ranks[i]);
   std::uint64_t twice_v = 0, total = 0;
   for (const Signed& value : values) {
     total += value.twice_rank;

@@ -4,8 +4,11 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <limits>
 
+#include "analysis/statistics/quantiles.h"
 #include "stimuli/random.h"
+#include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::analysis {
 namespace {
@@ -34,6 +37,9 @@ TEST(Wilson, IntervalsAreThePublishedOnes) {
 
 TEST(RankCorrelations, MidranksShareTies) {
   EXPECT_EQ(midranks({3, 1, 3, 2, 3}), (std::vector<double>{4, 1, 4, 2, 4}));
+  const double infinite = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(midranks({infinite, 0, -infinite, infinite}), (std::vector<double>{3.5, 2, 1, 3.5}));
+  EXPECT_EQ(midranks({1, 1.1, 1.2, 1.3}, 0.25), (std::vector<double>{2, 2, 2, 4}));
 }
 
 // Kendall's example (ranks of ten students), with 1 - 6 sum d^2 / (n^3 - n) where nothing is tied.
@@ -114,6 +120,60 @@ TEST(RankCorrelations, IntervalsHoldTheTruthAsOftenAsTheySay) {
   EXPECT_NEAR(partial, 0.95 * kSamples, 25);
 }
 
+/// Half the interval's length on the scale of Fisher's z, in standard errors of one point.
+double half_on_z(const Interval& ci) { return (std::atanh(ci.high) - std::atanh(ci.low)) / 2; }
+
+// Fisher (1924): h variables that are held constant take h points away. Each of p parameters' rank
+// correlations holds p - 1 others constant; with one it is Spearman's, with the same interval.
+TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
+  stimuli::Random random(21);
+  for (const std::size_t parameters : {1U, 2U, 3U, 5U}) {
+    constexpr std::size_t n = 10;
+    std::vector<std::vector<double>> inputs(parameters, std::vector<double>(n));
+    std::vector<double> output(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (auto& input : inputs) input[i] = random.unit();
+      output[i] = inputs[0][i] + 0.3 * random.normal();
+    }
+    const auto found = rank_correlations(inputs, output);
+    for (const RankCorrelation& one : found) {
+      ASSERT_TRUE(one.partial_ci95);
+      const double held = static_cast<double>(parameters) - 1, r = *one.partial, s = *one.spearman;
+      EXPECT_NEAR(half_on_z(*one.partial_ci95),
+                  1.959964 * std::sqrt((1 + r * r / 2) / (n - held - 3)), 1e-5);
+      EXPECT_NEAR(half_on_z(*one.spearman_ci95), 1.959964 * std::sqrt((1 + s * s / 2) / (n - 3)),
+                  1e-5);
+    }
+    if (parameters > 1) continue;
+    EXPECT_NEAR(found[0].partial_ci95->low, found[0].spearman_ci95->low, 1e-9);
+    EXPECT_NEAR(found[0].partial_ci95->high, found[0].spearman_ci95->high, 1e-9);
+  }
+}
+
+// A strong correlation, few points.
+TEST(RankCorrelations, IntervalsOfStrongOnesHoldTheTruthAsOftenAsTheySay) {
+  stimuli::Random random(12);
+  const auto sample = [&](std::size_t n) {
+    std::vector<std::vector<double>> inputs(3, std::vector<double>(n));
+    std::vector<double> output(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (auto& input : inputs) input[i] = random.unit();
+      output[i] = inputs[0][i] + 0.5 * inputs[1][i] + 0.3 * random.normal();
+    }
+    return rank_correlations(inputs, output)[0];
+  };
+  const double truth = *sample(100000).partial;
+  EXPECT_NEAR(truth, 0.7, 0.02);
+  int held = 0;
+  constexpr int kSamples = 2000;
+  for (int s = 0; s < kSamples; ++s) {
+    const Interval ci = *sample(14).partial_ci95;
+    held += ci.low < truth && truth < ci.high;
+  }
+  EXPECT_GE(held, 0.94 * kSamples);
+  EXPECT_LE(held, 0.98 * kSamples);
+}
+
 TEST(RankCorrelations, SaysWhyThereIsNone) {
   const std::vector<double> varies{1, 2, 3, 4, 5};
   EXPECT_FALSE(rank_correlations({varies}, {1, 1, 1, 1, 1})[0].undefined.empty());
@@ -124,6 +184,68 @@ TEST(RankCorrelations, SaysWhyThereIsNone) {
   EXPECT_FALSE(twins[0].partial);  // nothing tells them apart
 }
 
+struct NoisySweep {
+  std::vector<double> outputs, errors;
+};
+
+/// 10 x1 and chance whose standard deviation, 1 + 4 x1, each study estimates from seven people.
+NoisySweep noisy_sweep(std::size_t base_points, stimuli::Random& random) {
+  NoisySweep out;
+  for (const auto& x : testing::saltelli_points(3, base_points, [&] { return random.unit(); })) {
+    const double sd = 1 + 4 * x[0];
+    double squares = 0;
+    for (int i = 0; i < 6; ++i) squares += std::pow(random.normal(), 2);
+    out.outputs.push_back(10 * x[0] + sd * random.normal());
+    out.errors.push_back(sd * std::sqrt(squares / 6));
+  }
+  return out;
+}
+constexpr double kOfFirst = 100.0 / 12, kOfChance = 1 + 4 + 16.0 / 3;
+constexpr double kFirstShare = kOfFirst / (kOfFirst + kOfChance);
+
+// The variance of x1's part is 100/12, that of chance the mean of (1 + 4 x1)^2.
+TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
+  stimuli::Random random(8);
+  const NoisySweep sweep = noisy_sweep(4000, random);
+  const SobolIndices found = sobol_indices(sweep.outputs, sweep.errors, 3, 1);
+  EXPECT_NEAR(found.variance, kOfFirst + kOfChance, 0.6);
+  EXPECT_NEAR(*found.chance, 1 - kFirstShare, 0.02);
+  for (std::size_t p = 0; p < 3; ++p) {
+    const double truth = p == 0 ? kFirstShare : 0;
+    EXPECT_NEAR(*found.of[p].first, truth, 0.05);
+    EXPECT_NEAR(*found.of[p].total, truth, 0.05);
+  }
+  // Without standard errors chance counts to every total index, and it is known that it does.
+  const SobolIndices without = sobol_indices(sweep.outputs, {}, 3, 1);
+  EXPECT_FALSE(without.chance);
+  EXPECT_NEAR(*without.of[1].total, 1 - kFirstShare, 0.05);
+  EXPECT_NEAR(*without.of[1].first, 0, 0.05);
+}
+
+TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
+  stimuli::Random random(9);
+  int inert = 0, first = 0;
+  constexpr int kSweeps = 150;
+  for (int s = 0; s < kSweeps; ++s) {
+    const NoisySweep sweep = noisy_sweep(100, random);
+    const SobolIndices found = sobol_indices(sweep.outputs, sweep.errors, 3, 1, 200);
+    inert += found.of[1].total_ci95->low < 0 && 0 < found.of[1].total_ci95->high;
+    first +=
+        found.of[0].total_ci95->low < kFirstShare && kFirstShare < found.of[0].total_ci95->high;
+  }
+  EXPECT_GE(inert, 0.88 * kSweeps);
+  EXPECT_GE(first, 0.88 * kSweeps);
+}
+
+// Some of the studies have one participant with times: no standard error.
+TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
+  stimuli::Random random(10);
+  NoisySweep sweep = noisy_sweep(2000, random);
+  const double all = *sobol_indices(sweep.outputs, sweep.errors, 3, 1).of[2].total;
+  for (std::size_t i = 0; i < sweep.errors.size(); i += 3) sweep.errors[i] = kUndefined;
+  EXPECT_NEAR(*sobol_indices(sweep.outputs, sweep.errors, 3, 1).of[2].total, all, 0.02);
+}
+
 TEST(SobolIndices, BasePointsWithGapsAreLeftOut) {
   stimuli::Random random(5);
   std::vector<double> outputs;
@@ -131,20 +253,20 @@ TEST(SobolIndices, BasePointsWithGapsAreLeftOut) {
     const double a = random.unit(), b = random.unit(), a2 = random.unit(), b2 = random.unit();
     for (const double y : {a + a2, b + b2, b + a2, a + b2}) outputs.push_back(y);
   }
-  const SobolIndices all = sobol_indices(outputs, 2, 1);
+  const SobolIndices all = sobol_indices(outputs, {}, 2, 1);
   std::vector<double> with_gap = outputs;
   with_gap[4 * 20 + 3] = kUndefined;
-  const SobolIndices fewer = sobol_indices(with_gap, 2, 1);
+  const SobolIndices fewer = sobol_indices(with_gap, {}, 2, 1);
   EXPECT_EQ(all.base_points, 50u);
   EXPECT_EQ(fewer.base_points, 49u);
   EXPECT_EQ(fewer.dropped, 1u);
   with_gap.erase(with_gap.begin() + 80, with_gap.begin() + 84);
-  EXPECT_EQ(sobol_indices(with_gap, 2, 1).of[0].total, fewer.of[0].total);
-  EXPECT_FALSE(sobol_indices(std::vector<double>(200, 3.0), 2, 1).undefined.empty());
-  EXPECT_FALSE(sobol_indices({1, 2, 3, 4}, 2, 1).undefined.empty());
+  EXPECT_EQ(sobol_indices(with_gap, {}, 2, 1).of[0].total, fewer.of[0].total);
+  EXPECT_FALSE(sobol_indices(std::vector<double>(200, 3.0), {}, 2, 1).undefined.empty());
+  EXPECT_FALSE(sobol_indices({1, 2, 3, 4}, {}, 2, 1).undefined.empty());
   // A constant that is added changes nothing.
   for (double& y : outputs) y += 1000;
-  EXPECT_NEAR(*sobol_indices(outputs, 2, 1).of[0].first, *all.of[0].first, 1e-9);
+  EXPECT_NEAR(*sobol_indices(outputs, {}, 2, 1).of[0].first, *all.of[0].first, 1e-9);
 }
 
 }  // namespace

@@ -339,9 +339,10 @@ class Sweeps(Files):
         self.assertIn("missing --db", self.palpate("sweep", "p.json", "--space", "s.json", "--points", "3", status=2))
         self.assertEqual([path.name for path in self.folder.iterdir() if "sweep" in path.name], [])
         space = json.loads(json.dumps(SPACE))
-        space["parameters"][0]["name"] = "Gain_ball"
-        self.write("s.json", space)
-        self.assertIn("the name of another column", self.sweep("x.sweep", status=2))
+        for name in ("Gain_ball", "hat", "Ball"):
+            space["parameters"][0]["name"] = name
+            self.write("s.json", space)
+            self.assertIn("the name of another column or of a shape", self.sweep("x.sweep", status=2))
 
     def test_the_published_spaces_fit_to_the_papers_protocol(self):
         for path in sorted(PROTOCOLS.glob("spaces/*.json")):
@@ -359,7 +360,8 @@ class Analyses(Files):
             file.execute("DELETE FROM points")
             for i, row in enumerate(rows):
                 values = dict.fromkeys(columns, 1.0) | {"point": i + 1, "seed": 1, "order_seed": 1, "reason": "", "status": "ok",
-                                                        "noise": row[0], "size": row[1], "order": "interleaved"}
+                                                        "noise": row[0], "size": row[1], "order": "interleaved",
+                                                        "gain_se_ball": 0.0, "gain_se_hat": 0.0}
                 if len(row) == 2:
                     values |= dict.fromkeys(columns[8:]) | {"status": "failed", "reason": "why"}
                 else:

@@ -48,7 +48,8 @@ TEST(SobolIndices, AreThoseOfIshigamisFunction) {
   };
   const double v1 = 0.5 * std::pow(1 + b * std::pow(pi, 4) / 5, 2), v2 = a * a / 8;
   const double v13 = b * b * std::pow(pi, 8) * (1.0 / 18 - 1.0 / 50), v = v1 + v2 + v13;
-  const analysis::SobolIndices found = analysis::sobol_indices(outputs_of(design, ishigami), 3, 1);
+  const analysis::SobolIndices found =
+      analysis::sobol_indices(outputs_of(design, ishigami), {}, 3, 1);
   EXPECT_NEAR(found.variance, v, 0.01 * v);
   expect_indices(found, {{v1 / v, (v1 + v13) / v}, {v2 / v, v2 / v}, {0, v13 / v}}, 0.01);
 }
@@ -63,7 +64,8 @@ TEST(SobolIndices, AreTheSquaredCoefficientsOfALinearModel) {
     for (std::size_t i = 0; i < u.size(); ++i) sum += coefficients[i] * u[i];
     return sum;
   };
-  const analysis::SobolIndices found = analysis::sobol_indices(outputs_of(design, linear), 4, 1);
+  const analysis::SobolIndices found =
+      analysis::sobol_indices(outputs_of(design, linear), {}, 4, 1);
   EXPECT_NEAR(found.variance, 21.0 / 12, 0.01);
   expect_indices(
       found, {{16.0 / 21, 16.0 / 21}, {4.0 / 21, 4.0 / 21}, {1.0 / 21, 1.0 / 21}, {0, 0}}, 0.01);
