@@ -50,8 +50,9 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
                         "expected an existing file; there is no " + path.string());
   } else {
     try {
-      spec.file_bytes =
-          std::make_shared<const std::string>(stimuli::mesh_file_bytes(path.string()));
+      stimuli::MeshFileBytes read = stimuli::mesh_file_bytes(path.string());
+      spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
+      spec.files_read = std::move(read.files);
     } catch (const stimuli::MeshError& unreadable) {
       reader.faults().add(reader.pointer("file"), unreadable.what());
     }

@@ -267,7 +267,7 @@ bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
   if (!faults.empty()) return false;
   Builder builder(out, mesh, outlines);
   builder.build();
-  check_convexity(out, builder.soup_vertex(), mesh.error, faults);
+  check_convexity(out, builder.soup_vertex(), mesh.naming, mesh.error, faults);
   return true;
 }
 

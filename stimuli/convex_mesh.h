@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "stimuli/large_array.h"
+#include "stimuli/mesh_names.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
@@ -23,6 +25,8 @@ struct PolygonSoup {
   /// Names of a file's groups of faces, and of each face the number of its group. Empty: none.
   std::vector<std::string> group_names = {};
   std::vector<std::uint32_t> group_of = {};
+  /// What its file calls vertices and faces, for messages. nullptr: numbered from 0.
+  std::shared_ptr<const MeshNames> names = {};
 };
 
 /// Why a polygon soup is not a convex mesh: one message for each fault (the first few of each

@@ -37,9 +37,9 @@ Index other_end(const Edge& edge, Index vertex) { return edge.v0 == vertex ? edg
 
 class Checker {
  public:
-  Checker(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, double error,
-          MeshFaults& faults)
-      : mesh_(mesh), soup_vertex_(soup_vertex), error_(error), faults_(faults) {}
+  Checker(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, const MeshNaming& naming,
+          double error, MeshFaults& faults)
+      : mesh_(mesh), soup_vertex_(soup_vertex), naming_(naming), error_(error), faults_(faults) {}
 
   void check_facet(Index facet) {
     const Facet& shape = mesh_.facets()[facet];
@@ -96,8 +96,7 @@ class Checker {
     }
     if (turns_once(directions_, inside)) return;
     faults_.add("wound vertex", [&] {
-      return "the faces wind round vertex " + std::to_string(soup_vertex_[vertex]) +
-             " more than once; expected a convex corner";
+      return "the faces wind round " + name(vertex) + " more than once; expected a convex corner";
     });
   }
 
@@ -126,10 +125,17 @@ class Checker {
     return mesh_.facets()[e.v0 == vertex ? e.left : e.right];
   }
 
+  std::string label(Index vertex) const {
+    return naming_.label(soup_vertex_[vertex], position(vertex));
+  }
+  std::string name(Index vertex) const {
+    return naming_.vertex(soup_vertex_[vertex], position(vertex));
+  }
+
   std::string names(Index facet) const {
     std::string text;
     for (Index k = 0; k < std::min<Index>(mesh_.facets()[facet].side_count, 8); ++k) {
-      text += (k == 0 ? "" : " ") + std::to_string(soup_vertex_[corner(facet, k)]);
+      text += (k == 0 ? "" : " ") + label(corner(facet, k));
     }
     return text + (mesh_.facets()[facet].side_count > 8 ? " ..." : "");
   }
@@ -154,14 +160,14 @@ class Checker {
     }
     if (top == from) return;
     faults_.add("not convex", [&] {
-      return "vertex " + std::to_string(soup_vertex_[top]) + " stands " +
-             std::to_string(height / mesh_.size()) +
+      return name(top) + " stands " + std::to_string(height / mesh_.size()) +
              " of the object's size in front of the facet with the vertices " + names(facet);
     });
   }
 
   const ConvexMesh& mesh_;
   const std::vector<Index>& soup_vertex_;
+  const MeshNaming& naming_;
   double error_;
   MeshFaults& faults_;
   std::vector<Vec3> directions_, corners_;
@@ -169,9 +175,9 @@ class Checker {
 
 }  // namespace
 
-void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, double error,
-                     MeshFaults& faults) {
-  Checker checker(mesh, soup_vertex, error, faults);
+void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex,
+                     const MeshNaming& naming, double error, MeshFaults& faults) {
+  Checker checker(mesh, soup_vertex, naming, error, faults);
   for (Index f = 0; f < mesh.facets().size(); ++f) checker.check_facet(f);
   for (Index e = 0; e < mesh.edges().size(); ++e) checker.check_edge(e);
   for (Index v = 0; v < mesh.vertices().size(); ++v) checker.check_vertex(v);

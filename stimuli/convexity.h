@@ -13,9 +13,10 @@ namespace palpate::stimuli {
 /// convex at every edge, round every vertex and in every facet (van Heijenoort 1952): it must wind
 /// round each just once, for a star that is wound twice has convex edges only. A final check of
 /// every facet for vertices in front of its plane guards against accumulated tolerances.
-/// \param soup_vertex the number of each vertex in the input, for messages
+/// \param soup_vertex the number of each vertex in the input, for messages with what `naming` calls
+/// it
 /// \param error m, how far a coordinate may be from where it was meant
 void check_convexity(const ConvexMesh& mesh, const std::vector<std::uint32_t>& soup_vertex,
-                     double error, MeshFaults& faults);
+                     const MeshNaming& naming, double error, MeshFaults& faults);
 
 }  // namespace palpate::stimuli

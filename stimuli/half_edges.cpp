@@ -16,14 +16,13 @@ namespace {
 
 using Index = HalfEdges::Index;
 
-std::string corner_list(const std::vector<Index>& corners) {
-  constexpr std::size_t kShown = 8;
-  std::string text;
-  for (std::size_t i = 0; i < std::min(corners.size(), kShown); ++i) {
-    text += (i == 0 ? "" : " ") + std::to_string(corners[i]);
-  }
-  if (corners.size() > kShown) text += " ...";
-  return text;
+/// The name of a face that may not be part of a linked surface.
+std::string name_of_face(const PolygonSoup& soup, std::size_t f) {
+  const MeshNaming naming(soup.names);
+  std::vector<std::string> labels;
+  for (const Index v : soup.faces[f])
+    labels.push_back(naming.label(v, v < soup.vertices.size() ? soup.vertices[v] : Vec3(0)));
+  return naming.face(static_cast<Index>(f), labels);
 }
 
 bool finite(const Vec3& v) {
@@ -38,16 +37,15 @@ void check_numbers(const PolygonSoup& soup) {
   for (Index v = 0; v < soup.vertices.size(); ++v) {
     if (finite(soup.vertices[v])) continue;
     faults.add("not finite", [&] {
-      return "vertex " + std::to_string(v) + ": expected three finite coordinates (up to 1e30 m)";
+      return MeshNaming(soup.names).vertex(v, soup.vertices[v]) +
+             ": expected three finite coordinates (up to 1e30 m)";
     });
   }
   std::size_t corners = 0;
   for (std::size_t f = 0; f < soup.faces.size(); ++f) {
     const std::vector<Index>& face = soup.faces[f];
     corners += face.size();
-    const auto name = [&] {
-      return "face " + std::to_string(f) + " (vertices " + corner_list(face) + ")";
-    };
+    const auto name = [&] { return name_of_face(soup, f); };
     if (face.size() < 3) {
       faults.add("too few corners", [&] { return name() + ": expected at least 3"; });
     }
@@ -109,11 +107,14 @@ std::size_t take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<In
 
 void take_faces(const PolygonSoup& soup, const std::vector<Index>& point_of, HalfEdges& mesh,
                 MeshFaults& faults) {
-  std::vector<Index> corners, sorted;
+  std::vector<Index> corners, kept, sorted;
   for (Index f = 0; f < soup.faces.size(); ++f) {
     corners.clear();
+    kept.clear();
     for (const Index v : soup.faces[f]) {
-      if (corners.empty() || corners.back() != point_of[v]) corners.push_back(point_of[v]);
+      if (!corners.empty() && corners.back() == point_of[v]) continue;
+      corners.push_back(point_of[v]);
+      kept.push_back(v);
     }
     while (corners.size() > 1 && corners.back() == corners.front()) corners.pop_back();
     if (corners.size() < 3) continue;
@@ -121,14 +122,15 @@ void take_faces(const PolygonSoup& soup, const std::vector<Index>& point_of, Hal
     std::sort(sorted.begin(), sorted.end());
     if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
       faults.add("crossed face", [&] {
-        return "face " + std::to_string(f) + " (vertices " + corner_list(soup.faces[f]) +
-               "): expected every corner once, found one visited twice";
+        return name_of_face(soup, f) + ": expected every corner once, found one visited twice";
       });
       continue;
     }
     mesh.first.push_back(mesh.count());
     mesh.soup_face.push_back(f);
     mesh.origin.insert(mesh.origin.end(), corners.begin(), corners.end());
+    mesh.corner.insert(mesh.corner.end(), kept.begin(),
+                       kept.begin() + static_cast<std::ptrdiff_t>(corners.size()));
     mesh.face.resize(mesh.origin.size(), mesh.face_count() - 1);
   }
   mesh.first.push_back(mesh.count());
@@ -211,23 +213,25 @@ void check_fans(const HalfEdges& mesh, MeshFaults& faults) {
 }  // namespace
 
 std::string HalfEdges::name_face(Index f) const {
-  std::vector<Index> corners;
-  for (Index h = first[f]; h < first[f + 1]; ++h) corners.push_back(soup_vertex[origin[h]]);
-  return "face " + std::to_string(soup_face[f]) + " (vertices " + corner_list(corners) + ")";
+  std::vector<std::string> labels;
+  for (Index h = first[f]; h < first[f + 1]; ++h)
+    labels.push_back(naming.label(corner[h], from(h)));
+  return naming.face(soup_face[f], labels);
 }
 
 std::string HalfEdges::name_vertex(Index v) const {
-  return "vertex " + std::to_string(soup_vertex[v]);
+  return naming.vertex(soup_vertex[v], points[v]);
 }
 
 std::string HalfEdges::name_edge(Index h) const {
-  return "edge " + std::to_string(soup_vertex[origin[h]]) + "-" +
-         std::to_string(soup_vertex[origin[next(h)]]) + " of " + name_face(face[h]);
+  return "edge " + naming.label(corner[h], from(h)) + "-" + naming.label(corner[next(h)], to(h)) +
+         " of " + name_face(face[h]);
 }
 
 HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pieces) {
   check_numbers(soup);
   HalfEdges mesh;
+  mesh.naming = MeshNaming(soup.names);
   std::vector<Index> point_of;
   const std::size_t moved = take_points(soup, mesh, point_of);
   take_faces(soup, point_of, mesh, faults);

@@ -21,6 +21,8 @@ struct HalfEdges {
   std::vector<Index> soup_face;    ///< the soup's number of each face
   std::vector<Index> first;        ///< face f has the half-edges first[f] .. first[f + 1]
   std::vector<Index> origin, face, twin;
+  std::vector<Index> corner;  ///< the soup's vertex that each half-edge runs from
+  MeshNaming naming;
   double size = 0;   ///< m, diagonal of the bounding box
   double error = 0;  ///< m, of each coordinate
 
@@ -31,9 +33,9 @@ struct HalfEdges {
   const Vec3& from(Index h) const { return points[origin[h]]; }
   const Vec3& to(Index h) const { return points[origin[next(h)]]; }
 
-  std::string name_face(Index f) const;    ///< "face 3 (vertices 0 1 2)"
-  std::string name_vertex(Index v) const;  ///< "vertex 4"
-  std::string name_edge(Index h) const;    ///< "edge 4-5 of face 3 (vertices ...)"
+  std::string name_face(Index f) const;    ///< "face 3 at line 20 (vertices 1 2 5)"
+  std::string name_vertex(Index v) const;  ///< "vertex 5 at line 12"
+  std::string name_edge(Index h) const;    ///< "edge 4-5 of face 3 ..."
 };
 
 enum class Pieces { one, any };

@@ -1,10 +1,14 @@
 #include "stimuli/mesh_file.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "stimuli/mesh_text.h"
 
@@ -49,20 +53,73 @@ MeshFormat format_of(const std::string& path, FileFaults& faults) {
   return MeshFormat::none;
 }
 
-/// What a .gltf names, from the folder that it lies in.
-std::string beside(const std::string& path, const std::string& name, FileFaults& faults) {
-  const std::filesystem::path relative(name);
-  const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
-  if (relative.is_absolute() || leaves || name.find(':') != std::string::npos) {
-    faults.add("", "buffers in files of the same folder", in_quotes(name));
+/// The text that a URI's part stands for (RFC 3986, 2.1); nothing where it is malformed.
+std::optional<std::string> percent_decoded(std::string_view text) {
+  std::string decoded;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned value = static_cast<unsigned char>(text[i]);
+    if (text[i] == '%') {
+      const char* begin = text.data() + i + 1;
+      if (i + 3 > text.size()) return std::nullopt;
+      const auto [end, error] = std::from_chars(begin, begin + 2, value, 16);
+      if (error != std::errc() || end != begin + 2) return std::nullopt;
+      i += 2;
+    }
+    if (value == 0) return std::nullopt;  // would end a path
+    decoded += static_cast<char>(value);
+  }
+  return decoded;
+}
+
+/// The path of what a .gltf names, from the folder that it lies in; "" with a fault where it leads
+/// elsewhere.
+std::string beside(const std::string& path, const std::string& place, const std::string& uri,
+                   FileFaults& faults) {
+  const std::optional<std::string> name = percent_decoded(uri);
+  if (!name) {
+    faults.add(place, "a file name with two hexadecimal digits after each %", in_quotes(uri));
     return {};
   }
-  const std::filesystem::path file = std::filesystem::path(path).parent_path() / relative;
-  FileFaults own(file.string());
-  std::string bytes = contents(file.string(), own);
-  own.throw_if_any();
-  return bytes;
+  const std::filesystem::path relative(*name);
+  const bool leaves = std::find(relative.begin(), relative.end(), "..") != relative.end();
+  const bool has_scheme = uri.find(':') < uri.find('/');  // https://..., file:...
+  if (name->empty() || relative.is_absolute() || leaves || has_scheme) {
+    faults.add(place, "a file in the same folder or one within", in_quotes(uri));
+    return {};
+  }
+  return (std::filesystem::path(path).parent_path() / relative).string();
 }
+
+/// Reads the buffers of a .gltf.
+class BufferFiles {
+ public:
+  BufferFiles(std::string path, MeshFileBytes& file, FileFaults& faults)
+      : path_(std::move(path)),
+        left_(kLargestFile - file.bytes.size()),
+        file_(file),
+        faults_(faults) {}
+
+  std::string contents_of(const std::string& place, const std::string& uri) {
+    const std::string path = beside(path_, place, uri, faults_);
+    if (path.empty()) return {};
+    FileFaults own(path_ + ": " + place + ": " + path);
+    std::string bytes = contents(path, own);
+    own.throw_if_any();
+    if (bytes.size() > left_) {
+      faults_.add(place, "at most 2 GiB in all files", "more");
+      return {};
+    }
+    left_ -= bytes.size();
+    file_.files.push_back(path);
+    return bytes;
+  }
+
+ private:
+  std::string path_;
+  std::uintmax_t left_;
+  MeshFileBytes& file_;
+  FileFaults& faults_;
+};
 
 }  // namespace
 
@@ -70,19 +127,21 @@ PolygonSoup read_mesh_file(const std::string& path) {
   FileFaults faults(path);
   format_of(path, faults);  // before it is read
   faults.throw_if_any();
-  return read_mesh(path, mesh_file_bytes(path));
+  return read_mesh(path, mesh_file_bytes(path).bytes);
 }
 
-std::string mesh_file_bytes(const std::string& path) {
+MeshFileBytes mesh_file_bytes(const std::string& path) {
   FileFaults faults(path);
-  std::string bytes = contents(path, faults);
+  MeshFileBytes file{contents(path, faults), {path}};
   faults.throw_if_any();
   if (lower_extension(path) == ".gltf") {
-    bytes =
-        with_buffers(bytes, [&](const std::string& name) { return beside(path, name, faults); });
+    BufferFiles buffers(path, file, faults);
+    file.bytes = with_buffers(file.bytes, [&](const std::string& place, const std::string& uri) {
+      return buffers.contents_of(place, uri);
+    });
     faults.throw_if_any();
   }
-  return bytes;
+  return file;
 }
 
 bool is_mesh_file_name(const std::string& path) {

@@ -2,6 +2,7 @@
 // Reading of mesh files: Wavefront .obj, .stl, glTF 2.0.
 
 #include <string>
+#include <vector>
 
 #include "stimuli/convex_mesh.h"
 
@@ -13,8 +14,9 @@ inline constexpr const char* kMeshExtensions = ".obj, .stl, .gltf or .glb";
 bool is_mesh_file_name(const std::string& path);
 
 /// Reads a Wavefront .obj (v, f, g, o; other statements ignored; negative and v/vt/vn indices), an
-/// .stl (ASCII or binary) or glTF 2.0 (.gltf, .glb: triangles of the default scene, node transforms
-/// applied, each primitive a group; turned from +y up to +z up). Units are metres as they stand.
+/// .stl (ASCII or binary) or glTF 2.0 (.gltf, .glb: triangles, strips and fans of the default scene
+/// or else the first, node transforms applied, each primitive a group; turned from +y up to +z up;
+/// no sparse accessors, morph targets or required extensions). Units are metres as they stand.
 /// Whether it is a solid is checked by convex_parts(), not here.
 /// \throws MeshError with file, line (text formats) or byte (binary) and what was expected.
 PolygonSoup read_mesh_file(const std::string& path);
@@ -22,9 +24,16 @@ PolygonSoup read_mesh_file(const std::string& path);
 /// The same of a file that has been read. `path` gives its format and names it in messages.
 PolygonSoup read_mesh(const std::string& path, const std::string& bytes);
 
-/// The bytes of a mesh file, whatever they are; of a .gltf with the buffers that it names taken in,
-/// so that they are all of it. \throws MeshError: it cannot be read or is too
-/// large.
-std::string mesh_file_bytes(const std::string& path);
+/// A mesh file as it was read.
+struct MeshFileBytes {
+  /// Whatever they are; of a .gltf with the buffers that it names taken in, so that they are all of
+  /// it.
+  std::string bytes;
+  std::vector<std::string> files;  ///< paths of all that was read: its own, its buffers'
+};
+
+/// \throws MeshError: a file cannot be read, they are more than 2 GiB, or a .gltf names a buffer
+/// that does not lie in its folder or one within.
+MeshFileBytes mesh_file_bytes(const std::string& path);
 
 }  // namespace palpate::stimuli

@@ -2,312 +2,271 @@
 // group. Materials, skins and animations do not describe the solid.
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
+#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "stimuli/base64.h"
+#include "stimuli/mesh_gltf_accessors.h"
+#include "stimuli/mesh_gltf_document.h"
 #include "stimuli/mesh_text.h"
 
 namespace palpate::stimuli {
 namespace {
 
-using nlohmann::json;
 using Matrix = glm::dmat4;
+using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr int kMostNested = 100;  // nodes within nodes
-constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+constexpr std::size_t kMostVertices =
+    1U << 26U;  // of all nodes: a file may use a mesh again and again
+constexpr std::size_t kMostTriangles = 1U << 25U;
+constexpr double kUnitError = 1e-3;  // of a quaternion's length: what a few digits leave
 
-std::uint32_t word_at(std::string_view bytes, std::size_t at) {
-  std::uint32_t word = 0;
-  for (std::size_t i = 4; i-- > 0;) word = word << 8U | static_cast<unsigned char>(bytes[at + i]);
-  return word;
+double number_at(const GltfValue& list, std::size_t i) { return list.element(i).number(); }
+
+Matrix given_matrix(const GltfValue& list) {
+  list.require_numbers(16);
+  Matrix matrix(1);
+  for (std::size_t i = 0; i < 16; ++i)
+    matrix[static_cast<int>(i / 4)][static_cast<int>(i % 4)] = number_at(list, i);
+  for (std::size_t i = 3; i < 16; i += 4) {
+    if (std::abs(number_at(list, i) - (i == 15 ? 1 : 0)) > 1e-6)
+      list.element(i).refuse(i == 15 ? "1 (no perspective)" : "0 (no perspective)");
+  }
+  return matrix;
 }
 
-/// What a reader gives up with: expected, found.
-struct Refused {
-  std::string expected, found;
-};
+/// Of a rotation [x, y, z, w].
+Mat3 turn_of(const GltfValue& list) {
+  if (!list.present()) return Mat3(1);
+  list.require_numbers(4);
+  const Quat q(number_at(list, 3), number_at(list, 0), number_at(list, 1), number_at(list, 2));
+  const double length = glm::length(q);
+  if (!(std::abs(length - 1) <= kUnitError)) {
+    char text[64];
+    std::snprintf(text, sizeof text, "one of length %.6g", length);
+    throw GltfRefused{list.place(), "a unit quaternion [x, y, z, w] (within 0.001)", text};
+  }
+  return glm::mat3_cast(q / length);
+}
+
+Vec3 vector_of(const GltfValue& list, double otherwise) {
+  if (!list.present()) return Vec3(otherwise);
+  list.require_numbers(3);
+  return {number_at(list, 0), number_at(list, 1), number_at(list, 2)};
+}
+
+Matrix matrix_of(const GltfValue& node) {
+  if (const GltfValue matrix = node.member("matrix"); matrix.present()) return given_matrix(matrix);
+  const Vec3 scale = vector_of(node.member("scale"), 1);
+  const Mat3 turn = turn_of(node.member("rotation"));
+  Matrix matrix(1);
+  for (int axis = 0; axis < 3; ++axis) matrix[axis] = glm::dvec4(turn[axis] * scale[axis], 0);
+  matrix[3] = glm::dvec4(vector_of(node.member("translation"), 0), 1);
+  return matrix;
+}
+
+/// The triangles of a primitive, counter-clockwise seen from outside (glTF 2.0, 3.7.2.1).
+std::vector<Triangle> triangles_of(std::size_t mode, const std::vector<std::uint32_t>& corners,
+                                   const GltfValue& primitive) {
+  std::vector<Triangle> triangles;
+  const bool separate = mode == 4, strip = mode == 5;
+  if (corners.size() < 3 || (separate && corners.size() % 3 != 0)) {
+    throw GltfRefused{primitive.place(), "three corners for each triangle",
+                      std::to_string(corners.size())};
+  }
+  for (std::size_t i = 0; i + 2 < corners.size(); i += separate ? 3 : 1) {
+    const bool turned = strip && i % 2 == 1;
+    if (separate || strip) {
+      triangles.push_back(
+          {corners[i], corners[turned ? i + 2 : i + 1], corners[turned ? i + 1 : i + 2]});
+    } else {
+      triangles.push_back({corners[i + 1], corners[i + 2], corners[0]});
+    }
+  }
+  return triangles;
+}
 
 class GltfReader {
  public:
-  explicit GltfReader(std::string_view bytes) : bytes_(bytes) {}
-
-  /// Where in the document reading stands, as a JSON pointer.
-  const std::string& place() const { return place_; }
+  explicit GltfReader(std::string_view bytes) : document_(bytes), data_(document_) {}
 
   PolygonSoup read() {
-    root_ = json::parse(take_chunks());
-    check_version();
-    read_buffers();
-    if (root_.contains("scenes") && !root_["scenes"].empty()) {
-      for (const json& node :
-           member(entry("scenes", root_.value("scene", std::size_t{0})), "nodes"))
-        read_node(node.get<std::size_t>(), Matrix(1), 0);
-    } else {
+    reached_.assign(document_.list("nodes").size(), 0);
+    const GltfValue scenes = document_.list("scenes");
+    if (scenes.size() > 0) {
+      const GltfValue named = document_.list("scene");
+      const GltfValue nodes =
+          scenes.element(named.present() ? named.number_of("scene", scenes.size()) : 0)
+              .member("nodes");
+      for (std::size_t i = 0; i < nodes.size(); ++i) read_node(nodes.element(i), Matrix(1), 0);
+    } else if (!reached_.empty()) {
       read_roots();
+    } else {
+      const GltfValue meshes = document_.list("meshes");
+      for (std::size_t i = 0; i < meshes.size(); ++i)
+        read_mesh(meshes.element(i), GltfValue(nullptr, ""), "mesh " + std::to_string(i),
+                  Matrix(1));
     }
-    place_.clear();
-    if (soup_.faces.empty()) throw Refused{"at least one triangle", "none"};
+    if (soup_.faces.empty()) throw GltfRefused{"", "at least one triangle", "none"};
     soup_.coordinate_error = largest_ * 0x1p-24;
     if (soup_.group_names.size() == 1) {
       soup_.group_names.clear();
       soup_.group_of.clear();
     }
+    soup_.names = std::make_shared<const MeshNames>(std::move(names_));
     return std::move(soup_);
   }
 
  private:
-  // A .glb is a header and chunks; a .gltf is its JSON alone.
-  std::string_view take_chunks() {
-    if (bytes_.size() < 20 || word_at(bytes_, 0) != kMagic) return bytes_;
-    if (word_at(bytes_, 4) != 2)
-      throw Refused{"glTF version 2", std::to_string(word_at(bytes_, 4))};
-    std::string_view text;
-    for (std::size_t at = 12; at + 8 <= bytes_.size();) {
-      const std::size_t length = word_at(bytes_, at);
-      if (length > bytes_.size() - at - 8) {
-        throw Refused{
-            "a chunk of " + std::to_string(length) + " bytes at byte " + std::to_string(at),
-            std::to_string(bytes_.size() - at - 8)};
-      }
-      const std::string_view chunk = bytes_.substr(at + 8, length);
-      if (word_at(bytes_, at + 4) == kJsonChunk && text.empty()) text = chunk;
-      if (word_at(bytes_, at + 4) == kBinaryChunk && !binary_) binary_ = chunk;
-      at += 8 + length;
-    }
-    if (text.empty()) throw Refused{"a chunk of JSON", "none"};
-    return text;
-  }
-
-  void check_version() {
-    place_ = "/asset/version";
-    const std::string version = root_.at("asset").at("version");
-    if (version.substr(0, 2) != "2.") throw Refused{"2.0", in_quotes(version)};
-    place_ = "/extensionsRequired";
-    for (const json& extension : root_.value("extensionsRequired", json::array())) {
-      throw Refused{"a file that needs no extension (export without compression)",
-                    in_quotes(extension.get<std::string>())};
-    }
-  }
-
-  void read_buffers() {
-    const json& list = root_.contains("buffers") ? root_["buffers"] : json::array();
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      place_ = "/buffers/" + std::to_string(i) + "/uri";
-      if (!list[i].contains("uri")) {
-        if (i > 0 || !binary_) throw Refused{"data", "none"};
-        buffers_.emplace_back(*binary_);
-        continue;
-      }
-      const std::string uri = list[i].at("uri");
-      const std::size_t comma = uri.find(";base64,");
-      if (uri.rfind("data:", 0) != 0 || comma == std::string::npos)
-        throw Refused{"data that were read with the file", in_quotes(uri)};
-      std::optional<std::string> data = base64_decoded(std::string_view(uri).substr(comma + 8));
-      if (!data) throw Refused{"base64", in_quotes(uri)};
-      buffers_.push_back(std::move(*data));
-    }
-  }
-
-  const json& entry(const char* list, std::size_t index) {
-    place_ = std::string("/").append(list).append("/").append(std::to_string(index));
-    return root_.at(list).at(index);
-  }
-
-  static const json& member(const json& object, const char* key) {
-    static const json kNone = json::array();
-    const auto found = object.find(key);
-    return found == object.end() ? kNone : *found;
-  }
-
-  // Without a scene: the nodes that no other has, or the meshes as they are.
+  // Without a scene: the nodes that no other has.
   void read_roots() {
-    const std::size_t count = member(root_, "nodes").size();
-    std::vector<char> child(count, 0);
-    for (std::size_t i = 0; i < count; ++i) {
-      for (const json& c : member(entry("nodes", i), "children"))
-        child.at(c.get<std::size_t>()) = 1;
+    const GltfValue nodes = document_.list("nodes");
+    std::vector<char> is_child(nodes.size(), 0);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const GltfValue children = nodes.element(i).member("children");
+      for (std::size_t k = 0; k < children.size(); ++k)
+        is_child[children.element(k).number_of("node", nodes.size())] = 1;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (child[i] == 0) read_node(i, Matrix(1), 0);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (is_child[i] == 0) enter_node(i, nodes.element(i), Matrix(1), 0);
     }
-    if (count > 0) return;
-    for (std::size_t i = 0; i < member(root_, "meshes").size(); ++i)
-      read_mesh(i, "mesh " + std::to_string(i), Matrix(1));
   }
 
-  static Matrix matrix_of(const json& node) {
-    Matrix matrix(1);
-    if (node.contains("matrix")) {
-      for (int i = 0; i < 16; ++i)
-        matrix[i / 4][i % 4] = node["matrix"].at(static_cast<std::size_t>(i));
-      return matrix;
-    }
-    const auto number = [&](const char* key, std::size_t i, double otherwise) -> double {
-      return node.contains(key) ? node[key].at(i).get<double>() : otherwise;
-    };
-    const Quat q(number("rotation", 3, 1), number("rotation", 0, 0), number("rotation", 1, 0),
-                 number("rotation", 2, 0));
-    const Mat3 turn = glm::mat3_cast(q);
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(axis);
-      for (int row = 0; row < 3; ++row) matrix[axis][row] = turn[axis][row] * number("scale", i, 1);
-      matrix[3][axis] = number("translation", i, 0);
-    }
-    return matrix;
+  // Nodes are strict trees (glTF 2.0, 3.5.2).
+  void read_node(const GltfValue& number, const Matrix& parent, int depth) {
+    const GltfValue node = document_.named_by(number, "nodes", "node");
+    const std::size_t index = number.number_of("node", reached_.size());
+    if (reached_[index] != 0)
+      number.refuse("a node that has one parent, or none, and is in the scene once");
+    enter_node(index, node, parent, depth);
   }
 
-  void read_node(std::size_t index, const Matrix& parent, int depth) {
-    const json& node = entry("nodes", index);
-    if (depth > kMostNested) throw Refused{"nodes within at most 100 others", "a deeper one"};
+  void enter_node(std::size_t index, const GltfValue& node, const Matrix& parent, int depth) {
+    reached_[index] = 1;
+    if (depth > kMostNested)
+      throw GltfRefused{node.place(), "nodes within at most 100 others", "a deeper one"};
     const Matrix world = parent * matrix_of(node);
-    if (node.contains("mesh"))
-      read_mesh(node["mesh"].get<std::size_t>(),
-                node.value("name", "node " + std::to_string(index)), world);
-    for (const json& child : member(node, "children"))
-      read_node(child.get<std::size_t>(), world, depth + 1);
+    if (const GltfValue mesh = node.member("mesh"); mesh.present()) {
+      if (glm::determinant(Mat3(world)) == 0)
+        throw GltfRefused{node.place(), "a mesh that is placed as a solid", "a scale of 0"};
+      const GltfValue name = node.member("name");
+      read_mesh(document_.named_by(mesh, "meshes", "mesh"), node.member("weights"),
+                name.present() ? name.text("a name") : "node " + std::to_string(index), world);
+    }
+    const GltfValue children = node.member("children");
+    for (std::size_t i = 0; i < children.size(); ++i)
+      read_node(children.element(i), world, depth + 1);
   }
 
-  void read_mesh(std::size_t index, const std::string& name, const Matrix& world) {
-    const json& primitives = member(entry("meshes", index), "primitives");
+  void read_mesh(const GltfValue& mesh, const GltfValue& node_weights, const std::string& name,
+                 const Matrix& world) {
+    const GltfValue weights = node_weights.present() ? node_weights : mesh.member("weights");
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      if (number_at(weights, i) != 0) weights.element(i).refuse("0 (export without morph targets)");
+    }
+    const GltfValue primitives = mesh.member("primitives");
     for (std::size_t i = 0; i < primitives.size(); ++i) {
-      place_ = "/meshes/" + std::to_string(index) + "/primitives/" + std::to_string(i);
-      const json& primitive = primitives[i];
-      if (primitive.value("mode", 4) != 4)
-        throw Refused{"triangles (mode 4)", std::to_string(primitive.value("mode", 4))};
       soup_.group_names.push_back(primitives.size() == 1 ? name : name + "/" + std::to_string(i));
-      add_triangles(primitive, world);
+      names_.places.push_back(primitives.element(i).place() + " in '" + name + "'");
+      add_primitive(primitives.element(i), world);
     }
   }
 
-  void add_triangles(const json& primitive, const Matrix& world) {
+  void add_primitive(const GltfValue& primitive, const Matrix& world) {
+    const GltfValue mode = primitive.member("mode");
+    const std::size_t kind = mode.whole_or(4, "4, 5 or 6 (triangles)");
+    if (kind < 4 || kind > 6) mode.refuse("4, 5 or 6 (triangles)");
+    const GltfValue source = primitive.member("attributes").member("POSITION");
+    const std::size_t count = data_.count(source);
+    if (count > kMostVertices - soup_.vertices.size())
+      throw GltfRefused{primitive.place(),
+                        "at most " + std::to_string(kMostVertices) + " vertices in all nodes",
+                        "more"};
     const std::size_t first = soup_.vertices.size();
-    const auto positions = primitive.at("attributes").at("POSITION").get<std::size_t>();
-    const std::size_t count = add_positions(positions, world);
+    add_vertices(data_.positions(source), world, primitive);
     std::vector<std::uint32_t> corners;
-    if (primitive.contains("indices")) {
-      corners = indices(primitive["indices"].get<std::size_t>());
+    if (const GltfValue indices = primitive.member("indices"); indices.present()) {
+      corners = data_.indices(indices, count);
     } else {
       for (std::size_t i = 0; i < count; ++i) corners.push_back(static_cast<std::uint32_t>(i));
     }
-    if (corners.size() % 3 != 0)
-      throw Refused{"three corners for each triangle", std::to_string(corners.size())};
-    const bool mirrored = glm::determinant(Mat3(world)) < 0;
-    for (std::size_t i = 0; i < corners.size(); i += 3) {
-      std::vector<std::uint32_t> face;
-      for (const std::size_t k : {i, mirrored ? i + 2 : i + 1, mirrored ? i + 1 : i + 2}) {
-        if (corners[k] >= count)
-          throw Refused{"indices below " + std::to_string(count), std::to_string(corners[k])};
-        face.push_back(static_cast<std::uint32_t>(first + corners[k]));
-      }
-      soup_.faces.push_back(std::move(face));
-      soup_.group_of.push_back(static_cast<std::uint32_t>(soup_.group_names.size() - 1));
-    }
+    add_triangles(triangles_of(kind, corners, primitive), first, world, primitive);
   }
 
-  struct Values {
-    std::string_view data;
-    std::size_t count, stride;
-  };
-
-  Values values(std::size_t accessor, const char* type, std::size_t bytes_each) {
-    const json& a = entry("accessors", accessor);
-    if (a.at("type") != type) throw Refused{std::string("type ") + type, a["type"].dump()};
-    if (a.contains("sparse") || !a.contains("bufferView"))
-      throw Refused{"values in a bufferView", "sparse or none"};
-    const auto count = a.at("count").get<std::size_t>();
-    const auto offset = a.value("byteOffset", std::size_t{0});
-    const json& view = entry("bufferViews", a["bufferView"].get<std::size_t>());
-    const std::size_t stride = view.value("byteStride", bytes_each);
-    const auto start = view.value("byteOffset", std::size_t{0});
-    const auto length = view.at("byteLength").get<std::size_t>();
-    const std::string& buffer = buffers_.at(view.at("buffer").get<std::size_t>());
-    const bool fits = start <= buffer.size() && length <= buffer.size() - start &&
-                      stride >= bytes_each && offset <= length &&
-                      (count == 0 || (length - offset >= bytes_each &&
-                                      (count - 1) <= (length - offset - bytes_each) / stride));
-    if (!fits)
-      throw Refused{"room for " + std::to_string(count) + " values",
-                    std::to_string(length) + " bytes"};
-    return {std::string_view(buffer).substr(start + offset, length - offset), count, stride};
-  }
+  std::uint32_t group() const { return static_cast<std::uint32_t>(soup_.group_names.size() - 1); }
 
   // glTF has +y up and +z towards the viewer; here z is up and y leads away.
-  std::size_t add_positions(std::size_t accessor, const Matrix& world) {
-    if (entry("accessors", accessor).at("componentType") != 5126)
-      throw Refused{"positions in single precision (componentType 5126)",
-                    entry("accessors", accessor)["componentType"].dump()};
-    const Values all = values(accessor, "VEC3", 12);
+  void add_vertices(const std::vector<Vec3>& positions, const Matrix& world,
+                    const GltfValue& primitive) {
     double scale = 0;
-    for (int axis = 0; axis < 3; ++axis)
-      scale = std::max(scale, std::sqrt(glm::dot(Mat3(world)[axis], Mat3(world)[axis])));
-    for (std::size_t i = 0; i < all.count; ++i) {
-      glm::dvec4 local(0, 0, 0, 1);
-      for (int axis = 0; axis < 3; ++axis) {
-        local[axis] = std::bit_cast<float>(
-            word_at(all.data, i * all.stride + 4 * static_cast<std::size_t>(axis)));
-        largest_ = std::max(largest_, scale * std::abs(local[axis]));
-      }
-      const glm::dvec4 placed = world * local;
+    for (int axis = 0; axis < 3; ++axis) scale = std::max(scale, glm::length(Mat3(world)[axis]));
+    for (std::uint32_t i = 0; i < positions.size(); ++i) {
+      const Vec3 &local = positions[i], far = glm::abs(local);
+      largest_ = std::max(largest_, scale * std::max({far.x, far.y, far.z}));
+      const glm::dvec4 placed = world * glm::dvec4(local, 1);
       if (!std::isfinite(placed.x + placed.y + placed.z))
-        throw Refused{"finite coordinates", "others, at vertex " + std::to_string(i)};
+        throw GltfRefused{primitive.place(), "finite coordinates where its node places it",
+                          "others"};
+      names_.vertices.push_back({i, group()});
       soup_.vertices.emplace_back(placed.x, -placed.z, placed.y);
     }
-    return all.count;
   }
 
-  std::vector<std::uint32_t> indices(std::size_t accessor) {
-    const int type = entry("accessors", accessor).at("componentType");
-    const std::size_t size = type == 5121 ? 1 : type == 5123 ? 2 : type == 5125 ? 4 : 0;
-    if (size == 0) throw Refused{"unsigned indices (5121, 5123, 5125)", std::to_string(type)};
-    const Values all = values(accessor, "SCALAR", size);
-    std::vector<std::uint32_t> corners(all.count, 0);
-    for (std::size_t i = 0; i < all.count; ++i) {
-      for (std::size_t b = size; b-- > 0;)
-        corners[i] = corners[i] << 8U | static_cast<unsigned char>(all.data[i * all.stride + b]);
+  void add_triangles(const std::vector<Triangle>& triangles, std::size_t first, const Matrix& world,
+                     const GltfValue& primitive) {
+    if (triangles.size() > kMostTriangles - soup_.faces.size())
+      throw GltfRefused{primitive.place(),
+                        "at most " + std::to_string(kMostTriangles) + " triangles in all nodes",
+                        "more"};
+    const bool mirrored = glm::determinant(Mat3(world)) < 0;
+    const auto start = static_cast<std::uint32_t>(first);
+    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+      const auto& [a, b, c] = triangles[i];
+      names_.faces.push_back({i, group()});
+      soup_.faces.push_back({start + a, start + (mirrored ? c : b), start + (mirrored ? b : c)});
+      soup_.group_of.push_back(group());
     }
-    return corners;
   }
 
-  std::string_view bytes_;
-  std::optional<std::string_view> binary_;
-  json root_;
-  std::vector<std::string> buffers_;
-  std::string place_;
+  GltfDocument document_;
+  GltfAccessors data_;
+  std::vector<char> reached_;  // of each node
   PolygonSoup soup_;
+  MeshNames names_;
   double largest_ = 0;  // m, of the coordinates as they stand in the file
 };
 
 }  // namespace
 
 PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults) {
-  GltfReader reader(bytes);
   try {
-    return reader.read();
-  } catch (const Refused& refused) {
-    faults.add(reader.place(), refused.expected, refused.found);
-  } catch (const json::exception& error) {
-    faults.add(reader.place(), "glTF 2.0", error.what());
-  } catch (const std::out_of_range&) {
-    faults.add(reader.place(), "the number of something that is there", "another");
+    return GltfReader(bytes).read();
+  } catch (const GltfRefused& refused) {
+    faults.add(refused.place, refused.expected, refused.found);
   }
   return {};
 }
 
-std::string with_buffers(const std::string& bytes,
-                         const std::function<std::string(const std::string&)>& contents_of) {
+std::string with_buffers(const std::string& bytes, const ContentsOf& contents_of) {
+  using nlohmann::json;
   json root = json::parse(bytes, nullptr, false);
   if (!root.is_object() || !root.contains("buffers") || !root["buffers"].is_array()) return bytes;
   bool changed = false;
-  for (json& buffer : root["buffers"]) {
+  for (std::size_t i = 0; i < root["buffers"].size(); ++i) {
+    json& buffer = root["buffers"][i];
     if (!buffer.is_object() || !buffer.contains("uri") || !buffer["uri"].is_string()) continue;
     const std::string uri = buffer["uri"];
     if (uri.rfind("data:", 0) == 0) continue;
-    buffer["uri"] = "data:application/octet-stream;base64," + base64_encoded(contents_of(uri));
+    buffer["uri"] = "data:application/octet-stream;base64," +
+                    base64_encoded(contents_of("/buffers/" + std::to_string(i) + "/uri", uri));
     changed = true;
   }
   return changed ? root.dump() : bytes;

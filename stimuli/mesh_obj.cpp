@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -15,7 +16,10 @@ using Index = std::uint32_t;
 
 class ObjReader {
  public:
-  ObjReader(std::string_view text, FileFaults& faults) : text_(text), faults_(faults) {}
+  ObjReader(std::string_view text, FileFaults& faults)
+      : text_(text),
+        faults_(faults),
+        line_end_(text.find('\n') == std::string_view::npos ? '\r' : '\n') {}
 
   PolygonSoup read() {
     while (next_line()) {
@@ -36,8 +40,9 @@ class ObjReader {
     if (soup_.group_names.size() == 1) soup_.group_names.clear();
     if (soup_.group_names.empty()) soup_.group_of.clear();
     for (std::size_t f = 0; f < soup_.faces.size(); ++f) {
-      for (const Index v : soup_.faces[f]) check_known(v, face_lines_[f]);
+      for (const Index v : soup_.faces[f]) check_known(v, names_.faces[f].place);
     }
+    soup_.names = std::make_shared<const MeshNames>(std::move(names_));
     if (soup_.faces.empty()) faults_.add("", "at least one f statement", "none");
     soup_.coordinate_error = precision_.coordinate_error();
     return std::move(soup_);
@@ -51,7 +56,7 @@ class ObjReader {
     bool continued = true;
     joined_.clear();
     while (continued && at_ < text_.size()) {
-      std::size_t end = text_.find('\n', at_);
+      std::size_t end = text_.find(line_end_, at_);
       if (end == std::string_view::npos) end = text_.size();
       line_ = text_.substr(at_, end - at_);
       at_ = end + 1;
@@ -79,6 +84,7 @@ class ObjReader {
     }
     // Also after a fault, so that the following vertices keep their numbers.
     soup_.vertices.push_back(position);
+    names_.vertices.push_back({static_cast<Index>(soup_.vertices.size()), line()});
   }
 
   void add_face(const std::vector<std::string_view>& words) {
@@ -106,8 +112,10 @@ class ObjReader {
     }
     soup_.faces.push_back(std::move(face));
     soup_.group_of.push_back(group());
-    face_lines_.push_back(line_number_);
+    names_.faces.push_back({static_cast<Index>(soup_.faces.size()), line()});
   }
+
+  Index line() const { return static_cast<Index>(line_number_); }
 
   static std::string rest_of(const std::vector<std::string_view>& words) {
     std::string text;
@@ -136,10 +144,11 @@ class ObjReader {
 
   std::string_view text_, line_;
   FileFaults& faults_;
+  char line_end_;  // some old programs end lines with carriage returns alone
   std::string joined_;
   std::size_t at_ = 0, line_number_ = 1, lines_taken_ = 0;
   PolygonSoup soup_;
-  std::vector<std::size_t> face_lines_;
+  MeshNames names_{{}, {}, "line"};
   int object_ = 0;
   std::string object_name_, group_name_;
   std::map<std::pair<int, std::string>, Index> groups_;

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 
+#include "stimuli/little_endian.h"
 #include "stimuli/mesh_text.h"
 
 namespace palpate::stimuli {
@@ -12,12 +14,6 @@ namespace {
 
 constexpr std::size_t kHeader = 84;    // 80 bytes of anything, the number of triangles
 constexpr std::size_t kTriangle = 50;  // a normal, three corners, two bytes of anything
-
-std::uint32_t little_endian(std::string_view bytes, std::size_t at) {
-  std::uint32_t word = 0;
-  for (std::size_t i = 4; i-- > 0;) word = word << 8U | static_cast<unsigned char>(bytes[at + i]);
-  return word;
-}
 
 // A text that begins with "solid" may still be the header of a binary file; no text has a 0.
 bool is_text(std::string_view bytes) {
@@ -28,13 +24,17 @@ bool is_text(std::string_view bytes) {
   return start == "solid" && bytes.find('\0') == std::string_view::npos;
 }
 
-void add_triangle(PolygonSoup& soup) {
+/// \param place  the line or byte that it begins at
+void add_triangle(PolygonSoup& soup, MeshNames& names, std::size_t place) {
   const auto end = static_cast<std::uint32_t>(soup.vertices.size());
   soup.faces.push_back({end - 3, end - 2, end - 1});
+  names.faces.push_back(
+      {static_cast<std::uint32_t>(soup.faces.size()), static_cast<std::uint32_t>(place)});
 }
 
 PolygonSoup read_binary(std::string_view bytes, FileFaults& faults) {
   PolygonSoup soup;
+  MeshNames names{{}, {}, "byte"};
   const std::size_t count = little_endian(bytes, kHeader - 4);
   soup.vertices.reserve(3 * count);
   soup.faces.reserve(count);
@@ -56,9 +56,10 @@ PolygonSoup read_binary(std::string_view bytes, FileFaults& faults) {
       largest = std::max(largest, far);
       soup.vertices.push_back(position);
     }
-    add_triangle(soup);
+    add_triangle(soup, names, kHeader + kTriangle * t);
   }
   soup.coordinate_error = largest * 0x1p-24;
+  soup.names = std::make_shared<const MeshNames>(std::move(names));
   return soup;
 }
 
@@ -82,6 +83,7 @@ class AsciiReader {
     }
     if (inside_) fault("facet or endsolid");
     soup_.coordinate_error = precision_.coordinate_error();
+    soup_.names = std::make_shared<const MeshNames>(std::move(names_));
     return std::move(soup_);
   }
 
@@ -143,6 +145,7 @@ class AsciiReader {
 
   bool read_facet() {
     Vec3 position;
+    const std::size_t line = line_;
     advance();
     if (!take("normal") || !take_position(position, false) || !take("outer") || !take("loop")) {
       return false;
@@ -154,7 +157,7 @@ class AsciiReader {
     }
     if (!take("endloop") || !take("endfacet")) return false;
     soup_.vertices.insert(soup_.vertices.end(), corners.begin(), corners.end());
-    add_triangle(soup_);
+    add_triangle(soup_, names_, line);
     return true;
   }
 
@@ -163,6 +166,7 @@ class AsciiReader {
   std::size_t at_ = 0, line_ = 1;
   bool inside_ = false;
   PolygonSoup soup_;
+  MeshNames names_{{}, {}, "line"};
   NumberPrecision precision_;
 };
 

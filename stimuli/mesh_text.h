@@ -60,9 +60,11 @@ PolygonSoup read_obj(std::string_view text, FileFaults& faults);
 PolygonSoup read_stl(std::string_view bytes, FileFaults& faults);
 PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults);
 
+/// Contents of a buffer's file. \param place  where it is named, a JSON pointer \param uri  the
+/// name
+using ContentsOf = std::function<std::string(const std::string& place, const std::string& uri)>;
+
 /// The bytes of a .gltf with its external buffers inside, as it stands where it has none.
-/// \param contents_of  of a buffer's file, by the name that the .gltf gives it
-std::string with_buffers(const std::string& bytes,
-                         const std::function<std::string(const std::string&)>& contents_of);
+std::string with_buffers(const std::string& bytes, const ContentsOf& contents_of);
 
 }  // namespace palpate::stimuli

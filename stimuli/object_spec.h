@@ -46,7 +46,9 @@ struct ObjectSpec {
   int subdivisions = 4;   ///< sphere: an icosphere of 20 * 4^subdivisions triangles
   int segments = 64;      ///< cone, cylinder: corners of the rim
   std::string file_name;  ///< mesh: as the scene or protocol names its file
-  std::string file;       ///< mesh: resolved path of an .obj or .stl file
+  std::string file;       ///< mesh: resolved path of a file that mesh_file.h reads
+  /// mesh: paths of all that was read from the disk for it, a .gltf's buffers among them.
+  std::vector<std::string> files_read;
   /// mesh: what the file held when it was named; nullptr: to be read from the disk.
   std::shared_ptr<const std::string> file_bytes;
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound

@@ -1,11 +1,12 @@
 #include "stimuli/parts/convex_parts.h"
 
 #include <algorithm>
-#include <glm/geometric.hpp>
+#include <memory>
 #include <string>
 #include <utility>
 
 #include "stimuli/half_edges.h"
+#include "stimuli/parts/convex_parts_groups.h"
 #include "stimuli/parts/cover_check.h"
 #include "stimuli/parts/cutting.h"
 #include "stimuli/parts/merging.h"
@@ -18,20 +19,6 @@ namespace {
 // m, of the coordinates' error: facets are taken for plane within 8 errors, and a corner must not
 // lie on one of two facets that meet in it and miss the other.
 constexpr double kErrors = 16;
-
-PolygonSoup subset(const PolygonSoup& soup, const std::vector<char>& wanted) {
-  PolygonSoup some{soup.vertices, {}, soup.coordinate_error};
-  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
-    if (wanted[f] != 0) some.faces.push_back(soup.faces[f]);
-  }
-  return some;
-}
-
-bool is_closed(const PolygonSoup& soup) {
-  MeshFaults faults;
-  link_half_edges(soup, faults, Pieces::any);
-  return faults.empty();
-}
 
 // Neighbouring parts get the same corners, to the bit, those of the solid where there are some.
 std::vector<PolygonSoup> soups_of(const std::vector<std::vector<CellPolygon>>& parts,
@@ -47,6 +34,7 @@ std::vector<PolygonSoup> soups_of(const std::vector<std::vector<CellPolygon>>& p
   for (const auto& faces : parts) {
     PolygonSoup soup;
     soup.coordinate_error = solid.error;
+    soup.names = std::make_shared<const MeshNames>();  // its numbers are nobody's
     for (const CellPolygon& face : faces) {
       std::vector<std::uint32_t> polygon;
       for (std::size_t k = 0; k < face.corners.size(); ++k) {
@@ -80,24 +68,6 @@ std::vector<ConvexMesh> one_part(const PolygonSoup& soup) {
   } catch (const MeshError&) {
     return cut_into_convex_parts(soup);
   }
-}
-
-// The faces of each group that is closed by itself, then those of all others together.
-std::vector<std::pair<std::string, PolygonSoup>> closed_groups(const PolygonSoup& soup) {
-  std::vector<std::pair<std::string, PolygonSoup>> closed;
-  std::vector<char> rest(soup.faces.size(), 1);
-  for (std::size_t g = 0; g < soup.group_names.size(); ++g) {
-    std::vector<char> wanted(soup.faces.size(), 0);
-    for (std::size_t f = 0; f < soup.faces.size(); ++f) wanted[f] = soup.group_of[f] == g ? 1 : 0;
-    PolygonSoup group = subset(soup, wanted);
-    if (!is_closed(group)) continue;
-    for (std::size_t f = 0; f < soup.faces.size(); ++f) rest[f] = rest[f] && !wanted[f] ? 1 : 0;
-    closed.emplace_back("group '" + soup.group_names[g] + "'", std::move(group));
-  }
-  PolygonSoup others = subset(soup, rest);
-  if (!closed.empty() && !others.faces.empty())
-    closed.emplace_back("the groups that are not closed by themselves", std::move(others));
-  return closed;
 }
 
 }  // namespace
@@ -139,16 +109,14 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
   } catch (const MeshError&) {
     // Not convex, or broken: what follows says so.
   }
-  const auto groups = soup.group_names.size() > 1
-                          ? closed_groups(soup)
-                          : std::vector<std::pair<std::string, PolygonSoup>>();
+  const std::vector<SolidGroup> groups = solid_groups(soup);
   if (groups.empty()) return cut_into_convex_parts(soup);
   std::vector<std::string> faults;
-  for (const auto& [name, group] : groups) {
+  for (const SolidGroup& group : groups) {
     try {
-      for (ConvexMesh& part : one_part(group)) parts.push_back(std::move(part));
+      for (ConvexMesh& part : one_part(group.soup)) parts.push_back(std::move(part));
     } catch (const MeshError& error) {
-      for (const std::string& fault : error.faults()) faults.push_back(name + ": " + fault);
+      for (const std::string& fault : error.faults()) faults.push_back(group.name + ": " + fault);
     }
   }
   if (!faults.empty()) throw MeshError(std::move(faults));

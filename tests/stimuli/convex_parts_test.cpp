@@ -304,6 +304,81 @@ TEST(ConvexParts, AnOpenGroupBesideClosedOnesIsNamed) {
   EXPECT_NE(text.find("not closed by themselves: open: edge"), std::string::npos) << text;
 }
 
+/// A cube as a group of a soup. \param turned  all its faces, as of a void
+void add_cube(PolygonSoup& soup, const std::string& name, double edge, const Vec3& at,
+              bool turned = false) {
+  const PolygonSoup box = cube(edge);
+  const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+  for (const Vec3& vertex : box.vertices) soup.vertices.push_back(vertex + at);
+  for (std::vector<std::uint32_t> face : box.faces) {
+    for (std::uint32_t& corner : face) corner += first;
+    if (turned) std::reverse(face.begin(), face.end());
+    soup.faces.push_back(std::move(face));
+    soup.group_of.push_back(static_cast<std::uint32_t>(soup.group_names.size()));
+  }
+  soup.group_names.push_back(name);
+}
+
+TEST(ConvexParts, AVoidThatIsAGroupGoesWithTheGroupRoundIt) {
+  // In either order; within a shell in a void of a larger shell it goes with the inner one.
+  for (const bool void_first : {false, true}) {
+    PolygonSoup soup;
+    if (void_first) add_cube(soup, "cavity", 0.02, Vec3(0.005, 0, 0), true);
+    add_cube(soup, "shell", 0.06, Vec3(0));
+    if (!void_first) add_cube(soup, "cavity", 0.02, Vec3(0.005, 0, 0), true);
+    add_cube(soup, "beside", 0.06, Vec3(0.1, 0, 0));
+    EXPECT_NEAR(volume(convex_parts(soup)), 2 * 0.06 * 0.06 * 0.06 - 8e-6, 1e-15);
+  }
+  PolygonSoup nested;
+  add_cube(nested, "outer", 0.1, Vec3(0));
+  add_cube(nested, "gap", 0.08, Vec3(0), true);
+  add_cube(nested, "core", 0.06, Vec3(0));
+  add_cube(nested, "hole", 0.02, Vec3(0), true);
+  const std::vector<ConvexMesh> parts = convex_parts(nested);
+  EXPECT_NEAR(volume(parts), 1e-3 - 0.512e-3 + 0.216e-3 - 0.008e-3, 1e-15);
+  for (const Vec3& point : {Vec3(0), Vec3(0.035, 0, 0)}) {
+    EXPECT_TRUE(std::all_of(parts.begin(), parts.end(),
+                            [&](const ConvexMesh& part) { return out_of(part, point) > 0; }));
+  }
+}
+
+TEST(ConvexParts, AVoidInTheShellThatOtherGroupsMakeGoesWithIt) {
+  PolygonSoup soup;
+  add_cube(soup, "sides", 0.06, Vec3(0));
+  add_cube(soup, "cavity", 0.02, Vec3(0), true);
+  soup.group_of[0] = static_cast<std::uint32_t>(soup.group_names.size());
+  soup.group_names.push_back("lid");
+  EXPECT_NEAR(volume(convex_parts(soup)), 0.06 * 0.06 * 0.06 - 8e-6, 1e-15);
+}
+
+TEST(ConvexParts, AVoidInNothingIsNamed) {
+  for (const Vec3& at : {Vec3(0.1, 0, 0), Vec3(0.03, 0, 0)}) {  // beside it; half in it
+    PolygonSoup soup;
+    add_cube(soup, "shell", 0.06, Vec3(0));
+    add_cube(soup, "cavity", 0.02, at, true);
+    EXPECT_EQ(refusal(soup),
+              "group 'cavity': inside out: all faces are clockwise seen from outside, as of a "
+              "void; expected counter-clockwise, or another closed group round it");
+  }
+}
+
+TEST(ConvexParts, ManyGroupsTakeTheirOwnVerticesOnly) {
+  PolygonSoup soup;
+  const auto add = [&](std::size_t count) {
+    for (std::size_t i = soup.group_names.size(); i < count; ++i)
+      add_cube(soup, std::to_string(i), 0.01,
+               0.03 * Vec3(double(i % 25), double(i / 25 % 25), double(i / 625)));
+  };
+  add(3000);
+  const std::vector<ConvexMesh> parts = convex_parts(soup);
+  ASSERT_EQ(parts.size(), 3000U);
+  EXPECT_EQ(parts[1234].vertices().size(), 8U);
+  EXPECT_LT(glm::length(parts[1234].centre() - 0.03 * Vec3(9, 24, 1)), 1e-12);
+  add(10001);
+  EXPECT_EQ(refusal(soup),
+            "too many groups: expected at most 10000 that are closed by themselves, found more");
+}
+
 TEST(ConvexParts, GroupsThatAreOnlyPaintAreOneSolid) {
   PolygonSoup soup = solids::l_shape().soup;
   soup.group_names = {"ends", "sides"};

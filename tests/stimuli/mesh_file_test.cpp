@@ -278,6 +278,60 @@ TEST_F(MeshFile, ABinaryStlMustHaveTheSizeThatItClaims) {
   expect_fault("a.stl", nan, ": byte 146: expected three finite coordinates");
 }
 
+class MeshFileSurface : public MeshFile {
+ protected:
+  /// What is wrong with the surface that a file describes.
+  std::string surface_fault(const std::string& name, const std::string& bytes) const {
+    try {
+      const ConvexMesh mesh(read(name, bytes));
+      return "none";
+    } catch (const MeshError& error) {
+      return error.what();
+    }
+  }
+};
+
+TEST_F(MeshFileSurface, FaultsOfAnObjHaveItsNumbersAndLines) {
+  const std::string corners = "# a tetrahedron\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+  EXPECT_EQ(surface_fault("a.obj", corners + "f 1 3 2\nf 1 2 4\n\nf 1 4 3\nf 2 3 4\n"), "none");
+  const std::string open = surface_fault("a.obj", corners + "f 1 3 2\nf 1 2 4\n\nf 1 4 3\n");
+  EXPECT_EQ(open.rfind("open: edge 3-2 of face 1 at line 6 (vertices 1 3 2) has", 0), 0U) << open;
+  const std::string turned =
+      surface_fault("a.obj", corners + "f 1 3 2\nf 1 2 4\n\nf 1 3 4\nf 2 3 4\n");
+  EXPECT_NE(turned.find("turned face: edge 1-3 of face 3 at line 9 (vertices 1 3 4) runs the same "
+                        "way in face 1 at line 6 (vertices 1 3 2)"),
+            std::string::npos)
+      << turned;
+  EXPECT_EQ(surface_fault("a.obj", "\nv 1e31 0 0\n" + corners + "f 1 2 3"),
+            "not finite: vertex 1 at line 2: expected three finite coordinates (up to 1e30 m)");
+  // Corners of one place keep the numbers that the face itself gives them.
+  const std::string own = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 0 1\nv 1 0 0\n";
+  const std::string fault = surface_fault("a.obj", own + "f 1 3 2\nf 4 6 5\n");
+  EXPECT_NE(fault.find("open: edge 6-5 of face 2 at line 8 (vertices 4 6 5)"), std::string::npos)
+      << fault;
+}
+
+TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
+  PolygonSoup soup = triangulated(cube(1));
+  soup.faces.pop_back();
+  const std::string ascii = surface_fault("a.stl", as_ascii_stl(soup));
+  EXPECT_EQ(ascii.rfind("open: edge (", 0), 0U) << ascii;
+  EXPECT_NE(ascii.find(") of face "), std::string::npos) << ascii;
+  // Each facet takes seven lines, after the first; or 50 bytes, after 84.
+  const auto number_of = [](const std::string& text) {
+    return std::stoul(text.substr(text.find("of face ") + 8));
+  };
+  EXPECT_NE(
+      ascii.find(" at line " + std::to_string(2 + 7 * (number_of(ascii) - 1)) + " (vertices ("),
+      std::string::npos)
+      << ascii;
+  const std::string binary = surface_fault("b.stl", as_binary_stl(soup));
+  EXPECT_NE(
+      binary.find(" at byte " + std::to_string(84 + 50 * (number_of(binary) - 1)) + " (vertices ("),
+      std::string::npos)
+      << binary;
+}
+
 TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
   expect_fault("a.ply", "ply", ".obj, .stl, .gltf or .glb");
   EXPECT_THROW(read_mesh_file((folder_ / "none.obj").string()), MeshError);

@@ -1,58 +1,21 @@
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "stimuli/base64.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "tests/stimuli/gltf_box.h"
 
 namespace palpate::stimuli {
 namespace {
 
-void append(std::string& bytes, std::uint32_t word, int size = 4) {
-  for (int b = 0; b < size; ++b) bytes += static_cast<char>(word >> (8 * b) & 255U);
-}
-
-// A box of 0.02 x 0.04 x 0.06 m, as a file would hold it: x, y up, z towards the viewer.
-constexpr float kHalf[3] = {0.01F, 0.02F, 0.03F};
-
-std::string box_buffer() {
-  std::string bytes;
-  for (int corner = 0; corner < 8; ++corner) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const float value = (corner >> axis & 1) != 0 ? kHalf[axis] : -kHalf[axis];
-      append(bytes, std::bit_cast<std::uint32_t>(value));
-    }
-  }
-  constexpr int kTriangles[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5},
-                                     {0, 1, 5}, {0, 5, 4}, {2, 6, 7}, {2, 7, 3},
-                                     {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  for (const auto& triangle : kTriangles) {
-    for (const int corner : triangle) append(bytes, static_cast<std::uint32_t>(corner), 2);
-  }
-  return bytes;
-}
-
-std::string document(const std::string& nodes, const std::string& uri,
-                     const std::string& more = "") {
-  return R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": )" +
-         nodes + R"(, "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-   "accessors": [{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
-                 {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}],
-   "bufferViews": [{"buffer": 0, "byteLength": 96},
-                   {"buffer": 0, "byteOffset": 96, "byteLength": 72}],
-   "buffers": [{"byteLength": 168)" +
-         (uri.empty() ? "" : R"(, "uri": ")" + uri + "\"") + "}]" + more + "}";
-}
-
-std::string inside() {
-  return "data:application/octet-stream;base64," + base64_encoded(box_buffer());
-}
+using gltf::changed;
+using gltf::document;
 
 Vec3 extent(const PolygonSoup& soup) {
   Vec3 low = soup.vertices.at(0), high = low;
@@ -70,9 +33,10 @@ void expect_box(const PolygonSoup& soup, const Vec3& size, const Vec3& centre) {
   EXPECT_LT(glm::length(parts[0].centre() - centre), 1e-8);
 }
 
+const Vec3 kSize(0.02, 0.06, 0.04);  // of the box, up turned from y to z
+
 TEST(MeshGltf, UpIsTurnedFromYToZ) {
-  const PolygonSoup soup = read_mesh("box.gltf", document(R"([{"mesh": 0}])", inside()));
-  expect_box(soup, Vec3(0.02, 0.06, 0.04), Vec3(0));
+  expect_box(read_mesh("box.gltf", document()), kSize, Vec3(0));
 }
 
 TEST(MeshGltf, TransformsOfNodesWithinNodesApply) {
@@ -81,119 +45,182 @@ TEST(MeshGltf, TransformsOfNodesWithinNodesApply) {
     {"mesh": 0, "scale": [2, 1, 1], "rotation": [0, 0.7071067811865476, 0, 0.7071067811865476],
      "translation": [0.1, 0, 0.3]}])";
   // x: 2 * 0.02 becomes z, z becomes x; then (x, y, z) = (-0.1, 0.5, 0.3), in our frame (x, -z, y).
-  expect_box(read_mesh("box.gltf", document(nodes, inside())), Vec3(0.06, 0.04, 0.04),
-             Vec3(-0.1, -0.3, 0.5));
+  expect_box(read_mesh("box.gltf", document(nodes)), Vec3(0.06, 0.04, 0.04), Vec3(-0.1, -0.3, 0.5));
   const std::string matrix =
       R"([{"mesh": 0, "matrix": [0,0,-2,0, 0,1,0,0, 1,0,0,0, 0.1,0.2,0.3,1]}])";
-  expect_box(read_mesh("box.gltf", document(matrix, inside())), Vec3(0.06, 0.04, 0.04),
-             Vec3(0.1, -0.3, 0.2));
+  expect_box(read_mesh("box.gltf", document(matrix)), Vec3(0.06, 0.04, 0.04), Vec3(0.1, -0.3, 0.2));
+}
+
+TEST(MeshGltf, ARotationIsCounterClockwiseSeenAgainstItsAxis) {
+  const auto centre = [](const std::string& rotation) {
+    const std::string nodes = R"([{"children": [1], "rotation": )" + rotation +
+                              R"(}, {"mesh": 0, "translation": [0.1, 0.2, 0.4]}])";
+    return convex_parts(read_mesh("box.gltf", document(nodes))).at(0).centre();
+  };
+  // By 90 degrees about y, z goes to x and x to -z; about x, y to z; about z, x to y.
+  const std::string half = "0.7071067811865476";
+  EXPECT_LT(glm::length(centre("[0," + half + ",0," + half + "]") - Vec3(0.4, 0.1, 0.2)), 1e-8);
+  EXPECT_LT(glm::length(centre("[" + half + ",0,0," + half + "]") - Vec3(0.1, -0.2, -0.4)), 1e-8);
+  EXPECT_LT(glm::length(centre("[0,0," + half + "," + half + "]") - Vec3(-0.2, -0.4, 0.1)), 1e-8);
+}
+
+TEST(MeshGltf, ARoundedQuaternionNeitherScalesNorShears) {
+  const std::string nodes = R"([{"mesh": 0, "rotation": [0, 0.7076, 0, 0.7076]}])";  // 1.0007 long
+  expect_box(read_mesh("box.gltf", document(nodes)), Vec3(0.06, 0.02, 0.04), Vec3(0));
+}
+
+TEST(MeshGltf, MirroredNodesAreNotInsideOut) {
+  for (const char* scale : {"[-1, 1, 1]", "[1, -1, 1]", "[-1, -1, -1]", "[-1, -1, 1]"}) {
+    const std::string nodes = std::string(R"([{"mesh": 0, "scale": )") + scale + "}]";
+    expect_box(read_mesh("box.gltf", document(nodes)), kSize, Vec3(0));
+  }
 }
 
 TEST(MeshGltf, AMeshUsedTwiceIsTwoParts) {
   const std::string nodes = R"([{"children": [1, 2]}, {"mesh": 0, "name": "left"},
     {"mesh": 0, "translation": [0.05, 0, 0]}])";
-  const PolygonSoup soup = read_mesh("box.gltf", document(nodes, inside()));
+  const PolygonSoup soup = read_mesh("box.gltf", document(nodes));
   EXPECT_EQ(soup.group_names, (std::vector<std::string>{"left", "node 2"}));
   EXPECT_EQ(convex_parts(soup).size(), 2U);
 }
 
+TEST(MeshGltf, TheDefaultSceneIsRead) {
+  const std::string nodes = R"([{"mesh": 0}, {"mesh": 0, "translation": [1, 0, 0]}])";
+  const std::string text = changed(document(nodes), "[{\"nodes\": [0]}]",
+                                   "[{\"nodes\": [0]}, {\"nodes\": [1]}, {\"nodes\": [0, 1]}]");
+  expect_box(read_mesh("a.gltf", text), kSize, Vec3(0));
+  expect_box(read_mesh("a.gltf", changed(text, "\"scene\": 0", "\"scene\": 1")), kSize,
+             Vec3(1, 0, 0));
+  // Without any scene: the nodes that no other has.
+  const std::string roots = R"([{"mesh": 0}, {"children": [0], "translation": [1, 0, 0]}])";
+  expect_box(read_mesh("a.gltf", changed(document(roots), "\"scenes\"", "\"extras\"")), kSize,
+             Vec3(1, 0, 0));
+}
+
+TEST(MeshGltf, EveryWidthOfIndicesIsRead) {
+  for (const auto& [type, size] : {std::pair("5121", 1), {"5123", 2}, {"5125", 4}}) {
+    const std::string data = gltf::box_corners() + gltf::box_indices(size);
+    std::string text = document(R"([{"mesh": 0}])", gltf::data_uri(data));
+    text = changed(text, "5123", type);
+    text = changed(text, "\"byteLength\": 72", "\"byteLength\": " + std::to_string(36 * size));
+    text = changed(text, "\"byteLength\": 168", "\"byteLength\": " + std::to_string(data.size()));
+    expect_box(read_mesh("a.gltf", text), kSize, Vec3(0));
+  }
+}
+
+TEST(MeshGltf, InterleavedPositionsAreRead) {
+  const std::string data = std::string(4, '\x7f') + gltf::box_corners(20) + gltf::box_indices();
+  std::string text = document(R"([{"mesh": 0}])", gltf::data_uri(data));
+  text = changed(text, "\"byteLength\": 96", "\"byteLength\": 260, \"byteStride\": 32");
+  text = changed(text, "{\"bufferView\": 0", "{\"byteOffset\": 4, \"bufferView\": 0");
+  text = changed(text, "\"byteOffset\": 96", "\"byteOffset\": 260");
+  expect_box(read_mesh("a.gltf", text), kSize, Vec3(0));
+}
+
+TEST(MeshGltf, StripsAndFansAreTriangles) {
+  const auto with = [](const std::vector<std::uint32_t>& corners, const std::string& primitives,
+                       const std::string& accessors) {
+    std::string data = gltf::box_corners();
+    for (const std::uint32_t corner : corners) gltf::append(data, corner, 2);
+    std::string text = document(R"([{"mesh": 0}])", gltf::data_uri(data));
+    text = changed(text, R"({"attributes": {"POSITION": 0}, "indices": 1})", primitives);
+    text =
+        changed(text, R"({"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"})",
+                accessors);
+    text =
+        changed(text, "\"byteLength\": 72", "\"byteLength\": " + std::to_string(data.size() - 96));
+    return changed(text, "\"byteLength\": 168", "\"byteLength\": " + std::to_string(data.size()));
+  };
+  const std::string seen = R"({"attributes": {"POSITION": 0}, "mode": )";
+  const std::string read =
+      R"({"bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": )";
+  // Once over all sides.
+  expect_box(read_mesh("a.gltf", with({0, 1, 4, 5, 7, 1, 3, 0, 2, 4, 6, 7, 2, 3},
+                                      seen + R"(5, "indices": 1})", read + "14}")),
+             kSize, Vec3(0));
+  // The three sides round a corner, and those round the opposite one.
+  expect_box(read_mesh("a.gltf", with({0, 4, 6, 2, 3, 1, 5, 4, 7, 6, 4, 5, 1, 3, 2, 6},
+                                      seen + R"(6, "indices": 1}, )" + seen + R"(6, "indices": 2})",
+                                      read + "8}, " + read + R"(8, "byteOffset": 16})")),
+             kSize, Vec3(0));
+}
+
 TEST(MeshGltf, ABinaryFileIsTheSame) {
-  std::string text = document(R"([{"mesh": 0}])", "");
-  while (text.size() % 4 != 0) text += ' ';
-  const std::string data = box_buffer();
-  std::string bytes;
-  append(bytes, 0x46546C67);
-  append(bytes, 2);
-  append(bytes, static_cast<std::uint32_t>(28 + text.size() + data.size()));
-  append(bytes, static_cast<std::uint32_t>(text.size()));
-  append(bytes, 0x4E4F534A);
-  bytes += text;
-  append(bytes, static_cast<std::uint32_t>(data.size()));
-  append(bytes, 0x004E4942);
-  bytes += data;
-  expect_box(read_mesh("box.glb", bytes), Vec3(0.02, 0.06, 0.04), Vec3(0));
+  const std::string bytes = gltf::binary_file(document(R"([{"mesh": 0}])", ""), gltf::box_buffer());
+  expect_box(read_mesh("box.glb", bytes), kSize, Vec3(0));
   for (std::size_t cut = 0; cut < bytes.size(); cut += 7)
     EXPECT_THROW(read_mesh("box.glb", bytes.substr(0, cut)), MeshError) << cut;
 }
 
-TEST(MeshGltf, BuffersBesideTheFileAreTakenIn) {
-  const std::filesystem::path folder =
-      std::filesystem::path(::testing::TempDir()) / "palpate_mesh_gltf_test";
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "box.bin", std::ios::binary) << box_buffer();
-  std::ofstream(folder / "box.gltf") << document(R"([{"mesh": 0}])", "box.bin");
-  const std::string path = (folder / "box.gltf").string();
-  const std::string bytes = mesh_file_bytes(path);
-  std::filesystem::remove(folder / "box.bin");
-  expect_box(read_mesh(path, bytes), Vec3(0.02, 0.06, 0.04), Vec3(0));
-  try {
-    mesh_file_bytes(path);
-    FAIL() << "its buffer is gone";
-  } catch (const MeshError& error) {
-    EXPECT_NE(std::string(error.what()).find("box.bin"), std::string::npos) << error.what();
+class MeshGltfBuffers : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = ::testing::TempDir() + "/mesh_gltf_XXXXXX";
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    std::filesystem::create_directories(folder_ / "inner" / "data");
+    path_ = (folder_ / "inner" / "box.gltf").string();
   }
-  std::filesystem::remove_all(folder);
-}
+  void TearDown() override { std::filesystem::remove_all(folder_); }
 
-std::string refusal(const std::string& text) {
-  try {
-    read_mesh("a.gltf", text);
-    return "taken";
-  } catch (const MeshError& error) {
-    return error.what();
+  void write_buffer(const std::string& name) const {
+    std::ofstream(folder_ / "inner" / name, std::ios::binary) << gltf::box_buffer();
   }
-}
+  MeshFileBytes bytes_with(const std::string& uri) const {
+    std::ofstream(path_) << document(R"([{"mesh": 0}])", uri);
+    return mesh_file_bytes(path_);
+  }
+  std::string refusal_of(const std::string& uri) const {
+    try {
+      bytes_with(uri);
+      return "taken";
+    } catch (const MeshError& error) {
+      return error.what();
+    }
+  }
 
-TEST(MeshGltf, FaultsNameTheirPlace) {
-  const auto changed = [](const std::string& from, const std::string& to) {
-    std::string text = document(R"([{"mesh": 0}])", inside());
-    const std::size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    return refusal(text.replace(at, from.size(), to));
-  };
-  const std::pair<std::string, std::string> good{"\"count\": 8", "\"count\": 8"};
-  EXPECT_EQ(changed(good.first, good.second), "taken");
-  EXPECT_EQ(
-      changed("\"count\": 8", "\"count\": 9").rfind("a.gltf: /bufferViews/0: expected room", 0),
-      0U);
-  EXPECT_EQ(changed("5123", "5120"),
-            "a.gltf: /accessors/1: expected unsigned indices (5121, 5123, 5125), found 5120");
-  EXPECT_EQ(changed("\"indices\": 1", "\"indices\": 1, \"mode\": 5"),
-            "a.gltf: /meshes/0/primitives/0: expected triangles (mode 4), found 5");
-  EXPECT_EQ(changed("[{\"mesh\": 0}]", "[{\"children\": [0]}]")
-                .rfind("a.gltf: /nodes/0: expected nodes within at most 100", 0),
-            0U);
-  for (const auto& [from, to] :
-       {std::pair("\"2.0\"", "\"1.0\""),
-        {"\"VEC3\"", "\"VEC4\""},
-        {"\"POSITION\": 0", "\"POSITION\": 7"},
-        {"\"POSITION\": 0", "\"POSITION\": \"x\""},
-        {"\"buffer\": 0", "\"buffer\": -1"},
-        {"[{\"mesh\": 0}]", "[{\"mesh\": 4}]"},
-        {"\"nodes\": [0]", "\"nodes\": [3]"},
-        {"\"count\": 36", "\"count\": 35"},
-        {"base64,", "base64,%"},
-        {"{\"asset\"", "{asset"},
-        {"\"scene\": 0", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"]"}}) {
-    EXPECT_EQ(changed(from, to).rfind("a.gltf: ", 0), 0U) << from << " -> " << to;
+  std::filesystem::path folder_;
+  std::string path_;
+};
+
+TEST_F(MeshGltfBuffers, BesideTheFileAreTakenInAndNamed) {
+  for (const auto& [name, uri] : {std::pair("box.bin", "box.bin"),
+                                  {"my mesh.bin", "my%20mesh.bin"},
+                                  {"my mesh.bin", "my mesh.bin"},
+                                  {"data/h\xC3\xA4lfte.bin", "data/h%C3%a4lfte.bin"},
+                                  {"100%.bin", "100%25.bin"},
+                                  {"%2e.bin", "%252e.bin"}}) {
+    write_buffer(name);
+    const MeshFileBytes read = bytes_with(uri);
+    const std::string buffer = (folder_ / "inner" / name).string();
+    EXPECT_EQ(read.files, (std::vector<std::string>{path_, buffer}));
+    std::filesystem::remove(buffer);
+    expect_box(read_mesh(path_, read.bytes), kSize, Vec3(0));
   }
 }
 
-TEST(Base64, IsItsOwnInverse) {
-  // RFC 4648, section 10.
-  EXPECT_EQ(base64_encoded(""), "");
-  EXPECT_EQ(base64_encoded("f"), "Zg==");
-  EXPECT_EQ(base64_encoded("fo"), "Zm8=");
-  EXPECT_EQ(base64_encoded("foo"), "Zm9v");
-  EXPECT_EQ(base64_encoded("foobar"), "Zm9vYmFy");
-  std::string bytes;
-  for (int i = 0; i < 256; ++i) {
-    bytes += static_cast<char>(i);
-    EXPECT_EQ(base64_decoded(base64_encoded(bytes)), bytes);
+TEST_F(MeshGltfBuffers, ThatAreMissingAreNamed) {
+  const std::string text = refusal_of("box.bin");
+  EXPECT_EQ(text.rfind(path_ + ": /buffers/0/uri: ", 0), 0U) << text;
+  EXPECT_NE(text.find("inner/box.bin: expected a file, found No such file"), std::string::npos)
+      << text;
+}
+
+TEST_F(MeshGltfBuffers, ElsewhereAreRefusedHoweverTheyAreWritten) {
+  write_buffer("../box.bin");
+  const std::string outside = (folder_ / "box.bin").string();
+  for (const std::string& uri :
+       {std::string("../box.bin"), std::string("%2e%2e/box.bin"), std::string("%2E./box.bin"),
+        std::string("..%2fbox.bin"), std::string("data/%2e%2e/%2e%2e/box.bin"), outside,
+        "%2f" + outside.substr(1), "file://" + outside, std::string("https://a.org/box.bin")}) {
+    EXPECT_EQ(refusal_of(uri).rfind(
+                  path_ + ": /buffers/0/uri: expected a file in the same folder or one within", 0),
+              0U)
+        << uri << ": " << refusal_of(uri);
   }
-  EXPECT_EQ(base64_decoded("Zg"), "f");
-  EXPECT_FALSE(base64_decoded("Z"));
-  EXPECT_FALSE(base64_decoded("Zm9v!"));
+  for (const std::string uri : {"box%2", "box%zz.bin", "box%00.bin", "%"})
+    EXPECT_NE(refusal_of(uri).find("hexadecimal"), std::string::npos) << uri;
+  EXPECT_NE(refusal_of("data").find("expected a file"), std::string::npos) << refusal_of("data");
 }
 
 }  // namespace

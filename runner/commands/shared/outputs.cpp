@@ -112,9 +112,15 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
   check();
 }
 
-void Outputs::protect(const stimuli::ObjectSpec& object) {
+void Outputs::protect_files(const stimuli::ObjectSpec& object) {
   inputs_.add(object.file, "it is a mesh that is read, and would be overwritten");
-  for (const stimuli::ObjectSpec& part : object.parts) protect(part);
+  for (const std::string& file : object.files_read)
+    inputs_.add(file, object.file_name + " takes its data from it, it would be overwritten");
+  for (const stimuli::ObjectSpec& part : object.parts) protect_files(part);
+}
+
+void Outputs::protect(const stimuli::ObjectSpec& object) {
+  protect_files(object);
   check();
 }
 

@@ -26,7 +26,8 @@ class Outputs {
           std::initializer_list<const char*> options, std::initializer_list<const char*> inputs,
           const char* folder = nullptr);
 
-  /// Protects the mesh files of an object, which no option names. \throws UsageError.
+  /// Protects all files that the meshes of an object were read from, which no option names.
+  /// \throws UsageError.
   void protect(const stimuli::ObjectSpec& object);
 
   bool wanted(const char* option) const { return values_.count(option) > 0; }
@@ -43,6 +44,7 @@ class Outputs {
     std::string option, path, text;
   };
   void check() const;
+  void protect_files(const stimuli::ObjectSpec& object);
   const boost::program_options::variables_map& values_;
   bool force_ = false;
   data::ProtectedFiles inputs_;

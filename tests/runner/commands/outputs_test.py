@@ -3,10 +3,12 @@
 Usage: outputs_test.py PALPATE PROTOCOLS
 """
 
+import json
 import os
 import pathlib
 import shutil
 import stat
+import struct
 import subprocess
 import sys
 import tempfile
@@ -97,6 +99,28 @@ class Outputs(unittest.TestCase):
         scene, solid = self.write("scene.json", MESH), self.write("solid.obj", SOLID)
         for more in (["--trajectory", self.path, "--out"], ["--explain", "--json"]):
             self.refused(["render", "--scene", scene, "--renderer", "point", *more[:-1]], more[-1][2:], solid, "--force")
+
+    def test_what_a_mesh_takes_its_data_from_is_an_input(self):
+        solid = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+        corners = (0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3)
+        buffer = self.dir / "my mesh.bin"
+        buffer.write_bytes(b"".join(struct.pack("<3f", *v) for v in solid) + struct.pack("<12H", *corners))
+        self.write("solid.gltf", json.dumps({
+            "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
+                          {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+            "buffers": [{"byteLength": 72, "uri": "my%20mesh.bin"}]}))
+        mesh = {"shape": "mesh", "file": "solid.gltf"}
+        (self.dir / "link.bin").symlink_to(buffer)
+        for objects in ([mesh], [{"shape": "compound", "parts": [{"shape": "cube", "edge_m": 0.1}, mesh]}]):
+            scene = self.write("scene.json", json.dumps({"objects": objects}))
+            render = ["render", "--scene", scene, "--renderer", "point"]
+            for out in (buffer, self.dir / "link.bin"):
+                self.refused(render + ["--trajectory", self.path], "out", out, "--force")
+                self.refused(render + ["--explain"], "json", out, "--force")
+            self.palpate(*render, "--trajectory", self.path, "--out", self.dir / "other.csv", "--force")
 
     def test_no_output_is_a_database_or_beside_one(self):
         other = self.dir / "other.db"
