@@ -202,6 +202,17 @@ TEST_F(MeshFile, ReadsTheFormsOfObj) {
   }
 }
 
+TEST_F(MeshFile, LinesOfAnObjEndInAnyWay) {
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 \\\n4";
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string text;
+    for (const char c : obj) text += c == '\n' ? end : std::string(1, c);
+    EXPECT_EQ(facets_of(read("a.obj", text)), 4U);
+    expect_fault("a.obj", text + end + "f 1 2 9", ": line 10: expected vertex numbers up to 4");
+  }
+}
+
 TEST_F(MeshFile, AByteOrderMarkHidesNothing) {
   const std::string mark = "\xEF\xBB\xBF";
   const std::string obj =

@@ -71,7 +71,7 @@ TEST(MeshGltfFaults, NameThePlaceAndWhatWasExpected) {
   expect("\"count\": 8", "\"count\": 9",
          "/accessors/0: expected room for 9 values of 12 bytes in its bufferView, found 96 bytes");
   expect("\"count\": 8", "\"count\": 7",
-         "/accessors/1: expected numbers of vertices from 0 to 6, found 7 as number 14");
+         "/accessors/1: expected numbers of vertices from 0 to 6, found 7 as number 8");
   expect("\"count\": 36", "\"count\": 35",
          "/meshes/0/primitives/0: expected three corners for each triangle, found 35");
   expect("\"byteLength\": 72", "\"byteLength\": 73",
@@ -142,7 +142,13 @@ TEST(MeshGltfFaults, TransformsAreRotationsAndNumbers) {
             "a.gltf: /nodes/0/translation: expected a list of 3 numbers, found a list of 3");
   EXPECT_EQ(of_node("\"matrix\": [1,0,0,0.5, 0,1,0,0, 0,0,1,0, 0,0,0,1]"),
             "a.gltf: /nodes/0/matrix/3: expected 0 (no perspective), found 0.5");
-  EXPECT_NE(of_node("\"scale\": [1e300, 1e300, 1], \"translation\": [1e308, 0, 0]"), "taken");
+  EXPECT_EQ(of_node("\"scale\": [1, 0, 1]"),
+            "a.gltf: /nodes/0: expected a mesh that is placed as a solid, found a scale of 0");
+  const std::string huge = "\"scale\": [1e200, 1e200, 1e200]";
+  EXPECT_EQ(
+      refusal_of(document("[{\"children\": [1], " + huge + "}, {\"mesh\": 0, " + huge + "}]")),
+      "a.gltf: /meshes/0/primitives/0: expected finite coordinates where its node places it, "
+      "found others");
 }
 
 TEST(MeshGltfFaults, LengthsInABinaryFileAreChecked) {
