@@ -202,4 +202,26 @@ void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, 
   c.contact.type = ContactType::segment_face;
 }
 
+void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
+                        const Vec3& d, double slack, LoadedContact& c) {
+  std::uint32_t index = hit.feature.index;
+  if (hit.feature.kind == Kind::edge) {
+    const stimuli::Edge& edge = mesh.edges()[index];
+    const double left = glm::dot(mesh.facets()[edge.left].normal, d);
+    const double right = glm::dot(mesh.facets()[edge.right].normal, d);
+    index = std::abs(left) <= std::abs(right) ? edge.left : edge.right;
+  }
+  const stimuli::Facet& facet = mesh.facets()[index];
+  const double angle = turned(glm::dot(facet.normal, d), glm::length(d));
+  if (std::abs(angle) >= 1) return;
+  tick::Portion portion;
+  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+    const stimuli::Side& side = mesh.sides()[i];
+    portion.clip(glm::dot(side.inward, tip) - side.offset + slack, glm::dot(side.inward, d));
+  }
+  if (!(portion.enter <= portion.leave)) return;
+  c.probe_fraction = 0.5 * ((1 + angle) * portion.enter + (1 - angle) * portion.leave);
+  c.contact.type = ContactType::segment_face;
+}
+
 }  // namespace palpate::rendering

@@ -12,8 +12,8 @@
 
 namespace palpate::rendering {
 
-/// A contact farther off its facet than so many skins has left it.
-inline constexpr double kSlidOff = 4;
+/// Faces nearer to each other than so many skins abut.
+inline constexpr double kAbutting = 4;
 
 /// The ideal tool of one group, in one tick. Translations are relative to the virtual tool's tip.
 class IdealTool {
@@ -40,7 +40,7 @@ class IdealTool {
   ToolPose first_contact(const ToolPose& from, bool& entered);
 
   // ideal_tool_turn.cpp
-  void turn(const ToolPose& from);
+  double turn(const ToolPose& from, double most);
   bool settle(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
               double most_push);
   bool push_out(const Vec3& from, double most_push);
@@ -51,8 +51,11 @@ class IdealTool {
   void translate();
   bool next_hit(const Vec3& goal, std::uint32_t& near, PairCast& first);
   void move_to_hit(const Vec3& goal, std::uint32_t near, const PairCast& hit);
-  bool let_go_of_planes();
+  bool find_exact_place();
+  void let_go_of_idle_planes();
+  bool let_go_of_slid_planes(bool at_rest);
   bool slid_off(const Plane& plane) const;
+  bool slid_off_at_rest(const Plane& plane) const;
   bool parted_here(const NearPair& near) const;
 
   // ideal_tool_contacts.cpp
@@ -72,7 +75,8 @@ class IdealTool {
   NearPairs pairs_;
   const Tool* carried_;
   ToolPose pose_;  ///< its orientation; the tip is the virtual one plus at_
-  Vec3 at_;        ///< m, from the virtual tip to the ideal one
+  Vec3 at_;        ///< m, from the virtual tip to the ideal one, a skin off what it rests on
+  Vec3 exact_;     ///< m, the same without the skin, once it rests
   Planes planes_;
   bool stuck_ = false;
 };

@@ -13,8 +13,6 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-constexpr double kExact = 1e-5;  // of the skin; what is nearer than this is rounding
-
 }  // namespace
 
 /// Equation (2) over all faces that the segment lies along, of the part that carries it and of
@@ -34,7 +32,7 @@ void IdealTool::spread_over_parts(const NearPair& carrying, const WalkResult& hi
     faced[count++] = {&beside, pairs_.state_of(other).feature, beside.local_point(world_tip),
                       other.true_d};
   }
-  spread_over_faces(std::span<const FacedPart>(faced.data(), count), hit, kSlidOff * group_.skin,
+  spread_over_faces(std::span<const FacedPart>(faced.data(), count), hit, kAbutting * group_.skin,
                     c);
 }
 
@@ -56,6 +54,8 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   at.feature = plane.feature;
   if (tick_.sides) {
     tick::SegmentProbe::classify(*part.mesh, at, tip, near.true_d, glm::length(near.true_d), c);
+    if (c.contact.type != ContactType::segment_face)
+      place_along_border(*part.mesh, at, tip, near.true_d, kAbutting * group_.skin, c);
     if (part.shallow_ridges || c.contact.type == ContactType::segment_face)
       spread_over_parts(near, at, tip, c);
   } else {
@@ -82,9 +82,7 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
 /// Contacts from the planes that hold the tool, without the skin.
 void IdealTool::add_contacts() {
   Vec3& shift = memory_.shift;
-  shift = at_;
-  stuck_ = stuck_ || (!planes_.nearest(Vec3(0), 0, kExact * group_.skin, shift) &&
-                      !planes_.nearest(Vec3(0), 0, group_.skin / 8, shift));
+  shift = stuck_ ? at_ : exact_;
   if (stuck_) {
     // It stays where it is, and all of the force is that of the plane that holds most of it.
     tick_.faults |= render_fault::kContactCapped;

@@ -7,7 +7,10 @@ namespace palpate::rendering {
 namespace {
 
 constexpr int kRounds = 96;         // of casts in one tick; then the ideal tool stays where it is
-constexpr double kOnFacet = 1e-11;  // of the size, the same where the skin is thin
+constexpr double kSlidOff = 4;      // skins; a contact farther off its facet has left it,
+constexpr double kOnFacet = 1e-11;  // or farther than this of the size, where the skin is thin
+constexpr double kAtRest = 2e-12;   // of the size: the same without the skin, all else is rounding
+constexpr double kExact = 1e-5;     // of the skin; what is nearer than this is rounding
 constexpr double kSamePlace = 8;    // skins; within it a contact that comes back never left
 
 }  // namespace
@@ -47,11 +50,21 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
   return first.time <= 1;
 }
 
+/// Whether the tool, on its way and a skin away, is past the facet.
 bool IdealTool::slid_off(const Plane& plane) const {
   const NearPair& near = pairs_[plane.near];
   const stimuli::ConvexMesh& mesh = *pairs_.part_of(near).mesh;
   const double slack = kSlidOff * group_.skin + kOnFacet * (mesh.size() + glm::length(near.d));
   return distance_off(mesh, plane.feature, pairs_.local(near, at_), near.d) > slack;
+}
+
+/// The same where it rests, without the skin.
+bool IdealTool::slid_off_at_rest(const Plane& plane) const {
+  const NearPair& near = pairs_[plane.near];
+  const ScenePart& part = pairs_.part_of(near);
+  const double slack = kAtRest * (part.mesh->size() + glm::length(near.true_d));
+  const Vec3 tip = near.true_tip + part.local_vector(exact_);
+  return distance_off(*part.mesh, plane.feature, tip, near.true_d) > slack;
 }
 
 /// Whether the pair let go of the ideal tool where that is now, within rounding.
@@ -61,23 +74,35 @@ bool IdealTool::parted_here(const NearPair& near) const {
   return near.parted && glm::dot(apart, apart) <= same * same;
 }
 
-/// Lets go of planes that hold nothing, and of those whose facet the tool has slid off. True when
-/// there is one of the latter.
-bool IdealTool::let_go_of_planes() {
+/// Lets go of planes that hold nothing.
+void IdealTool::let_go_of_idle_planes() {
+  planes_.remove_if([&](const Plane& plane) {
+    if (plane.multiplier > 0) return false;
+    pairs_[plane.near].carries = false;
+    return true;
+  });
+}
+
+/// Lets go of planes whose facet the tool has slid off. True when there are some.
+bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   bool slid = false;
   planes_.remove_if([&](const Plane& plane) {
     NearPair& near = pairs_[plane.near];
-    const bool off = plane.multiplier > 0 && !(plane.stays && parted_here(near)) && slid_off(plane);
-    if (plane.multiplier > 0 && !off) return false;
+    if (plane.stays && parted_here(near)) return false;
+    if (!(at_rest ? slid_off_at_rest(plane) : slid_off(plane))) return false;
     near.carries = false;
-    if (off) {
-      near.parted = true;
-      near.parted_at = at_;
-      slid = true;
-    }
+    near.parted = true;
+    near.parted_at = at_;
+    slid = true;
     return true;
   });
   return slid;
+}
+
+/// Where the tool rests without the skin; sets the multipliers. False where rounding hides it.
+bool IdealTool::find_exact_place() {
+  return planes_.nearest(Vec3(0), 0, kExact * group_.skin, exact_) ||
+         planes_.nearest(Vec3(0), 0, group_.skin / 8, exact_);
 }
 
 void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCast& hit) {
@@ -88,17 +113,15 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   const double height = glm::dot(plane.normal, at_) - plane.depth;
   const double time = rate < 0 ? std::clamp((height - group_.skin) / -rate, 0.0, hit.time) : 0.0;
   at_ += time * way;
-  if (time * glm::length(way) > kSamePlace * group_.skin) let_go_of_planes();
+  if (time * glm::length(way) > kSamePlace * group_.skin) {
+    let_go_of_idle_planes();
+    let_go_of_slid_planes(false);
+  }
   NearPair& near = pairs_[index];
   plane.stays = parted_here(near);
   near.carries = true;
   pairs_.state_of(near).feature = plane.feature;
-  if (planes_.full())
-    planes_.remove_if([&](const Plane& old) {
-      if (old.multiplier > 0) return false;
-      pairs_[old.near].carries = false;
-      return true;
-    });
+  if (planes_.full()) let_go_of_idle_planes();
   if (planes_.full()) {
     near.carries = false;
     stuck_ = true;
@@ -123,7 +146,9 @@ void IdealTool::translate() {
       continue;
     }
     at_ = goal;
-    if (!let_go_of_planes()) return;
+    let_go_of_idle_planes();
+    if (!find_exact_place()) break;
+    if (!let_go_of_slid_planes(true)) return;
   }
   stuck_ = true;
 }

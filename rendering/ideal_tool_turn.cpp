@@ -8,9 +8,9 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-constexpr int kPushRounds = 12;  // to get out of what a turn brought the tool into
-constexpr int kHalvings = 4;     // of a turn that fails; then it waits for the next tick
-constexpr double kFarPush = 8;   // times the turn's own motion; farther is no way out
+constexpr int kPushRounds = 12;          // to get out of what a turn brought the tool into
+constexpr double kLeastTurn = 1.0 / 16;  // of a turn that fails; then it waits for the next tick
+constexpr double kFarPush = 8;           // times the turn's own motion; farther is no way out
 
 }  // namespace
 
@@ -31,7 +31,8 @@ bool IdealTool::put_plane(std::uint32_t index, ContactFeature feature) {
 
 /// Turns the ideal tool as the virtual one has turned, about where it touches, as far as the parts
 /// let it.
-void IdealTool::turn(const ToolPose& from) {
+/// \param most  of the turn \return what it took of it, 0 to 1
+double IdealTool::turn(const ToolPose& from, double most) {
   const PlacedTool before = pairs_.placed(from), after = pairs_.placed(tick_.tool);
   const Vec3 shift = turned(memory_.grasp, from) - turned(memory_.grasp, tick_.tool);
   double motion = 0;
@@ -48,21 +49,21 @@ void IdealTool::turn(const ToolPose& from) {
     pose_ = tick_.tool;
     at_ = from.tip - tick_.tool.tip;
     pairs_.orient(before);
-    return;
+    return 0;
   }
-  double fraction = 1;
-  for (int i = 0; i <= kHalvings; ++i, fraction *= 0.5) {
-    ToolPose to = i == 0 ? tick_.tool : between(from, tick_.tool, fraction);
+  for (double fraction = most; fraction >= kLeastTurn; fraction *= 0.5) {
+    ToolPose to = fraction == 1 ? tick_.tool : between(from, tick_.tool, fraction);
     to.tip = from.tip + turned(memory_.grasp, from) - turned(memory_.grasp, to);
     if (settle(from, before, to, far)) {
       pose_ = to;
-      return;
+      return fraction;
     }
   }
   pose_ = from;
   at_ = from.tip - tick_.tool.tip;
   planes_.clear();
   pairs_.orient(before);
+  return 0;
 }
 
 /// Whether a turned tool gets out of all parts near where it is; then it is there.

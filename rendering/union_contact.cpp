@@ -75,9 +75,14 @@ void IdealTool::follow() {
     from = first_contact(tick_.state.has_last ? all_.last : tick_.tool, entered);
     if (!entered) return;
   }
-  turn(from);
-  resume_planes();
-  translate();
+  // A turn that leads into a crack, or to no rest, is halved.
+  double most = 1;
+  do {
+    most = 0.5 * turn(from, most);
+    stuck_ = false;
+    resume_planes();
+    translate();
+  } while (most > 0 && (stuck_ || !planes_.leave_room()));
   const std::size_t first_contact = all_.contacts.size();
   add_contacts();
   remember(first_contact);

@@ -40,6 +40,23 @@ class Planes {
         planes_.begin());
   }
 
+  /// Whether the planes, all of which hold the tool, leave it room: not where they are a crack.
+  bool leave_room() const {
+    // Sine of half the opening of the narrowest groove that a tool turns into. In narrower ones the
+    // apex is lost in rounding; between parts that abut a tool would turn for ever.
+    constexpr double kNarrowest = 5e-5;
+    if (count_ < 2) return true;
+    if (count_ == 2) {
+      const double cosine = glm::dot(planes_[0].normal, planes_[1].normal);
+      return 1 + cosine > 2 * kNarrowest * kNarrowest;
+    }
+    std::array<PlaneBound, kMostPlanes> raised;
+    for (std::size_t i = 0; i < count_; ++i) raised[i] = {planes_[i].normal, 1};
+    const ConstrainedPoint out =
+        constrained_point(std::span<const PlaneBound>(raised.data(), count_), 1e-6);
+    return out.found && glm::dot(out.point, out.point) * (kNarrowest * kNarrowest) < 1;
+  }
+
   /// The point nearest to `origin` at least `skin` above all planes; sets the multipliers.
   bool nearest(const Vec3& origin, double skin, double tolerance, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;

@@ -4,6 +4,7 @@
 #include <array>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 
 namespace palpate::rendering {
 namespace {
@@ -11,6 +12,8 @@ namespace {
 // Planes whose normals span less than this (squared sine, or the squared volume of three) meet in
 // no point or line that rounding leaves in place.
 constexpr double kDependent = 1e-13;
+
+constexpr double kMostMultiple = 1e5;  // of a vector's length
 
 /// The multipliers with which `from` comes to lie on all the planes chosen.
 bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
@@ -88,6 +91,60 @@ std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const Half
     }
   }
   return nearest;
+}
+
+namespace {
+
+/// Normals that span a line, a plane or the space, with what gives a vector's multiple of each:
+/// its product with `up`.
+struct Generators {
+  std::array<Vec3, 3> normals, up;
+  std::size_t count = 0;
+
+  /// m; what the non-negative multiples leave of the vector; infinity where one is negative, or so
+  /// large that what is left is rounding.
+  double rest(const Vec3& vector) const {
+    Vec3 left = vector;
+    std::array<double, 3> multiples{};
+    for (int step = 0; step < 2; ++step) {  // the second takes out the rounding of the first
+      const Vec3 before = left;
+      for (std::size_t i = 0; i < count; ++i) {
+        const double more = glm::dot(up[i], before);
+        multiples[i] += more;
+        left -= more * normals[i];
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!(multiples[i] >= 0 && multiples[i] <= kMostMultiple * glm::length(vector)))
+        return std::numeric_limits<double>::infinity();
+    }
+    return glm::length(left);
+  }
+};
+
+}  // namespace
+
+double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals) {
+  double least = glm::length(vector);
+  const auto try_on = [&](const Generators& some) { least = std::min(least, some.rest(vector)); };
+  const std::size_t n = normals.size();
+  for (std::size_t a = 0; a < n; ++a) {
+    const Vec3& p = normals[a];
+    try_on({{p}, {p}, 1});
+    for (std::size_t b = a + 1; b < n; ++b) {
+      const Vec3& q = normals[b];
+      const Vec3 pq = glm::cross(p, q);
+      const double sine2 = glm::dot(pq, pq);
+      if (sine2 > 0) try_on({{p, q}, {glm::cross(q, pq) / sine2, glm::cross(pq, p) / sine2}, 2});
+      for (std::size_t c = b + 1; c < n; ++c) {
+        const Vec3& r = normals[c];
+        const double volume = glm::dot(pq, r);
+        if (volume == 0) continue;
+        try_on({{p, q, r}, {glm::cross(q, r) / volume, glm::cross(r, p) / volume, pq / volume}, 3});
+      }
+    }
+  }
+  return least;
 }
 
 }  // namespace palpate::rendering

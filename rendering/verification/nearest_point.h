@@ -27,4 +27,9 @@ struct NearestPoint {
 std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const HalfSpace> planes,
                                           double tolerance);
 
+/// m; how far a vector is from all sums of non-negative multiples of the normals. In 3 dimensions
+/// the nearest of them has at most three terms, which are all tried.
+/// \param normals  unit
+double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals);
+
 }  // namespace palpate::rendering

@@ -14,8 +14,17 @@
 namespace palpate::rendering {
 namespace {
 
+// Compilers choose the order of a call's arguments: every draw is a statement of its own, or a walk
+// would not be the same everywhere.
+
 double between(stimuli::Random& random, double low, double high) {
   return low + (high - low) * random.unit();
+}
+
+Vec3 vector_between(stimuli::Random& random, double low, double high) {
+  Vec3 drawn;
+  for (int k = 2; k >= 0; --k) drawn[k] = between(random, low, high);
+  return drawn;
 }
 
 Vec3 random_direction(stimuli::Random& random) {
@@ -53,11 +62,14 @@ stimuli::PolygonSoup random_convex(stimuli::Random& random) {
   switch (random.below(6)) {
     case 0:
       return stimuli::icosphere(0.5, static_cast<int>(random.below(2)));
-    case 1:
-      return stimuli::cone(0.5, between(random, 0.6, 1.5), static_cast<int>(3 + random.below(9)));
-    case 2:
-      return stimuli::cylinder(0.5, between(random, 0.6, 1.5),
-                               static_cast<int>(3 + random.below(9)));
+    case 1: {
+      const auto sides = static_cast<int>(3 + random.below(9));
+      return stimuli::cone(0.5, between(random, 0.6, 1.5), sides);
+    }
+    case 2: {
+      const auto sides = static_cast<int>(3 + random.below(9));
+      return stimuli::cylinder(0.5, between(random, 0.6, 1.5), sides);
+    }
     default:
       return stimuli::cube(1);
   }
@@ -135,18 +147,19 @@ OracleParts random_cluster(stimuli::Random& random, int parts) {
   Vec3 corner(-0.02);  // of the next box that abuts the one before
   while (static_cast<int>(cluster.size()) < parts) {
     if (random.below(3) == 0) {
-      const Vec3 size(between(random, 0.01, 0.03), between(random, 0.01, 0.03),
-                      between(random, 0.01, 0.03));
+      const Vec3 size = vector_between(random, 0.01, 0.03);
       cluster.push_back(box_part(corner, corner + size));
       const auto axis = static_cast<int>(random.below(3));
       corner[axis] += size[axis];
       continue;
     }
     const Quat turn = random.below(4) == 0 ? Quat(1, 0, 0, 0) : stimuli::uniform_rotation(random);
-    const Vec3 factors(between(random, 0.4, 1), between(random, 0.4, 1), between(random, 0.4, 1));
-    cluster.push_back(part_of(turned_and_moved(
-        stretched(random_convex(random), factors), turn, between(random, 0.02, 0.05),
-        between(random, 0, 0.025) * random_direction(random))));
+    const Vec3 factors = vector_between(random, 0.4, 1);
+    const Vec3 direction = random_direction(random);
+    const Vec3 place = between(random, 0, 0.025) * direction;
+    const double size = between(random, 0.02, 0.05);
+    const stimuli::PolygonSoup solid = stretched(random_convex(random), factors);
+    cluster.push_back(part_of(turned_and_moved(solid, turn, size, place)));
   }
   return cluster;
 }
@@ -156,7 +169,8 @@ OracleTool random_tool(stimuli::Random& random, int segments) {
   while (static_cast<int>(tool.size()) < segments) {
     const OracleSegment& at = tool[random.below(tool.size())];
     const Vec3 from = random.below(2) == 0 ? at.from : at.to;
-    tool.push_back({from, from + between(random, 0.01, 0.05) * random_direction(random)});
+    const Vec3 direction = random_direction(random);
+    tool.push_back({from, from + between(random, 0.01, 0.05) * direction});
   }
   return tool;
 }
@@ -174,11 +188,13 @@ std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OraclePa
   const auto next_tip = [&](const Quat& turned) {
     const OracleSegment& segment = tool[random.below(tool.size())];
     const Vec3 led = segment.from + random.unit() * (segment.to - segment.from);
-    return between(random, 0.3, 1.2) * radius * random_direction(random) - turned * led;
+    const Vec3 direction = random_direction(random);
+    return between(random, 0.3, 1.2) * radius * direction - turned * led;
   };
   // It comes in straight, from just off the object.
   const UnionOracle oracle(parts, tool);
-  const Vec3 first = next_tip(orientation), outwards = random_direction(random);
+  const Vec3 first = next_tip(orientation);
+  const Vec3 outwards = random_direction(random);
   OraclePose at{first, glm::mat3_cast(orientation)};
   while (oracle.depth(at) > -kClear) at.tip += kClear * outwards;
   std::vector<OraclePose> path{at};
@@ -194,8 +210,9 @@ std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OraclePa
   };
   lead_to(first, orientation);
   while (path.size() < ticks) {
-    const Quat turned = glm::normalize(
-        glm::angleAxis(between(random, 0, kMostTurn), random_direction(random)) * orientation);
+    const Vec3 axis = random_direction(random);
+    const Quat turned =
+        glm::normalize(glm::angleAxis(between(random, 0, kMostTurn), axis) * orientation);
     lead_to(next_tip(turned), turned);
   }
   return path;

@@ -90,18 +90,18 @@ void Descent::choose(std::size_t next, std::vector<HalfSpace>& planes, Choice& b
   }
 }
 
-std::optional<NearestPoint> Descent::above_all_touched(const Vec3& tip) const {
-  std::vector<HalfSpace> planes;
+double Descent::unbalanced(const Vec3& tip) const {
+  std::vector<Vec3> normals;
   for (const OracleSum& sum : sums_) {
     for (const std::size_t facet : touched_facets(sum, tip, touching_)) {
-      const OraclePlane& plane = sum.planes[facet];
-      const bool known = std::any_of(planes.begin(), planes.end(), [&](const HalfSpace& other) {
-        return glm::length(other.normal - plane.normal) < 1e-12;
+      const Vec3& normal = sum.planes[facet].normal;
+      const bool known = std::any_of(normals.begin(), normals.end(), [&](const Vec3& other) {
+        return glm::length(other - normal) < 1e-15;
       });
-      if (!known) planes.push_back({plane.normal, plane.offset});
+      if (!known) normals.push_back(normal);
     }
   }
-  return nearest_point(virtual_tip_, planes, kRoundingOfTouching * touching_);
+  return distance_to_cone(tip - virtual_tip_, normals);
 }
 
 double Descent::free_way(const Vec3& tip, const Vec3& goal) const {

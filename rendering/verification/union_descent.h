@@ -2,7 +2,6 @@
 // Steepest descent of a point towards another one outside of convex sums, each given by all of its
 // planes. Of union_oracle.cpp alone.
 
-#include <optional>
 #include <vector>
 
 #include "rendering/verification/nearest_point.h"
@@ -34,9 +33,9 @@ class Descent {
   /// way. \return false when rounding leaves no such point
   bool goal(const Vec3& tip, Choice& best);
 
-  /// The point nearest to the virtual tip above all facets that are touched. Empty when rounding
-  /// leaves none
-  std::optional<NearestPoint> above_all_touched(const Vec3& tip) const;
+  /// m; what of the way from the virtual tip is no sum of non-negative multiples of the normals of
+  /// facets that are touched.
+  double unbalanced(const Vec3& tip) const;
 
   /// How much of the straight way to the goal lies outside all sums, with the facets of the choice
   /// bounding those that are touched. In [0, 1].

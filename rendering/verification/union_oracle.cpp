@@ -221,9 +221,7 @@ OracleAudit UnionOracle::audit(const OraclePose& ideal, const Vec3& virtual_tip,
   }
   Choice choice;
   Descent descent(all, virtual_tip, touching);
-  const auto above = descent.above_all_touched(ideal.tip);
-  audit.unbalanced =
-      above ? glm::length(above->point - ideal.tip) : std::numeric_limits<double>::quiet_NaN();
+  audit.unbalanced = descent.unbalanced(ideal.tip);
   audit.descent = descent.goal(ideal.tip, choice) ? glm::length(choice.goal.point - ideal.tip)
                                                   : std::numeric_limits<double>::quiet_NaN();
   return audit;

@@ -14,6 +14,7 @@ constexpr double kSpring = 800;                       // N/m
 constexpr double kInside = 1e-12, kMinimal = 1e-9;    // sizes
 constexpr double kTouching = 1e-11;                   // sizes
 constexpr double kFlat = 2 * std::numbers::pi / 180;  // rad
+const double kSinBlend = std::sin(kFlat / 2);         // of equation (2)
 constexpr double kTurned = 1e-9;                      // rad; less is rounding
 constexpr std::uint32_t kCounted = render_fault::kContactCapped | render_fault::kReleased;
 
@@ -124,12 +125,14 @@ class Walk {
     const Vec3 from = ideal_.place(walk_.tool[segment].from);
     const Vec3 to = ideal_.place(walk_.tool[segment].to);
     const double aside = distance_to_segment(r.deepest.point, from, to);
-    const bool flat = r.deepest.type == ContactType::segment_face;  // (2) is no single place
     const UnionOracle place(walk_.parts, {{Vec3(0), Vec3(0)}});
-    const double off = flat ? 0 : std::abs(place.depth({r.deepest.point, Mat3(1)}));
+    const double above = -place.depth({r.deepest.point, Mat3(1)});
+    // (2) is no single place, but it is over a face that the segment lies along.
+    const double most_above =
+        r.deepest.type == ContactType::segment_face ? kSinBlend * glm::length(to - from) : 0;
+    const double off = std::max({aside, above - most_above, -above});
     const double rounded = 1e-9 * (oracle_.size() + oracle_.reach());
-    wrong(std::max(aside, off) > rounded, counts_.off_place, "contact off its place by",
-          std::max(aside, off));
+    wrong(off > rounded, counts_.off_place, "contact off its place by", off);
   }
 
   /// The oracle from the same last pose.

@@ -61,7 +61,8 @@ class Bytes {
 OraclePart grid_part(Bytes& bytes) {
   stimuli::PolygonSoup soup = stimuli::cube(1);
   const Vec3 low = bytes.grid_point(3);
-  const Vec3 size = kGrid * Vec3(1 + bytes.below(4), 1 + bytes.below(4), 1 + bytes.below(4));
+  Vec3 size;
+  for (int k = 2; k >= 0; --k) size[k] = kGrid * (1 + bytes.below(4));
   for (Vec3& v : soup.vertices) v = low + (v + Vec3(0.5)) * size;
   if (bytes.below(3) == 0) {  // its upper side moved along x: slopes
     for (Vec3& v : soup.vertices) {

@@ -22,13 +22,13 @@ inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, cons
   const std::uint64_t count = 2 + random.below(7);
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto edge = [&] { return 0.01 + 0.03 * random.unit(); };
-    Vec3 half = 0.5 * Vec3(edge(), edge(), edge());
+    Vec3 half = 0.5 * Vec3{edge(), edge(), edge()};
     if (random.below(4) == 0) half.z = 5e-4;  // a thin plate
     stimuli::PolygonSoup soup = random.below(4) == 0
                                     ? random_polyhedron(random, 12, Vec3(0.02, 0.015, 0.01))
                                     : box_soup(-half, half);
     for (Vec3& v : soup.vertices) v *= scale;
-    const Pose at{0.02 * scale * Vec3(random.normal(), random.normal(), random.normal()),
+    const Pose at{0.02 * scale * Vec3{random.normal(), random.normal(), random.normal()},
                   stimuli::uniform_rotation(random)};
     parts.push_back(placed_object(
         mesh_of(soup),
@@ -44,7 +44,7 @@ inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments
   for (std::size_t j = 0; j < segments; ++j) {
     const Vec3 from = j == 0 ? Vec3(0) : tool.segments.back().to;
     const Vec3 along =
-        j == 0 ? Vec3(0, 0, 0.05) : 0.02 * Vec3(random.normal(), random.normal(), random.normal());
+        j == 0 ? Vec3(0, 0, 0.05) : 0.02 * Vec3{random.normal(), random.normal(), random.normal()};
     tool.segments.push_back({from, from + scale * along});
   }
   return tool;

@@ -77,10 +77,10 @@ TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
     std::vector<HalfSpace> planes;
     const std::size_t count = random.below(7);
     for (std::size_t i = 0; i < count; ++i) {
-      planes.push_back(
-          {stimuli::uniform_rotation(random) * Vec3(0, 0, 1), 2 * random.unit() - 1.5});
+      const Vec3 normal = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+      planes.push_back({normal, 2 * random.unit() - 1.5});
     }
-    const Vec3 from(random.normal(), random.normal(), random.normal());
+    const Vec3 from{random.normal(), random.normal(), random.normal()};
     const auto nearest = nearest_point(from, planes, 1e-14);
     if (!nearest) continue;
     ++found;
@@ -104,6 +104,39 @@ TEST(NearestPoint, OfNothingIsNone) {
   EXPECT_FALSE(nearest_point(Vec3(0), apart, 1e-14).has_value());
 }
 
+// A vector is as far from a cone as it is from its nearest point there.
+TEST(DistanceToCone, IsThatOfTheNearestPoint) {
+  const std::array<Vec3, 3> corner{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+  EXPECT_EQ(distance_to_cone({1, 2, 3}, corner), 0);
+  EXPECT_EQ(distance_to_cone({1, 2, -3}, corner), 3);
+  EXPECT_EQ(distance_to_cone({-3, 2, -4}, corner), 5);
+  EXPECT_EQ(distance_to_cone({-3, 0, -4}, {}), 5);
+  // Moreau: what is left is the nearest point of the polar cone.
+  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+    stimuli::Random random(seed, {4});
+    std::vector<Vec3> normals;
+    std::vector<HalfSpace> polar;
+    for (std::size_t count = random.below(6); normals.size() < count;) {
+      normals.push_back(stimuli::uniform_rotation(random) * Vec3(0, 0, 1));
+      polar.push_back({-normals.back(), 0});
+    }
+    const Vec3 vector{random.normal(), random.normal(), random.normal()};
+    const auto left = nearest_point(vector, polar, 1e-14);
+    ASSERT_TRUE(left) << seed;
+    EXPECT_NEAR(distance_to_cone(vector, normals), glm::length(left->point), 1e-12) << seed;
+  }
+}
+
+TEST(DistanceToCone, IsExactBetweenNearlyAntiparallelNormals) {
+  for (const double opening : {1e-1, 1e-2, 1e-3, 1e-4}) {
+    const std::array<Vec3, 2> wedge{glm::normalize(Vec3(opening, 0, 1)),
+                                    glm::normalize(Vec3(opening, 0, -1))};
+    EXPECT_LE(distance_to_cone({1, 0, 0.3}, wedge), 1e-11) << opening;
+    EXPECT_NEAR(distance_to_cone({1, 0.2, 0.3}, wedge), 0.2, 1e-11) << opening;
+    EXPECT_NEAR(distance_to_cone({-1, 0, 0}, wedge), 1, opening) << opening;
+  }
+}
+
 // The sums are those of the brute-force reference for one part.
 TEST(UnionOracle, DepthIsThatOfTheReference) {
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
@@ -114,7 +147,7 @@ TEST(UnionOracle, DepthIsThatOfTheReference) {
     for (int i = 0; i < 20; ++i) {
       const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
       const Vec3 tip =
-          mesh->centre() + 0.7 * size * Vec3(random.unit(), random.unit(), random.unit());
+          mesh->centre() + 0.7 * size * Vec3{random.unit(), random.unit(), random.unit()};
       const double reference = reference_depth(*mesh, {tip, tip + length * axis}).depth;
       if (reference <= 0) continue;
       EXPECT_NEAR(oracle.depth({tip, axes_along(axis)}), reference, 1e-12 * size) << seed;
@@ -163,8 +196,8 @@ TEST(UnionOracle, GroovesOf2To178Degrees) {
       const UnionOracle oracle(groove(opening), tool);
       stimuli::Random random(7);
       for (int i = 0; i < 40; ++i) {
-        const Vec3 bottom(0.002 * (random.unit() - 0.5), 0.02 * random.unit(),
-                          -0.003 * random.unit());
+        const Vec3 bottom{0.002 * (random.unit() - 0.5), 0.02 * random.unit(),
+                          -0.003 * random.unit()};
         Led led(oracle, {{0, 0.01, 0.055}, Mat3(1)});
         expect_near(led.straight_to(bottom, 50), groove_displacement(opening, bottom),
                     1e-15 / std::sin(opening / 2) + 1e-15, "opening, degrees", degrees);
@@ -272,9 +305,9 @@ TEST(UnionOracle, CutSolidsEqualWholeOnes) {
   long in_contact = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     stimuli::Random random(seed, {3});
-    const stimuli::PolygonSoup solid =
-        turned_and_moved(cut_cube(random, static_cast<int>(random.below(8))),
-                         stimuli::uniform_rotation(random), 0.05, Vec3(0));
+    const stimuli::PolygonSoup cut_once = cut_cube(random, static_cast<int>(random.below(8)));
+    const Quat turn = stimuli::uniform_rotation(random);
+    const stimuli::PolygonSoup solid = turned_and_moved(cut_once, turn, 0.05, Vec3(0));
     const OracleParts whole{part_of(solid)};
     const OracleParts cut = cut_to_pieces(solid, 1 + static_cast<int>(random.below(2)), random);
     const OracleTool tool = random_tool(random, 1 + static_cast<int>(random.below(3)));

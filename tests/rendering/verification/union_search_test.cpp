@@ -61,6 +61,37 @@ TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
   expect_nothing_wrong(3, 5836);
 }
 
+TEST(UnionSearch, NoToolTurnsIntoACrackBetweenPartsThatAbut) {
+  // Two walls back to back: half of the turn into their common plane, then half of the rest.
+  expect_nothing_wrong(1, 1836);
+  expect_nothing_wrong(2, 2865);
+  expect_nothing_wrong(3, 3401);
+  expect_nothing_wrong(3, 3578);
+  expect_nothing_wrong(3, 3921);
+}
+
+TEST(UnionSearch, WhatIsLeftByLessThanTheSkinIsLeft) {
+  // The virtual tool passes an edge of a facet, exactly but for what the ideal one is behind.
+  expect_nothing_wrong(1, 1325);
+  expect_nothing_wrong(1, 4253);
+  expect_nothing_wrong(3, 37);
+  expect_nothing_wrong(3, 2824);
+}
+
+TEST(UnionSearch, AToolOnACornerIsHeldByTheFacetItIsOn) {
+  // Another segment's facet there is nearly parallel.
+  expect_nothing_wrong(1, 3071);
+}
+
+TEST(UnionSearch, AContactAlongTheBorderOfAFaceIsOnTheFace) {
+  expect_nothing_wrong(1, 276);
+  expect_nothing_wrong(1, 5394);
+  expect_nothing_wrong(1, 5500);
+  expect_nothing_wrong(2, 1092);
+  expect_nothing_wrong(2, 4948);
+  expect_nothing_wrong(3, 3281);
+}
+
 TEST(UnionSearch, WhatWasLetGoOfComesBackOutside) { expect_nothing_wrong(1, 4418); }
 
 TEST(UnionSearch, DoesNotDependOnWhoWalks) {
