@@ -203,7 +203,7 @@ void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, 
 }
 
 void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
-                        const Vec3& d, double slack, LoadedContact& c) {
+                        const Vec3& d, double length, double slack, LoadedContact& c) {
   std::uint32_t index = hit.feature.index;
   if (hit.feature.kind == Kind::edge) {
     const stimuli::Edge& edge = mesh.edges()[index];
@@ -212,8 +212,9 @@ void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, 
     index = std::abs(left) <= std::abs(right) ? edge.left : edge.right;
   }
   const stimuli::Facet& facet = mesh.facets()[index];
-  const double angle = turned(glm::dot(facet.normal, d), glm::length(d));
-  if (std::abs(angle) >= 1) return;
+  const double slope = glm::dot(facet.normal, d);
+  if (std::abs(slope) >= tick::kSinBlendAngle * length) return;
+  const double angle = turned(slope, length);
   tick::Portion portion;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
     const stimuli::Side& side = mesh.sides()[i];

@@ -37,10 +37,10 @@ void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, 
 /// portion of it may be empty then, and the contact at an end of the segment that is far from the
 /// face.
 /// \param hit    the contact's feature, measured
-/// \param tip    of the ideal segment
+/// \param tip    of the ideal segment, from tip to tip + d, of that length
 /// \param slack  m, by which the face's polygon is larger
 /// \param c      changed where the segment is within the blend angle of the face
 void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
-                        const Vec3& d, double slack, LoadedContact& c);
+                        const Vec3& d, double length, double slack, LoadedContact& c);
 
 }  // namespace palpate::rendering

@@ -53,9 +53,10 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   WalkResult at = measure(*part.mesh, plane.feature, tip, near.true_d);
   at.feature = plane.feature;
   if (tick_.sides) {
-    tick::SegmentProbe::classify(*part.mesh, at, tip, near.true_d, glm::length(near.true_d), c);
+    const double length = glm::length(near.true_d);
+    tick::SegmentProbe::classify(*part.mesh, at, tip, near.true_d, length, c);
     if (c.contact.type != ContactType::segment_face)
-      place_along_border(*part.mesh, at, tip, near.true_d, kAbutting * group_.skin, c);
+      place_along_border(*part.mesh, at, tip, near.true_d, length, kAbutting * group_.skin, c);
     if (part.shallow_ridges || c.contact.type == ContactType::segment_face)
       spread_over_parts(near, at, tip, c);
   } else {
@@ -64,14 +65,12 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
   out.shift = shift;
   const Vec3 on_tool = segment.from + c.probe_fraction * segment.along;
   out.place = tick_.tool.tip + shift + on_tool;
-  const PlacedTool now = pairs_.placed(tick_.tool);
-  const PlacedTool before = tick_.state.has_last ? pairs_.placed(all_.last) : now;
-  const auto point_of = [&](const PlacedTool& tool) {
-    return tool.segments[near.segment].from + c.probe_fraction * tool.segments[near.segment].along;
-  };
-  out.motion = tick_.state.has_last
-                   ? tick_.tool.tip - all_.last.tip + point_of(now) - point_of(before)
-                   : Vec3(0);
+  if (tick_.state.has_last) {
+    const PlacedSegment now = pairs_.now().segments[near.segment];
+    const PlacedSegment last = pairs_.placed(all_.last, near.segment);
+    out.motion = tick_.tool.tip - all_.last.tip + (now.from + c.probe_fraction * now.along) -
+                 (last.from + c.probe_fraction * last.along);
+  }
   out.group = index_;
   out.pair = near.pair;
   out.segment = static_cast<int>(near.segment);

@@ -33,7 +33,8 @@ bool IdealTool::put_plane(std::uint32_t index, ContactFeature feature) {
 /// let it.
 /// \param most  of the turn \return what it took of it, 0 to 1
 double IdealTool::turn(const ToolPose& from, double most) {
-  const PlacedTool before = pairs_.placed(from), after = pairs_.placed(tick_.tool);
+  const PlacedTool before = pairs_.placed(from);
+  const PlacedTool& after = pairs_.now();
   const Vec3 shift = turned(memory_.grasp, from) - turned(memory_.grasp, tick_.tool);
   double motion = 0;
   for (std::size_t j = 0; j < before.count; ++j) {
@@ -54,6 +55,10 @@ double IdealTool::turn(const ToolPose& from, double most) {
   for (double fraction = most; fraction >= kLeastTurn; fraction *= 0.5) {
     ToolPose to = fraction == 1 ? tick_.tool : between(from, tick_.tool, fraction);
     to.tip = from.tip + turned(memory_.grasp, from) - turned(memory_.grasp, to);
+    if (fraction == 1)
+      pairs_.orient(after);
+    else
+      pairs_.orient(pairs_.placed(to));
     if (settle(from, before, to, far)) {
       pose_ = to;
       return fraction;
@@ -66,10 +71,9 @@ double IdealTool::turn(const ToolPose& from, double most) {
   return 0;
 }
 
-/// Whether a turned tool gets out of all parts near where it is; then it is there.
+/// Whether a turned tool, oriented, gets out of all parts near where it is; then it is there.
 bool IdealTool::settle(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
                        double most_push) {
-  pairs_.orient(pairs_.placed(to));
   planes_.clear();
   for (NearPair& near : pairs_.all()) near.carries = false;
   at_ = to.tip - tick_.tool.tip;

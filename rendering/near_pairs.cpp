@@ -51,7 +51,7 @@ void NearPairs::take_up_plane(NearPair& near) {
 void NearPairs::collect(const ToolPose& from, const PlacedTool& placed_from, double motion,
                         double reach) {
   all_.near.clear();
-  const PlacedTool now = placed(tick_.tool);
+  const PlacedTool& now = now_;
   visit_near_parts([&](std::uint32_t index) {
     const ScenePart& part = tick_.scene.parts()[index];
     for (std::uint32_t j = 0; j < now.count; ++j) {
@@ -124,9 +124,8 @@ Entry NearPairs::sweep(NearPair& near, const LineProbe& before, const LineProbe&
 }
 
 bool NearPairs::virtual_inside() {
-  const PlacedTool now = placed(tick_.tool);
-  collect(tick_.tool, now, 0, 0);
-  orient(now);
+  collect(tick_.tool, now_, 0, 0);
+  orient(now_);
   for (NearPair& near : all_.near) {
     const WalkResult at = locate(mesh_of(near), state_of(near).feature, near.true_tip, near.true_d);
     state_of(near).feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;

@@ -36,7 +36,8 @@ class NearPairs {
       : tick_(tick),
         all_(tick.state.unions),
         group_(group),
-        carried_(tick.sides ? tick.scene.tool() : nullptr) {}
+        carried_(tick.sides ? tick.scene.tool() : nullptr),
+        now_(placed(tick.tool)) {}
 
   std::span<NearPair> all() { return all_.near; }
   std::span<const NearPair> all() const { return all_.near; }
@@ -54,6 +55,11 @@ class NearPairs {
   /// The segments' tool; null: the stylus itself.
   const Tool* carried() const { return carried_; }
   PlacedTool placed(const ToolPose& pose) const { return place(carried_, tick_.sides, pose); }
+  PlacedSegment placed(const ToolPose& pose, std::uint32_t segment) const {
+    return place_segment(carried_, tick_.sides, pose, segment);
+  }
+  /// The virtual tool.
+  const PlacedTool& now() const { return now_; }
 
   /// Sets the pairs that the tool can touch while it comes from `from` and then stays within
   /// `reach` of the virtual tool.
@@ -88,7 +94,7 @@ class NearPairs {
   UnionMemory& all_;
   const PartGroup& group_;
   const Tool* carried_;
-  PlacedTool oriented_;
+  PlacedTool now_, oriented_;
 };
 
 }  // namespace palpate::rendering

@@ -60,16 +60,16 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured) {
   return {side, glm::cross(axis, side), axis};
 }
 
+PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, std::size_t index) {
+  if (tool == nullptr || !sides) return {Vec3(0), sides ? pose.d : Vec3(0)};
+  const ToolSegment& segment = tool->segments[index];
+  return {pose.frame * segment.from, pose.frame * (segment.to - segment.from)};
+}
+
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose) {
   PlacedTool out;
-  if (tool == nullptr || !sides) {
-    out.segments[0] = {Vec3(0), sides ? pose.d : Vec3(0)};
-    out.count = 1;
-    return out;
-  }
-  for (const ToolSegment& segment : tool->segments)
-    out.segments[out.count++] = {pose.frame * segment.from,
-                                 pose.frame * (segment.to - segment.from)};
+  out.count = tool == nullptr || !sides ? 1 : tool->segments.size();
+  for (std::size_t j = 0; j < out.count; ++j) out.segments[j] = place_segment(tool, sides, pose, j);
   return out;
 }
 

@@ -41,6 +41,9 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured);
 /// \param sides  false: the tip alone touches
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose);
 
+/// One of them.
+PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, std::size_t index);
+
 /// A pose between two: the tip moves linearly; the stylus turns about one axis, with the tool where
 /// there is one. Its length changes in proportion.
 /// \param fraction  0: `from`, 1: `to`

@@ -27,7 +27,8 @@ double motion_of(const ToolPose& from, const PlacedTool& placed_from, const Tool
 /// The pose at which a tool that comes from free space meets the first part; the virtual one where
 /// it meets none.
 ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
-  const PlacedTool before = pairs_.placed(from), after = pairs_.placed(tick_.tool);
+  const PlacedTool before = pairs_.placed(from);
+  const PlacedTool& after = pairs_.now();
   pairs_.collect(from, before, motion_of(from, before, tick_.tool, after), 0);
   Entry first;
   const NearPair* at = nullptr;
@@ -45,7 +46,7 @@ ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   if (!entered) return tick_.tool;
   ToolPose pose = between(from, tick_.tool, first.time);
   // It turns on about where it touches.
-  const PlacedSegment segment = pairs_.placed(pose).segments[at->segment];
+  const PlacedSegment segment = pairs_.placed(pose, at->segment);
   const LineProbe local = pairs_.shrunk(*at, pose.tip, segment);
   const WalkResult contact =
       measure(*pairs_.part_of(*at).mesh, first.feature, local.tip, local.tail - local.tip);
