@@ -68,7 +68,7 @@ class SolidCutter {
     return cell;
   }
 
-  // No wider than the tolerance: nothing that a hand or a mesh could hold.
+  // Thinner than the tolerance: its faces cannot be told apart.
   bool is_sliver(const std::vector<CellPolygon>& faces) const {
     if (faces.size() < 4) return true;
     const CellBulk bulk = bulk_of(faces);

@@ -379,6 +379,24 @@ TEST(ConvexParts, ManyGroupsTakeTheirOwnVerticesOnly) {
             "too many groups: expected at most 10000 that are closed by themselves, found more");
 }
 
+TEST(ConvexParts, FacesOfAGroupKeepTheirNumbersInMessages) {
+  PolygonSoup soup;
+  add_cube(soup, "closed", 0.02, Vec3(0));
+  add_cube(soup, "open", 0.02, Vec3(0.1, 0, 0));
+  soup.faces.pop_back();
+  soup.group_of.pop_back();
+  const std::string text = refusal(soup);
+  bool named = false;
+  for (std::uint32_t f = 6; f < 11; ++f) {
+    std::string corners;
+    for (const std::uint32_t corner : soup.faces[f])
+      corners += (corners.empty() ? "" : " ") + std::to_string(corner);
+    named = named || text.find(" of face " + std::to_string(f) + " (vertices " + corners +
+                               ") has no face") != std::string::npos;
+  }
+  EXPECT_TRUE(named) << text;
+}
+
 TEST(ConvexParts, GroupsThatAreOnlyPaintAreOneSolid) {
   PolygonSoup soup = solids::l_shape().soup;
   soup.group_names = {"ends", "sides"};

@@ -5,6 +5,7 @@
 #include "stimuli/base64.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/random.h"
 #include "tests/stimuli/gltf_box.h"
 
 namespace palpate::stimuli {
@@ -139,7 +140,7 @@ TEST(MeshGltfFaults, TransformsAreRotationsAndNumbers) {
   EXPECT_EQ(of_node("\"scale\": 2"),
             "a.gltf: /nodes/0/scale: expected a list of 3 numbers, found 2");
   EXPECT_EQ(of_node("\"translation\": [0, \"1\", 0]"),
-            "a.gltf: /nodes/0/translation: expected a list of 3 numbers, found a list of 3");
+            "a.gltf: /nodes/0/translation/1: expected a number, found \"1\"");
   EXPECT_EQ(of_node("\"matrix\": [1,0,0,0.5, 0,1,0,0, 0,0,1,0, 0,0,0,1]"),
             "a.gltf: /nodes/0/matrix/3: expected 0 (no perspective), found 0.5");
   EXPECT_EQ(of_node("\"scale\": [1, 0, 1]"),
@@ -192,6 +193,36 @@ TEST(MeshGltfFaults, SurfacesAreNamedByPrimitiveAndNode) {
         std::string::npos)
         << error.what();
   }
+}
+
+// Damaged files give a soup or a MeshError, nothing else.
+TEST(MeshGltfFaults, DamagedFilesNeverCrash) {
+  Random random(4);
+  const std::string files[] = {
+      document(), gltf::binary_file(document(R"([{"mesh": 0}])", ""), gltf::box_buffer())};
+  int taken = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::string bytes = files[random.below(2)];
+    for (std::uint64_t damage = 1 + random.below(3); damage > 0; --damage) {
+      const std::size_t at = random.below(bytes.size());
+      if (random.below(2) == 0) {
+        // Another digit or sign keeps it a document.
+        const std::size_t digit = bytes.find_first_of("0123456789", at);
+        if (digit != std::string::npos) bytes[digit] = "0123456789-.e"[random.below(13)];
+      } else {
+        bytes.replace(at, random.below(4),
+                      bytes.substr(random.below(bytes.size()), random.below(4)));
+      }
+    }
+    try {
+      convex_parts(read_mesh("a.gltf", bytes));
+      ++taken;
+    } catch (const MeshError& error) {
+      EXPECT_FALSE(error.faults().empty());
+      EXPECT_EQ(std::string(error.what()).find("json.exception"), std::string::npos);
+    }
+  }
+  EXPECT_GT(taken, 0);
 }
 
 TEST(Base64, IsItsOwnInverse) {
