@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <stdexcept>
@@ -68,8 +69,11 @@ int submit_or_say(const ClusterSettings& settings, const fs::path& folder, Clust
   return 0;
 }
 
-/// \param command  of a shard
-int begin(const ClusterSettings& settings, ClusterJob job, const std::string& command,
+/// \param others  files that the tasks read beside the protocol. \param command  of a shard, from
+/// where the copies of protocol and others are
+int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Protocol& protocol,
+          const std::vector<std::string>& others,
+          const std::function<std::string(const std::vector<std::string>&)>& command,
           double trials_an_item) {
   if (settings.shards < 1 || settings.shards > std::min<std::int64_t>(job.items, 999'999)) {
     throw UsageError("--shards: must be 1 to the number of " +
@@ -78,7 +82,7 @@ int begin(const ClusterSettings& settings, ClusterJob job, const std::string& co
   }
   const fs::path folder = make_folder(settings);
   job.shards = settings.shards;
-  write_scripts(folder, job, command);
+  write_scripts(folder, job, command(copy_inputs(folder, protocol, others)));
   const double items = static_cast<double>(job.items) / static_cast<double>(job.shards);
   warn_of_small_shards(
       std::to_string(std::lround(items)) + (job.work == "sweep" ? " points" : " participants"),
@@ -86,23 +90,23 @@ int begin(const ClusterSettings& settings, ClusterJob job, const std::string& co
   return submit_or_say(settings, folder, std::move(job));
 }
 
-std::string file_word(const std::string& path) { return shell_quoted(fs::absolute(path).string()); }
-
 int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
   const PlannedSweep planned(sweep);
-  std::string command = "sweep " + file_word(sweep.protocol) + " --space " +
-                        file_word(sweep.space) + " --points " + std::to_string(sweep.points) +
-                        " --design " + sweep.design + " --seed " + std::to_string(sweep.seed) +
-                        " --participants " + std::to_string(sweep.participants) +
-                        " --participant-version " + std::to_string(sweep.version);
-  if (sweep.repetitions > 0) command += " --repetitions " + std::to_string(sweep.repetitions);
-  if (!sweep.patch.empty()) command += " --settings " + file_word(sweep.patch);
+  const auto command = [&](const std::vector<std::string>& inputs) {
+    std::string out = "sweep " + shell_quoted(inputs[0]) + " --space " + shell_quoted(inputs[1]) +
+                      " --points " + std::to_string(sweep.points) + " --design " + sweep.design +
+                      " --seed " + std::to_string(sweep.seed) + " --participants " +
+                      std::to_string(sweep.participants) + " --participant-version " +
+                      std::to_string(sweep.version);
+    if (sweep.repetitions > 0) out += " --repetitions " + std::to_string(sweep.repetitions);
+    return inputs[2].empty() ? out : out + " --settings " + shell_quoted(inputs[2]);
+  };
   ClusterJob job;
   job.work = "sweep";
   job.unit = "points";
   job.items = planned.plan.points;
   const int repetitions = sweep.repetitions > 0 ? sweep.repetitions : planned.protocol.repetitions;
-  return begin(settings, job, command,
+  return begin(settings, job, planned.protocol, {sweep.space, sweep.patch}, command,
                static_cast<double>(planned.plan.shapes.size() * planned.plan.renderers.size()) *
                    sweep.participants * repetitions);
 }
@@ -110,17 +114,19 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
 int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
   protocols::Protocol protocol = protocols::parse_protocol(study.protocol);
   fit_to_simulation(protocol, load_simulated_settings(study.patch, study.version));
-  std::string command = "simulate " + file_word(study.protocol) + " --participants " +
-                        std::to_string(study.participants) + " --seed " +
-                        std::to_string(study.seed) + " --participant-version " +
-                        std::to_string(study.version);
-  if (!study.patch.empty()) command += " --settings " + file_word(study.patch);
+  const auto command = [&](const std::vector<std::string>& inputs) {
+    const std::string out = "simulate " + shell_quoted(inputs[0]) + " --participants " +
+                            std::to_string(study.participants) + " --seed " +
+                            std::to_string(study.seed) + " --participant-version " +
+                            std::to_string(study.version);
+    return inputs[1].empty() ? out : out + " --settings " + shell_quoted(inputs[1]);
+  };
   ClusterJob job;
   job.work = "simulate";
   job.unit = "sessions";
   job.items = study.participants;
   job.per_item = protocol.sessions.count;
-  return begin(settings, job, command,
+  return begin(settings, job, protocol, {study.patch}, command,
                static_cast<double>(protocol.stimuli.size() * protocol.renderers.size()) *
                    protocol.repetitions);
 }
@@ -186,7 +192,7 @@ int cluster_status(const std::string& given) {
     const std::string merged = plan ? "" : std::string("all") + job.extension() + ", ";
     const std::string last = plan ? "power.svg" : "report.html";
     std::cout << "result: "
-              << (fs::exists(folder / last)
+              << (fs::exists(folder / last) && merged_units(folder, job) >= all
                       ? merged + "analysis.txt, analysis.json, " + last
                       : "not merged yet; logs/finish.log, or by hand: finish.sh")
               << "\n";

@@ -14,6 +14,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/shard.h"
+#include "runner/session/protocol_info.h"
 
 namespace palpate::runner {
 namespace {
@@ -81,10 +82,49 @@ ClusterJob read_job(const fs::path& folder) {
     job.array_job = in.at("array_job");
     job.submitted_s = in.at("submitted_s");
     job.done_then = in.at("done_then");
+    if (job.shards < 1 || job.shards > job.items || job.per_item < 1)
+      throw UsageError(path + ": expected 1 or more shards of at least one item each, found " +
+                       std::to_string(job.shards) + " shards of " + std::to_string(job.items));
     return job;
   } catch (const json::exception& error) {
     throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
   }
+}
+
+std::int64_t merged_units(const fs::path& folder, const ClusterJob& job) {
+  if (job.work == "plan") return job.items;
+  return recorded_in(job, (folder / ("all" + std::string(job.extension()))).string());
+}
+
+std::vector<std::string> copy_inputs(const fs::path& folder, const protocols::Protocol& protocol,
+                                     const std::vector<std::string>& others) {
+  const data::ProtocolInfo info = info_of(protocol);
+  std::ptrdiff_t up = 0;  // steps out of the protocol's folder
+  for (const data::ProtocolFile& file : info.files) {
+    const fs::path name = fs::path(file.name).lexically_normal();
+    if (name.is_absolute())
+      throw UsageError("the protocol names " + file.name +
+                       ", which is not copied for the tasks; name it relative to the protocol");
+    up = std::max(up, std::count(name.begin(), name.end(), fs::path("..")));
+  }
+  const fs::path inputs = folder / "inputs";
+  fs::path place = inputs;
+  for (; up > 0; --up) place /= "protocol";
+  fs::create_directories(place);
+  const auto put = [](const fs::path& path, const std::string& bytes) {
+    fs::create_directories(path.parent_path());
+    write_whole(path.string(), bytes);
+  };
+  put(place / "protocol.json", info.text);
+  for (const data::ProtocolFile& file : info.files)
+    put((place / file.name).lexically_normal(), file.bytes);
+  std::vector<std::string> out{(place / "protocol.json").string()};
+  for (std::size_t i = 0; i < others.size(); ++i) {
+    out.push_back(
+        others[i].empty() ? "" : (inputs / ("other" + std::to_string(i + 1) + ".json")).string());
+    if (!others[i].empty()) put(out.back(), protocols::read_text_file(others[i]));
+  }
+  return out;
 }
 
 std::vector<ShardState> shard_states(const fs::path& folder, const ClusterJob& job) {
@@ -145,11 +185,13 @@ void write_scripts(const fs::path& folder, const ClusterJob& job, const std::str
                    "\" \\\n  --db \"parts/part$(printf %06d \"${1:-$SLURM_ARRAY_TASK_ID}\")" +
                    extension + "\"\n");
   const std::string given = job.work == "sweep" ? "--sweep" : "--db";
+  const std::string all = "all" + extension, fresh = "new-" + all;
   write_script(folder / "finish.sh",
-               "# When all shards are done: one file, and its analysis.\nset -e\n" + enter +
-                   "\n[ -e all" + extension + " ] || " + program + " merge --out all" + extension +
-                   " parts/*" + extension + "\n" + program + " analyze " + given + " all" +
-                   extension +
+               "# When all shards are done: one file, and its analysis. Again, after more of "
+               "them.\nset -e\n" +
+                   enter + "\nrm -f " + fresh + "\n" + program + " merge --out " + fresh +
+                   " parts/*" + extension + "\nmv " + fresh + " " + all + "\n" + program +
+                   " analyze " + given + " " + all +
                    " --json analysis.json --report report.html --force > analysis.txt\n");
 }
 

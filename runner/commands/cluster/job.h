@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "protocols/protocol.h"
+
 namespace palpate::runner {
 
 /// What DIR/cluster.json holds.
@@ -37,6 +39,10 @@ void write_job(const std::filesystem::path& folder, const ClusterJob& job);
 /// \throws UsageError: it is not what write_job wrote
 ClusterJob read_job(const std::filesystem::path& folder);
 
+/// Units in the merged file; 0: there is none yet. A plan has no such file, and none is missing.
+/// \throws data::StoreRefused
+std::int64_t merged_units(const std::filesystem::path& folder, const ClusterJob& job);
+
 /// By shard, from 1, as its file has it. \throws data::StoreRefused
 std::vector<ShardState> shard_states(const std::filesystem::path& folder, const ClusterJob& job);
 std::int64_t recorded_units(const std::vector<ShardState>& states);
@@ -44,6 +50,13 @@ std::int64_t recorded_units(const std::vector<ShardState>& states);
 /// The shards that are not done as an array job, and after them what puts all together; says so on
 /// stdout. \throws std::runtime_error with what sbatch says
 void submit_shards(const std::filesystem::path& folder, ClusterJob& job);
+
+/// Copies what the tasks read, so that it can change outside while they run: the protocol with the
+/// files that it names, and others. \return where the copies of protocol and others are, in order.
+/// \throws UsageError: the protocol names a file by a whole path
+std::vector<std::string> copy_inputs(const std::filesystem::path& folder,
+                                     const protocols::Protocol& protocol,
+                                     const std::vector<std::string>& others);
 
 /// Writes shard.sh K, which runs a shard or goes on with it, and finish.sh, which puts the parts
 /// together and analyses them. \param command  of a shard, without --jobs, --shard and --db

@@ -172,6 +172,12 @@ class Cluster(unittest.TestCase):
         (self.folder / "old").mkdir()
         (self.folder / "old/cluster.json").write_text('{"version": 1, "shards": 3}')
         self.assertIn("expected version 2, found 1", self.palpate("cluster", "status", "old", status=2))
+        self.palpate("cluster", "sweep", *self.PLAN, "--shards", 3, "--dir", "d", "--no-submit")
+        job = json.loads((self.folder / "d/cluster.json").read_text())
+        for shards in (0, -3, 6, "many"):
+            (self.folder / "d/cluster.json").write_text(json.dumps({**job, "shards": shards}))
+            for command in ("status", "submit"):
+                self.assertIn("cluster.json", self.palpate("cluster", command, "d", status=2))
 
     def test_without_slurm_the_scripts_do_it(self):
         said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "d", status=1, slurm=False)
@@ -183,6 +189,44 @@ class Cluster(unittest.TestCase):
         subprocess.run([self.folder / "e/finish.sh"], check=True, stdout=subprocess.DEVNULL)
         self.assertEqual((self.folder / "e/all.sweep").read_bytes(), self.single())
         self.assertIn("2 done", self.palpate("cluster", "status", "e", slurm=False))
+
+    def test_what_was_put_together_too_early_is_no_result(self):
+        self.palpate("cluster", "sweep", *self.PLAN, "--shards", 3, "--dir", "d", "--no-submit")
+
+        def script(*words):
+            subprocess.run([self.folder / "d" / words[0], *words[1:]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+        script("shard.sh", "1")
+        script("finish.sh")
+        script("shard.sh", "2")
+        script("shard.sh", "3")
+        status = self.palpate("cluster", "status", "d")
+        self.assertIn("3 done", status)
+        self.assertIn("not merged yet", status)
+        script("finish.sh")
+        self.assertIn("report.html", self.palpate("cluster", "status", "d"))
+        self.assertEqual((self.folder / "d/all.sweep").read_bytes(), self.single())
+
+    def test_files_that_change_on_the_way_change_nothing(self):
+        room = self.folder / "lab" / "protocols"
+        (room / "shapes").mkdir(parents=True)
+        tetrahedron = "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+        (room / "shapes" / "inner.obj").write_text(tetrahedron)
+        (self.folder / "lab" / "outer.obj").write_text(tetrahedron.replace("0.05", "0.04"))
+        protocol = json.loads((PROTOCOLS / "quick.json").read_text())
+        protocol["stimuli"][0] = {"name": "sphere", "shape": "mesh", "file": "shapes/inner.obj"}
+        protocol["stimuli"][1] = {"name": "cone", "shape": "mesh", "file": "../outer.obj"}
+        (room / "p.json").write_text(json.dumps(protocol))
+        (self.folder / "patch.json").write_text('{"observer": {"threshold": 0.8}}')
+        plan = [room / "p.json", "--space", "s.json", "--settings", "patch.json", *self.PLAN[3:]]
+        self.palpate("sweep", *plan, "--db", "one.sweep")
+        self.palpate("cluster", "sweep", *plan, "--shards", 2, "--dir", "d", "--no-submit")
+        for file in (room / "p.json", room / "shapes" / "inner.obj", self.folder / "lab" / "outer.obj", self.folder / "s.json",
+                     self.folder / "patch.json"):
+            file.write_text("changed")
+        for words in (["shard.sh", "1"], ["shard.sh", "2"], ["finish.sh"]):
+            subprocess.run([self.folder / "d" / words[0], *words[1:]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.assertEqual((self.folder / "d/all.sweep").read_bytes(), (self.folder / "one.sweep").read_bytes())
 
     def test_wrong_usage(self):
         for arguments, said in (([], "expected sweep, simulate, plan, status or submit"), (["run"], "found 'run'"), (["status"], "one folder"),
