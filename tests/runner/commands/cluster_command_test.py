@@ -210,9 +210,10 @@ class Cluster(unittest.TestCase):
     def test_files_that_change_on_the_way_change_nothing(self):
         room = self.folder / "lab" / "protocols"
         (room / "shapes").mkdir(parents=True)
-        tetrahedron = "v 0 0 0\nv 0.05 0 0\nv 0 0.05 0\nv 0 0 0.05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-        (room / "shapes" / "inner.obj").write_text(tetrahedron)
-        (self.folder / "lab" / "outer.obj").write_text(tetrahedron.replace("0.05", "0.04"))
+        octahedron = ("v 0.03 0 0\nv -0.03 0 0\nv 0 0.03 0\nv 0 -0.03 0\nv 0 0 0.03\nv 0 0 -0.03\nf 1 3 5\nf 3 2 5\nf 2 4 5\n"
+                      "f 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n")
+        (room / "shapes" / "inner.obj").write_text(octahedron)
+        (self.folder / "lab" / "outer.obj").write_text(octahedron.replace("0.03", "0.02"))
         protocol = json.loads((PROTOCOLS / "quick.json").read_text())
         protocol["stimuli"][0] = {"name": "sphere", "shape": "mesh", "file": "shapes/inner.obj"}
         protocol["stimuli"][1] = {"name": "cone", "shape": "mesh", "file": "../outer.obj"}

@@ -19,7 +19,7 @@ def on_path():
 
 
 @pytest.mark.parametrize("name,words", [("recover_parameters", ("slide speed", "correlation")),
-                                        ("choose_sizes", ("standard", "bits"))])
+                                        ("choose_sizes", ("standard", "best"))])
 def test_an_example_runs_and_is_the_same_again(name, words, tmp_path):
     command = [sys.executable, str(EXAMPLES / f"{name}.py"), "--quick"]
     said = [subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=1500).stdout
@@ -67,23 +67,17 @@ def test_the_prior_is_what_it_says_and_is_never_left():
     assert weights.sum() == pytest.approx(1)
 
 
-def test_information_is_none_without_a_difference_and_nearly_all_with_a_large_one():
+def test_d_prime_is_that_of_normal_figures():
     module = importlib.import_module("choose_sizes")
     random = np.random.default_rng(6)
-    is_three = np.arange(200) % 2 == 1
-    noise = random.normal(size=(200, 29))
-    nothing, error = module.information(noise, is_three)
-    assert nothing < 0.05
-    shifted = noise.copy()
-    shifted[is_three, :3] += 4
-    assert module.information(shifted, is_three)[0] > 0.9
-    # One figure that is apart by 1.5 sd: the information of two normal distributions, by integration.
-    half = noise.copy()
-    half[is_three, 0] += 1.5
-    x = np.linspace(-8, 10, 4001)
-    two, three = np.exp(-x**2 / 2), np.exp(-(x - 1.5)**2 / 2)
-    two, three = two / two.sum(), three / three.sum()
-    mixed = (two + three) / 2
-    truth = sum((p * np.log2(p / mixed)).sum() / 2 for p in (two, three))
-    found, error = module.information(half[:, :4], is_three)
-    assert abs(found - truth) < 4 * error + 0.05
+    is_three = np.arange(400) % 2 == 1
+    noise = random.normal(size=(400, 6))
+    nothing, error = module.separation(noise, is_three)
+    assert nothing < 3 * error
+    for shift in (1, 1.5, 3):  # of two independent figures: shift * sqrt(2) in all
+        figures = noise.copy()
+        figures[is_three, :2] += shift
+        found, error = module.separation(figures, is_three)
+        assert abs(found - shift * np.sqrt(2)) < 3 * error
+    mirrored, _ = module.separation(-figures * 7 + 3, is_three)  # the unit of a figure does not count
+    assert mirrored == pytest.approx(found)
