@@ -224,7 +224,7 @@ Panel drivers_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
 std::string chance_note(const SweepAnalysis& analysis) {
   std::string with;
   for (const Drivers& drivers : analysis.drivers) {
-    if (drivers.strongest.empty() || drivers.sobol->chance) continue;
+    if (drivers.strongest.empty() || drivers.sobol->noise_share) continue;
     with += (with.empty() ? "" : ", ") + title_of(drivers.output);
   }
   return with.empty() ? "Chance within the points belongs to no index."

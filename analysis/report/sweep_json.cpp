@@ -82,7 +82,7 @@ Json drivers_json(const SweepAnalysis& analysis, const Drivers& drivers) {
     out["base_points"] = drivers.sobol->base_points;
     out["base_points_dropped"] = drivers.sobol->dropped;
     out["variance"] = drivers.sobol->variance;
-    out["chance"] = json_of(drivers.sobol->chance);
+    out["noise_share"] = json_of(drivers.sobol->noise_share);
     if (const std::string note = chance_note(drivers); !note.empty()) out["note"] = note;
     put_undefined(out, drivers.sobol->undefined);
   }

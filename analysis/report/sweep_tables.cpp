@@ -83,9 +83,9 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
   }
   if (sobol && !drivers.sobol->undefined.empty())
     table.notes.push_back("None: " + drivers.sobol->undefined + ".");
-  if (sobol && drivers.sobol->chance) {
+  if (sobol && drivers.sobol->noise_share) {
     table.notes.push_back("Shares of the variance over the settings, of which " +
-                          fixed(100 * *drivers.sobol->chance, 0) +
+                          fixed(100 * *drivers.sobol->noise_share, 0) +
                           " % is chance within the points and belongs to no parameter.");
   }
   if (sobol && drivers.sobol->dropped > 0) {
@@ -141,7 +141,7 @@ std::string sweep_answer(const SweepAnalysis& analysis) {
   const std::string what = pattern.of_the_paper ? "The paper's pattern" : "The pattern";
   if (!pattern.share) return what + " is defined in none of the settings";
   const std::string share = what + " holds in " + fixed(100 * *pattern.share, 1) + " % of the ";
-  if (!pattern.ci95) return share + "grid's points";
+  if (analysis.table.design == "grid") return share + "grid's points";
   return share + "settings (95 % interval " + fixed(100 * pattern.ci95->low, 1) + " to " +
          fixed(100 * pattern.ci95->high, 1) + " %)";
 }
@@ -159,18 +159,18 @@ std::string pattern_note(const SweepAnalysis& analysis) {
     out += "; in " + std::to_string(pattern.undefined) +
            " others it is undefined (failed, or a figure is missing)";
   }
-  if (!pattern.ci95)
+  if (design == "grid")
     return out +
            ". No interval: a share of a grid's points is no estimate of a share of the space.";
-  return out + ". Wilson's interval" +
-         (design == "saltelli" ? ""
-                               : ", of independent settings: these are more even, so it is "
-                                 "rather too wide") +
-         ". It is about the space that was given, with its distributions, not about people.";
+  if (!pattern.ci95) return out + ".";
+  return out +
+         ". Wilson's interval, of independent settings: a design's are more even, so it is rather "
+         "too wide. It is about the space that was given, with its distributions, not about "
+         "people.";
 }
 
 std::string chance_note(const Drivers& drivers) {
-  if (!drivers.sobol || !drivers.sobol->undefined.empty() || drivers.sobol->chance) return "";
+  if (!drivers.sobol || !drivers.sobol->undefined.empty() || drivers.sobol->noise_share) return "";
   return "Chance within the points is a part of every total index: it has no standard errors that "
          "could be subtracted.";
 }

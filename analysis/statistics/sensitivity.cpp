@@ -142,7 +142,7 @@ SobolIndices sobol_indices(const std::vector<double>& outputs, const std::vector
   }
   if (std::any_of(samples.with_errors.begin(), samples.with_errors.end(),
                   [](double n) { return n > 0; }))
-    out.chance = all.noise / all.variance;
+    out.noise_share = all.noise / all.variance;
   std::vector<std::vector<double>> first(parameters), total(parameters);
   stimuli::Random random(seed, {1});
   std::vector<std::size_t> drawn(samples.size());

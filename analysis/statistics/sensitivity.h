@@ -27,7 +27,7 @@ struct SobolIndices {
   double variance = 0;          ///< of the output, that by chance included; squared units of it
   /// Share of the variance that is chance: the mean squared standard error, which the total indices
   /// leave out. None: no standard errors, so chance is a part of every total index.
-  std::optional<double> chance;
+  std::optional<double> noise_share;
   std::vector<SobolIndex> of;  ///< of each parameter
 };
 

@@ -209,7 +209,7 @@ TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
   const NoisySweep sweep = noisy_sweep(4000, random);
   const SobolIndices found = sobol_indices(sweep.outputs, sweep.errors, 3, 1);
   EXPECT_NEAR(found.variance, kOfFirst + kOfChance, 0.6);
-  EXPECT_NEAR(*found.chance, 1 - kFirstShare, 0.02);
+  EXPECT_NEAR(*found.noise_share, 1 - kFirstShare, 0.02);
   for (std::size_t p = 0; p < 3; ++p) {
     const double truth = p == 0 ? kFirstShare : 0;
     EXPECT_NEAR(*found.of[p].first, truth, 0.05);
@@ -217,7 +217,7 @@ TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
   }
   // Without standard errors chance counts to every total index, and it is known that it does.
   const SobolIndices without = sobol_indices(sweep.outputs, {}, 3, 1);
-  EXPECT_FALSE(without.chance);
+  EXPECT_FALSE(without.noise_share);
   EXPECT_NEAR(*without.of[1].total, 1 - kFirstShare, 0.05);
   EXPECT_NEAR(*without.of[1].first, 0, 0.05);
 }

@@ -78,7 +78,7 @@ TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
     return Outcome{10 * x[0] + 3 * random.normal(), 3};
   };
   const SweepAnalysis known = analyze_sweep(table_of("saltelli", points, noisy), "cone > 5", "1");
-  EXPECT_TRUE(known.drivers[0].sobol->chance);
+  EXPECT_TRUE(known.drivers[0].sobol->noise_share);
   EXPECT_EQ(chance_note(known.drivers[0]), "");
   EXPECT_NE(chance_note(known.drivers[1]), "");  // a pattern has no standard error
   const SweepAnalysis unknown =
@@ -87,7 +87,7 @@ TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
                                return Outcome{10 * x[0] + 3 * random.normal(), std::nan("")};
                              }),
                     "", "1");
-  EXPECT_FALSE(unknown.drivers[0].sobol->chance);
+  EXPECT_FALSE(unknown.drivers[0].sobol->noise_share);
   EXPECT_NE(sweep_text(unknown).find("Chance within the points is a part of every total index"),
             std::string::npos);
   EXPECT_NE(sweep_json(unknown).find("Chance within the points is a part of every total index"),
