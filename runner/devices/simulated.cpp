@@ -14,15 +14,17 @@ Vec3 round_to(const Vec3& v, double step) {
 /// The rotation vector (rad) of the smallest rotation from unit `from` to unit `to`.
 Vec3 rotation_between(const Vec3& from, const Vec3& to) {
   const Vec3 c = glm::cross(from, to);
-  const double sine = glm::length(c);
-  if (sine == 0) return Vec3(0);
+  const double sine2 = glm::dot(c, c);
+  if (sine2 == 0) return Vec3(0);
+  const double sine = std::sqrt(sine2);
   return std::atan2(sine, glm::dot(from, to)) / sine * c;
 }
 
 /// Rodrigues' formula.
 Vec3 rotate(const Vec3& v, const Vec3& rotation) {
-  const double angle = glm::length(rotation);
-  if (angle == 0) return v;
+  const double angle2 = glm::dot(rotation, rotation);
+  if (angle2 == 0) return v;
+  const double angle = std::sqrt(angle2);
   const Vec3 k = rotation / angle;
   return std::cos(angle) * v + std::sin(angle) * glm::cross(k, v) +
          (1 - std::cos(angle)) * glm::dot(k, v) * k;
@@ -83,6 +85,13 @@ void SimulatedStylus::reset(const HandTarget& target) {
   position_ = target.grip;
   axis_ = target.axis;
   velocity_ = spin_ = force_ = torque_ = Vec3(0);
+  away_ = rotation_between(target_.axis, axis_);
+}
+
+void SimulatedStylus::set_target(const HandTarget& target) {
+  const bool turns = target.axis != target_.axis;
+  target_ = target;
+  if (turns) away_ = rotation_between(target_.axis, axis_);
 }
 
 DeviceReading SimulatedStylus::read() noexcept {
@@ -106,10 +115,12 @@ DeviceReading SimulatedStylus::read() noexcept {
   // Rotation likewise, about the target's axis. Roll about the stylus is neither sensed nor
   // actuated.
   const Vec3 turned_balance = torque_ / hand_.turn_stiffness;
-  Vec3 turned = rotation_between(target_.axis, axis_) - turned_balance;
+  Vec3 turned = away_ - turned_balance;
   turn_.advance(turned, spin_);
   axis_ = glm::normalize(rotate(target_.axis, turned + turned_balance));
   spin_ -= glm::dot(spin_, axis_) * axis_;
+  // For the next tick, now: the processor does it while the tick waits for the renderer.
+  away_ = rotation_between(target_.axis, axis_);
 
   DeviceReading reading;
   reading.stylus.tip = round_to(position_ - grip_ * axis_, settings_.resolution);

@@ -58,7 +58,7 @@ class SimulatedStylus final : public Device {
 
   /// Puts it at rest at the target, without force.
   void reset(const HandTarget& target);
-  void set_target(const HandTarget& target) { target_ = target; }
+  void set_target(const HandTarget& target);
   /// True position of the grip, m, not quantised.
   const Vec3& grip() const { return position_; }
 
@@ -76,6 +76,7 @@ class SimulatedStylus final : public Device {
   HandTarget target_;
   Vec3 position_, velocity_;   ///< m, m/s, of the grip
   Vec3 axis_{0, 0, 1}, spin_;  ///< unit tip to tail; rad/s
+  Vec3 away_;                  ///< rad; rotation from the target's axis to axis_
   Vec3 force_, torque_;        ///< N; N m about the grip, held over the tick
 };
 

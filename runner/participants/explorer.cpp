@@ -36,6 +36,9 @@ Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_s
       tick_(tick),
       aim_depth_(settings.motor.indentation * (1 + wall_stiffness / settings.hand.stiffness)),
       max_offset_(settings.motor.max_indentation * wall_stiffness / settings.hand.stiffness),
+      wander_(std::sqrt(2 * tick / settings.motor.heading_time)),
+      turn_cosine_(std::cos(settings.stylus.turning * tick)),
+      turn_sine_(std::sin(settings.stylus.turning * tick)),
       past_(static_cast<std::size_t>(
           std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
 
@@ -151,7 +154,7 @@ void Explorer::turn_to(const Vec3& heading) {
 Vec3 Explorer::slide(const TouchState& known) {
   const double speed = settings_.motor.slide_speed;
   // A random walk of the heading in the surface whose correlation fades as exp(-t / heading_time).
-  double turn = std::sqrt(2 * tick_ / settings_.motor.heading_time) * random_.normal();
+  double turn = wander_ * random_.normal();
   if (turn_left_ > 0) {
     turn += turn_rate_ * std::min(tick_, turn_left_);
     turn_left_ -= tick_;
@@ -185,20 +188,21 @@ Vec3 Explorer::move_to_start() {
 }
 
 void Explorer::turn_axis() {
-  const double step = settings_.stylus.turning * tick_;
   const double cosine = std::clamp(glm::dot(axis_, goal_axis_), -1.0, 1.0);
-  if (cosine >= std::cos(step)) {
+  if (cosine >= turn_cosine_) {
     axis_ = goal_axis_;
     return;
   }
   const Vec3 side = unit_or(goal_axis_ - cosine * axis_, any_perpendicular(axis_));
-  axis_ = glm::normalize(std::cos(step) * axis_ + std::sin(step) * side);
+  axis_ = glm::normalize(turn_cosine_ * axis_ + turn_sine_ * side);
 }
 
 void Explorer::limit_force(const rendering::LineProbe& stylus) {
   const Vec3 held = stylus.tip + grip_ * unit_or(stylus.tail - stylus.tip, axis_);
   const Vec3 offset = tip_ + grip_ * axis_ - held;
-  const double length = glm::length(offset);
+  const double length2 = glm::dot(offset, offset);
+  if (length2 < (1 - 1e-12) * max_offset_ * max_offset_) return;  // whatever the roundings
+  const double length = std::sqrt(length2);
   if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
 }
 

@@ -40,6 +40,7 @@ struct Query {
   float fit[kMaxPositions];       // likelihood of `along` at that position
   float inverse_scale = 0;        // of the soft minimum, 1/m
   float torque_floor = 0;
+  float torque_needed = 0;  // a log likelihood below it stays below the floor
 };
 
 template <class ShapeLine>
@@ -62,6 +63,17 @@ void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& d
   }
 }
 
+/// Whether some hypothesis of the block is above the floor if the torque fits as well as it can;
+/// else it is the floor for all of them, whatever the torque.
+bool torque_matters(const Query& query, const float* log_likelihood) {
+  float most[8];
+  for (int i = 0; i < 8; ++i) most[i] = log_likelihood[i];
+  for (int first = 8; first < kBlock; first += 8) {
+    for (int i = 0; i < 8; ++i) most[i] = lane::max(most[i], log_likelihood[first + i]);
+  }
+  return *std::max_element(most, most + 8) > query.torque_needed;
+}
+
 template <class ShapeLine>
 void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_likelihood) {
   Deepest deepest;
@@ -76,7 +88,8 @@ void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_
       log_likelihood[i] =
           query.direction_precision * (deepest.cosine[i] - 1.0f) - d * d * query.half_precision;
     }
-    if (query.positions > 0) add_torque_cue(shape, query, deepest, log_likelihood);
+    if (query.positions > 0 && torque_matters(query, log_likelihood))
+      add_torque_cue(shape, query, deepest, log_likelihood);
   } else {
     for (int i = 0; i < kBlock; ++i) {
       log_likelihood[i] =
@@ -120,6 +133,9 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.weight = static_cast<float>(weight_of(percept, settings));
 
   if (percept.contact && percept.ray && percept.along) {
+    constexpr double kRoundings = 0.001;
+    query.torque_needed =
+        static_cast<float>(settings.floor - std::log1p(settings.torque_floor) - kRoundings);
     query.positions = settings.places_along;
     for (int k = 0; k < query.positions; ++k) {
       const double position = length * k / (query.positions - 1);

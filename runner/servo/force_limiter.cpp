@@ -5,26 +5,41 @@
 #include <glm/geometric.hpp>
 
 namespace palpate::runner {
+namespace {
+
+/// Whether both are shorter than the limit whatever the roundings: most ticks then need no square
+/// root. False where one is not finite.
+bool surely_within(double limit, const Vec3& a, const Vec3& b) {
+  const double least = (1 - 1e-12) * limit * limit;
+  return glm::dot(a, a) < least && glm::dot(b, b) < least;
+}
+
+}  // namespace
 
 DeviceForces ForceLimiter::apply(const Vec3& device1, const Vec3& device2) noexcept {
-  // A sum is finite only when each of its terms is.
-  const double size1 = glm::length(device1), size2 = glm::length(device2);
-  if (!std::isfinite(size1 + size2)) trip();
+  double strongest = 0;  // where it may be above the limit
+  if (!surely_within(limits_.max_force, device1, device2)) {
+    // A sum is finite only when each of its terms is.
+    const double size1 = glm::length(device1), size2 = glm::length(device2);
+    if (!std::isfinite(size1 + size2)) trip();
+    strongest = std::max(size1, size2);
+  }
   if (tripped_) return {};
   ramp_ = std::min(1.0, ramp_ + ramp_step_);
   DeviceForces out;
-  const double strongest = std::max(size1, size2);
-  const double scale = ramp_ * (strongest > limits_.max_force ? limits_.max_force / strongest : 1);
+  out.limited = strongest > limits_.max_force;
+  const double scale = ramp_ * (out.limited ? limits_.max_force / strongest : 1);
   out.device1 = scale * device1;
   out.device2 = scale * device2;
-  out.limited = strongest > limits_.max_force;
   const Vec3 change1 = out.device1 - last1_, change2 = out.device2 - last2_;
-  const double change = std::max(glm::length(change1), glm::length(change2));
-  if (change > limits_.max_change) {
-    const double part = limits_.max_change / change;
-    out.device1 = last1_ + part * change1;
-    out.device2 = last2_ + part * change2;
-    out.limited = true;
+  if (!surely_within(limits_.max_change, change1, change2)) {
+    const double change = std::max(glm::length(change1), glm::length(change2));
+    if (change > limits_.max_change) {
+      const double part = limits_.max_change / change;
+      out.device1 = last1_ + part * change1;
+      out.device2 = last2_ + part * change2;
+      out.limited = true;
+    }
   }
   last1_ = out.device1;
   last2_ = out.device2;

@@ -67,6 +67,7 @@ void Servo::begin(TrialScene& shown) noexcept {
   shown_ = &shown;
   rested_ = 0;
   quality_ = {};
+  strongest2_ = 0;
   limiter_.release();
   if (passivity_) passivity_->reset();
   const std::int64_t last_ns = sample_.time_ns;
@@ -193,7 +194,8 @@ const Sample& Servo::tick() noexcept {
   ++quality_.ticks;
   quality_.faults |= sample_.faults;
   quality_.longest_compute_ns = std::max(quality_.longest_compute_ns, sample_.compute_ns);
-  quality_.max_force = std::max(quality_.max_force, glm::length(sample_.device1 + sample_.device2));
+  const Vec3 on_hand = sample_.device1 + sample_.device2;
+  strongest2_ = std::max(strongest2_, glm::dot(on_hand, on_hand));
   return sample_;
 }
 
@@ -205,6 +207,7 @@ ServoQuality Servo::stop() noexcept {
   sample_.device1 = sample_.device2 = Vec3(0);
   sample_.rendering = {};
   shown_ = nullptr;
+  quality_.max_force = std::sqrt(strongest2_);
   return std::exchange(quality_, {});
 }
 

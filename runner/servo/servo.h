@@ -104,6 +104,7 @@ class Servo final : public TickSource {
   int late_in_a_row_ = 0;
   Sample sample_;
   ServoQuality quality_;
+  double strongest2_ = 0;  ///< N^2, of the forces on the hand: its root is quality_'s, in the end
   std::atomic<bool> emergency_{false}, clear_{false};
   static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
 };
