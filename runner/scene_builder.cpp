@@ -207,6 +207,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
                              part.layer,
                              part.break_force});
         }
+        if (!sides) edges_.emplace_back(scene);
         // Where it stands: its surface as well where only its layers are felt.
         const rendering::Scene surface = builder.build({as_surface(stimulus.object)}, sides);
         for (const rendering::ScenePart& part : surface.parts())

@@ -1,6 +1,7 @@
 #pragma once
 // Builds the renderers' scenes from the objects of a protocol or scene file.
 
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,6 +12,7 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
+#include "runner/sharp_edges.h"
 #include "runner/workspace_map.h"
 
 namespace palpate::runner {
@@ -59,10 +61,15 @@ class StimulusLibrary {
   rendering::Scene scene(const protocols::Trial& trial) const;
   /// Radius of the sphere about the origin that contains the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
+  /// Of the stimulus as the protocol has it, not turned.
+  const SharpEdges& edges(int stimulus) const {
+    return edges_[static_cast<std::size_t>(stimulus)];
+  }
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
   std::vector<double> reaches_;
+  std::vector<SharpEdges> edges_;
   rendering::Tool tool_;
 };
 

@@ -21,7 +21,7 @@ void put_trial_without_participant(Row& row, const StoredTrial& trial, const Exp
       << record.started_inside << record.ticks
       << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
       << trial.run.observer_sha256 << (!record.response.empty() && !record.first_contact_time)
-      << trial.run.response_device;
+      << trial.run.response_device << record.contact_share << record.edge_dwell;
   if (clock.relative()) row << clock.elapsed(trial);
 }
 /// trial_columns()

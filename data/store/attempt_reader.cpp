@@ -48,7 +48,7 @@ class AttemptReader {
         find_(db, std::string("SELECT ") + kPlanColumns +
                       ", a.run_id, a.state, a.cut_off_reason, " +
                       (sealed() ? "a.link, a.seal, a.samples_sha256, " : "NULL, NULL, NULL, ") +
-                      kOutcomeColumns +
+                      outcome_columns(version) +
                       " FROM attempts a WHERE a.session_id = ? ORDER BY a.trial, a.attempt"),
         find_samples_(db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?") {}
 

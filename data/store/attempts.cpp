@@ -67,7 +67,7 @@ constexpr const char* kComplete =
     "response_time = ?, first_contact_time = ?, onset_ns = ?, response_ns = ?, start_tip_x = ?, "
     "start_tip_y = ?, start_tip_z = ?, start_tail_x = ?, start_tail_y = ?, start_tail_z = ?, "
     "ticks = ?, missed_ticks = ?, longest_period_ns = ?, faults = ?, started_inside = ?, "
-    "max_force = ?, samples_sha256 = ? WHERE id = ?";
+    "max_force = ?, contact_share = ?, edge_dwell = ?, samples_sha256 = ? WHERE id = ?";
 
 void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
               const TrialRecord& record) {
@@ -78,7 +78,7 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   for (const double x : record.start_tip) bind << x;
   for (const double x : record.start_tail) bind << x;
   bind << record.ticks << record.missed_ticks << record.longest_period_ns << record.faults
-       << record.started_inside << record.max_force;
+       << record.started_inside << record.max_force << record.contact_share << record.edge_dwell;
   const auto count = static_cast<std::int64_t>(record.samples.size());
   const std::string packed = count > 0 ? pack_samples(record.samples) : "";
   bind << (count > 0 ? std::optional(checksum_of_samples(kSamplesPacking, count, packed.data(),

@@ -80,13 +80,22 @@ std::int64_t read_plan(RowReader& row, TrialRecord& record) {
   return id;
 }
 
+std::string outcome_columns(int version) {
+  return std::string(
+             "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, "
+             "a.onset_ns, a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, "
+             "a.start_tail_x, a.start_tail_y, a.start_tail_z, a.ticks, a.missed_ticks, "
+             "a.longest_period_ns, a.faults, a.started_inside, a.max_force, ") +
+         (version < 4 ? "NULL, NULL" : "a.contact_share, a.edge_dwell");
+}
+
 void read_outcome(RowReader& row, TrialRecord& record) {
   row >> record.response >> record.correct >> record.timed_out >> record.response_time >>
       record.first_contact_time >> record.onset_ns >> record.response_ns;
   for (double& x : record.start_tip) row >> x;
   for (double& x : record.start_tail) row >> x;
   row >> record.ticks >> record.missed_ticks >> record.longest_period_ns >> record.faults >>
-      record.started_inside >> record.max_force;
+      record.started_inside >> record.max_force >> record.contact_share >> record.edge_dwell;
 }
 
 }  // namespace palpate::data

@@ -40,11 +40,7 @@ inline constexpr const char* kPlanColumns =
 /// begun until read_outcome sets it. \returns the row id of the attempt
 std::int64_t read_plan(RowReader& row, TrialRecord& record);
 
-inline constexpr const char* kOutcomeColumns =
-    "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, a.onset_ns, "
-    "a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, a.start_tail_x, a.start_tail_y, "
-    "a.start_tail_z, a.ticks, a.missed_ticks, a.longest_period_ns, a.faults, a.started_inside, "
-    "a.max_force";
+std::string outcome_columns(int version);  ///< of the schema
 void read_outcome(RowReader& row, TrialRecord& record);
 
 // CROSS JOIN fixes SQLite's join order (https://www.sqlite.org/optoverview.html, 7.3): each level

@@ -58,9 +58,10 @@ std::string back_up(SQLite::Database& db, const std::string& path, int version) 
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 2> steps = {
+  static const std::array<Migration, 3> steps = {
       {{1, withdrawal_sql()},
-       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); }}}};
+       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); }},
+       {3, contact_sql()}}};
   return steps;
 }
 

@@ -9,16 +9,17 @@
 
 namespace palpate::data {
 
-inline constexpr int kSchemaVersion = 3;
+inline constexpr int kSchemaVersion = 4;
 inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", PRAGMA application_id
 
 inline constexpr int kPageSize = 4096;  ///< bytes
 
-/// schema.sql (version 1), withdrawal.sql and provenance.sql (the changes of versions 2 and 3),
-/// embedded when the program was built.
+/// schema.sql (version 1), withdrawal.sql, provenance.sql and contact.sql (the changes of versions 2,
+/// 3 and 4), embedded when the program was built.
 const char* schema_sql();
 const char* withdrawal_sql();
 const char* provenance_sql();
+const char* contact_sql();
 
 /// Turns version `from` into `from + 1`.
 struct Migration {

@@ -10,7 +10,14 @@
 namespace palpate::data {
 namespace {
 
-constexpr int kVersion = 3;  // of the schema whose columns are sealed
+constexpr int kVersion = 3;  // of the schema that brought the seals
+
+/// Of the schema: the rows of an older database are sealed before it has the columns of today.
+int version_of(SQLite::Database& db) {
+  SQLite::Statement find(
+      db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'contact_share'");
+  return find.executeStep() ? 4 : kVersion;
+}
 
 std::vector<std::int64_t> ids(SQLite::Database& db, const char* sql, std::int64_t of = 0) {
   SQLite::Statement find(db, sql);
@@ -101,7 +108,8 @@ void SealWriter::attempt(std::int64_t id) {
   if (!find_attempt_) {
     find_attempt_.emplace(db_,
                           std::string("SELECT a.session_id, r.link, ") + kPlanColumns +
-                              ", a.cut_off_reason, a.samples_sha256, " + kOutcomeColumns +
+                              ", a.cut_off_reason, a.samples_sha256, " +
+                              outcome_columns(version_of(db_)) +
                               " FROM attempts a JOIN runs r ON r.id = a.run_id WHERE a.id = ?");
     seal_attempt_.emplace(db_, "UPDATE attempts SET link = ?, seal = ? WHERE id = ?");
   }

@@ -79,6 +79,7 @@ void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRec
         << record.started_inside << record.max_force;
   }
   out << attempt.samples;
+  if (record.contact_share || record.edge_dwell) out << record.contact_share << record.edge_dwell;
 }
 
 void put_end(SealedValues& out, std::int64_t run_link, const std::string& reason,

@@ -16,7 +16,8 @@
 //   run      the columns of runs from started_utc_ns to hand, sha256 of its own protocol or null,
 //            files_sha256
 //   note     link of its run, at_ns, text
-//   attempt  link of its run, the columns of attempts from trial to samples_sha256
+//   attempt  link of its run, the columns of attempts from trial to samples_sha256; then
+//            contact_share and edge_dwell, unless both are null
 //   end      link of its run, end_reason, ended_ns
 
 #include <bit>

@@ -110,6 +110,11 @@ void validate_outcome(Validator& validator, const TrialRecord& record) {
     validator.finite("start_tail", record.start_tail[i]);
   }
   validator.amount("max_force", record.max_force);
+  if (record.contact_share) {
+    validator.amount("contact_share", *record.contact_share);
+    validator.expect(!(*record.contact_share > 1), "contact_share must be at most 1");
+  }
+  if (record.edge_dwell) validator.amount("edge_dwell", *record.edge_dwell);
   validator.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
   validator.expect(!record.timed_out || (record.response.empty() && !record.correct),
                    "a time-out has no response and is not correct");

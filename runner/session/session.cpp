@@ -118,6 +118,7 @@ std::optional<Answer> Session::wait_for_answer(std::uint32_t& faults, DeviceTrou
     if (faults & servo_fault::kTripped) return std::nullopt;
     if (sample.phase == Phase::feeling) {
       record_onset_and_contact(sample);
+      contact_.add(sample);
       if (station_.protocol.samples) record_sample(sample);
       record_.response_ns = sample.time_ns;
     }
@@ -142,6 +143,7 @@ bool Session::run_trial() {
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;
   try {
+    contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
     participant_.begin_trial(trial);
     station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
     answer = wait_for_answer(faults, trouble);
@@ -179,6 +181,8 @@ bool Session::run_trial() {
   record_.faults = quality.faults;
   record_.started_inside = (quality.faults & rendering::render_fault::kStartedInside) != 0;
   record_.max_force = quality.max_force;
+  record_.contact_share = contact_.contact_share();
+  record_.edge_dwell = contact_.edge_dwell(1 / protocol.servo_rate);
   if (events_ != nullptr) events_->answered(record_);
   return true;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "data/record.h"
+#include "runner/session/contact_log.h"
 #include "runner/participants/respondent.h"
 #include "runner/session/station.h"
 
@@ -86,6 +87,7 @@ class Session {
   double least_reach_;
   State state_ = State::instruction;
   data::TrialRecord record_;  ///< of the trial under way
+  ContactLog contact_;        ///< likewise
 };
 
 }  // namespace palpate::runner

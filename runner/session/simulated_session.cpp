@@ -1,5 +1,6 @@
 #include "runner/session/simulated_session.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -21,27 +22,6 @@ const protocols::Protocol& checked(const protocols::Protocol& protocol,
   if (!reasons.empty()) throw std::invalid_argument(reasons);
   return protocol;
 }
-
-/// The servo loop, counting.
-class ContactCount final : public TickSource {
- public:
-  ContactCount(TickSource& servo, std::uint64_t& ticks) : servo_(servo), ticks_(ticks) {}
-  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
-               const HomeZone& home) override {
-    ticks_ = 0;
-    servo_.prepare(scene, renderer, home);
-  }
-  const Sample& next() noexcept override {
-    const Sample& sample = servo_.next();
-    if (sample.phase == Phase::feeling && sample.rendering.contacts > 0) ++ticks_;
-    return sample;
-  }
-  ServoQuality stop() noexcept override { return servo_.stop(); }
-
- private:
-  TickSource& servo_;
-  std::uint64_t& ticks_;
-};
 
 class VisitingLog final : public TrialLog {
  public:
@@ -68,8 +48,7 @@ SimulatedStudy::SimulatedStudy(const protocols::Protocol& p, const SimulatedSett
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
-                           TrialLog& log, const std::function<bool()>& halting,
-                           std::uint64_t* contact_ticks) {
+                           TrialLog& log, const std::function<bool()>& halting) {
   const protocols::Protocol& protocol = study.protocol;
   const SimulatedSettings own = individual(study.settings, study.seed, session.participant);
   SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -79,10 +58,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   if (protocol.passivity_controller) servo.control_passivity();
   SimulatedParticipant participant(own, study.hypotheses, stylus, protocol, study.seed,
                                    session.participant);
-  std::uint64_t uncounted = 0;
-  ContactCount counting(servo, contact_ticks != nullptr ? *contact_ticks : uncounted);
-  TickSource& ticks = contact_ticks != nullptr ? static_cast<TickSource&>(counting) : servo;
-  const Station station{protocol, study.library, session.plan, ticks, clock, session.utc, log};
+  const Station station{protocol, study.library, session.plan, servo, clock, session.utc, log};
   Session trials(station, participant);
   // A trial that was shown is recorded, also when it is the last for now.
   while (trials.state() != Session::State::end &&
@@ -116,14 +92,15 @@ bool simulate_in_memory(
   const SimulatedStudy study(protocol, settings, seed);
   for (int number = 1; number <= participants; ++number) {
     for (int session = 1; session <= protocol.sessions.count; ++session) {
-      std::uint64_t contact_ticks = 0;
-      VisitingLog log(
-          [&](const data::TrialRecord& record) { visit(number, record, contact_ticks); });
+      VisitingLog log([&](const data::TrialRecord& record) {
+        const double ticks = *record.contact_share * static_cast<double>(record.ticks);
+        visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
+      });
       run_simulated_session(
           study,
           {number, SessionPlan(protocol, number, session), 0,
            simulated_run(protocol, settings, number, session).clock},
-          log, [&stop] { return stop.load(); }, &contact_ticks);
+          log, [&stop] { return stop.load(); });
       if (stop) return false;
     }
   }

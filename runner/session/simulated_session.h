@@ -36,12 +36,9 @@ struct SimulatedSession {
   data::ClockStamp utc;
 };
 
-/// \param contact_ticks  where not null: of the trial under way, ticks from time zero on with
-/// contact; good when `log` gets the trial's record \param halting  asked between trials; one that
-/// was shown is finished
+/// \param halting  asked between trials; one that was shown is finished
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
-                           TrialLog& log, const std::function<bool()>& halting,
-                           std::uint64_t* contact_ticks = nullptr);
+                           TrialLog& log, const std::function<bool()>& halting);
 
 /// What is on record of a session of a simulated participant before its first trial. Its clock is
 /// that of a day of its own, from nine in the morning.

@@ -9,7 +9,7 @@ ATTEMPT = ("trial, attempt, block, renderer, shape, practice, orientation_w, ori
            "orientation_z, began_ns, state, cut_off_reason, response, correct, timed_out, response_time, "
            "first_contact_time, onset_ns, response_ns, start_tip_x, start_tip_y, start_tip_z, start_tail_x, "
            "start_tail_y, start_tail_z, ticks, missed_ticks, longest_period_ns, faults, started_inside, max_force, "
-           "samples_sha256")
+           "samples_sha256, contact_share, edge_dwell")
 
 
 def packed(value):
@@ -47,7 +47,8 @@ def rows(base, session):
     columns = ", ".join("a." + name for name in ATTEMPT.split(", "))
     for row in base.execute(f"SELECT a.id, a.link, a.seal, r.link, {columns} FROM attempts a JOIN runs r ON r.id = "
                             "a.run_id WHERE a.session_id = ? AND a.state <> 'running' ORDER BY a.id", (session,)).fetchall():
-        yield "attempts", row[0], ("link", "seal"), "attempt", row[3:], row[1], row[2]
+        values = row[3:] if row[-2:] != (None, None) else row[3:-2]
+        yield "attempts", row[0], ("link", "seal"), "attempt", values, row[1], row[2]
     for row in base.execute("SELECT id, end_link, end_seal, link, end_reason, ended_ns FROM runs WHERE session_id = ? "
                             "AND end_reason <> 'running' ORDER BY id", (session,)).fetchall():
         yield "runs", row[0], ("end_link", "end_seal"), "end", row[3:], row[1], row[2]

@@ -1,0 +1,6 @@
+-- Schema version 4: how the object of a trial was touched.
+
+-- NULL: recorded by a version that did not measure it. Sealed where it is there (seals.h).
+ALTER TABLE attempts ADD COLUMN contact_share REAL CHECK (contact_share BETWEEN 0 AND 1);
+-- s; NULL also where the stimulus has too many edges to tell one from the next.
+ALTER TABLE attempts ADD COLUMN edge_dwell REAL CHECK (edge_dwell >= 0);

@@ -1,0 +1,67 @@
+#include "runner/sharp_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+
+namespace palpate::runner {
+namespace {
+
+bool turns(const Vec3& normal, const Vec3& other) {
+  // A mesh's facets at exactly the least turn differ from it by roundings.
+  static const double most = std::cos(SharpEdges::kLeastTurn) + 1e-9;
+  return glm::dot(normal, other) <= most;
+}
+
+}  // namespace
+
+SharpEdges::SharpEdges(const rendering::Scene& scene) {
+  int surface = std::numeric_limits<int>::max();
+  for (const rendering::ScenePart& part : scene.parts()) surface = std::min(surface, part.layer);
+  for (const rendering::ScenePart& part : scene.parts()) {
+    if (part.layer == surface) add_part(part);
+  }
+  too_many_ = lines_.size() > kMost;
+  if (too_many_) lines_.clear();
+}
+
+void SharpEdges::add_part(const rendering::ScenePart& part) {
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  const auto world = [&part](const Vec3& local) {
+    return part.world_vector(local) + part.position;
+  };
+  std::vector<bool> on_edge(mesh.vertices().size());
+  for (const stimuli::Edge& edge : mesh.edges()) {
+    if (!turns(mesh.facets()[edge.left].normal, mesh.facets()[edge.right].normal)) continue;
+    const Vec3 along = part.world_vector(edge.to - edge.from);
+    lines_.push_back({world(edge.from), along, 1 / glm::dot(along, along)});
+    on_edge[edge.v0] = on_edge[edge.v1] = true;
+  }
+  for (std::uint32_t v = 0; v < on_edge.size(); ++v) {
+    if (on_edge[v]) continue;
+    const auto fan = [&mesh, v](std::uint32_t i) -> const Vec3& {
+      return mesh.facets()[mesh.edges()[mesh.fan_edges()[i]].left].normal;
+    };
+    const std::uint32_t first = mesh.fan_first()[v], end = mesh.fan_first()[v + 1];
+    bool sharp = false;
+    for (std::uint32_t i = first; i < end && !sharp; ++i) {
+      for (std::uint32_t j = first; j < i && !sharp; ++j) sharp = turns(fan(i), fan(j));
+    }
+    if (sharp) lines_.push_back({world(mesh.vertices()[v]), Vec3(0), 0});
+  }
+}
+
+double SharpEdges::distance(const Vec3& point) const {
+  double least2 = std::numeric_limits<double>::infinity();
+  for (const Line& line : lines_) {
+    const Vec3 to = point - line.from;
+    const double t = std::clamp(glm::dot(to, line.along) * line.inverse_square, 0.0, 1.0);
+    const Vec3 off = to - t * line.along;
+    least2 = std::min(least2, glm::dot(off, off));
+  }
+  return std::sqrt(least2);
+}
+
+}  // namespace palpate::runner
