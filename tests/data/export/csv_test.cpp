@@ -23,7 +23,7 @@ TEST_F(ExportCsv, AlwaysHasTheSameColumns) {
       "orientation_w,orientation_x,orientation_y,orientation_z,practice,timed_out,"
       "first_contact_time,onset_utc,device,simulated,missed_ticks,attempt,protocol_sha256,"
       "program_version,participant_number,started_inside,ticks,longest_period,faults,max_force,"
-      "observer_sha256,before_contact,response_device\r\n");
+      "observer_sha256,before_contact,response_device,contact_share,edge_dwell\r\n");
 }
 
 TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
@@ -40,6 +40,8 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
   record.faults = 6;
   record.started_inside = true;
   record.max_force = 7.5;
+  record.contact_share = 0.625;
+  record.edge_dwell = 0.1;
   show(record);
   TrialRecord silent = a_record(4);
   silent.timed_out = true;
@@ -83,7 +85,9 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
                                                     {"max_force", "7.5"},
                                                     {"observer_sha256", ""},
                                                     {"before_contact", "0"},
-                                                    {"response_device", ""}};
+                                                    {"response_device", ""},
+                                                    {"contact_share", "0.625"},
+                                                    {"edge_dwell", "0.1"}};
   EXPECT_EQ(row, expected);
   const auto second = by_name(rows(), 2);
   EXPECT_EQ(second.at("timed_out"), "1");
@@ -91,6 +95,8 @@ TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {
   EXPECT_EQ(second.at("correct"), "0");
   EXPECT_EQ(second.at("response_time"), "60");
   EXPECT_EQ(second.at("first_contact_time"), "");
+  EXPECT_EQ(second.at("contact_share"), "") << "not measured";
+  EXPECT_EQ(second.at("edge_dwell"), "");
   EXPECT_EQ(second.at("before_contact"), "0") << "there was no answer";
   EXPECT_EQ(by_name(rows(), 3).at("before_contact"), "1");
 }

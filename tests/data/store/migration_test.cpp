@@ -119,7 +119,14 @@ TEST(VersionOne, IsReadAsItIs) {
   const std::string path = folder / "old.db";
   make_version_1(path);
   const std::string before = contents_of(path);
-  EXPECT_EQ(Store::open(path, Store::Mode::read_only).counts().completed, 2);
+  Store store = Store::open(path, Store::Mode::read_only);
+  EXPECT_EQ(store.counts().completed, 2);
+  store.for_each_trial(
+      [](const StoredTrial& trial) {
+        EXPECT_FALSE(trial.record.contact_share) << "nobody measured it";
+        EXPECT_FALSE(trial.record.edge_dwell);
+      },
+      false);
   EXPECT_EQ(contents_of(path), before);
 }
 

@@ -36,6 +36,8 @@ void expect_same(const TrialRecord& got, const TrialRecord& want) {
   EXPECT_EQ(got.faults, want.faults);
   EXPECT_EQ(got.started_inside, want.started_inside);
   EXPECT_EQ(got.max_force, want.max_force);
+  EXPECT_EQ(got.contact_share, want.contact_share);
+  EXPECT_EQ(got.edge_dwell, want.edge_dwell);
 }
 
 void expect_same(const RunInfo& got, const RunInfo& want) {
@@ -77,6 +79,8 @@ TrialRecord unusual_record() {
   r.longest_period_ns = 123'456'789'012;
   r.faults = 0xFFFFFFFF;
   r.max_force = std::numeric_limits<double>::max();
+  r.contact_share = 1.0 / 3.0;
+  r.edge_dwell = 5e-324;
   return r;
 }
 
@@ -243,11 +247,14 @@ TEST(StoreRoundTrip, InvalidValuesAreRefusedFieldByField) {
   record.first_contact_time = -std::numeric_limits<double>::infinity();
   record.start_tail[1] = nan;
   record.max_force = nan;
+  record.contact_share = 1.0000000000000002;
+  record.edge_dwell = nan;
   record.orientation_wxyz[2] = nan;
   record.ticks = 1ull << 63;
   const std::string error = error_of([&] { store.finish_attempt(run, record); });
   for (const char* field : {"response must", "response_time", "first_contact_time", "start_tail",
-                            "max_force", "orientation", "ticks", "s.db", "trial 1"}) {
+                            "max_force", "contact_share must be at most 1", "edge_dwell",
+                            "orientation", "ticks", "s.db", "trial 1"}) {
     EXPECT_TRUE(contains(error, field)) << field << " in: " << error;
   }
   record = a_record(1);

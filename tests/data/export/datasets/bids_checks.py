@@ -15,9 +15,9 @@ NAME = re.compile(
 NUMBERS = (
     "onset duration session block trial correct response_time orientation_w orientation_x orientation_y orientation_z "
     "practice timed_out first_contact_time simulated missed_ticks attempt participant_number started_inside ticks "
-    "longest_period faults max_force before_contact elapsed"
+    "longest_period faults max_force before_contact contact_share edge_dwell elapsed"
 ).split()
-MAY_BE_MISSING = {"response", "first_contact_time", "observer_sha256", "response_device"}
+MAY_BE_MISSING = {"response", "first_contact_time", "observer_sha256", "response_device", "contact_share", "edge_dwell"}
 
 
 def read_tsv(path):
