@@ -339,6 +339,19 @@ TEST(ForceLimiter, RampsUpCutsSizeAndChange) {
   EXPECT_NEAR(out.device2.x, 3, 1e-9) << "both scaled together";
 }
 
+TEST(ForceLimiter, TheLimitsAreExactWhereALengthIsWithinRoundingsOfThem) {
+  for (int ulps = -6; ulps <= 6; ++ulps) {
+    double size = 6;
+    for (int i = 0; i < std::abs(ulps); ++i) size = std::nextafter(size, ulps < 0 ? 0 : 9);
+    ForceLimiter limiter({6, kInfinity, 1e-3}, 1e-3);
+    const DeviceForces out = limiter.apply({0, size, 0}, {0, 0, 0});
+    EXPECT_EQ(out.limited, size > 6) << ulps;
+    EXPECT_EQ(out.device1, Vec3(0, std::min(size, 6 / size * size), 0)) << ulps;
+    ForceLimiter slow({kInfinity, 6, 1e-3}, 1e-3);
+    EXPECT_EQ(slow.apply({0, 0, 0}, {size, 0, 0}).limited, size > 6) << ulps;
+  }
+}
+
 TEST(ForceLimiter, NotFiniteIsZeroUntilCleared) {
   for (const double bad : {kNaN, kInfinity, -kInfinity}) {
     ForceLimiter limiter({6, 0.5, 0.2}, 1e-3);
