@@ -45,12 +45,12 @@ struct TrialRecord {
   std::array<double, 3> start_tip{}, start_tail{};  ///< m, at time zero
   std::uint64_t ticks = 0, missed_ticks = 0;
   std::int64_t longest_period_ns = 0;
-  std::uint32_t faults = 0;           ///< bitwise or of all ticks' fault bits
-  bool started_inside = false;        ///< the stylus was inside an object at time zero
-  double max_force = 0;               ///< N
-  /// How the object was touched (runner/session/contact_log.h): share of the ticks with contact, and
-  /// s with contact near an edge. None: recorded by a version without them; edge_dwell also where
-  /// the stimulus has too many edges.
+  std::uint32_t faults = 0;     ///< bitwise or of all ticks' fault bits
+  bool started_inside = false;  ///< the stylus was inside an object at time zero
+  double max_force = 0;         ///< N
+  /// How the object was touched (runner/session/contact_log.h): share of the ticks with contact,
+  /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also
+  /// where the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;
   std::vector<SampleRecord> samples;  ///< empty unless recorded and requested
 };

@@ -62,9 +62,7 @@ class StimulusLibrary {
   /// Radius of the sphere about the origin that contains the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
   /// Of the stimulus as the protocol has it, not turned.
-  const SharpEdges& edges(int stimulus) const {
-    return edges_[static_cast<std::size_t>(stimulus)];
-  }
+  const SharpEdges& edges(int stimulus) const { return edges_[static_cast<std::size_t>(stimulus)]; }
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus

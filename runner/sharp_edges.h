@@ -11,8 +11,8 @@ namespace palpate::runner {
 /// The sharp edges of a scene's parts, those at which the surface turns by kLeastTurn or more, and
 /// the sharp vertices that are on none of them (the tip of a cone): there some two facets differ by
 /// as much. So the facets of a round shape have none, and the rims of a cylinder are sharp. An edge
-/// of a convex part counts also where the union of the parts goes on smoothly. Parts of layers count
-/// where there is no surface above them. Immutable, so threads can share it.
+/// of a convex part counts also where the union of the parts goes on smoothly. Parts of layers
+/// count where there is no surface above them. Immutable, so threads can share it.
 class SharpEdges {
  public:
   static constexpr double kLeastTurn = 0.5235987755982988;  ///< rad; 30 degrees

@@ -106,11 +106,10 @@ void SealWriter::end(std::int64_t run_id) {
 
 void SealWriter::attempt(std::int64_t id) {
   if (!find_attempt_) {
-    find_attempt_.emplace(db_,
-                          std::string("SELECT a.session_id, r.link, ") + kPlanColumns +
-                              ", a.cut_off_reason, a.samples_sha256, " +
-                              outcome_columns(version_of(db_)) +
-                              " FROM attempts a JOIN runs r ON r.id = a.run_id WHERE a.id = ?");
+    find_attempt_.emplace(
+        db_, std::string("SELECT a.session_id, r.link, ") + kPlanColumns +
+                 ", a.cut_off_reason, a.samples_sha256, " + outcome_columns(version_of(db_)) +
+                 " FROM attempts a JOIN runs r ON r.id = a.run_id WHERE a.id = ?");
     seal_attempt_.emplace(db_, "UPDATE attempts SET link = ?, seal = ? WHERE id = ?");
   }
   SQLite::Statement& find = *find_attempt_;

@@ -57,7 +57,7 @@ class Explorer {
   double aim_depth_;  ///< m below the sensed surface that the target lies
   double
       max_offset_;  ///< m; largest distance of the target from the stylus, which limits the force
-  double wander_;     ///< rad; of the heading in a tick, standard deviation
+  double wander_;   ///< rad; of the heading in a tick, standard deviation
   double turn_cosine_, turn_sine_;  ///< of the angle by which the stylus turns in a tick
   stimuli::Random random_{0};
   std::vector<TouchState> past_;  ///< ring buffer over the reaction delay

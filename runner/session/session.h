@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "data/record.h"
-#include "runner/session/contact_log.h"
 #include "runner/participants/respondent.h"
+#include "runner/session/contact_log.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {

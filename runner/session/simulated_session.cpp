@@ -96,11 +96,10 @@ bool simulate_in_memory(
         const double ticks = *record.contact_share * static_cast<double>(record.ticks);
         visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
       });
-      run_simulated_session(
-          study,
-          {number, SessionPlan(protocol, number, session), 0,
-           simulated_run(protocol, settings, number, session).clock},
-          log, [&stop] { return stop.load(); });
+      run_simulated_session(study,
+                            {number, SessionPlan(protocol, number, session), 0,
+                             simulated_run(protocol, settings, number, session).clock},
+                            log, [&stop] { return stop.load(); });
       if (stop) return false;
     }
   }

@@ -36,8 +36,8 @@ double distance_to_cube_edges(const Vec3& p, double edge) {
   for (int axis = 0; axis < 3; ++axis) {
     const int b = (axis + 1) % 3, c = (axis + 2) % 3;
     const double off = std::max(std::abs(p[axis]) - half, 0.0);
-    least = std::min(
-        least, std::hypot(off, std::hypot(std::abs(p[b]) - half, std::abs(p[c]) - half)));
+    least =
+        std::min(least, std::hypot(off, std::hypot(std::abs(p[b]) - half, std::abs(p[c]) - half)));
   }
   return least;
 }
