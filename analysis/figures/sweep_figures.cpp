@@ -22,7 +22,7 @@ constexpr double kLowestGain = -100;       // %; a slowing-down has no end: it i
 /// "" where all points are drawn.
 std::string thinned_note(const SweepAnalysis& analysis) {
   if (analysis.table.rows() <= kShownPoints) return "";
-  return std::to_string(kShownPoints) + " of the points with a figure are drawn, at random. ";
+  return "At most " + std::to_string(kShownPoints) + " of the points are drawn, chosen at random. ";
 }
 
 Figure sweep_figure(const SweepAnalysis& analysis, std::string id, std::string title) {
