@@ -34,10 +34,8 @@ bool left(UnionTick& tick, std::uint32_t object) {
 }
 
 void restore_layers(UnionTick& tick, std::uint32_t object) {
-  for (std::uint32_t i = 0; i < tick.scene.groups().size(); ++i) {
-    if (tick.scene.groups()[i].object_state != object) continue;
-    tick.state.unions.groups[i].giving_way = false;
-    tick.state.unions.groups[i].strength = 1;
+  for (std::uint32_t i = 0; i < tick.scene.breaking().size(); ++i) {
+    if (tick.scene.breaking()[i].object_state == object) tick.state.unions.breaking[i] = {};
   }
 }
 
@@ -67,24 +65,29 @@ void release_hooked(UnionTick& tick) {
   }
 }
 
+/// Null: the contact's part never gives way.
+BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
+  const std::uint32_t index = tick.scene.parts()[contact.loaded.part].breaking;
+  return index == ScenePart::kHolds ? nullptr : &tick.state.unions.breaking[index];
+}
+
 /// Layers whose force exceeds what they bear begin to give way.
 void break_layers(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
-  for (std::size_t i = 0, end = 0; i < all.contacts.size(); i = end) {
-    const std::uint32_t group = all.contacts[i].group;
-    Vec3 force(0);
-    for (end = i; end < all.contacts.size() && all.contacts[end].group == group; ++end)
-      force += all.contacts[end].loaded.force * all.contacts[end].loaded.contact.normal;
-    const double most = tick.scene.groups()[group].break_force;
-    if (glm::dot(force, force) > most * most) {
-      all.groups[group].giving_way = true;
+  for (BreakState& parts : all.breaking) parts.force = Vec3(0);
+  for (const PlacedContact& c : all.contacts) {
+    if (BreakState* const parts = breaking_of(tick, c))
+      parts->force += c.loaded.force * c.loaded.contact.normal;
+  }
+  for (std::size_t i = 0; i < all.breaking.size(); ++i) {
+    BreakState& parts = all.breaking[i];
+    const double most = tick.scene.breaking()[i].force;
+    if (glm::dot(parts.force, parts.force) > most * most) {
+      parts.giving_way = true;
       all.exceptions = true;
     }
-  }
-  if (!all.exceptions) return;
-  for (GroupState& group : all.groups) {
-    if (group.giving_way)
-      group.strength = std::max(0.0, group.strength - step_of(tick) / kFadeTime);
+    if (parts.giving_way)
+      parts.strength = std::max(0.0, parts.strength - step_of(tick) / kFadeTime);
   }
 }
 
@@ -92,7 +95,7 @@ void break_layers(UnionTick& tick) {
 
 bool is_off(const UnionTick& tick, const PartGroup& group) {
   const ObjectState& object = tick.state.unions.objects[group.object_state];
-  return object.off || object.just_left;
+  return !group.felt || object.off || object.just_left;
 }
 
 void update_objects(UnionTick& tick) {
@@ -114,22 +117,23 @@ void update_objects(UnionTick& tick) {
       tick.faults |= object.started_inside ? render_fault::kStartedInside : render_fault::kReleased;
     all.exceptions |= object.off || object.just_left || object.releasing || object.lagging > 0;
   }
-  for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
-    const std::uint32_t object = tick.scene.groups()[g].object_state;
-    if (!all.groups[g].giving_way) continue;
+  for (std::size_t i = 0; i < all.breaking.size(); ++i) {
+    const std::uint32_t object = tick.scene.breaking()[i].object_state;
+    if (!all.breaking[i].giving_way) continue;
     if (!all.objects[object].off && left(tick, object)) restore_layers(tick, object);
-    all.exceptions |= all.groups[g].giving_way;
+    all.exceptions |= all.breaking[i].giving_way;
   }
 }
 
 void fade_forces(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
-  break_layers(tick);
+  if (!all.breaking.empty()) break_layers(tick);
   if (!all.exceptions) return;
   release_hooked(tick);
   for (PlacedContact& c : all.contacts) {
     const std::uint32_t object = tick.scene.groups()[c.group].object_state;
-    const double strength = all.objects[object].strength * all.groups[c.group].strength;
+    const BreakState* const parts = breaking_of(tick, c);
+    const double strength = all.objects[object].strength * (parts != nullptr ? parts->strength : 1);
     c.loaded.force *= strength;
     c.loaded.stiffness *= strength;  // of friction
   }

@@ -16,7 +16,7 @@ inline constexpr double kFadeTime = 0.02;
 /// tick of all go off; those that are off and have been left come back.
 void update_objects(UnionTick& tick);
 
-/// Whether the group's object gives no force for now.
+/// Whether the group gives no force for now, or never: it only bounds its object.
 bool is_off(const UnionTick& tick, const PartGroup& group);
 
 /// After materials have had their say: hooked objects and broken layers lose their force. Changes

@@ -107,7 +107,7 @@ void Scene::group_parts() {
       group.first_pair = i * static_cast<std::uint32_t>(segments());
       group.object = part.object;
       group.object_state = static_cast<std::uint32_t>(known - objects.begin());
-      group.break_force = part.break_force;
+      group.felt = part.layer != kNotFelt;
       if (known == objects.end()) objects.push_back(part.object);
       groups_.push_back(group);
     }
@@ -115,15 +115,32 @@ void Scene::group_parts() {
     parts_[i].group = static_cast<std::uint32_t>(groups_.size() - 1);
   }
   object_states_ = objects.size();
+  find_breaking_parts();
   std::vector<std::uint32_t> parts_of_object(object_states_);
   for (const PartGroup& group : groups_) parts_of_object[group.object_state] += group.part_count;
+  for (const BreakingParts& parts : breaking_) ++parts_of_object[parts.object_state];
   for (PartGroup& group : groups_) {
-    group.by_law = tool() != nullptr || parts_of_object[group.object_state] > 1;
+    // The walk knows one part that never gives way.
+    group.by_law = tool() != nullptr || !group.felt || parts_of_object[group.object_state] > 1;
     if (!group.by_law) continue;
     for (std::uint32_t k = 0; k < group.part_count; ++k) {
       ScenePart& part = parts_[group.first_part + k];
       add_margin(part);
       group.skin = std::max({group.skin, 3 * part.margin, kSkin * part.mesh->size()});
+    }
+  }
+}
+
+void Scene::find_breaking_parts() {
+  for (const PartGroup& group : groups_) {
+    const std::size_t first = breaking_.size();
+    for (std::uint32_t k = 0; k < group.part_count; ++k) {
+      ScenePart& part = parts_[group.first_part + k];
+      if (!std::isfinite(part.break_force)) continue;
+      std::size_t same = first;
+      while (same < breaking_.size() && breaking_[same].force != part.break_force) ++same;
+      if (same == breaking_.size()) breaking_.push_back({group.object_state, part.break_force});
+      part.breaking = static_cast<std::uint32_t>(same);
     }
   }
 }
@@ -143,6 +160,7 @@ RenderState Scene::initial_state() const {
     state.unions.pairs.resize(parts_.size() * segments());
     state.unions.groups.resize(groups_.size());
     state.unions.objects.resize(object_states_);
+    state.unions.breaking.resize(breaking_.size());
     state.unions.near.reserve(most_pairs);
     state.unions.contacts.reserve(contacts);
     state.unions.rubbed.reserve(contacts);

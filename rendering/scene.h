@@ -21,6 +21,10 @@
 
 namespace palpate::rendering {
 
+/// The layer of what is nowhere felt itself, but bounds an object that has layers: who is inside of
+/// it has not left the object.
+inline constexpr int kNotFelt = -1;
+
 /// One convex part to be put into a scene.
 struct SceneObject {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
@@ -29,8 +33,10 @@ struct SceneObject {
   int object =
       0;  ///< index of the object in the scene; the parts of a compound share it, side by side
   std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
-  int layer = 0;  ///< 0: the object's surface; 1 and on: its layers, each felt on its own
-  /// N; a layer whose force exceeds it gives way until the object has been left
+  /// 0: the object's surface; 1 and on: its layers, each felt on its own.
+  int layer = 0;
+  /// N; of a layer. Parts of equal bounds that bear more together give way until the object has
+  /// been left.
   double break_force = std::numeric_limits<double>::infinity();
 };
 
@@ -50,6 +56,8 @@ struct ScenePart {
   int layer = 0;
   double break_force = std::numeric_limits<double>::infinity();  ///< N; of its layer
   std::uint32_t group = 0;                                       ///< index in Scene::groups()
+  static constexpr std::uint32_t kHolds = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t breaking = kHolds;  ///< index in Scene::breaking(); kHolds: it never gives way
 
   // For unions and tools (union_contact.h): the law sees the part larger by a margin, far above
   // rounding and far below what is felt, so that parts that abut leave no crack. Instead of the
@@ -128,6 +136,7 @@ class Scene {
   std::size_t features_index() const { return features_index_; }
   /// Parts of one group stand side by side.
   const std::vector<PartGroup>& groups() const { return groups_; }
+  const std::vector<BreakingParts>& breaking() const { return breaking_; }
   /// What the stylus carries; null: nothing but itself.
   const Tool* tool() const { return tool_.segments.empty() ? nullptr : &tool_; }
   /// m, from the tip to the farthest point of the tool.
@@ -137,9 +146,11 @@ class Scene {
 
  private:
   void group_parts();
+  void find_breaking_parts();
 
   std::vector<ScenePart> parts_;
   std::vector<PartGroup> groups_;
+  std::vector<BreakingParts> breaking_;
   std::size_t object_states_ = 0;
   double tool_reach_ = 0;
   Tool tool_;

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "rendering/active_planes.h"
@@ -24,8 +23,15 @@ struct PartGroup {
   std::uint32_t object_state = 0;
   int object = 0;
   bool by_law = false;  ///< else a single part without a tool, which the walk alone renders
+  bool felt = true;     ///< false: it has no force and only says what is inside of the object
   double skin = 0;      ///< m; the ideal tool keeps this distance from what it rests on
-  double break_force = std::numeric_limits<double>::infinity();  ///< N
+};
+
+/// Parts of one group that give way together: a layer, or in a compound what has equal bounds of
+/// it.
+struct BreakingParts {
+  std::uint32_t object_state = 0;
+  double force = 0;  ///< N; what they bear
 };
 
 /// One part and one segment of the tool.
@@ -43,8 +49,13 @@ struct GroupState {
   bool touching = false;
   Vec3 shift;      ///< m, at the last tick, from the virtual to the ideal tool, without the skin
   double lag = 0;  ///< rad, by which it is behind the virtual tool in turning
-  bool giving_way = false;  ///< a layer that broke: its force falls, until the object is left
-  double strength = 1;      ///< what is left of its force
+};
+
+/// What is remembered of BreakingParts.
+struct BreakState {
+  bool giving_way = false;  ///< they broke: their force falls, until the object is left
+  double strength = 1;      ///< what is left of their force
+  Vec3 force;               ///< N, of this tick's contacts with them
 };
 
 /// What the ideal tools of one object share.
@@ -100,6 +111,7 @@ struct UnionMemory {
   std::vector<PairState> pairs;
   std::vector<GroupState> groups;
   std::vector<ObjectState> objects;
+  std::vector<BreakState> breaking;
   std::vector<NearPair> near;           ///< of the group in hand
   std::vector<PlacedContact> contacts;  ///< of the last tick
   std::vector<RubbedPair> rubbed;       ///< at the last tick

@@ -7,20 +7,38 @@
 #include <glm/geometric.hpp>
 #include <sstream>
 
-#include "stimuli/inset.h"
+#include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/parts/inset_parts.h"
 
 namespace palpate::runner {
 namespace {
 
-Pose compose(const Pose& outer, const Pose& inner) {
-  return {outer.orientation * inner.position + outer.position,
-          outer.orientation * inner.orientation};
-}
-
 std::string key_of(double value) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
+bool same_layer(const stimuli::Layer& a, const stimuli::Layer& b) {
+  return a.depth == b.depth && a.stiffness == b.stiffness && a.damping == b.damping &&
+         a.break_force == b.break_force;
+}
+
+/// The mesh in the frame in which its own has this pose.
+std::shared_ptr<const stimuli::ConvexMesh> in_frame(const stimuli::ConvexMesh& mesh,
+                                                    const Pose& pose) {
+  stimuli::PolygonSoup soup;
+  for (const Vec3& v : mesh.vertices())
+    soup.vertices.push_back(pose.orientation * v + pose.position);
+  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+    const stimuli::Facet& facet = mesh.facets()[f];
+    auto& face = soup.faces.emplace_back();
+    for (std::uint32_t k = 0; k < facet.side_count; ++k) {
+      const stimuli::Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
+      face.push_back(edge.left == f ? edge.v0 : edge.v1);
+    }
+  }
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
 }
 
 /// Shapes with equal keys have equal meshes.
@@ -33,11 +51,9 @@ std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
          spec.file;
 }
 
-/// The same shape with nothing under a surface that is felt.
-stimuli::ObjectSpec as_surface(stimuli::ObjectSpec spec) {
-  spec.material = {};
-  for (stimuli::ObjectSpec& part : spec.parts) part = as_surface(std::move(part));
-  return spec;
+bool has_layers(const stimuli::ObjectSpec& spec) {
+  if (spec.shape != stimuli::ShapeKind::compound) return !spec.material.layers.empty();
+  return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
 }
 
 }  // namespace
@@ -82,72 +98,102 @@ const rendering::Renderer& renderer_for(protocols::RendererKind kind) {
 struct SceneBuilder::Placing {
   int object;
   bool side_contact;
+  bool has_layers;  ///< anywhere: then its whole surface says where it ends
   std::vector<rendering::SceneObject>& out;
-  struct Layer {
-    double depth = 0;      ///< m, the least that was asked for
-    bool is_left = false;  ///< of some part
-    void add(double asked, bool left) {
-      depth = depth > 0 ? std::min(depth, asked) : asked;
-      is_left = is_left || left;
-    }
+  /// A shape that has layers.
+  struct Shape {
+    const stimuli::ObjectSpec* spec;
+    Pose pose;
   };
-  std::vector<Layer> layers = {};
-  double deepest = 0;  ///< m, at which the last part with layers is gone
+  std::vector<Shape> shapes = {};
 
-  void check() const {
-    std::vector<std::string> faults;
-    for (std::size_t i = 0; i < layers.size(); ++i) {
-      if (layers[i].is_left) continue;
-      std::ostringstream text;
-      text << "/layers/" << i << "/depth_m: nothing of the object is left at a depth of "
-           << layers[i].depth << " m; expected less than " << deepest << " m";
-      faults.push_back(text.str());
-    }
-    if (!faults.empty()) throw stimuli::MeshError(std::move(faults));
+  void add(int layer, const stimuli::Layer& of, const Prepared& prepared, const Pose& pose) {
+    rendering::SceneObject part{prepared.mesh, pose, {}, object, prepared.trees};
+    part.material.stiffness = of.stiffness;
+    part.material.damping = of.damping;
+    part.layer = layer;
+    if (of.break_force) part.break_force = *of.break_force;
+    out.push_back(std::move(part));
   }
 };
+
+std::vector<SceneBuilder::Prepared> SceneBuilder::with_trees(
+    const std::vector<std::shared_ptr<const stimuli::ConvexMesh>>& meshes, bool side_contact) {
+  std::vector<Prepared> parts;
+  for (const auto& mesh : meshes)
+    parts.push_back({mesh, std::make_shared<const rendering::ContactTrees>(*mesh, side_contact)});
+  return parts;
+}
+
+std::vector<std::shared_ptr<const stimuli::ConvexMesh>> SceneBuilder::surface_of(
+    const stimuli::ObjectSpec& spec, bool side_contact) {
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
+  for (const Prepared& part : prepare(spec, 0, side_contact)) meshes.push_back(part.mesh);
+  return meshes;
+}
 
 const std::vector<SceneBuilder::Prepared>& SceneBuilder::prepare(const stimuli::ObjectSpec& spec,
                                                                  double depth, bool side_contact) {
   const std::string key = shape_key(spec, side_contact) + ' ' + key_of(depth);
   if (const auto known = prepared_.find(key); known != prepared_.end()) return known->second;
-  std::vector<Prepared> parts;
-  const auto add = [&](std::shared_ptr<const stimuli::ConvexMesh> mesh) {
-    if (!mesh) return;
-    auto trees = std::make_shared<const rendering::ContactTrees>(*mesh, side_contact);
-    parts.push_back({std::move(mesh), std::move(trees)});
-  };
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
   if (depth > 0) {
-    for (const Prepared& part : prepare(spec, 0, side_contact))
-      add(stimuli::inset(*part.mesh, depth));
+    meshes = stimuli::inset_union(surface_of(spec, side_contact), depth);
   } else {
     for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec))
-      add(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
+      meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
   }
-  return prepared_.emplace(key, std::move(parts)).first->second;
+  return prepared_.emplace(key, with_trees(meshes, side_contact)).first->second;
 }
 
-void SceneBuilder::place_layers(const stimuli::ObjectSpec& spec, const Pose& pose,
-                                Placing& placing) {
-  const std::vector<stimuli::Layer>& layers = spec.material.layers;
-  if (placing.layers.size() < layers.size()) placing.layers.resize(layers.size());
-  for (std::size_t i = 0; i < layers.size(); ++i) {
-    const stimuli::Layer& layer = layers[i];
-    const std::vector<Prepared>& left = prepare(spec, layer.depth, placing.side_contact);
-    placing.layers[i].add(layer.depth, !left.empty());
-    for (const Prepared& prepared : left) {
-      rendering::SceneObject part{prepared.mesh, pose, {}, placing.object, prepared.trees};
-      part.material.stiffness = layer.stiffness;
-      part.material.damping = layer.damping;
-      part.layer = static_cast<int>(i) + 1;
-      if (layer.break_force) part.break_force = *layer.break_force;
-      placing.out.push_back(std::move(part));
+/// Shapes with equal layers have them in common: what lies between two of them is no surface.
+void SceneBuilder::place_layers(Placing& placing) {
+  std::size_t most = 0;
+  for (const Placing::Shape& shape : placing.shapes)
+    most = std::max(most, shape.spec->material.layers.size());
+  std::vector<std::string> faults;
+  for (std::size_t i = 0; i < most; ++i) {
+    std::vector<Placing::Shape> left = placing.shapes;
+    std::erase_if(left, [&](const auto& shape) { return shape.spec->material.layers.size() <= i; });
+    double least = left.front().spec->material.layers[i].depth, deepest = 0;
+    bool is_left = false;
+    while (!left.empty()) {
+      const stimuli::Layer layer = left.front().spec->material.layers[i];
+      const auto others = std::stable_partition(left.begin(), left.end(), [&](const auto& shape) {
+        return same_layer(shape.spec->material.layers[i], layer);
+      });
+      const std::vector<Placing::Shape> same(left.begin(), others);
+      left.erase(left.begin(), others);
+      least = std::min(least, layer.depth);
+      std::vector<std::shared_ptr<const stimuli::ConvexMesh>> surface;
+      std::vector<Prepared> parts;
+      Pose pose;
+      if (same.size() == 1) {
+        pose = same[0].pose;
+        surface = surface_of(*same[0].spec, placing.side_contact);
+        parts = prepare(*same[0].spec, layer.depth, placing.side_contact);
+      } else {
+        for (const Placing::Shape& shape : same) {
+          for (const auto& mesh : surface_of(*shape.spec, placing.side_contact))
+            surface.push_back(in_frame(*mesh, shape.pose));
+        }
+        parts = with_trees(stimuli::inset_union(surface, layer.depth), placing.side_contact);
+      }
+      for (const Prepared& part : parts) placing.add(static_cast<int>(i) + 1, layer, part, pose);
+      is_left |= !parts.empty();
+      if (!is_left) deepest = std::max(deepest, stimuli::largest_inset(surface));
     }
+    if (is_left) continue;
+    std::ostringstream text;
+    text << "/layers/" << i << "/depth_m: nothing of the object is left at a depth of " << least
+         << " m; expected less than " << deepest << " m";
+    faults.push_back(text.str());
   }
+  if (!faults.empty()) throw stimuli::MeshError(std::move(faults));
 }
 
 void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing) {
-  const Pose pose = compose(parent, spec.pose);
+  const Pose pose = stimuli::compose(parent, spec.pose);
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts) place(part, pose, placing);
     return;
@@ -155,13 +201,15 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
   stimuli::Material surface = spec.material;
   surface.layers.clear();
   for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
-    if (surface.stiffness > 0)
-      placing.out.push_back({part.mesh, pose, surface, placing.object, part.trees});
-    if (!spec.material.layers.empty())
-      placing.deepest =
-          std::max(placing.deepest, stimuli::largest_inscribed_ball(*part.mesh).radius);
+    rendering::SceneObject placed{part.mesh, pose, surface, placing.object, part.trees};
+    if (!(surface.stiffness > 0)) {
+      placed.layer = rendering::kNotFelt;
+      placed.material = {};
+      placed.material.stiffness = 0;
+    }
+    if (surface.stiffness > 0 || placing.has_layers) placing.out.push_back(std::move(placed));
   }
-  place_layers(spec, pose, placing);
+  if (!spec.material.layers.empty()) placing.shapes.push_back({&spec, pose});
 }
 
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
@@ -169,10 +217,10 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   std::vector<rendering::SceneObject> parts;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
-      Placing placing{static_cast<int>(i), side_contact, parts};
+      Placing placing{static_cast<int>(i), side_contact, has_layers(objects[i]), parts};
       const auto first = static_cast<std::ptrdiff_t>(parts.size());
       place(objects[i], Pose{}, placing);
-      placing.check();
+      place_layers(placing);
       // The parts of a layer stand side by side.
       std::stable_sort(parts.begin() + first, parts.end(),
                        [](const auto& a, const auto& b) { return a.layer < b.layer; });
@@ -206,12 +254,10 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
                              part.trees,
                              part.layer,
                              part.break_force});
+          if (part.layer <= 0)  // layers are inside of the surface
+            reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
         }
         if (!sides) edges_.emplace_back(scene);
-        // Where it stands: its surface as well where only its layers are felt.
-        const rendering::Scene surface = builder.build({as_surface(stimulus.object)}, sides);
-        for (const rendering::ScenePart& part : surface.parts())
-          reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
       } catch (const stimuli::MeshError& error) {
         std::vector<std::string> faults;
         for (std::string fault : error.faults()) {
@@ -231,7 +277,7 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
   std::vector<rendering::SceneObject> objects =
       (sides ? with_sides_ : without_sides_)[trial.stimulus];
   for (rendering::SceneObject& object : objects)
-    object.pose = compose({Vec3(0), trial.orientation}, object.pose);
+    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
   return rendering::Scene(std::move(objects), sides, tool_);
 }
 

@@ -30,8 +30,9 @@ double grip_from_virtual_tip(const protocols::Protocol& protocol);
 /// and its search trees.
 class SceneBuilder {
  public:
-  /// \throws MeshError where a shape is no solid that falls into convex parts, or where nothing of
-  /// it is left for a layer, with the place as a JSON pointer.
+  /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
+  /// is left for a layer, or where a layer cannot be made of convex parts (inset_union), with the
+  /// place as a JSON pointer.
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {});
 
@@ -40,13 +41,17 @@ class SceneBuilder {
     std::shared_ptr<const stimuli::ConvexMesh> mesh;
     std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  /// Its convex parts. \param depth  m, by which their surfaces are moved inwards: parts may be
-  /// gone
+  static std::vector<Prepared> with_trees(
+      const std::vector<std::shared_ptr<const stimuli::ConvexMesh>>& meshes, bool side_contact);
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> surface_of(
+      const stimuli::ObjectSpec& spec, bool side_contact);
+  /// Its convex parts. \param depth  m, by which its surface is moved inwards: empty where nothing
+  /// is left
   const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, double depth,
                                        bool side_contact);
   struct Placing;
   void place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing);
-  void place_layers(const stimuli::ObjectSpec& spec, const Pose& pose, Placing& placing);
+  void place_layers(Placing& placing);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };

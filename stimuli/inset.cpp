@@ -53,15 +53,10 @@ void make_round(std::vector<Vec3>& points) {
   }
 }
 
-struct Plane {
-  Vec3 normal;    // unit, outward
-  double offset;  // m, from the origin
-};
-
 /// The point on three planes, by Gaussian elimination with full pivoting. Planes of neighbouring
 /// facets of a fine mesh are nearly parallel: only differences of their equations tell where they
 /// meet, and they are taken in extended precision.
-Vec3 common_point(const std::array<const Plane*, 3>& planes) {
+Vec3 common_point(const std::array<const HalfSpace*, 3>& planes) {
   using Real = long double;
   std::array<std::array<Real, 4>, 3> a{};
   for (int r = 0; r < 3; ++r)
@@ -170,37 +165,45 @@ PolygonSoup without_short_edges(const PolygonSoup& soup, double least) {
 
 }  // namespace
 
-std::shared_ptr<const ConvexMesh> inset(const ConvexMesh& mesh, double depth) {
-  const Ball ball = largest_inscribed_ball(mesh);
-  if (!(ball.radius - depth > kThinnest * mesh.size())) return nullptr;
+std::shared_ptr<const ConvexMesh> body_behind(const std::vector<HalfSpace>& half_spaces,
+                                              const Vec3& inside, double size) {
   // Duality about a point inside: a plane n.x = d is the point n/d, and the facets of the points'
   // convex hull are the vertices of the body behind the planes (Preparata & Shamos 1985, 7.2.5).
   // Points that are not on the hull are planes that bound nothing.
-  std::vector<Plane> planes;
+  std::vector<HalfSpace> planes;  // from the point inside
   std::vector<Vec3> duals;
-  planes.reserve(mesh.facets().size());
-  duals.reserve(mesh.facets().size());
-  for (const Facet& facet : mesh.facets()) {
-    planes.push_back({facet.normal, facet.offset - depth - glm::dot(facet.normal, ball.centre)});
-    duals.push_back(facet.normal / planes.back().offset);
+  planes.reserve(half_spaces.size());
+  duals.reserve(half_spaces.size());
+  for (const HalfSpace& plane : half_spaces) {
+    planes.push_back({plane.normal, plane.offset - glm::dot(plane.normal, inside)});
+    duals.push_back(plane.normal / planes.back().offset);
   }
   make_round(duals);
   const GridHull hull = grid_hull(duals, 0);
   PolygonSoup soup;
   soup.vertices.reserve(hull.soup.faces.size());
   for (const auto& corners : hull.soup.faces) {
-    soup.vertices.push_back(ball.centre + common_point({&planes[hull.point[corners[0]]],
-                                                        &planes[hull.point[corners[1]]],
-                                                        &planes[hull.point[corners[2]]]}));
+    soup.vertices.push_back(
+        inside + common_point({&planes[hull.point[corners[0]]], &planes[hull.point[corners[1]]],
+                               &planes[hull.point[corners[2]]]}));
   }
   soup.faces = fans_of(hull.soup);
-  soup.coordinate_error = kCoordinateError * mesh.size();
+  soup.coordinate_error = kCoordinateError * size;
   try {
     return std::make_shared<const ConvexMesh>(soup);
   } catch (const MeshError&) {
     // A corner of many facets comes apart when they move by little, too little for a mesh.
-    return std::make_shared<const ConvexMesh>(without_short_edges(soup, kLeastEdge * mesh.size()));
+    return std::make_shared<const ConvexMesh>(without_short_edges(soup, kLeastEdge * size));
   }
+}
+
+std::shared_ptr<const ConvexMesh> inset(const ConvexMesh& mesh, double depth) {
+  const Ball ball = largest_inscribed_ball(mesh);
+  if (!(ball.radius - depth > kThinnest * mesh.size())) return nullptr;
+  std::vector<HalfSpace> moved;
+  moved.reserve(mesh.facets().size());
+  for (const Facet& facet : mesh.facets()) moved.push_back({facet.normal, facet.offset - depth});
+  return body_behind(moved, ball.centre, mesh.size());
 }
 
 }  // namespace palpate::stimuli

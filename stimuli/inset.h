@@ -2,6 +2,7 @@
 // The surface of a convex body moved inwards. The mesh's own frame, SI units.
 
 #include <memory>
+#include <vector>
 
 #include "stimuli/convex_mesh.h"
 
@@ -11,6 +12,20 @@ struct Ball {
   Vec3 centre;        ///< m
   double radius = 0;  ///< m
 };
+
+/// A half-space: dot(normal, p) <= offset.
+struct HalfSpace {
+  Vec3 normal;        ///< unit, outward
+  double offset = 0;  ///< m
+};
+
+/// What is behind all planes, which must bound a body. Planes that bound nothing of it are no
+/// facets.
+/// \param inside  m, a point inside, better far from all planes
+/// \param size    m, about that of the body: its vertices lie on their planes within 1e-11 of it
+/// \throws MeshError where the body is too thin to be told from a plane
+std::shared_ptr<const ConvexMesh> body_behind(const std::vector<HalfSpace>& half_spaces,
+                                              const Vec3& inside, double size);
 
 /// The largest ball in the body (one of them, where there are several).
 Ball largest_inscribed_ball(const ConvexMesh& mesh);

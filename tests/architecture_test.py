@@ -72,7 +72,7 @@ def room_of(name):
 
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/triangulate "
+    "stimuli": "compose convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/triangulate "
                "primitives printable random shapes vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool tool_pose",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "stimuli/compose.h"
 #include "stimuli/parts/triangulate.h"
 #include "stimuli/primitives.h"
 
@@ -28,8 +29,7 @@ void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
 }
 
 void add(const stimuli::ObjectSpec& spec, const Pose& parent, DrawnMesh& out) {
-  const Pose pose{parent.orientation * spec.pose.position + parent.position,
-                  parent.orientation * spec.pose.orientation};
+  const Pose pose = stimuli::compose(parent, spec.pose);
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts) add(part, pose, out);
   } else {

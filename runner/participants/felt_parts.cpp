@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "stimuli/compose.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
 
@@ -20,8 +21,7 @@ std::optional<double> felt_depth(const stimuli::Material& material) {
 }
 
 void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<PlacedPart>& out) {
-  const Pose pose{parent.orientation * spec.pose.position + parent.position,
-                  parent.orientation * spec.pose.orientation};
+  const Pose pose = stimuli::compose(parent, spec.pose);
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts) add(part, pose, out);
     return;

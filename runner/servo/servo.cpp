@@ -19,18 +19,22 @@ double distance_of_segment(const rendering::LineProbe& probe) {  // from the ori
   return glm::length(probe.tip + t * d);
 }
 
-/// From the origin to the nearest point of what touches, m. A trial's tool begins with the roll
-/// that its first pose gives it.
+/// From the origin to the nearest point of what touches, m; NaN where the stylus is not finite. A
+/// trial's tool begins with the roll that its first pose gives it.
 double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
+  const double stylus = distance_of_segment(probe);
+  if (!std::isfinite(stylus)) return std::numeric_limits<double>::quiet_NaN();
   const rendering::Tool* const tool = shown.scene.tool();
-  if (tool == nullptr || !shown.renderer->side_contact()) return distance_of_segment(probe);
+  if (tool == nullptr || !shown.renderer->side_contact()) return stylus;
   const Vec3 d = probe.tail - probe.tip;
   const rendering::PlacedTool placed =
       rendering::place(tool, true, {probe.tip, d, rendering::tool_frame(d, nullptr, Vec3(0))});
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < placed.count; ++k) {
     const Vec3 from = probe.tip + placed.segments[k].from;
-    least = std::min(least, distance_of_segment({from, from + placed.segments[k].along}));
+    const double distance = distance_of_segment({from, from + placed.segments[k].along});
+    if (std::isnan(distance)) return distance;  // std::min would forget it
+    least = std::min(least, distance);
   }
   return least;
 }

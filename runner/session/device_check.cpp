@@ -41,6 +41,29 @@ void visit_materials(Object& object, const Visit& visit) {
   for (auto& part : object.parts) visit_materials(part, visit);
 }
 
+/// What is felt at most of a stimulus: its parts have one ideal tool for each layer, which rests
+/// on any of them, so that each layer counts as the stiffest of the parts' layers of its number.
+void add_felt(const stimuli::ObjectSpec& object, stimuli::Material& felt) {
+  for (const stimuli::ObjectSpec& part : object.parts) add_felt(part, felt);
+  if (!object.parts.empty()) return;
+  const auto larger = [](double a, double b) { return std::abs(a) < std::abs(b) ? b : a; };
+  const stimuli::Material& material = object.material;
+  felt.stiffness = larger(felt.stiffness, material.stiffness);
+  felt.damping = larger(felt.damping, material.damping);
+  if (felt.layers.size() < material.layers.size()) felt.layers.resize(material.layers.size());
+  for (std::size_t i = 0; i < material.layers.size(); ++i) {
+    felt.layers[i].stiffness = larger(felt.layers[i].stiffness, material.layers[i].stiffness);
+    felt.layers[i].damping = larger(felt.layers[i].damping, material.layers[i].damping);
+  }
+}
+
+stimuli::Material felt_material(const stimuli::ObjectSpec& object) {
+  stimuli::Material felt;
+  felt.stiffness = 0;
+  add_felt(object, felt);
+  return felt;
+}
+
 void scale_down(stimuli::Material& material, double fraction) {
   material.stiffness *= fraction;
   material.damping *= fraction;
@@ -185,17 +208,32 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
   if (protocol.material_limit != protocols::MaterialLimit::limit || device.actuated_freedom == 0)
     return out;
   for (protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    int part = -1;
-    visit_materials(stimulus.object, [&](stimuli::Material& material) {
-      ++part;
+    const auto share_of = [&](const stimuli::Material& material) {
       const ShowableMaterial can = showable(material, device, shown_rate(protocol, device),
                                             felt_gain(protocol), protocol.passivity_controller);
-      if (can.reason.empty() || can.fraction == 0) return;  // nothing to show: incompatible
-      const double shown = can.fraction * (1 - 1e-12);      // rounding stays below the bound
-      out.push_back({stimulus.name, part, shown, material.stiffness, material.damping,
-                     sentence("stimulus '", stimulus.name, "' has ", can.reason, ": limited to ",
-                              whole_stiffness(material) * shown, " N/m and ",
-                              whole_damping(material) * shown, " N s/m")});
+      if (can.reason.empty() || can.fraction == 0)  // nothing to show: incompatible
+        return ShowableMaterial{};
+      return ShowableMaterial{can.fraction * (1 - 1e-12), can.reason};  // rounding stays below
+    };
+    // First what alone is too stiff; parts keep their differences where they can.
+    std::vector<ShowableMaterial> shares;
+    stimuli::ObjectSpec limited = stimulus.object;
+    visit_materials(limited, [&](stimuli::Material& material) {
+      shares.push_back(share_of(material));
+      if (!shares.back().reason.empty()) scale_down(material, shares.back().fraction);
+    });
+    const ShowableMaterial together = share_of(felt_material(limited));
+    int part = -1;
+    visit_materials(stimulus.object, [&](stimuli::Material& material) {
+      const ShowableMaterial& alone = shares[static_cast<std::size_t>(++part)];
+      if (alone.reason.empty() && together.reason.empty()) return;
+      const double shown = alone.fraction * together.fraction;
+      out.push_back(
+          {stimulus.name, part, shown, material.stiffness, material.damping,
+           sentence("stimulus '", stimulus.name, "' has ",
+                    alone.reason.empty() ? "in all its parts " + together.reason : alone.reason,
+                    ": limited to ", whole_stiffness(material) * shown, " N/m and ",
+                    whole_damping(material) * shown, " N s/m")});
       scale_down(material, shown);
     });
   }
@@ -265,16 +303,20 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
   }
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
-    const auto check_material = [&](const stimuli::Material& material) {
+    bool refused = false;
+    const auto check_material = [&](const stimuli::Material& material, const char* of_parts) {
       const ShowableMaterial can = showable(material, device, shown_rate(protocol, device),
                                             felt_gain(protocol), protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
-      add("stimulus '", stimulus.name, "' has ", can.reason, ": soften /material, raise ",
+      refused = true;
+      add("stimulus '", stimulus.name, "' has ", of_parts, can.reason, ": soften /material, raise ",
           "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
           passivity_advice(protocol, material, device, can),
           "or have it limited by /servo/material_limit \"limit\"");
     };
-    visit_materials(stimulus.object, check_material);
+    visit_materials(stimulus.object,
+                    [&](const stimuli::Material& material) { check_material(material, ""); });
+    if (!refused) check_material(felt_material(stimulus.object), "in all its parts ");
     const double radius =
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
     const std::string fault = workspace_fault(protocol, radius, device);

@@ -26,7 +26,8 @@ struct ShowableMaterial {
 /// the stiffness that its maker gives for its highest rate, in proportion to the rate. Bounds of
 /// passivity: no hand can make it buzz. The passivity controller makes up for kPassivityExtension
 /// times what the device's own damping does.
-/// Of a material with layers the sums count: all of them are felt at once by who presses deep.
+/// Of a material with layers the sums count: all of them are felt at once by who presses deep. Of a
+/// compound's parts the stiffest counts for the surface and for each layer, and the sum of these.
 /// \param gain  the hand feels so many times the stiffness and damping: felt_gain
 ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
                           double rate, double gain, bool passivity_controller);

@@ -321,6 +321,28 @@ TEST(Servo, AToolWaitsForTheHomeZoneWithAllOfItself) {
   EXPECT_EQ(first_force(hook, 0.112), 499);
 }
 
+TEST(Servo, AStylusThatIsNoNumberIsNotAtHomeWithAToolEither) {
+  rendering::Tool one{{{{0, 0, 0}, {0, 0, 0.12}}}}, two = one;
+  two.segments.push_back({{0, 0, 0}, {0.01, 0, 0.02}});
+  const rendering::LineProbe far{{0, 0, 0.5}, {0, 0, 0.62}};
+  for (const rendering::Tool& tool : {rendering::Tool{}, one, two}) {
+    for (int coordinate = 0; coordinate < 6; ++coordinate) {
+      rendering::LineProbe bad = far;
+      (coordinate < 3 ? bad.tip : bad.tail)[coordinate % 3] = kNaN;
+      FakeDevice device([&](int) { return DeviceReading{bad, 0, false}; });
+      VirtualClock clock;
+      Servo servo(device, clock, 1000, ForceLimits{});
+      const rendering::Scene scene(
+          {{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)), Pose{},
+            stimuli::Material{}, 0, nullptr}},
+          true, tool);
+      servo.prepare(scene, rendering::ray_renderer(), HomeZone{.rest = 0});
+      for (int tick = 0; tick < 10; ++tick)
+        ASSERT_EQ(servo.tick().phase, Phase::homing) << tool.segments.size() << ' ' << coordinate;
+    }
+  }
+}
+
 TEST(ForceLimiter, RampsUpCutsSizeAndChange) {
   ForceLimiter limiter({6, 0.5, 0.2}, 1e-3);
   DeviceForces out;

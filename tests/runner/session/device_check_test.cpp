@@ -171,6 +171,55 @@ TEST(DeviceCheck, LayersAndPartsCount) {
   EXPECT_NEAR(protocol.stimuli[0].object.parts[0].material.stiffness, 2000, 1e-6);
 }
 
+TEST(DeviceCheck, OfACompoundCountsWhatItsPartsLayersAreTogether) {
+  // Surface of one part, layer of another: under an edge where they meet both are felt.
+  stimuli::ObjectSpec surface, layered, both;
+  surface.material = of(1800);
+  layered.material = of(0);
+  layered.material.layers = {{1e-3, 200}, {2e-3, 1600}};
+  both.material = of(100);
+  both.material.layers = {{1e-3, 600}};
+  protocols::Protocol protocol = some_protocol(of(1));
+  stimuli::ObjectSpec& object = protocol.stimuli[0].object;
+  object.shape = stimuli::ShapeKind::compound;
+  const StimulusLibrary library(some_protocol(of(1)));
+  object.parts = {surface, both};
+  object.parts[0].material.stiffness = 1400;
+  EXPECT_TRUE(incompatibilities(protocol, library, some_device()).empty());  // 1400 + 600
+  object.parts[0].material.stiffness = 1401;
+  EXPECT_EQ(incompatibilities(protocol, library, some_device()).size(), 1u);
+  object.parts = {surface, layered, both};  // 1800 + 600 + 1600 N/m: twice what is shown
+  const auto refused = incompatibilities(protocol, library, some_device());
+  ASSERT_EQ(refused.size(), 1u);
+  EXPECT_NE(refused[0].find("'ball' has in all its parts 4000 N/m with its layers"),
+            std::string::npos)
+      << refused[0];
+  protocol.material_limit = protocols::MaterialLimit::limit;
+  protocols::Protocol again = protocol;
+  const auto limited = limit_materials(protocol, some_device());
+  EXPECT_NEAR(object.parts[0].material.stiffness, 900, 1e-6);
+  EXPECT_NEAR(object.parts[1].material.layers[1].stiffness, 800, 1e-6);
+  EXPECT_NEAR(object.parts[2].material.layers[0].stiffness, 300, 1e-6);
+  EXPECT_TRUE(incompatibilities(protocol, library, some_device()).empty());
+  EXPECT_TRUE(limit_materials(protocol, some_device()).empty());
+  EXPECT_TRUE(limit_as_recorded(again, to_json_text(limited, some_device(), 1000)));
+  EXPECT_EQ(again.stimuli[0].object.parts[2].material.layers[0].stiffness,
+            object.parts[2].material.layers[0].stiffness);
+}
+
+TEST(DeviceCheck, APartThatIsSoftEnoughStaysBesideOneThatIsNot) {
+  stimuli::ObjectSpec soft, stiff;
+  soft.material = of(500);
+  stiff.material = of(8000);
+  protocols::Protocol protocol = some_protocol(of(1));
+  protocol.stimuli[0].object.shape = stimuli::ShapeKind::compound;
+  protocol.stimuli[0].object.parts = {soft, stiff};
+  protocol.material_limit = protocols::MaterialLimit::limit;
+  EXPECT_EQ(limit_materials(protocol, some_device()).size(), 1u);
+  EXPECT_EQ(protocol.stimuli[0].object.parts[0].material.stiffness, 500);
+  EXPECT_NEAR(protocol.stimuli[0].object.parts[1].material.stiffness, 2000, 1e-6);
+}
+
 TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
   protocols::Protocol protocol = some_protocol(of(2500, 0.1));
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());

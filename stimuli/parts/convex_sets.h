@@ -1,0 +1,63 @@
+#pragma once
+// Convex sets inside of a union of convex parts. One frame for all, SI units.
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "stimuli/inset.h"
+
+namespace palpate::stimuli {
+
+using MeshPointer = std::shared_ptr<const ConvexMesh>;
+
+/// m, of a point over the plane that it is farthest out of; negative inside.
+double height_over(const ConvexMesh& mesh, const Vec3& p);
+
+/// Of a facet, counter-clockwise.
+std::vector<Vec3> corners_of(const ConvexMesh& mesh, std::uint32_t facet);
+
+/// A convex set inside of the union.
+struct ConvexSet {
+  MeshPointer mesh;
+  std::vector<HalfSpace> planes;  ///< that bound it; some may bound nothing
+};
+
+ConvexSet whole(const MeshPointer& part);
+
+/// What a set must keep when it grows.
+struct Kept {
+  std::optional<HalfSpace> plane = std::nullopt;  ///< that it does not grow through
+  std::optional<Vec3> point = std::nullopt;       ///< m; else the set only grows
+  double depth = 0;                               ///< m, of the point behind all that is cut off
+};
+
+/// How sets grow from part to part, as far as they stay convex.
+class SetGrowth {
+ public:
+  /// \param abuts  of the size of the largest part; parts nearer than this touch
+  SetGrowth(const std::vector<MeshPointer>& parts, double abuts);
+
+  double tolerance() const { return tolerance_; }  ///< m
+
+  /// The set with what of `others` can be added to it, which are inside of the union. Where a point
+  /// is to be kept, what is beside of it is given up for what is beyond of it.
+  ConvexSet grown(ConvexSet set, const std::vector<MeshPointer>& others, const Kept& kept) const;
+
+  /// What of the set is behind a plane; none: nothing.
+  std::optional<ConvexSet> behind(const ConvexSet& set, const HalfSpace& plane) const;
+
+ private:
+  std::optional<ConvexSet> through(const ConvexSet& set, std::uint32_t f,
+                                   const ConvexMesh& beyond) const;
+  std::optional<ConvexSet> narrowed_through(const ConvexSet& set, std::uint32_t f,
+                                            const ConvexMesh& beyond, const Kept& kept) const;
+  std::optional<ConvexSet> step(const ConvexSet& set, const std::vector<MeshPointer>& others,
+                                const Kept& kept, bool narrower) const;
+
+  double abuts_, tolerance_ = 0;
+};
+
+}  // namespace palpate::stimuli

@@ -1,0 +1,205 @@
+// What the scenes of layered objects render, built as scene files are: what is inside of an object,
+// and what gives way.
+
+#include "runner/scene_builder.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rendering/release.h"
+#include "rendering/render_fault.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr double kTick = 1e-3;   // s
+constexpr double kHalf = 0.025;  // m, of a cube
+
+stimuli::Material of(double surface, std::vector<stimuli::Layer> layers) {
+  stimuli::Material material;
+  material.stiffness = surface;
+  material.layers = std::move(layers);
+  return material;
+}
+
+stimuli::ObjectSpec box(const Vec3& low, const Vec3& high, const stimuli::Material& material) {
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::box;
+  spec.size = high - low;
+  spec.pose.position = 0.5 * (low + high);
+  spec.material = material;
+  return spec;
+}
+
+stimuli::ObjectSpec cube(const stimuli::Material& material) {
+  return box(Vec3(-kHalf), Vec3(kHalf), material);
+}
+
+stimuli::ObjectSpec compound(std::vector<stimuli::ObjectSpec> parts) {
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::compound;
+  spec.parts = std::move(parts);
+  return spec;
+}
+
+/// One stylus in one scene, upright, led to a depth under the cube's upper face.
+class Press {
+ public:
+  explicit Press(const stimuli::ObjectSpec& object, const rendering::Tool& tool = {})
+      : scene_(SceneBuilder().build({object}, true, tool)), state_(scene_.initial_state()) {}
+
+  rendering::Rendering at(double depth, double x = 0.004) {
+    const Vec3 tip(x, 0.003, kHalf - depth);
+    return rendering::ray_renderer().tick(scene_, state_, {tip, tip + Vec3(0, 0, 0.12)}, kTick);
+  }
+  double force(double depth, double x = 0.004) { return at(depth, x).force.z; }
+  /// N, the largest on a slow way between depths.
+  double largest_force(double from, double to, double x = 0.004) {
+    double most = 0;
+    const int ticks = static_cast<int>(std::abs(to - from) / 2e-5);
+    for (int i = 0; i <= ticks; ++i)
+      most = std::max(most, force(from + (to - from) * i / ticks, x));
+    return most;
+  }
+
+ private:
+  rendering::Scene scene_;
+  rendering::RenderState state_;
+};
+
+class LayerThatBreaks : public ::testing::TestWithParam<double> {};
+
+TEST_P(LayerThatBreaks, GivesWayWhateverElseTheObjectHas) {
+  const double surface = GetParam(), step = 500 * 2e-5;
+  const stimuli::Material material = of(surface, {{0.02, 500, 0, 1.0}});
+  for (const rendering::Tool& tool :
+       {rendering::Tool{}, rendering::Tool{{{{0, 0, 0}, {0, 0, 0.12}}}}}) {
+    Press press(cube(material), tool);
+    const double most = press.largest_force(-0.005, 0.024);
+    EXPECT_GE(most, 1 + surface * 0.021 - 2 * step);
+    EXPECT_LE(most, 1 + surface * 0.023 + 2 * step);
+    for (int i = 0; i < 25; ++i) press.at(0.024);
+    EXPECT_NEAR(press.force(0.024), surface * 0.024, 1e-9);
+    // Out of the layer, not out of the object: it stays broken.
+    press.largest_force(0.024, 0.010);
+    EXPECT_NEAR(press.largest_force(0.010, 0.024), surface * 0.024, 1e-9);
+    // Out of the object: whole again.
+    press.largest_force(0.024, -0.002);
+    EXPECT_GT(press.largest_force(-0.002, 0.0215), 0.74);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(UnderSurfaces, LayerThatBreaks, ::testing::Values(0.0, 0.001, 50.0));
+
+TEST(SceneBuilder, WhoStartsAboveALayerIsInsideOfAnObjectThatIsFeltUnderneathOnly) {
+  for (const double surface : {0.0, 0.001}) {
+    Press press(cube(of(surface, {{0.012, 500, 0, {}}})));
+    for (const double depth : {0.010, 0.015, 0.022, 0.003}) {
+      const rendering::Rendering r = press.at(depth);
+      EXPECT_EQ(r.force, Vec3(0)) << depth;
+      EXPECT_EQ(r.faults, rendering::render_fault::kStartedInside) << depth;
+    }
+    press.at(-0.001);
+    const rendering::Rendering r = press.at(0.015);
+    EXPECT_NEAR(r.force.z, surface * 0.015 + 500 * 0.003, 1e-9);
+    EXPECT_EQ(r.faults, 0u);
+  }
+}
+
+TEST(SceneBuilder, ASurfaceThatIsNotFeltHasNoForceAndNoContact) {
+  Press press(cube(of(0, {{0.012, 500, 0, {}}})));
+  press.at(-0.001);
+  const rendering::Rendering over = press.at(0.011), in = press.at(0.013);
+  EXPECT_EQ(over.contacts, 0);
+  EXPECT_EQ(over.force, Vec3(0));
+  EXPECT_EQ(over.faults, 0u);
+  EXPECT_EQ(in.contacts, 1);
+  EXPECT_NEAR(in.deepest.depth, 0.001, 1e-9);
+}
+
+TEST(SceneBuilder, WhoIsInsideOfAnotherPartHasNotLeftTheCompound) {
+  // A block that is not felt at all stands on the layered one.
+  Press press(compound({cube(of(0, {{0.005, 500, 0, 1.0}})),
+                        box({-kHalf, -kHalf, kHalf}, {kHalf, kHalf, 3 * kHalf}, of(0, {}))}));
+  press.at(-3 * kHalf);
+  EXPECT_NEAR(press.largest_force(-3 * kHalf, 0.012), 1, 0.02);
+  for (int i = 0; i < 25; ++i) press.at(0.012);
+  press.largest_force(0.012, -0.01);
+  EXPECT_EQ(press.largest_force(-0.01, 0.012), 0) << "still inside of the block above";
+  press.largest_force(0.012, -2 * kHalf - 0.001);
+  EXPECT_GT(press.largest_force(-2 * kHalf - 0.001, 0.0065), 0.7);
+}
+
+TEST(SceneBuilder, EachPartOfACompoundHasItsOwnBoundOfALayer) {
+  // Left of 1 N, right of 3 N, in the middle one that holds; in any order.
+  const auto part = [](double x, std::optional<double> breaks) {
+    return box({x - 0.02, -kHalf, -kHalf}, {x + 0.02, kHalf, kHalf},
+               of(0, {{0.002, 1000, 0, breaks}}));
+  };
+  std::vector<stimuli::ObjectSpec> parts{part(-0.05, 1), part(0, {}), part(0.05, 3)};
+  std::sort(parts.begin(), parts.end(),
+            [](const auto& a, const auto& b) { return a.pose.position.x < b.pose.position.x; });
+  do {
+    const double step = 1000 * 2e-5;
+    for (const double x : {-0.05, 0.0, 0.05}) {
+      const double bound = x < 0 ? 1 : x > 0 ? 3 : 6;
+      Press press(compound(parts));
+      press.at(-0.001, x);
+      EXPECT_NEAR(press.largest_force(-0.001, 0.008, x), bound, 2 * step) << x;
+    }
+  } while (std::next_permutation(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return a.pose.position.x < b.pose.position.x;
+  }));
+}
+
+TEST(SceneBuilder, OnePartThatBrokeLeavesItsNeighboursWhole) {
+  const auto part = [](double low, double high, std::optional<double> breaks) {
+    return box({low, -kHalf, -kHalf}, {high, kHalf, kHalf}, of(100, {{0.002, 1000, 0, breaks}}));
+  };
+  Press press(compound({part(-kHalf, 0, 1.0), part(0, kHalf, {})}));
+  press.largest_force(-0.001, 0.006, -0.012);
+  for (int i = 0; i < 25; ++i) press.at(0.006, -0.012);
+  EXPECT_NEAR(press.force(0.006, -0.012), 100 * 0.006, 1e-9);
+  for (double x = -0.012; x < 0.012; x += 1e-4) press.at(0.001, x);
+  EXPECT_NEAR(press.largest_force(0.001, 0.006, 0.012), 100 * 0.006 + 1000 * 0.004, 1e-9);
+}
+
+TEST(SceneBuilder, ALayerGoesOnFromPartToPart) {
+  const stimuli::Material material = of(0, {{0.003, 1000, 0, {}}});
+  const stimuli::ObjectSpec left = box(Vec3(-kHalf), {0, kHalf, kHalf}, material),
+                            right = box({0, -kHalf, -kHalf}, Vec3(kHalf), material);
+  for (const auto& object : {compound({left, right}), compound({right, compound({left})})}) {
+    Press press(object);
+    for (double depth = -0.001; depth < 0.005; depth += 1e-4) press.at(depth, -0.01);
+    for (double x = -0.01; x < 0.01; x += 1e-4) {
+      const rendering::Rendering r = press.at(0.005, x);
+      ASSERT_LE(glm::length(r.force - Vec3(0, 0, 1000 * 0.002)), 1e-6) << x;
+    }
+    // Deeper than the half of either part.
+    EXPECT_NO_THROW(SceneBuilder().build(
+        {compound({box(Vec3(-kHalf), {0, kHalf, kHalf}, of(0, {{0.02, 1000, 0, {}}})),
+                   box({0, -kHalf, -kHalf}, Vec3(kHalf), of(0, {{0.02, 1000, 0, {}}}))})},
+        true));
+  }
+}
+
+TEST(SceneBuilder, SaysHowDeepTheLayersOfACompoundMayBe) {
+  const stimuli::Material material = of(0, {{0.026, 1000, 0, {}}});
+  try {
+    SceneBuilder().build({compound({box(Vec3(-kHalf), {0, kHalf, kHalf}, material),
+                                    box({0, -kHalf, -kHalf}, Vec3(kHalf), material)})},
+                         true);
+    FAIL() << "nothing is left";
+  } catch (const stimuli::MeshError& error) {
+    ASSERT_EQ(error.faults().size(), 1u);
+    EXPECT_EQ(error.faults()[0],
+              "/objects/0/layers/0/depth_m: nothing of the object is left at a depth of 0.026 m; "
+              "expected less than 0.025 m");
+  }
+}
+
+}  // namespace
+}  // namespace palpate::runner
