@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "rendering/tool.h"
 #include "runner/servo/servo.h"
 #include "stimuli/object_spec.h"
 
@@ -105,6 +106,7 @@ struct ConsoleState {
   Sample sample;                      ///< the servo's newest
   std::shared_ptr<const std::vector<stimuli::ObjectSpec>>
       objects;                                ///< of the current trial, virtual frame
+  rendering::Tool tool;                       ///< that the stylus carries; empty: none
   std::uint64_t ticks = 0, missed_ticks = 0;  ///< of this session
   std::int64_t longest_period_ns = 0;
 };

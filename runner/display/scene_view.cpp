@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
+#include "runner/display/tool_shape.h"
 #include "runner/display/window.h"
 
 namespace palpate::runner {
@@ -194,41 +195,47 @@ void SceneView::draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4&
   draw_shape(cone_, along(neck, from + length * direction, 0.3 * head), colour);
 }
 
-void SceneView::draw_stylus(const Sample& sample) const {
+void SceneView::draw_stylus(const rendering::Tool& tool, const Sample& sample) const {
   const rendering::LineProbe& hand = sample.probe;
   if (!finite(hand.tip) || !finite(hand.tail)) return;
   const bool touching = sample.rendering.contacts > 0 && finite(sample.rendering.ideal.tip) &&
                         finite(sample.rendering.ideal.tail);
-  // In contact the ideal probe lies on the surface and the virtual probe inside: draw both.
-  const rendering::LineProbe& seen = touching ? sample.rendering.ideal : hand;
+  // In contact the ideal tool lies on the surface and the virtual one inside: draw both.
+  const DrawnTool in_hand = tool_in_hand(tool, sample);
+  const DrawnTool seen = touching ? ideal_tool(tool, sample) : in_hand;
   const auto ball = [&](const Vec3& at, double radius, const glm::vec4& colour) {
     draw_shape(sphere_,
                glm::scale(glm::translate(glm::mat4(1), glm::vec3(at)),
                           glm::vec3(static_cast<float>(radius))),
                colour);
   };
-  draw_rod(seen.tip, seen.tail, kThin, kStylus);
-  ball(seen.tip, 1.6 * kThin, kStylus);
-  ball(seen.tail, 1.6 * kThin, kStylus);
+  for (const rendering::LineProbe& segment : seen.segments) {
+    draw_rod(segment.tip, segment.tail, kThin, kStylus);
+    ball(segment.tip, 1.6 * kThin, kStylus);
+    ball(segment.tail, 1.6 * kThin, kStylus);
+  }
+  // What is held but does not touch.
+  if (!tool.segments.empty()) draw_rod(seen.stylus.tip, seen.stylus.tail, 0.4 * kThin, kStylus);
   if (touching) {
-    draw_rod(hand.tip, hand.tail, 0.4 * kThin, kVirtual);
+    for (const rendering::LineProbe& segment : in_hand.segments)
+      draw_rod(segment.tip, segment.tail, 0.4 * kThin, kVirtual);
     if (finite(sample.rendering.deepest.point)) {
       ball(sample.rendering.deepest.point, 2.2 * kThin, kContact);
     }
   }
-  draw_arrow(seen.tip, sample.device1, kForce);
-  draw_arrow(seen.tail, sample.device2, kForce);
+  draw_arrow(seen.stylus.tip, sample.device1, kForce);
+  draw_arrow(seen.stylus.tail, sample.device2, kForce);
 }
 
 /// The part of the stylus inside or behind the object, translucent: the experimenter must see where
 /// the tip is.
-void SceneView::draw_hidden_stylus(const Sample& sample) const {
+void SceneView::draw_hidden_stylus(const rendering::Tool& tool, const Sample& sample) const {
   glDepthFunc(GL_GREATER);
   glDepthMask(GL_FALSE);
   glEnable(GL_BLEND);
   glBlendColor(0, 0, 0, 0.45F);
   glBlendFunc(GL_CONSTANT_ALPHA, GL_ONE_MINUS_CONSTANT_ALPHA);
-  draw_stylus(sample);
+  draw_stylus(tool, sample);
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_LESS);
@@ -252,8 +259,8 @@ std::optional<glm::vec3> SceneView::hit(const glm::vec3& from, const glm::vec3& 
   return from + *nearest * along;
 }
 
-unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Camera& camera,
-                         int width, int height) {
+unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
+                         const Camera& camera, int width, int height) {
   resize(std::max(width, 1), std::max(height, 1));
   if (objects != shown_) {
     discard(objects_);
@@ -284,9 +291,9 @@ unsigned SceneView::draw(const Objects& objects, const Sample& sample, const Cam
   }
   if (objects_.corners > 0) {
     draw_shape(objects_, glm::mat4(1), kObject);
-    draw_hidden_stylus(sample);
+    draw_hidden_stylus(tool, sample);
   }
-  draw_stylus(sample);
+  draw_stylus(tool, sample);
   glBindVertexArray(0);
   glUseProgram(0);
   glDisable(GL_DEPTH_TEST);

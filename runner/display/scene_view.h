@@ -25,8 +25,8 @@ class SceneView {
 
   using Objects = std::shared_ptr<const std::vector<stimuli::ObjectSpec>>;
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
-  unsigned draw(const Objects& objects, const Sample& sample, const Camera& camera, int width,
-                int height);
+  unsigned draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
+                const Camera& camera, int width, int height);
   /// The first point where a line meets, from outside, the objects drawn last.
   std::optional<glm::vec3> hit(const glm::vec3& from, const glm::vec3& along) const;
   /// Why the objects could not be drawn; empty: they were.
@@ -43,8 +43,8 @@ class SceneView {
   void draw_shape(const Shape& shape, const glm::mat4& place, const glm::vec4& colour) const;
   void draw_rod(const Vec3& from, const Vec3& to, double radius, const glm::vec4& colour) const;
   void draw_arrow(const Vec3& from, const Vec3& force, const glm::vec4& colour) const;
-  void draw_stylus(const Sample& sample) const;
-  void draw_hidden_stylus(const Sample& sample) const;
+  void draw_stylus(const rendering::Tool& tool, const Sample& sample) const;
+  void draw_hidden_stylus(const rendering::Tool& tool, const Sample& sample) const;
 
   const int samples_;  ///< multisampling, per pixel
   unsigned program_ = 0;

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/compose.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -36,6 +38,7 @@ const char* in_words(Session::State state) {
 SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& sources)
     : station_(station), sources_(sources), started_ns_(station.clock.now_ns()) {
   state_.study = station.protocol.name;
+  state_.tool = tool_of(station.protocol.tool);
   state_.participant = marker_.participant = station.record.participant().code;
   state_.session = marker_.session = station.record.session();
   for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
@@ -103,8 +106,7 @@ void SessionMonitor::began(const protocols::Trial& trial) {
   feeling_ = false;
   trial_began_ns_ = station_.clock.now_ns();
   stimuli::ObjectSpec object = stimulus.object;
-  object.pose = {trial.orientation * object.pose.position,
-                 trial.orientation * object.pose.orientation};
+  object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
   state_.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, std::move(object));
   state_.shape = stimulus.name;
   state_.practice = trial.practice;

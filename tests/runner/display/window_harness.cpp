@@ -2,7 +2,8 @@
 // standard output says what was pressed.
 //   page KIND TEXT      text, neutral, go, feedback, message, break or checklist; the keys are
 //                       those of the paper
-//   state SHAPE FAULTS [WORD]  a console in a trial, or in the state that the word says
+//   state SHAPE FAULTS [WORD]  a console in a trial, or in the state that the word says; "tool": a
+//                       trial with a tool of three segments on the cube
 //   where               answers "tip x y z axis x y z" of the mouse's stylus
 //   ping                answers "pong"
 //   end
@@ -108,6 +109,17 @@ ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& sty
   state.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, object);
   state.sample.probe = stylus;
   state.sample.phase = Phase::feeling;
+  if (word == "tool") {
+    state.state = "trial";
+    state.tool.segments = {
+        {{0, 0, 0}, {0, 0, 0.12}}, {{-0.04, 0, 0}, {0.04, 0, 0}}, {{0.04, 0, 0}, {0.04, 0, -0.03}}};
+    state.sample.rendering.ideal_side = Vec3(1, 0, 0);
+    state.sample.probe = {{0, 0, 0.058}, {0, 0.03, 0.17}};
+    state.sample.rendering.contacts = 1;
+    state.sample.rendering.ideal = {{0, 0, 0.062}, {0, 0.03, 0.174}};
+    state.sample.rendering.deepest.point = {0.04, 0, 0.032};
+    state.sample.device1 = {0, 0, 2};
+  }
   return state;
 }
 

@@ -126,6 +126,21 @@ class WindowsTest(unittest.TestCase):
         self.windows.say("ping")
         self.assertEqual(self.expect("pong")[0], [])
 
+    def test_the_view_shows_the_tool_that_the_stylus_carries(self):
+        def bright():
+            width, _ = self.screen.size(self.windows.console)
+            view = self.screen.pixels(self.windows.console, 10, 60, width // 2, 330)
+            return sum(min(pixel) > 150 and max(pixel) - min(pixel) < 25 for pixel in view)
+
+        self.windows.say("page neutral")
+        self.windows.say("state cube 0")
+        plain = self.screen.settled_picture(self.windows.console)
+        before = bright()
+        self.windows.say("state cube 0 tool")
+        self.screen.settled_picture(self.windows.console, differs_from=plain)
+        self.screen.keep(self.windows.console, "console_tool")
+        self.assertGreater(bright(), before + 100)
+
     def test_keys_in_order_keypad_as_digits(self):
         self.windows.say("page neutral")
         self.screen.focus(self.windows.participant)
