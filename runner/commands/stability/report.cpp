@@ -131,6 +131,12 @@ std::vector<std::string> how_to_read() {
   return notes;
 }
 
+/// Null: the stylus is as long as the real one.
+Json reach_json(const std::optional<rendering::Reach>& reach) {
+  if (!reach) return nullptr;
+  return {{"factor", reach->factor}, {"pivot_share_of_stylus", reach->fraction}};
+}
+
 Json loop_json(const LoopCase& loop) {
   const LoopSettings& s = loop.settings;
   return {{"scene", to_string(loop.contact_case)},
@@ -141,6 +147,8 @@ Json loop_json(const LoopCase& loop) {
           {"friction_n", s.friction},
           {"resolution_m", s.resolution},
           {"delay_ticks", s.delay},
+          {"layer_stiffness_of_surface", loop.layer_share},
+          {"reach", reach_json(s.reach)},
           {"hand_stiffness_n_per_m", s.hand.stiffness},
           {"hand_damping_ns_per_m", s.hand.damping},
           {"hand_mass_kg", s.hand.mass}};

@@ -45,6 +45,12 @@ class Stability(unittest.TestCase):
                 stiffness = felt.get(curve["name"], 1) * point["stiffness_n_per_m"]
                 theory = stiffness / loop["rate_hz"] * (0.5 + loop["delay_ticks"]) + loop["virtual_damping_ns_per_m"]
                 self.assertAlmostEqual(point["theory_ns_per_m"] / theory, 1, 12)
+        extras = {curve["name"]: (curve["loop"]["layer_stiffness_of_surface"], curve["loop"]["reach"])
+                  for curve in result["theory"] + result["curves"]}
+        self.assertEqual({name: extra for name, extra in extras.items() if extra != (0, None)},
+                         {"a layer as stiff as the surface": (1, None),
+                          "reach 5 about the tail": (0, {"factor": 5, "pivot_share_of_stylus": 1}),
+                          "reach 5 about the middle": (0, {"factor": 5, "pivot_share_of_stylus": 0.5})})
         # A dot or a triangle for every point, a dot for every name.
         root = xml.etree.ElementTree.parse(figure).getroot()
         svg = "{http://www.w3.org/2000/svg}"
