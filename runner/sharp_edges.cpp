@@ -19,7 +19,9 @@ bool turns(const Vec3& normal, const Vec3& other) {
 
 SharpEdges::SharpEdges(const rendering::Scene& scene) {
   int surface = std::numeric_limits<int>::max();
-  for (const rendering::ScenePart& part : scene.parts()) surface = std::min(surface, part.layer);
+  for (const rendering::ScenePart& part : scene.parts()) {
+    if (part.layer != rendering::kNotFelt) surface = std::min(surface, part.layer);
+  }
   for (const rendering::ScenePart& part : scene.parts()) {
     if (part.layer == surface) add_part(part);
   }

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "stimuli/compose.h"
-#include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/parts/inset_parts.h"
 
 namespace palpate::runner {
 namespace {
@@ -28,11 +28,11 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
   }
   const std::optional<double> depth = felt_depth(spec.material);
   if (!depth) return;
-  for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec)) {
-    auto mesh = std::make_shared<const stimuli::ConvexMesh>(std::move(part));
-    if (*depth > 0) mesh = stimuli::inset(*mesh, *depth);
-    if (mesh) out.push_back({std::move(mesh), pose});
-  }
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
+  for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec))
+    meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
+  if (*depth > 0) meshes = stimuli::inset_union(meshes, *depth);
+  for (auto& mesh : meshes) out.push_back({std::move(mesh), pose});
 }
 
 }  // namespace
