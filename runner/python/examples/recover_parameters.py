@@ -151,8 +151,12 @@ def main():
             top, bottom = axes[0, i], axes[1, i]
             top.plot(truth, mean, ".", ms=3, alpha=0.6)
             top.plot([LOW[i], HIGH[i]], [LOW[i], HIGH[i]], "k-", lw=0.7)
-            if IS_LOG[i]:
-                top.set(xscale="log", yscale="log")
+            ticks = [LOW[i], np.sqrt(LOW[i] * HIGH[i]) if IS_LOG[i] else (LOW[i] + HIGH[i]) / 2, HIGH[i]]
+            words = [f"{tick:.2g}" for tick in ticks]
+            for axis, scale in ((top.xaxis, top.set_xscale), (top.yaxis, top.set_yscale)):
+                scale("log" if IS_LOG[i] else "linear")
+                axis.set_ticks(ticks, labels=words)
+                axis.set_minor_locator(pyplot.NullLocator())
             top.set(title=name, xlabel="truth" + (f", {unit}" if unit else ""), ylabel="posterior mean" if i == 0 else "")
             bottom.hist(ranks[:, i], 10, (0, 1), color="0.6")
             bottom.axhline(tests / 10, color="k", lw=0.7)
