@@ -5,6 +5,7 @@
 // Probe is PointProbe or SegmentProbe.
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "rendering/approach.h"
@@ -18,14 +19,10 @@ template <class Probe>
 ContactFeature nearby_feature(const ScenePart& part, ContactFeature known, const LineProbe& probe) {
   using Kind = ContactFeature::Kind;
   const stimuli::ConvexMesh& mesh = *part.mesh;
-  const SupportMap* const map = part.trees->support_map();
+  const FacetMap* const map = part.trees->facet_map();
   if (map == nullptr) return known;
-  const Vec3 d = probe.tail - probe.tip, to_tip = probe.tip - mesh.centre();
-  const double d2 = glm::dot(d, d);
-  const double fraction = d2 > 0 ? std::clamp(-glm::dot(to_tip, d) / d2, 0.0, 1.0) : 0;
-  const std::uint32_t vertex = map->near_support(to_tip + fraction * d);
-  const std::uint32_t edge = mesh.fan_edges()[mesh.fan_first()[vertex]];
-  const ContactFeature under(Kind::facet, false, mesh.edges()[edge].left);
+  const Vec3 d = probe.tail - probe.tip;
+  const ContactFeature under(Kind::facet, false, map->facet_under(probe.tip, d));
   if (known.kind == Kind::none) return under;
   return Probe::same_feature(mesh, known, probe.tip, d).depth <=
                  Probe::same_feature(mesh, under, probe.tip, d).depth
@@ -67,6 +64,27 @@ inline void search_separating_plane(const ScenePart& part, PartState& state,
   state.nearby = {ContactFeature::Kind::facet, false, mesh.edges()[edge].left};
 }
 
+/// Over a large mesh, whose facets are not in the processor's caches: goes on to the facet of M under
+/// the probe, takes its plane for no longer separating some ticks before it is crossed, so that
+/// contact is looked for from then on, and asks for the memory that the next tick will need.
+/// \param from  the probe at the last tick
+template <class Probe>
+void expect_contact(const ScenePart& part, PartState& state, const LineProbe& from,
+                    const LineProbe& probe) {
+  constexpr double kTicks = 4;
+  constexpr double kOfSize = 1.0 / 256;  // at least; for a hand that speeds up
+  if (part.trees->facet_map() == nullptr || !state.plane.valid) return;
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  const WalkResult under =
+      Probe::farthest_plane(mesh, state.nearby, probe.tip, probe.tail - probe.tip);
+  if (under.separating_feature.kind != ContactFeature::Kind::none)
+    record_separation(state, under, probe);
+  const Vec3 tip = probe.tip - from.tip, tail = probe.tail - from.tail;
+  const double motion = std::sqrt(std::max(glm::dot(tip, tip), glm::dot(tail, tail)));
+  state.plane.offset += std::max(kTicks * motion, kOfSize * mesh.size());
+  prefetch_neighbours(mesh, state.nearby);
+}
+
 /// Contact of a part that was not in contact at the last tick, of kind none where there is none.
 /// \param before  the probe at the last tick, world frame; null at the first tick of all
 template <class Probe>
@@ -88,6 +106,7 @@ WalkResult detect_contact(const ScenePart& part, PartState& state, const LinePro
         if (approach.end == Approach::End::separated) {
           state.plane = approach.plane;
           state.nearby = approach.feature;
+          expect_contact<Probe>(part, state, from, probe);
           return {};
         }
         decided = approach.end == Approach::End::entered;
@@ -101,9 +120,13 @@ WalkResult detect_contact(const ScenePart& part, PartState& state, const LinePro
       state.started_inside =
           !state.plane.valid && (state.started_inside ||
                                  Probe::nearest_feature(mesh, probe.tip, d).depth > part.tolerance);
+      expect_contact<Probe>(part, state, from, probe);
       return {};
     }
-    if (state.plane.separates(from.tip, from.tail)) return {};  // and all poses between
+    if (state.plane.separates(from.tip, from.tail)) {  // and all poses between
+      expect_contact<Probe>(part, state, from, probe);
+      return {};
+    }
     first = Probe::first_contact(mesh, *part.trees, from, probe, part.tolerance);
   }
   WalkResult hit;

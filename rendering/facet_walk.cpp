@@ -121,14 +121,15 @@ bool parallel_to_facet(double slope, const Vec3& d) {
   return slope * slope <= kParallelSine * kParallelSine * glm::dot(d, d);
 }
 
-template <bool kSegment>
+/// \tparam kOutside  goes on where a plane separates, while the next one is farther from the probe
+template <bool kSegment, bool kOutside = false>
 [[gnu::always_inline]] inline WalkResult walk(const stimuli::ConvexMesh& mesh, ContactFeature start,
                                               const Vec3& tip, const Vec3& d) {
   const double gain = kDepthRounding * mesh.size();
   Measured at = resume<kSegment>(mesh, start, tip, d);
   bool capped = false, stalled = false;
   std::size_t steps = 0;
-  while (at.depth >= 0) {
+  while (kOutside || at.depth >= 0) {
     Measured next;
     if (kSegment && at.edge) {
       if (!step_from_edge(mesh, at, tip, d, next)) break;
@@ -221,6 +222,16 @@ WalkResult walk_segment(const stimuli::ConvexMesh& mesh, ContactFeature start, c
 
 WalkResult walk_point(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip) {
   return walk<false>(mesh, start, tip, Vec3(0));
+}
+
+WalkResult farthest_plane_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                  const Vec3& tip, const Vec3& d) {
+  return walk<true, true>(mesh, start, tip, d);
+}
+
+WalkResult farthest_plane_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                const Vec3& tip) {
+  return walk<false, true>(mesh, start, tip, Vec3(0));
 }
 
 void prefetch_neighbours(const stimuli::ConvexMesh& mesh, ContactFeature at) {

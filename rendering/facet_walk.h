@@ -65,6 +65,13 @@ WalkResult walk_segment(const stimuli::ConvexMesh& mesh, ContactFeature start, c
 /// The same walk with the probe shrunk to its tip: facets of the object only.
 WalkResult walk_point(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip);
 
+/// From a facet of M whose plane separates the probe over neighbours to one whose plane is farther
+/// from it than theirs: it is under the probe, and the next contact is near.
+WalkResult farthest_plane_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                  const Vec3& tip, const Vec3& d);
+WalkResult farthest_plane_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                const Vec3& tip);
+
 /// Prefetches the memory two steps from a feature that the walk has come to; changes nothing. What
 /// is one step away was prefetched one feature before. Neighbours of triangles only: other facets
 /// are few.

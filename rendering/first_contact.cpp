@@ -158,8 +158,11 @@ bool has_shallow_ridges(const stimuli::ConvexMesh& mesh) {
 
 }  // namespace
 
-ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scan_limit)
-    : support_map_(mesh), shallow_ridges_(with_edges && has_shallow_ridges(mesh)) {
+ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std::size_t scan_limit,
+                           std::size_t small_mesh)
+    : support_map_(mesh, small_mesh),
+      facet_map_(mesh, small_mesh),
+      shallow_ridges_(with_edges && has_shallow_ridges(mesh)) {
   if (mesh.facets().size() > scan_limit) {
     std::vector<Box> boxes;
     boxes.reserve(mesh.facets().size());

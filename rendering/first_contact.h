@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "rendering/bounding_tree.h"
+#include "rendering/facet_map.h"
 #include "rendering/facet_walk.h"
 #include "rendering/probe.h"
 #include "rendering/support_map.h"
@@ -20,18 +21,22 @@ class ContactTrees {
   static constexpr std::size_t kScanLimit = 64;
 
   /// \param scan_limit  for measurements: up to so many facets or edges get no tree
+  /// \param small_mesh  the same: a mesh of up to so many vertices gets no maps
   ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges,
-               std::size_t scan_limit = kScanLimit);
+               std::size_t scan_limit = kScanLimit,
+               std::size_t small_mesh = SupportMap::kSmallMesh);
 
   const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
   const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
   /// Two large faces meet at less than twice the blend angle of equation (2).
   bool shallow_ridges() const { return shallow_ridges_; }
   const SupportMap* support_map() const { return support_map_.empty() ? nullptr : &support_map_; }
+  const FacetMap* facet_map() const { return facet_map_.empty() ? nullptr : &facet_map_; }
 
  private:
   BoundingTree polygons_, edges_;
   SupportMap support_map_;
+  FacetMap facet_map_;
   bool shallow_ridges_ = false;
 };
 

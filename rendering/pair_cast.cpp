@@ -131,8 +131,7 @@ bool beyond(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip
   return true;
 }
 
-/// A facet of M, near the point of the segment that is nearest to the mesh's middle, that looks
-/// along `out`.
+/// A facet of M near the segment.
 template <bool kSegment>
 Measured facing(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d,
                 const Vec3& out) {
@@ -140,6 +139,10 @@ Measured facing(const CastMesh& part, ContactFeature start, const Vec3& tip, con
   if (start.kind != Kind::none && part.trees.support_map() == nullptr) {
     const Measured known = measured<kSegment>(mesh, start, tip, d);
     if (glm::dot(known.normal, out) > 0) return known;
+  }
+  if (const FacetMap* const map = part.trees.facet_map(); map != nullptr) {
+    const Measured under = measure_facet<kSegment>(mesh, map->facet_under(tip, d), tip, d);
+    if (glm::dot(under.normal, out) > 0) return under;
   }
   const std::uint32_t vertex = vertex_under(part, out);
   std::uint32_t best = mesh.edges()[mesh.fan_edges()[mesh.fan_first()[vertex]]].left;

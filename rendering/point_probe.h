@@ -30,6 +30,11 @@ struct PointProbe {
     return same_feature_point(mesh, start, tip);
   }
 
+  static WalkResult farthest_plane(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                   const Vec3& tip, const Vec3&) {
+    return farthest_plane_point(mesh, start, tip);
+  }
+
   static WalkResult nearest_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3&) {
     return nearest_feature_point(mesh, tip);
   }

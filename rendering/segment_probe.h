@@ -110,6 +110,11 @@ struct SegmentProbe {
     return same_feature_segment(mesh, start, tip, d);
   }
 
+  static WalkResult farthest_plane(const stimuli::ConvexMesh& mesh, ContactFeature start,
+                                   const Vec3& tip, const Vec3& d) {
+    return farthest_plane_segment(mesh, start, tip, d);
+  }
+
   static WalkResult nearest_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip,
                                     const Vec3& d) {
     return nearest_feature_segment(mesh, tip, d);
