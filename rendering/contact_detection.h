@@ -64,25 +64,32 @@ inline void search_separating_plane(const ScenePart& part, PartState& state,
   state.nearby = {ContactFeature::Kind::facet, false, mesh.edges()[edge].left};
 }
 
-/// Over a large mesh, whose facets are not in the processor's caches: goes on to the facet of M under
-/// the probe, takes its plane for no longer separating some ticks before it is crossed, so that
-/// contact is looked for from then on, and asks for the memory that the next tick will need.
+/// Over a large mesh, whose facets are not in the processor's caches: goes on to the facet of M
+/// under the probe, takes its plane for no longer separating some ticks before it is crossed, so
+/// that contact is looked for from then on, and asks for the memory that the next tick will need.
 /// \param from  the probe at the last tick
 template <class Probe>
-void expect_contact(const ScenePart& part, PartState& state, const LineProbe& from,
-                    const LineProbe& probe) {
+[[gnu::noinline]] void watch_surface(const ScenePart& part, PartState& state, const LineProbe& from,
+                                     const LineProbe& probe) {
   constexpr double kTicks = 4;
   constexpr double kOfSize = 1.0 / 256;  // at least; for a hand that speeds up
-  if (part.trees->facet_map() == nullptr || !state.plane.valid) return;
   const stimuli::ConvexMesh& mesh = *part.mesh;
-  const WalkResult under =
-      Probe::farthest_plane(mesh, state.nearby, probe.tip, probe.tail - probe.tip);
+  const ContactFeature near = nearby_feature<Probe>(part, state.nearby, probe);
+  const WalkResult under = Probe::farthest_plane(mesh, near, probe.tip, probe.tail - probe.tip);
   if (under.separating_feature.kind != ContactFeature::Kind::none)
     record_separation(state, under, probe);
   const Vec3 tip = probe.tip - from.tip, tail = probe.tail - from.tail;
   const double motion = std::sqrt(std::max(glm::dot(tip, tip), glm::dot(tail, tail)));
   state.plane.offset += std::max(kTicks * motion, kOfSize * mesh.size());
   prefetch_neighbours(mesh, state.nearby);
+}
+
+/// After a tick that ended with a separating plane.
+template <class Probe>
+void expect_contact(const ScenePart& part, PartState& state, const LineProbe& from,
+                    const LineProbe& probe) {
+  if (part.trees->facet_map() != nullptr && state.plane.valid)
+    watch_surface<Probe>(part, state, from, probe);
 }
 
 /// Contact of a part that was not in contact at the last tick, of kind none where there is none.

@@ -120,7 +120,8 @@ TEST(SupportMap, AClimbFromItEndsOnTheExtremeVertex) {
       stimuli::cylinder(kRadius, 0.06, 700)));  // caps of coplanar faces
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     stimuli::Random random(seed, {21});
-    meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random)));
+    meshes.push_back(
+        std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random)));
   }
   stimuli::Random random(9);
   for (const Mesh& mesh : meshes) {
@@ -144,7 +145,8 @@ TEST(PairCast, LocatedWithoutAStartIsInsideWhereNoPlaneSeparates) {
     const CastMesh part{*mesh, trees, testing::middle_of(*mesh), scans};
     stimuli::Random random(10);
     for (int i = 0; i < 60; ++i) {
-      const Vec3 at = uniform(random, 0.95, 1.05) * kRadius * by * testing::random_direction(random);
+      const Vec3 at =
+          uniform(random, 0.95, 1.05) * kRadius * by * testing::random_direction(random);
       const Vec3 d = i % 3 == 0 ? Vec3(0) : 0.1 * testing::random_direction(random);
       const Vec3 tip = at - random.unit() * d;
       const double depth = i % 3 == 0 ? nearest_feature_point(*mesh, tip).depth
@@ -175,8 +177,8 @@ class WithAndWithoutMaps {
     for (const std::size_t small_mesh : {std::size_t{0}, SIZE_MAX}) {
       SceneObject object;
       object.mesh = mesh;
-      object.trees = std::make_shared<const ContactTrees>(*mesh, true, ContactTrees::kScanLimit,
-                                                          small_mesh);
+      object.trees =
+          std::make_shared<const ContactTrees>(*mesh, true, ContactTrees::kScanLimit, small_mesh);
       scenes_.emplace_back(std::vector<SceneObject>{object});
       states_.push_back(scenes_.back().initial_state());
     }
@@ -233,7 +235,8 @@ TEST_P(Maps, ChangeNoBitOnAnySolid) {
   int contacts = 0;
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     stimuli::Random random(seed, {23});
-    const auto mesh = std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
+    const auto mesh =
+        std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     WithAndWithoutMaps both(*GetParam(), mesh);
     const double length = mesh->size() * uniform(random, 0, 3);
     for (const LineProbe& probe : testing::wandering_path(random, *mesh, length, 150, 0.02)) {
