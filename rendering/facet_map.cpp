@@ -81,11 +81,6 @@ std::uint32_t exit_facet(const stimuli::ConvexMesh& mesh, const Ray& ray, std::u
   return at;
 }
 
-/// The index of the cell that coordinate c in [-1, 1] lies in.
-int cell_of(double c, int resolution) {
-  return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution), 0, resolution - 1);
-}
-
 }  // namespace
 
 FacetMap::FacetMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
@@ -105,44 +100,18 @@ FacetMap::FacetMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
   row1_ = {-b / (a * e), 1 / e, 0};
   row2_ = {(b * f / e - c) / (a * g), -f / (e * g), 1 / g};
 
-  const double cells = static_cast<double>(mesh.facets().size()) / (6 * facets_per_cell);
-  resolution_ = std::max(1, static_cast<int>(std::sqrt(cells)));
-  const auto side = static_cast<std::size_t>(resolution_);
-  cells_.resize(6 * side * side);
+  directions_ = DirectionCells::about(static_cast<double>(mesh.facets().size()) / facets_per_cell);
+  cells_.resize(directions_.count());
   std::uint32_t facet = 0;
-  for (std::size_t face = 0; face < 6; ++face) {
-    for (std::size_t row = 0; row < side; ++row) {
-      for (std::size_t k = 0; k < side; ++k) {
-        const std::size_t column = row % 2 == 0 ? k : side - 1 - k;  // the next cell is a neighbour
-        Vec3 u;
-        const auto axis = static_cast<int>(face / 2);
-        u[axis] = face % 2 == 0 ? 1 : -1;
-        u[(axis + 1) % 3] = (2.0 * static_cast<double>(row) + 1) / resolution_ - 1;
-        u[(axis + 2) % 3] = (2.0 * static_cast<double>(column) + 1) / resolution_ - 1;
-        const Vec3 along(a * u.x, b * u.x + e * u.y, c * u.x + f * u.y + g * u.z);
-        facet = exit_facet(mesh, {middle_, along}, facet);
-        cells_[(face * side + row) * side + column] = facet;
-      }
-    }
-  }
+  directions_.visit_middles([&](std::size_t cell, const Vec3& u) {
+    const Vec3 along(a * u.x, b * u.x + e * u.y, c * u.x + f * u.y + g * u.z);
+    facet = exit_facet(mesh, {middle_, along}, facet);
+    cells_[cell] = facet;
+  });
 }
 
 Vec3 FacetMap::rounded(const Vec3& v) const {
   return {row0_.x * v.x, row1_.x * v.x + row1_.y * v.y, glm::dot(row2_, v)};
-}
-
-std::uint32_t FacetMap::cell_at(const Vec3& direction) const {
-  int axis = 0;
-  for (int k = 1; k < 3; ++k) {
-    if (std::abs(direction[k]) > std::abs(direction[axis])) axis = k;
-  }
-  if (!(std::abs(direction[axis]) > 0)) return cells_[0];
-  const double scale = 1 / std::abs(direction[axis]);
-  const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
-  const int row = cell_of(scale * direction[(axis + 1) % 3], resolution_);
-  const int column = cell_of(scale * direction[(axis + 2) % 3], resolution_);
-  const int cell = (face * resolution_ + row) * resolution_ + column;
-  return cells_[static_cast<std::size_t>(cell)];
 }
 
 std::uint32_t FacetMap::facet_under(const Vec3& tip, const Vec3& d) const {
@@ -150,9 +119,11 @@ std::uint32_t FacetMap::facet_under(const Vec3& tip, const Vec3& d) const {
   const double length2 = glm::dot(along, along);
   const double fraction =
       length2 > 0 ? std::clamp(-glm::dot(to_tip, along) / length2, 0.0, 1.0) : 0;
-  return cell_at(to_tip + fraction * along);
+  return cells_[directions_.cell_of(to_tip + fraction * along)];
 }
 
-std::uint32_t FacetMap::facet_under(const Vec3& p) const { return cell_at(rounded(p - middle_)); }
+std::uint32_t FacetMap::facet_under(const Vec3& p) const {
+  return cells_[directions_.cell_of(rounded(p - middle_))];
+}
 
 }  // namespace palpate::rendering

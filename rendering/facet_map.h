@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rendering/direction_cells.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
@@ -31,11 +32,10 @@ class FacetMap {
  private:
   /// To the frame in which the mesh is round, from the middle.
   Vec3 rounded(const Vec3& v) const;
-  std::uint32_t cell_at(const Vec3& direction) const;
 
   Vec3 middle_;
   Vec3 row0_, row1_, row2_;  // of the linear map, lower triangular
-  int resolution_ = 0;       // cells along an edge of the cube map
+  DirectionCells directions_;
   std::vector<std::uint32_t> cells_;
 };
 

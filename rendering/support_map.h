@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rendering/direction_cells.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
@@ -26,7 +27,7 @@ class SupportMap {
   std::uint32_t near_support(const Vec3& direction) const;
 
  private:
-  int resolution_ = 0;  // cells along an edge of the cube map
+  DirectionCells directions_;
   std::vector<std::uint32_t> cells_;
 };
 

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <set>
@@ -161,12 +160,10 @@ TEST(PairCast, LocatedWithoutAStartIsInsideWhereNoPlaneSeparates) {
   EXPECT_GT(outside, 30);
 }
 
-bool same(const Vec3& a, const Vec3& b) { return a == b; }
-
-bool same(const Rendering& a, const Rendering& b) {
-  return same(a.force, b.force) && same(a.torque, b.torque) && same(a.ideal.tip, b.ideal.tip) &&
-         same(a.ideal.tail, b.ideal.tail) && same(a.deepest.point, b.deepest.point) &&
-         same(a.deepest.normal, b.deepest.normal) && a.deepest.depth == b.deepest.depth &&
+bool same_bits(const Rendering& a, const Rendering& b) {
+  return a.force == b.force && a.torque == b.torque && a.ideal.tip == b.ideal.tip &&
+         a.ideal.tail == b.ideal.tail && a.deepest.point == b.deepest.point &&
+         a.deepest.normal == b.deepest.normal && a.deepest.depth == b.deepest.depth &&
          a.deepest.type == b.deepest.type && a.contacts == b.contacts && a.faults == b.faults;
 }
 
@@ -193,7 +190,7 @@ class WithAndWithoutMaps {
     const Rendering with = renderer_.tick(scenes_[0], states_[0], probe, 1e-3);
     const Rendering without = renderer_.tick(scenes_[1], states_[1], probe, 1e-3);
     touching_ = without.contacts > 0;
-    return same(with, without);
+    return same_bits(with, without);
   }
   bool touching() const { return touching_; }
 

@@ -1,0 +1,68 @@
+#pragma once
+// Directions cut into cells, as a cube map. Of support_map.cpp and facet_map.cpp.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "stimuli/vec.h"
+
+namespace palpate::rendering {
+
+/// The faces of a cube about the origin, each cut into resolution x resolution squares.
+class DirectionCells {
+ public:
+  /// \param cells  wanted in all, about
+  static DirectionCells about(double cells) {
+    return DirectionCells(std::max(1, static_cast<int>(std::sqrt(cells / 6))));
+  }
+  DirectionCells() = default;
+  explicit DirectionCells(int resolution) : resolution_(resolution) {}
+
+  std::size_t count() const {
+    return 6 * static_cast<std::size_t>(resolution_) * static_cast<std::size_t>(resolution_);
+  }
+
+  /// \param direction  any length; of 0 the cell is any
+  std::size_t cell_of(const Vec3& direction) const {
+    int axis = 0;
+    for (int k = 1; k < 3; ++k) {
+      if (std::abs(direction[k]) > std::abs(direction[axis])) axis = k;
+    }
+    if (!(std::abs(direction[axis]) > 0)) return 0;
+    const double scale = 1 / std::abs(direction[axis]);
+    const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
+    const int row = square_of(scale * direction[(axis + 1) % 3]);
+    const int column = square_of(scale * direction[(axis + 2) % 3]);
+    return static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column);
+  }
+
+  /// Calls visit(cell, its middle), mostly from neighbour to neighbour.
+  template <class Visit>
+  void visit_middles(const Visit& visit) const {
+    for (int face = 0; face < 6; ++face) {
+      for (int row = 0; row < resolution_; ++row) {
+        for (int k = 0; k < resolution_; ++k) {
+          const int column = row % 2 == 0 ? k : resolution_ - 1 - k;
+          Vec3 middle;
+          const int axis = face / 2;
+          middle[axis] = face % 2 == 0 ? 1 : -1;
+          middle[(axis + 1) % 3] = (2.0 * row + 1) / resolution_ - 1;
+          middle[(axis + 2) % 3] = (2.0 * column + 1) / resolution_ - 1;
+          visit(static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column),
+                middle);
+        }
+      }
+    }
+  }
+
+ private:
+  /// The square along a side that coordinate c in [-1, 1] lies in.
+  int square_of(double c) const {
+    return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution_), 0, resolution_ - 1);
+  }
+
+  int resolution_ = 0;
+};
+
+}  // namespace palpate::rendering
