@@ -12,9 +12,10 @@ namespace {
 
 using namespace minkowski;
 
-constexpr double kPoint = 1e-12;    // of the size; a shorter segment is a point
-constexpr double kOnFacet = 1e-11;  // of the size; a segment that is no farther off is on the facet
-constexpr int kStalledSteps = 8;    // without a later time: rounding; every facet is looked at
+constexpr double kPoint = 1e-12;  // of the size; a shorter segment is a point
+constexpr double kOnBorder =
+    1e-11;                        // of the size; a segment that is no farther off is on the facet
+constexpr int kStalledSteps = 8;  // without a later time: rounding; every facet is looked at
 
 bool is_point(const stimuli::ConvexMesh& mesh, const Vec3& d) {
   const double least = kPoint * mesh.size();
@@ -260,7 +261,7 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
     if (!beyond<kSegment>(mesh, at, at_tip, d, next)) return {true, time, feature_of(at)};
     // On the border of two facets rounding says of each that the line is past it.
     if (stalled > 1 && minkowski::distance_off<kSegment>(mesh, at, at_tip, d) <=
-                           kOnFacet * (mesh.size() + glm::length(d)))
+                           kOnBorder * (mesh.size() + glm::length(d)))
       return {true, time, feature_of(at)};
     at = next;
   }
