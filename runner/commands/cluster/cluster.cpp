@@ -46,7 +46,7 @@ void warn_of_small_shards(const std::string& items, double trials) {
 fs::path make_folder(const ClusterSettings& settings) {
   if (settings.folder.empty())
     throw UsageError("missing --dir DIR, a new folder that all nodes see");
-  const fs::path folder = fs::absolute(settings.folder).lexically_normal();
+  fs::path folder = fs::absolute(settings.folder).lexically_normal();
   if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw UsageError("--dir " + settings.folder +
                      ": exists and is not empty; 'palpate cluster submit' goes on with a folder");
@@ -201,7 +201,7 @@ int cluster_status(const std::string& given) {
 }
 
 /// A shard a number of trials: a curve takes long only with --test model.
-int begin_plan(ClusterSettings settings, const PlanOptions& options,
+int begin_plan(const ClusterSettings& settings, const PlanOptions& options,
                const po::variables_map& values) {
   analysis::Pilot pilot = starting_point(options, values);
   model_of(pilot, options, values);  // what is refused is refused here
