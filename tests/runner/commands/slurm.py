@@ -38,6 +38,10 @@ PartitionName=all Nodes=n1,n2 Default=YES MaxTime=INFINITE State=UP
 """
 
 
+class NotHere(Exception):
+    """The daemons do not run on this machine; why."""
+
+
 class Slurm:
     def __init__(self, folder):
         self.folder = pathlib.Path(folder)
@@ -55,11 +59,15 @@ class Slurm:
         try:
             self.start("munged", "munged", "--force", "--foreground", f"--socket={munge}/sock", f"--key-file={munge}/key",
                        f"--log-file={munge}/log", f"--pid-file={munge}/pid", f"--seed-file={munge}/seed")
-            self.wait("munge answers", (munge / "sock").exists)
+            self.wait("munge answers", (munge / "sock").exists, 60)
             self.start_controller()
             for node in ("n1", "n2"):
                 self.start_node(node)
-            self.wait("both nodes are idle", lambda: self.ask("sinfo", "-h", "-t", "idle", "-o", "%D").strip() == "2")
+            self.wait("both nodes are idle", lambda: self.ask("sinfo", "-h", "-t", "idle", "-o", "%D").strip() == "2", 120)
+        except (AssertionError, OSError) as error:
+            self.__exit__()
+            logs = sorted((self.folder / "log").iterdir())
+            raise NotHere(f"{error}\n" + "".join(log.read_text(errors="replace")[-500:] for log in logs)) from error
         except BaseException:
             self.__exit__()
             raise
