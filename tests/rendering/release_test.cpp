@@ -14,7 +14,7 @@ using testing::box;
 using testing::box_soup;
 using testing::kTick;
 
-constexpr double kHalf = 0.03;  // m, of a cube
+constexpr double kHalfEdge = 0.03;  // m, of a cube
 
 /// A cube and the same cube moved inwards by each layer's depth.
 std::vector<SceneObject> layered_cube(double surface, const std::vector<stimuli::Layer>& layers,
@@ -22,7 +22,7 @@ std::vector<SceneObject> layered_cube(double surface, const std::vector<stimuli:
   std::vector<SceneObject> parts;
   const auto add = [&](int layer, double depth, double stiffness, double damping,
                        std::optional<double> breaks) {
-    const double half = kHalf - depth;
+    const double half = kHalfEdge - depth;
     std::vector<stimuli::PolygonSoup> solids{box_soup(Vec3(-half), Vec3(half))};
     if (in_two_parts) solids = testing::cut_in_two(solids[0], Vec3(1, 0, 0), Vec3(0.001, 0, 0));
     for (const auto& solid : solids) {
@@ -41,7 +41,7 @@ std::vector<SceneObject> layered_cube(double surface, const std::vector<stimuli:
 }
 
 LineProbe at_depth(double depth) {
-  return {{0.004, 0.003, kHalf - depth}, {0.004, 0.003, kHalf - depth + 0.1}};
+  return {{0.004, 0.003, kHalfEdge - depth}, {0.004, 0.003, kHalfEdge - depth + 0.1}};
 }
 
 class Layers : public ::testing::TestWithParam<bool> {};

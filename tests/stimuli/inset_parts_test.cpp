@@ -85,14 +85,14 @@ class Surface {
   TriangleSurface triangles_;
 };
 
-struct Counts {
+struct LayerPoints {
   int in = 0, out = 0, round = 0;  // points in the layer, not in it, and where either is right
 };
 
 /// Random points of the solid: those in what was made are at least as deep, and what is deeper is
 /// in it: exactly under faces, within kInsetWithin under concave edges.
-Counts compare(const solids::Solid& solid, const std::vector<MeshPointer>& parts, double depth,
-               int points) {
+LayerPoints compare(const solids::Solid& solid, const std::vector<MeshPointer>& parts, double depth,
+                    int points) {
   const Surface surface(solid.soup);
   double size = 0;
   Vec3 low(1e9), high(-1e9);
@@ -103,7 +103,7 @@ Counts compare(const solids::Solid& solid, const std::vector<MeshPointer>& parts
   size = glm::length(high - low);
   const std::vector<MeshPointer> layer = inset_union(parts, depth);
   Random random(5);
-  Counts counts;
+  LayerPoints counts;
   while (counts.in + counts.out + counts.round < points) {
     Vec3 p;
     for (int k = 0; k < 3; ++k) p[k] = low[k] + random.unit() * (high[k] - low[k]);
@@ -126,13 +126,13 @@ Counts compare(const solids::Solid& solid, const std::vector<MeshPointer>& parts
   return counts;
 }
 
-Counts compare_cut(const solids::Solid& solid, double depth, int points = 3000) {
+LayerPoints compare_cut(const solids::Solid& solid, double depth, int points = 3000) {
   return compare(solid, pointers(cut_into_convex_parts(solid.soup)), depth, points);
 }
 
 TEST(InsetUnion, OfCutSolidsIsWhatIsDeeper) {
   for (const double depth : {0.0005, 0.002, 0.005}) {
-    const Counts l = compare_cut(solids::l_shape(), depth);
+    const LayerPoints l = compare_cut(solids::l_shape(), depth);
     EXPECT_GT(l.in, 500);
     EXPECT_LT(l.round, 0.01 * (l.in + l.out));
     compare_cut(solids::u_shape(), depth);
@@ -143,7 +143,7 @@ TEST(InsetUnion, OfCutSolidsIsWhatIsDeeper) {
 
 TEST(InsetUnion, OfATorusIsATorus) {
   for (const double depth : {0.001, 0.004}) {
-    const Counts counts = compare_cut(solids::torus(0.03, 0.01, 12, 8), depth, 1500);
+    const LayerPoints counts = compare_cut(solids::torus(0.03, 0.01, 12, 8), depth, 1500);
     EXPECT_GT(counts.in, 100);
   }
 }
