@@ -91,7 +91,7 @@ class BallProgram {
     for (int i = 0; i < 4; ++i) {
       if (share[i] <= 1e-12) continue;
       const double ratio = std::max(0.0, weight_[i]) / share[i];
-      if (ratio > step || (ratio == step && share[i] <= share[goes])) continue;
+      if (goes >= 0 && (ratio > step || (ratio == step && share[i] <= share[goes]))) continue;
       step = ratio;
       goes = i;
     }
