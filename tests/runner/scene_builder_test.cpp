@@ -15,8 +15,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kTick = 1e-3;   // s
-constexpr double kHalf = 0.025;  // m, of a cube
+constexpr double kServoPeriod = 1e-3;  // s
+constexpr double kHalf = 0.025;        // m, of a cube
 
 stimuli::Material of(double surface, std::vector<stimuli::Layer> layers) {
   stimuli::Material material;
@@ -53,7 +53,8 @@ class Press {
 
   rendering::Rendering at(double depth, double x = 0.004) {
     const Vec3 tip(x, 0.003, kHalf - depth);
-    return rendering::ray_renderer().tick(scene_, state_, {tip, tip + Vec3(0, 0, 0.12)}, kTick);
+    return rendering::ray_renderer().tick(scene_, state_, {tip, tip + Vec3(0, 0, 0.12)},
+                                          kServoPeriod);
   }
   double force(double depth, double x = 0.004) { return at(depth, x).force.z; }
   /// N, the largest on a slow way between depths.
