@@ -64,7 +64,8 @@ class SimulatedStudy : public ::testing::Test {
                          const SimulatedSettings& settings = load_simulated_settings("")) const {
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
-    return simulate_study(protocol, store, settings, {3, seed, jobs}, never, {});
+    return simulate_study(protocol, store, settings,
+                          {.participants = 3, .seed = seed, .jobs = jobs}, never, {});
   }
 
   /// Settings with a patch that the text says.
@@ -109,8 +110,8 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
       std::this_thread::sleep_for(std::chrono::milliseconds(after));
       stop = true;
     });
-    const StudyProgress progress =
-        simulate_study(p, store, load_simulated_settings(""), {3, 1, 2}, stop, {});
+    const StudyProgress progress = simulate_study(
+        p, store, load_simulated_settings(""), {.participants = 3, .seed = 1, .jobs = 2}, stop, {});
     done = progress.recorded == progress.expected;
     ++stops;
   }
