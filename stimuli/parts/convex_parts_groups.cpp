@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "stimuli/half_edges.h"
+#include "stimuli/mesh_faults.h"
 #include "stimuli/parts/solid.h"
 
 namespace palpate::stimuli {
@@ -172,8 +173,12 @@ std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
     }
     closed.push_back(solid_of({"group '" + soup.group_names[g] + "'", std::move(group)}));
     if (closed.size() > kMostClosedGroups) {
-      throw MeshError({"too many groups: expected at most " + std::to_string(kMostClosedGroups) +
-                       " that are closed by themselves, found more"});
+      MeshFaults faults;
+      faults.add("too many groups", [] {
+        return "expected at most " + std::to_string(kMostClosedGroups) +
+               " that are closed by themselves, found more";
+      });
+      faults.throw_if_any();
     }
   }
   if (closed.empty()) return {};
