@@ -128,8 +128,8 @@ class WindowsTest(unittest.TestCase):
 
     def test_the_view_shows_the_tool_that_the_stylus_carries(self):
         def bright():
-            width, _ = self.screen.size(self.windows.console)
-            view = self.screen.pixels(self.windows.console, 10, 60, width // 2, 330)
+            width, height = self.screen.size(self.windows.console)
+            view = self.screen.pixels(self.windows.console, 20, 80, width // 2, height * 6 // 10)
             return sum(min(pixel) > 150 and max(pixel) - min(pixel) < 25 for pixel in view)
 
         self.windows.say("page neutral")
