@@ -108,7 +108,9 @@ std::size_t run(const std::string& which, std::uint32_t ticks) {
   Stroke stroke(scene, rendering::ray_renderer(), ticks);
   if (which == "least") {
     stroke.prepare(scene, rendering::ray_renderer(), {});
-    UnloggedTrial trial(stroke, participant, std::int64_t{100} * 1'000'000'000);
+    const protocols::Trial& next = plan.next();
+    UnloggedTrial trial(stroke, participant, library.edges(next.stimulus), next.orientation,
+                        std::int64_t{100} * 1'000'000'000);
     measured_unlogged_trial(trial);
     return 0;
   }

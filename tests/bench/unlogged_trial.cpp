@@ -17,6 +17,7 @@ void UnloggedTrial::run() {
     faults = sample.faults;
     if (sample.phase == runner::Phase::feeling) {
       note(sample);
+      contact_.add(sample);
       record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns_;
       record_.response_ns = sample.time_ns;
     }

@@ -3,14 +3,19 @@
 #include "data/record.h"
 #include "runner/participants/respondent.h"
 #include "runner/servo/tick_source.h"
+#include "runner/session/contact_log.h"
 
 namespace palpate::bench {
 
-/// A trial as Session::run_trial would run it if samples could not be kept: its yardstick.
+/// A trial as Session::run_trial would run it if samples could not be kept: its yardstick. How the
+/// object was touched is counted in either: every trial's record has it.
 class UnloggedTrial {
  public:
-  UnloggedTrial(runner::TickSource& servo, runner::Respondent& participant, std::int64_t limit_ns)
-      : servo_(servo), participant_(participant), limit_ns_(limit_ns) {}
+  UnloggedTrial(runner::TickSource& servo, runner::Respondent& participant,
+                const runner::SharpEdges& edges, const Quat& orientation, std::int64_t limit_ns)
+      : servo_(servo), participant_(participant), limit_ns_(limit_ns) {
+    contact_.begin(edges, orientation);
+  }
   void run();
 
  private:
@@ -20,6 +25,7 @@ class UnloggedTrial {
   runner::Respondent& participant_;
   std::int64_t limit_ns_;
   data::TrialRecord record_;
+  runner::ContactLog contact_;
 };
 
 }  // namespace palpate::bench
