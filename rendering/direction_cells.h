@@ -23,7 +23,7 @@ class DirectionCells {
     return 6 * static_cast<std::size_t>(resolution_) * static_cast<std::size_t>(resolution_);
   }
 
-  /// \param direction  any length; of 0 the cell is any
+  /// \param direction  any length; of 0 or without an end the cell is any
   std::size_t cell_of(const Vec3& direction) const {
     int axis = 0;
     for (int k = 1; k < 3; ++k) {
@@ -57,9 +57,10 @@ class DirectionCells {
   }
 
  private:
-  /// The square along a side that coordinate c in [-1, 1] lies in.
+  /// The square along a side that coordinate c in [-1, 1] lies in; some square if c is no number.
   int square_of(double c) const {
-    return std::clamp(static_cast<int>((c + 1) * 0.5 * resolution_), 0, resolution_ - 1);
+    return static_cast<int>(
+        std::min(std::max(0.0, (c + 1) * 0.5 * resolution_), resolution_ - 1.0));
   }
 
   int resolution_ = 0;

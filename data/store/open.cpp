@@ -88,8 +88,8 @@ void Store::Impl::require_usable_path() {
   std::error_code error;
   file = fs::weakly_canonical(fs::absolute(path, error), error).string();
   if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a database");
-  if (writes()) {  // Reading follows links of other users; writing does not, they could redirect
-                   // it.
+  // Reading follows links of other users; writing does not, they could redirect it.
+  if (writes()) {
     const ResolvedPath resolved = resolve_trusted_links(path);
     if (!resolved.fault.empty()) refuse(resolved.fault);
     file = resolved.path;

@@ -105,6 +105,15 @@ TEST(FacetMap, IsUnderThePointOfASegmentThatIsNearest) {
   }
 }
 
+TEST(FacetMap, OfWhatIsNoDirectionTheFacetIsAny) {
+  const Mesh mesh = stretched_ball(Vec3(1), 5);
+  const FacetMap map(*mesh, 0);
+  for (const double bad : {HUGE_VAL, -HUGE_VAL, 1e308, std::nan("")}) {
+    for (const Vec3& p : {Vec3(bad, 0.01, 0), Vec3(0.01, bad, bad), Vec3(bad)})
+      EXPECT_LT(map.facet_under(p, Vec3(bad, 0, 1)), mesh->facets().size());
+  }
+}
+
 TEST(FacetMap, SmallMeshesHaveNone) {
   const ContactTrees small(*stretched_ball(Vec3(1), 3), true);
   EXPECT_EQ(small.facet_map(), nullptr);

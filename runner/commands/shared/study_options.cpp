@@ -1,8 +1,5 @@
 #include "runner/commands/shared/study_options.h"
 
-#include <algorithm>
-#include <vector>
-
 #include "runner/commands/shared/simulation.h"
 
 namespace palpate::runner {
@@ -26,9 +23,7 @@ void add_study_options(CommandLine& line, StudyOptions& options) {
 
 void check_study_options(const po::variables_map& values, StudyOptions& options) {
   check_simulated_participants(options.participants);
-  const std::vector<int> versions = participant_versions();
-  if (std::find(versions.begin(), versions.end(), options.version) == versions.end())
-    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+  check_participant_version(options.version);
   options.protocol = values["PROTOCOL.json"].as<std::string>();
 }
 

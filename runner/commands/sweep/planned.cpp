@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "protocols/sha256.h"
+#include "runner/commands/shared/simulation.h"
 #include "runner/session/protocol_info.h"
 
 namespace palpate::runner {
@@ -102,13 +103,10 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
   constexpr std::int64_t kMostPoints = 100'000'000;
   if (settings.points < 1 || settings.points > kMostPoints)
     throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
-  if (settings.participants < 1 || settings.participants > 100000)
-    throw UsageError("--participants: must be 1 to 100000");
+  check_simulated_participants(settings.participants);
   if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
     throw UsageError("--repetitions: must be 1 to 1000000");
-  const std::vector<int> versions = participant_versions();
-  if (std::find(versions.begin(), versions.end(), settings.version) == versions.end())
-    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+  check_participant_version(settings.version);
   settings.protocol = values["PROTOCOL.json"].as<std::string>();
 }
 

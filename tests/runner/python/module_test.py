@@ -7,6 +7,7 @@ import inspect
 import io
 import json
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -243,7 +244,7 @@ def test_no_file_is_written(tmp_path):
 
 
 def test_stubs_and_docstrings_fit_the_module():
-    stub = ast.parse((__import__("pathlib").Path(palpate.__file__).parent / "_palpate.pyi").read_text())
+    stub = ast.parse((pathlib.Path(palpate.__file__).parent / "_palpate.pyi").read_text())
     stated = {node.name for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     stated |= {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
     found = {name for name in dir(palpate._palpate) if not name.startswith("__") or name == "__version__"}
