@@ -34,7 +34,7 @@ class DirectionCells {
     const int face = 2 * axis + (direction[axis] < 0 ? 1 : 0);
     const int row = square_of(scale * direction[(axis + 1) % 3]);
     const int column = square_of(scale * direction[(axis + 2) % 3]);
-    return static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column);
+    return cell(face, row, column);
   }
 
   /// Calls visit(cell, its middle), mostly from neighbour to neighbour.
@@ -49,8 +49,7 @@ class DirectionCells {
           middle[axis] = face % 2 == 0 ? 1 : -1;
           middle[(axis + 1) % 3] = (2.0 * row + 1) / resolution_ - 1;
           middle[(axis + 2) % 3] = (2.0 * column + 1) / resolution_ - 1;
-          visit(static_cast<std::size_t>((face * resolution_ + row) * resolution_ + column),
-                middle);
+          visit(cell(face, row, column), middle);
         }
       }
     }
@@ -61,6 +60,12 @@ class DirectionCells {
   int square_of(double c) const {
     return static_cast<int>(
         std::min(std::max(0.0, (c + 1) * 0.5 * resolution_), resolution_ - 1.0));
+  }
+
+  std::size_t cell(int face, int row, int column) const {
+    const auto side = static_cast<std::size_t>(resolution_);
+    return (static_cast<std::size_t>(face) * side + static_cast<std::size_t>(row)) * side +
+           static_cast<std::size_t>(column);
   }
 
   int resolution_ = 0;
