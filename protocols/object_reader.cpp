@@ -35,16 +35,6 @@ bool contains(const NumberRange& range, double value) {
   return (range.above_min ? value > range.min : value >= range.min) && value <= range.max;
 }
 
-bool read_number(const json& value, const std::string& pointer, double& out,
-                 const NumberRange& range, FaultList& faults) {
-  if (value.is_number() && contains(range, value.get<double>())) {
-    out = value.get<double>();
-    return true;
-  }
-  faults.add(pointer, describe("a number", range) + found_text(value));
-  return false;
-}
-
 bool read_integer(const json& value, const std::string& pointer, int& out, const NumberRange& range,
                   FaultList& faults) {
   // JSON knows numbers only: 76.0 is an integer too.
@@ -108,6 +98,16 @@ std::string found_text(const json& value) {
   put_start(value, kShown + 1, text);
   if (text.size() > kShown) text = text.substr(0, kShown - 3) + "...";
   return ", found " + text;
+}
+
+bool read_number(const json& value, const std::string& pointer, double& out,
+                 const NumberRange& range, FaultList& faults) {
+  if (value.is_number() && contains(range, value.get<double>())) {
+    out = value.get<double>();
+    return true;
+  }
+  faults.add(pointer, describe("a number", range) + found_text(value));
+  return false;
 }
 
 std::optional<Quat> read_quaternion(const json& value, const std::string& pointer,

@@ -44,6 +44,10 @@ bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out
   return false;
 }
 
+/// A number of a range. False and a fault otherwise.
+bool read_number(const nlohmann::json& value, const std::string& pointer, double& out,
+                 const NumberRange& range, FaultList& faults);
+
 /// A unit quaternion [w, x, y, z]; within 1e-6 of unit length, then normalised. nullopt and a fault
 /// otherwise.
 std::optional<Quat> read_quaternion(const nlohmann::json& value, const std::string& pointer,

@@ -19,7 +19,9 @@ MAY_INCLUDE = {
     "rendering/verification": RENDERING,
     "rendering/accuracy": RENDERING | {"rendering/verification"},
     # Stimuli are scene objects in orientations: their types, rotations and generator live there.
-    "protocols": {"stimuli"},
+    "protocols": {"stimuli", "protocols/procedures"},
+    # Which level comes next: pure functions of plain values.
+    "protocols/procedures": {"stimuli"},
     "data": set(),
     "data/files": {"data"},
     "data/store": {"data", "data/files"},
@@ -78,6 +80,7 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space",
+    "protocols/procedures": "procedure_spec",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",

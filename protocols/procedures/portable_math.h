@@ -1,0 +1,12 @@
+#pragma once
+// Exponential, logarithm and normal distribution of additions, multiplications and divisions alone:
+// libm's differ in the last bit between machines, and which level comes next must not.
+
+namespace palpate::protocols {
+
+double portable_exp(double x);  ///< relative error below 1e-15; 0 and infinity beyond the range
+double portable_log(double x);  ///< natural; x > 0; 0 gives -infinity
+/// Distribution function of the standard normal, absolute error below 2e-15.
+double portable_normal_cdf(double x);
+
+}  // namespace palpate::protocols

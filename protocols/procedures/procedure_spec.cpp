@@ -1,0 +1,63 @@
+#include "protocols/procedures/procedure_spec.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "protocols/procedures/limits.h"
+
+namespace palpate::protocols {
+namespace {
+
+double raised(double base, int exponent) {
+  double product = 1;
+  for (int i = 0; i < exponent; ++i) product *= base;
+  return product;
+}
+
+/// Probability of `down` successes in a row before `up` failures in a row (Feller 1968, XIII.7).
+double probability_of_harder(int up, int down, double p) {
+  const double successes = raised(p, down - 1), failures = raised(1 - p, up - 1);
+  return successes * (1 - raised(1 - p, up)) / (successes + failures - successes * failures);
+}
+
+}  // namespace
+
+double convergence_point(const Staircase& spec) {
+  double low = 0, high = 1;
+  for (int i = 0; i < 60; ++i) {
+    const double p = 0.5 * (low + high);
+    const double harder = probability_of_harder(spec.up, spec.down, p);
+    (harder < (1 - harder) * spec.step_ratio ? low : high) = p;
+  }
+  return 0.5 * (low + high);
+}
+
+double step_ratio_for(double target, int down) {
+  const double harder = raised(target, down);
+  return harder / (1 - harder);
+}
+
+std::vector<double> levels_to_check(const ProcedureSpec& spec) {
+  if (const auto* constant = std::get_if<ConstantStimuli>(&spec)) return constant->levels;
+  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->levels;
+  if (const auto* limits = std::get_if<Limits>(&spec)) {
+    std::vector<double> levels = series_levels(*limits, true, 0);
+    const std::vector<double> descending = series_levels(*limits, false, 0);
+    levels.insert(levels.end(), descending.begin(), descending.end());
+    return levels;
+  }
+  const auto& staircase = std::get<Staircase>(spec);
+  return {staircase.min, staircase.start, staircase.max};
+}
+
+std::size_t most_trials(const ProcedureSpec& spec) {
+  if (const auto* constant = std::get_if<ConstantStimuli>(&spec))
+    return constant->levels.size() * static_cast<std::size_t>(constant->repetitions);
+  if (const auto* quest = std::get_if<QuestPlus>(&spec))
+    return static_cast<std::size_t>(quest->stop_trials);
+  if (const auto* limits = std::get_if<Limits>(&spec))
+    return static_cast<std::size_t>(limits->series) * series_levels(*limits, true, 0).size();
+  return static_cast<std::size_t>(std::get<Staircase>(spec).stop_trials);
+}
+
+}  // namespace palpate::protocols

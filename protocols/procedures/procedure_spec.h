@@ -1,0 +1,76 @@
+#pragma once
+// How the level of each trial is chosen: plain values, as a protocol says them.
+
+#include <cstddef>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "protocols/procedures/psychometric.h"
+
+namespace palpate::protocols {
+
+/// Method of constant stimuli: every level equally often. Each round of all levels has an order of
+/// its own.
+struct ConstantStimuli {
+  std::vector<double> levels;
+  int repetitions = 1;
+};
+
+/// Up-down staircase: `down` successes in a row make it harder by a step, `up` failures in a row
+/// make it easier by step_ratio steps (Levitt 1971; weighted: Kaernbach 1991).
+struct Staircase {
+  double start = 0;
+  /// On the scale; the i-th holds from the i-th reversal (from 0) on, the last for all later ones.
+  std::vector<double> steps;
+  int up = 1, down = 1;
+  double step_ratio = 1;  ///< step to easier / step to harder
+  LevelScale scale = LevelScale::linear;
+  Easier easier = Easier::higher;
+  double min = 0, max = 0;  ///< the levels stay within
+  std::optional<int> stop_reversals;
+  int stop_trials = 200;      ///< ends even without the reversals
+  int discard_reversals = 2;  ///< the first ones, which the estimate leaves out
+};
+
+/// Probability of a success at which a staircase has no drift.
+double convergence_point(const Staircase& spec);
+/// The step ratio with which a staircase of `down` and up = 1 converges at `target`:
+/// target^down / (1 - target^down).
+double step_ratio_for(double target, int down);
+
+/// Values that a parameter may have and how likely they are before the first trial.
+struct ParameterGrid {
+  std::vector<double> values;
+  std::vector<double> weights;  ///< > 0; empty: equally likely
+};
+
+/// QUEST+ (Watson 2017): the level of the smallest expected entropy of the parameters.
+struct QuestPlus {
+  PsychometricFunction function;
+  std::vector<double> levels;
+  ParameterGrid threshold, slope, guess, lapse;
+  int stop_trials = 60;
+  std::optional<double> stop_entropy_bits;  ///< of the posterior of all parameters
+};
+
+/// Method of limits: ascending and descending series in turn, each until the answer changes.
+struct Limits {
+  double low = 0, high = 1;
+  double step = 1;  ///< on the scale
+  LevelScale scale = LevelScale::linear;
+  Easier easier = Easier::higher;
+  int series = 8;
+  bool ascending_first = true;
+  int jitter_steps = 0;  ///< a series starts up to so many steps inside, by chance
+};
+
+using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits>;
+
+/// Levels that a procedure may ask for: all of them, or (Staircase) its start and the ends of its
+/// range. What cannot be shown at one of these must be refused before the first trial.
+std::vector<double> levels_to_check(const ProcedureSpec& spec);
+/// No procedure of this spec has more trials.
+std::size_t most_trials(const ProcedureSpec& spec);
+
+}  // namespace palpate::protocols
