@@ -82,19 +82,15 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
 void IdealTool::add_contacts() {
   Vec3& shift = memory_.shift;
   shift = stuck_ ? at_ : exact_;
-  if (stuck_) {
-    // It stays where it is, and all of the force is that of the plane that holds most of it.
-    tick_.faults |= render_fault::kContactCapped;
-    const Plane* most = nullptr;
-    for (const Plane& plane : planes_.all()) {
-      if (most == nullptr || plane.multiplier > most->multiplier) most = &plane;
-    }
-    const double length = glm::length(at_);
+  if (stuck_) tick_.faults |= render_fault::kContactCapped;  // it stays where it is
+  const double length = glm::length(shift);
+  const Plane* most = planes_.most_loaded();
+  if (stuck_ || (most != nullptr && most->multiplier > kMostLeverage * length)) {
     if (most == nullptr || !(length > 0)) return;
     Plane held = *most;
-    held.normal = at_ / length;
+    held.normal = shift / length;
     held.multiplier = length;
-    add_contact(held, at_);
+    add_contact(held, shift);
     return;
   }
   for (const Plane& plane : planes_.all()) {

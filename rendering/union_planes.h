@@ -13,6 +13,14 @@
 
 namespace palpate::rendering {
 
+/// Sine of half the opening of the narrowest groove that a tool turns into.
+inline constexpr double kNarrowest = 5e-5;
+
+/// In a groove as narrow two planes hold so many times what pushes the tool in. Where they hold
+/// more, it is clamped, and what pushes it is felt as one contact: opposite forces of 1e5 times as
+/// much would be rounding, and their torque would be no hand's.
+inline constexpr double kMostLeverage = 0.5 / kNarrowest;
+
 /// A plane that holds an ideal tool. Translations are relative to the virtual tool's tip.
 struct Plane {
   std::uint32_t near = 0;  ///< index of the pair in UnionMemory::near
@@ -28,6 +36,14 @@ class Planes {
  public:
   std::span<Plane> all() { return {planes_.data(), count_}; }
   std::span<const Plane> all() const { return {planes_.data(), count_}; }
+  /// Null where there is none.
+  const Plane* most_loaded() const {
+    const Plane* most = nullptr;
+    for (const Plane& plane : all()) {
+      if (most == nullptr || plane.multiplier > most->multiplier) most = &plane;
+    }
+    return most;
+  }
   bool full() const { return count_ == planes_.size(); }
   bool empty() const { return count_ == 0; }
   void clear() { count_ = 0; }
@@ -42,9 +58,8 @@ class Planes {
 
   /// Whether the planes, all of which hold the tool, leave it room: not where they are a crack.
   bool leave_room() const {
-    // Sine of half the opening of the narrowest groove that a tool turns into. In narrower ones the
-    // apex is lost in rounding; between parts that abut a tool would turn for ever.
-    constexpr double kNarrowest = 5e-5;
+    // In narrower ones the apex is lost in rounding; between parts that abut a tool would turn for
+    // ever.
     if (count_ < 2) return true;
     if (count_ == 2) {
       const double cosine = glm::dot(planes_[0].normal, planes_[1].normal);

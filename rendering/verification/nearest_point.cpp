@@ -13,8 +13,6 @@ namespace {
 // no point or line that rounding leaves in place.
 constexpr double kDependent = 1e-13;
 
-constexpr double kMostMultiple = 1e5;  // of a vector's length
-
 /// The multipliers with which `from` comes to lie on all the planes chosen.
 bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
                std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
@@ -103,7 +101,7 @@ struct Generators {
 
   /// m; what the non-negative multiples leave of the vector; infinity where one is negative, or so
   /// large that what is left is rounding.
-  double rest(const Vec3& vector) const {
+  double rest(const Vec3& vector, double most_multiple) const {
     Vec3 left = vector;
     std::array<double, 3> multiples{};
     for (int step = 0; step < 2; ++step) {  // the second takes out the rounding of the first
@@ -115,7 +113,7 @@ struct Generators {
       }
     }
     for (std::size_t i = 0; i < count; ++i) {
-      if (!(multiples[i] >= 0 && multiples[i] <= kMostMultiple * glm::length(vector)))
+      if (!(multiples[i] >= 0 && multiples[i] <= most_multiple * glm::length(vector)))
         return std::numeric_limits<double>::infinity();
     }
     return glm::length(left);
@@ -124,9 +122,11 @@ struct Generators {
 
 }  // namespace
 
-double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals) {
+double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals, double most_multiple) {
   double least = glm::length(vector);
-  const auto try_on = [&](const Generators& some) { least = std::min(least, some.rest(vector)); };
+  const auto try_on = [&](const Generators& some) {
+    least = std::min(least, some.rest(vector, most_multiple));
+  };
   const std::size_t n = normals.size();
   for (std::size_t a = 0; a < n; ++a) {
     const Vec3& p = normals[a];

@@ -29,7 +29,10 @@ std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const Half
 
 /// m; how far a vector is from all sums of non-negative multiples of the normals. In 3 dimensions
 /// the nearest of them has at most three terms, which are all tried.
-/// \param normals  unit
-double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals);
+/// \param normals        unit
+/// \param most_multiple  of a normal, in lengths of the vector: beyond 1e5 opposite normals hold
+///                       anything across them
+double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals,
+                        double most_multiple = 1e5);
 
 }  // namespace palpate::rendering

@@ -90,7 +90,7 @@ void Descent::choose(std::size_t next, std::vector<HalfSpace>& planes, Choice& b
   }
 }
 
-double Descent::unbalanced(const Vec3& tip) const {
+double Descent::unbalanced(const Vec3& tip, double most_multiple) const {
   std::vector<Vec3> normals;
   for (const OracleSum& sum : sums_) {
     for (const std::size_t facet : touched_facets(sum, tip, touching_)) {
@@ -101,7 +101,7 @@ double Descent::unbalanced(const Vec3& tip) const {
       if (!known) normals.push_back(normal);
     }
   }
-  return distance_to_cone(tip - virtual_tip_, normals);
+  return distance_to_cone(tip - virtual_tip_, normals, most_multiple);
 }
 
 double Descent::free_way(const Vec3& tip, const Vec3& goal) const {

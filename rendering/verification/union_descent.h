@@ -34,8 +34,8 @@ class Descent {
   bool goal(const Vec3& tip, Choice& best);
 
   /// m; what of the way from the virtual tip is no sum of non-negative multiples of the normals of
-  /// facets that are touched.
-  double unbalanced(const Vec3& tip) const;
+  /// facets that are touched, each at most `most_multiple` times as long as the way.
+  double unbalanced(const Vec3& tip, double most_multiple) const;
 
   /// How much of the straight way to the goal lies outside all sums, with the facets of the choice
   /// bounding those that are touched. In [0, 1].

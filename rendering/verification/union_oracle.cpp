@@ -221,10 +221,17 @@ OracleAudit UnionOracle::audit(const OraclePose& ideal, const Vec3& virtual_tip,
   }
   Choice choice;
   Descent descent(all, virtual_tip, touching);
-  audit.unbalanced = descent.unbalanced(ideal.tip);
+  audit.unbalanced = descent.unbalanced(ideal.tip, 1e5);
   audit.descent = descent.goal(ideal.tip, choice) ? glm::length(choice.goal.point - ideal.tip)
                                                   : std::numeric_limits<double>::quiet_NaN();
   return audit;
+}
+
+bool UnionOracle::held_in_gap(const OraclePose& ideal, const Vec3& virtual_tip, double touching,
+                              double least) const {
+  constexpr double kMostLeverage = 1e9;  // beyond it facets that are parallel are not, by rounding
+  const std::vector<OracleSum> all = sums(ideal.axes);
+  return Descent(all, virtual_tip, touching).unbalanced(ideal.tip, kMostLeverage) <= least;
 }
 
 }  // namespace palpate::rendering

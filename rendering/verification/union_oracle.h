@@ -94,6 +94,10 @@ class UnionOracle {
   OracleTick tick(const OraclePose& last_ideal, const OraclePose& virtual_tool) const;
   /// \param touching  m; sums no further away count as touched
   OracleAudit audit(const OraclePose& ideal, const Vec3& virtual_tip, double touching) const;
+  /// Whether facets that are no further away hold the ideal tool if a groove of opposite facets may
+  /// clamp it with any leverage that rounding leaves. \param least  m; less is no rest
+  bool held_in_gap(const OraclePose& ideal, const Vec3& virtual_tip, double touching,
+                   double least) const;
 
   double size() const { return size_; }            ///< m, of the largest part
   double thickness() const { return thickness_; }  ///< m, least width of the thinnest part

@@ -89,20 +89,24 @@ class Walk {
     const OracleAudit audit = oracle_.audit(ideal_, pose.tip, kTouching * size);
     counts_.worst_penetration = std::max(counts_.worst_penetration, audit.penetration / size);
     wrong(audit.penetration > kInside * size, counts_.inside, "inside by", audit.penetration);
-    const bool lowest = capped || check_minimal(audit);
+    const bool lowest = capped || check_minimal(audit, pose);
     check_force(r, pose);
     if (held && !capped && !lagged && lowest) compare(r, last, pose);
     return true;
   }
 
   /// \return whether it is at a local minimum
-  bool check_minimal(const OracleAudit& audit) {
+  bool check_minimal(const OracleAudit& audit, const OraclePose& pose) {
     const double size = oracle_.size();
     const bool balanced = audit.unbalanced <= kMinimal * size;
     const bool lowest = audit.descent <= kMinimal * size;
     if (lowest) counts_.worst_descent = std::max(counts_.worst_descent, audit.descent / size);
     counts_.on_edge += balanced && !lowest;
-    wrong(!balanced, counts_.not_minimal, "unbalanced, by", audit.unbalanced);
+    const bool in_gap =
+        !balanced && oracle_.held_in_gap(ideal_, pose.tip, 2 * scene_.groups().front().skin,
+                                         kMinimal * size);
+    counts_.in_gap += in_gap;
+    wrong(!balanced && !in_gap, counts_.not_minimal, "unbalanced, by", audit.unbalanced);
     return balanced && lowest;
   }
 
@@ -209,6 +213,7 @@ UnionCounts& UnionCounts::operator+=(const UnionCounts& other) {
   capped += other.capped;
   released += other.released;
   on_edge += other.on_edge;
+  in_gap += other.in_gap;
   torques += other.torques;
   compared += other.compared;
   elsewhere += other.elsewhere;

@@ -23,7 +23,7 @@ struct UnionCounts {
   // Wrong ticks; all of these must be 0.
   std::uint64_t inside = 0;  ///< ideal tool inside a part by more than 1e-12 of the size
   /// The displacement is no sum of non-negative multiples of the normals of facets that are
-  /// touched, by more than 1e-9 of the size.
+  /// touched, by more than 1e-9 of the size; nor does a gap hold it (UnionCounts::in_gap).
   std::uint64_t not_minimal = 0;
   /// Force is not stiffness times displacement, or the two devices' forces are not the force, by
   /// more than 1e-9 of it.
@@ -43,6 +43,10 @@ struct UnionCounts {
   /// Balanced on an edge exactly, from where it could slide down along its other facet. Paths on a
   /// grid lead there, and bends of a tool that touch with both segments.
   std::uint64_t on_edge = 0;
+  /// Held by facets that are not touched, but within two skins (some 1e-9 of the size), which the
+  /// ideal tool keeps from what it rests on: a gap that is narrower may be open or closed to it. Or
+  /// clamped in a groove so narrow that each side holds more than 1e5 times what pushes it in.
+  std::uint64_t in_gap = 0;
   std::uint64_t torques = 0;   ///< torques that were compared
   std::uint64_t compared = 0;  ///< contact ticks repeated by the oracle from the same last pose
   /// Of those: elsewhere by more than 1e-9 of the size. Both are ideal tools by definition.

@@ -170,6 +170,7 @@ Json union_search_json(const rendering::UnionCounts& c, std::uint64_t seed) {
           {"capped", c.capped},
           {"released", c.released},
           {"on_edge", c.on_edge},
+          {"in_gap", c.in_gap},
           {"torques_compared", c.torques},
           {"compared_with_oracle", c.compared},
           {"at_another_minimum", c.elsewhere}};
