@@ -103,8 +103,8 @@ class Walk {
     if (lowest) counts_.worst_descent = std::max(counts_.worst_descent, audit.descent / size);
     counts_.on_edge += balanced && !lowest;
     const bool in_gap =
-        !balanced && oracle_.held_in_gap(ideal_, pose.tip, 2 * scene_.groups().front().skin,
-                                         kMinimal * size);
+        !balanced &&
+        oracle_.held_in_gap(ideal_, pose.tip, 2 * scene_.groups().front().skin, kMinimal * size);
     counts_.in_gap += in_gap;
     wrong(!balanced && !in_gap, counts_.not_minimal, "unbalanced, by", audit.unbalanced);
     return balanced && lowest;

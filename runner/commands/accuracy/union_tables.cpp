@@ -61,7 +61,8 @@ analysis::Table union_search_table(const rendering::UnionCounts& c, std::uint64_
       "Of the ticks in contact, " + count(c.lagged) + " with an orientation that lags, " +
       count(c.capped) + " stopped at the limit of rounds, " + count(c.released) +
       " released from a hook, " + count(c.on_edge) + " balanced on an edge exactly, " +
-      count(c.in_gap) + " held in a gap narrower than 1e-9 of the size, or clamped in a groove of less than 1e-5.");
+      count(c.in_gap) +
+      " held in a gap narrower than 1e-9 of the size, or clamped in a groove of less than 1e-5.");
   table.notes.push_back("Repeated by the oracle from the same last pose: " + count(c.compared) +
                         ", of which " + count(c.elsewhere) +
                         " came to another minimum; torques compared: " + count(c.torques) + ".");
