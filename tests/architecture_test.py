@@ -38,7 +38,8 @@ MAY_INCLUDE = {
     "runner/sound": {"stimuli", "protocols"},
     "runner/devices": SERVO | {"protocols", "data", "runner/devices/falcon"},
     "runner/devices/falcon": SERVO | {"protocols"},
-    "runner/display": SERVO | {"protocols", "runner/devices", "runner/safety"},
+    "runner/display": SERVO | {"protocols", "runner/devices", "runner/safety", "runner/display/scene"},
+    "runner/display/scene": SERVO,
     "runner/participants": SERVO | {"protocols", "data", "runner/devices", "runner/display"},
     "runner/session": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices",
                                "runner/display", "runner/participants", "runner/sound"},
@@ -100,6 +101,7 @@ PUBLIC = {
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display text_display window",
+    "runner/display/scene": "camera display_error painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent settings_document simulated simulated_settings",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay_comparison session_plan simulated_session simulated_study station",

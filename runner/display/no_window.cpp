@@ -1,11 +1,20 @@
+#include "runner/display/scene/display_error.h"
+#include "runner/display/scene/painter.h"
 #include "runner/display/window.h"
 
 namespace palpate::runner {
+namespace {
+
+constexpr const char* kNotBuiltIn = "this palpate was built without windows and pictures";
+
+}  // namespace
 
 std::unique_ptr<DisplayLoop> make_windows(const WindowSettings&) {
-  throw DisplayError("this palpate was built without windows");
+  throw DisplayError(kNotBuiltIn);
 }
 
 std::string missing_letters(const std::vector<std::string>&) { return {}; }
+
+std::unique_ptr<ScenePainter> make_painter(int, int) { throw DisplayError(kNotBuiltIn); }
 
 }  // namespace palpate::runner

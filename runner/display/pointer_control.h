@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "runner/devices/mouse.h"
-#include "runner/display/camera.h"
+#include "runner/display/scene/camera.h"
 #include "runner/servo/servo.h"
 
 namespace palpate::runner {

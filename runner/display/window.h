@@ -3,19 +3,14 @@
 
 #include <functional>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "runner/devices/mouse.h"
 #include "runner/display/display.h"
+#include "runner/display/scene/display_error.h"
 
 namespace palpate::runner {
-
-/// No window can be opened: not built in, no display, or an unsuitable one; what() says which.
-class DisplayError : public std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 struct WindowSettings {
   std::string title;               ///< UTF-8, of the window frames: study and participant

@@ -97,7 +97,8 @@ py::dict render(const Document& given, const std::vector<TimedPose>& poses,
     table = std::make_unique<data::ColumnTable>(force_columns(tool));
     Interruption interruption;
     render_along(scene, spec, renderer, poses,
-                 [&](const TimedPose& pose, const rendering::Rendering& rendering) {
+                 [&](const TimedPose& pose, const rendering::Rendering& rendering,
+                     const rendering::RenderState&) {
                    put_forces(*table, pose.t, rendering, tool);
                    interruption.check();
                  });

@@ -9,13 +9,17 @@
 namespace palpate::runner {
 namespace {
 
+rendering::Reach reach_for(const protocols::ReachSpec& spec, const rendering::LineProbe& real) {
+  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
+  return reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
+}
+
 /// One tick of a stylus that reaches farther than it is long.
 rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
                                    const rendering::Renderer& renderer,
                                    const protocols::ReachSpec& spec,
                                    const rendering::LineProbe& real, double dt) {
-  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
-  const rendering::Reach reach = reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
+  const rendering::Reach reach = reach_for(spec, real);
   return felt(reach, renderer.tick(scene, state, stretched(reach, real), dt));
 }
 
@@ -43,15 +47,21 @@ rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec
 
 void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spec,
                   const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
-                  const std::function<void(const TimedPose&, const rendering::Rendering&)>& visit) {
+                  const TickVisitor& visit) {
   rendering::RenderState state = scene.initial_state();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
     state.measured_side = poses[i].side;
-    visit(poses[i], spec.reach
-                        ? extended_tick(scene, state, renderer, *spec.reach, poses[i].probe, dt)
-                        : renderer.tick(scene, state, poses[i].probe, dt));
+    const rendering::Rendering rendering =
+        spec.reach ? extended_tick(scene, state, renderer, *spec.reach, poses[i].probe, dt)
+                   : renderer.tick(scene, state, poses[i].probe, dt);
+    visit(poses[i], rendering, state);
   }
+}
+
+rendering::LineProbe virtual_stylus(const protocols::SceneSpec& spec,
+                                    const rendering::LineProbe& real) {
+  return spec.reach ? stretched(reach_for(*spec.reach, real), real) : real;
 }
 
 }  // namespace palpate::runner

@@ -77,9 +77,8 @@ int render_command(const std::vector<std::string>& args) {
   const rendering::Scene scene = build_scene(scene_path, spec, renderer);
   ForceTable table(scene.tool() != nullptr);
   render_along(scene, spec, renderer, poses,
-               [&table](const TimedPose& pose, const rendering::Rendering& rendering) {
-                 table.add(pose, rendering);
-               });
+               [&table](const TimedPose& pose, const rendering::Rendering& rendering,
+                        const rendering::RenderState&) { table.add(pose, rendering); });
   outputs.put("out", table.text());
   outputs.write();
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));

@@ -39,6 +39,7 @@ int analyze_command(const std::vector<std::string>& args);
 int bench_command(const std::vector<std::string>& args);
 int cluster_command(const std::vector<std::string>& args);
 int devices_command(const std::vector<std::string>& args);
+int explore_command(const std::vector<std::string>& args);
 int export_command(const std::vector<std::string>& args);
 int forget_command(const std::vector<std::string>& args);
 int merge_command(const std::vector<std::string>& args);

@@ -1,6 +1,6 @@
 // The tool that the console draws is the one that is felt.
 
-#include "runner/display/tool_shape.h"
+#include "runner/display/scene/tool_shape.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "runner/display/tool_shape.h"
+#include "runner/display/scene/tool_shape.h"
 
 #include "rendering/tool_pose.h"
 

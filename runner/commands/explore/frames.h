@@ -1,0 +1,41 @@
+#pragma once
+// Pictures of a scene along a recorded path.
+
+#include <string>
+#include <vector>
+
+#include "protocols/parse.h"
+#include "rendering/renderer.h"
+#include "runner/commands/explore/option_values.h"
+#include "runner/commands/render/trajectory_csv.h"
+
+namespace palpate::runner {
+
+struct FrameSettings {
+  PictureSize size;
+  double every = 0.016;  ///< s, between pictures
+  ViewAngles view;
+  bool labels = false;
+  std::string folder;      ///< of PNG files; empty: none
+  bool animate = false;    ///< as a WebP as well
+  bool may_replace = false;  ///< pictures in the folder
+};
+
+inline constexpr std::size_t kMostFrames = 100'000;
+
+/// Refuses a folder of frames before any work: what exists is empty, or with `may_replace` holds
+/// nothing but frames. \throws UsageError
+void check_frames_folder(const std::string& folder, bool may_replace);
+
+struct DrawnFrames {
+  std::size_t pictures = 0;
+  std::string animation;  ///< WebP; empty: none
+  double seconds = 0;     ///< of the path
+};
+
+/// \param scene_path  that faults name. \throws UsageError, DisplayError, MeshError, StoreError
+DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpec& spec,
+                        const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
+                        const FrameSettings& settings);
+
+}  // namespace palpate::runner

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <span>
+
+namespace palpate::runner {
+
+/// The camera of a picture of a scene; y is up. Points in the virtual frame, m; pixels from the
+/// picture's upper left corner.
+class Camera {
+ public:
+  void resize(float width, float height);
+  /// \param right, up  rad
+  void orbit(float right, float up);
+  /// Where the camera stands, about the centre. \param yaw  rad, about +y, 0: on +z. \param pitch
+  /// rad, up
+  void look_from(float yaw, float pitch);
+  /// \param closer  above 1: larger in the picture
+  void zoom(float closer);
+  /// Moves the centre in the picture's plane. px
+  void pan(const glm::vec2& pixels);
+  /// Moves centre and distance so that all points are in the picture as it is now, with a margin.
+  void fit(std::span<const glm::vec3> points);
+
+  glm::vec3 eye() const;
+  glm::vec3 centre() const { return centre_; }
+  float distance() const { return distance_; }  ///< m, from the centre
+  glm::mat4 matrix() const;                     ///< virtual frame to clip space
+  glm::vec2 project(const glm::vec3& point) const;
+  /// The point seen at a pixel, at the same depth as `depth_of`.
+  glm::vec3 unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const;
+  glm::vec3 towards_viewer() const;  ///< unit, from the centre to the camera
+
+ private:
+  glm::mat4 view() const;
+  float near() const;
+
+  float width_ = 1, height_ = 1;     ///< px
+  float yaw_ = 0.5F, pitch_ = 0.4F;  ///< rad
+  float distance_ = 0.62F;           ///< m
+  glm::vec3 centre_{0, 0, 0};        ///< m
+};
+
+}  // namespace palpate::runner

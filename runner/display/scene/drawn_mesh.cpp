@@ -1,0 +1,163 @@
+#include "runner/display/scene/drawn_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <map>
+
+#include "stimuli/compose.h"
+#include "stimuli/parts/triangulate.h"
+#include "stimuli/primitives.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr int kSides = 24;
+constexpr float kFlattest = 0.866F;  // cosine between normals that are smoothed
+
+void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
+  std::vector<Vec3> corners;
+  for (const auto& face : soup.faces) {
+    corners.clear();
+    for (const std::uint32_t corner : face)
+      corners.push_back(pose.orientation * soup.vertices[corner] + pose.position);
+    for (const auto& triangle : stimuli::triangulate(corners)) {
+      const Vec3 across = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+      const double area = glm::length(across);
+      if (!(area > 0)) continue;
+      const glm::vec3 normal(across / area);
+      for (const Vec3& corner : triangle) out.push_back({glm::vec3(corner), normal});
+    }
+  }
+}
+
+void add_object(const stimuli::ObjectSpec& spec, const Pose& pose, DrawnMesh& out) {
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    for (const stimuli::ObjectSpec& part : spec.parts)
+      add_object(part, stimuli::compose(pose, part.pose), out);
+  } else {
+    add(stimuli::polygons_of(spec), pose, out);
+  }
+}
+
+glm::vec3 on_rim(int corner) {
+  const double angle = 2 * M_PI * corner / kSides;
+  return {std::cos(angle), std::sin(angle), 0};
+}
+
+}  // namespace
+
+DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
+  DrawnMesh out;
+  add_object(object, Pose(), out);
+  smooth(out);
+  return out;
+}
+
+void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& out) {
+  stimuli::PolygonSoup soup;
+  soup.vertices.assign(mesh.vertices().begin(), mesh.vertices().end());
+  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+    const stimuli::Facet& facet = mesh.facets()[f];
+    auto& face = soup.faces.emplace_back();
+    for (std::uint32_t k = 0; k < facet.side_count; ++k) {
+      const stimuli::Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
+      face.push_back(edge.left == f ? edge.v0 : edge.v1);
+    }
+  }
+  add(soup, pose, out);
+}
+
+void smooth(DrawnMesh& mesh) {
+  // Corners of one place, within a thousandth of the size.
+  float size = 0;
+  for (const DrawnVertex& corner : mesh)
+    size = std::max(size, std::abs(corner.position.x) + std::abs(corner.position.y) +
+                              std::abs(corner.position.z));
+  if (!(size > 0)) return;
+  const float cell = 1e-4F * size;
+  std::map<std::array<long, 3>, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const glm::vec3& p = mesh[i].position;
+    places[{std::lround(p.x / cell), std::lround(p.y / cell), std::lround(p.z / cell)}].push_back(
+        i);
+  }
+  // Each triangle weighs by its angle at the corner, so that how a face is cut does not matter.
+  std::vector<float> angles(mesh.size());
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    const std::size_t first = i - i % 3;
+    const glm::vec3& p = mesh[i].position;
+    const glm::vec3 a = glm::normalize(mesh[first + (i + 1) % 3].position - p);
+    const glm::vec3 b = glm::normalize(mesh[first + (i + 2) % 3].position - p);
+    angles[i] = std::acos(std::clamp(glm::dot(a, b), -1.0F, 1.0F));
+  }
+  const DrawnMesh flat = mesh;
+  for (const auto& [place, corners] : places) {
+    for (const std::size_t i : corners) {
+      glm::vec3 sum(0);
+      for (const std::size_t k : corners) {
+        if (glm::dot(flat[i].normal, flat[k].normal) > kFlattest) sum += angles[k] * flat[k].normal;
+      }
+      if (glm::length(sum) > 0) mesh[i].normal = glm::normalize(sum);
+    }
+  }
+}
+
+// Moeller & Trumbore 1997, front faces only.
+std::optional<float> distance_to(const DrawnMesh& mesh, const glm::vec3& from,
+                                 const glm::vec3& along) {
+  std::optional<float> nearest;
+  for (std::size_t i = 0; i + 2 < mesh.size(); i += 3) {
+    const glm::vec3 corner = mesh[i].position;
+    const glm::vec3 a = mesh[i + 1].position - corner, b = mesh[i + 2].position - corner;
+    const glm::vec3 p = glm::cross(along, b);
+    const float size = glm::dot(a, p);
+    if (!(size > 0)) continue;
+    const glm::vec3 off = from - corner, q = glm::cross(off, a);
+    const float u = glm::dot(off, p), v = glm::dot(along, q), t = glm::dot(b, q) / size;
+    if (u < 0 || v < 0 || u + v > size || t <= 0) continue;
+    if (!nearest || t < *nearest) nearest = t;
+  }
+  return nearest;
+}
+
+DrawnMesh unit_cylinder() {
+  DrawnMesh out;
+  out.reserve(std::size_t{6} * kSides);
+  const glm::vec3 up(0, 0, 1);
+  for (int i = 0; i < kSides; ++i) {
+    const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
+    for (const DrawnVertex& corner :
+         {DrawnVertex{a, a}, {b, b}, {b + up, b}, {a, a}, {b + up, b}, {a + up, a}}) {
+      out.push_back(corner);
+    }
+  }
+  return out;
+}
+
+DrawnMesh unit_cone() {
+  DrawnMesh out;
+  out.reserve(std::size_t{6} * kSides);
+  const glm::vec3 apex(0, 0, 1), down(0, 0, -1);
+  for (int i = 0; i < kSides; ++i) {
+    const glm::vec3 a = on_rim(i), b = on_rim(i + 1);
+    const glm::vec3 normal = glm::normalize(a + b + apex);
+    for (const DrawnVertex& corner : {DrawnVertex{a, normal}, {b, normal}, {apex, normal}}) {
+      out.push_back(corner);
+    }
+    for (const DrawnVertex& corner : {DrawnVertex{b, down}, {a, down}, {glm::vec3(0), down}}) {
+      out.push_back(corner);
+    }
+  }
+  return out;
+}
+
+DrawnMesh unit_sphere() {
+  DrawnMesh out;
+  add(stimuli::icosphere(1, 3), Pose(), out);
+  for (DrawnVertex& corner : out) corner.normal = glm::normalize(corner.position);
+  return out;
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,39 @@
+#pragma once
+// Meshes for pictures: triangles with normals, m.
+
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "stimuli/convex_mesh.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::runner {
+
+struct DrawnVertex {
+  glm::vec3 position;  ///< m
+  glm::vec3 normal;    ///< unit, outward
+};
+using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
+
+/// The triangles of an object in its own frame (its pose is left out, not those of its parts).
+/// Edges that are flatter than 30 degrees are smoothed. \throws MeshError, std::runtime_error where
+/// a file is no mesh
+DrawnMesh triangles_of(const stimuli::ObjectSpec& object);
+
+/// Adds the facets of a convex mesh, in the frame in which its own has this pose.
+void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& out);
+
+/// Where facets meet at less than 30 degrees, their corners get a common normal.
+void smooth(DrawnMesh& mesh);
+
+/// How far along a line it first enters the mesh; none: it misses it.
+std::optional<float> distance_to(const DrawnMesh& mesh, const glm::vec3& from,
+                                 const glm::vec3& along);
+
+DrawnMesh unit_cylinder();  ///< radius 1, from z = 0 to z = 1, without ends
+DrawnMesh unit_cone();      ///< radius 1 at z = 0, apex at z = 1
+DrawnMesh unit_sphere();    ///< radius 1
+
+}  // namespace palpate::runner

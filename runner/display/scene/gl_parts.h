@@ -1,0 +1,98 @@
+#pragma once
+// Parts of OpenGL that belong to someone: freed with their owner. All need a current context of
+// OpenGL 3.3, also to be destroyed.
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <string>
+
+#include "runner/display/scene/drawn_mesh.h"
+
+namespace palpate::runner {
+
+/// \throws DisplayError where the current context is too old to draw scenes
+void require_opengl();
+
+/// Whether the processor draws, not a graphics card.
+bool draws_in_software();
+
+/// \throws DisplayError naming `doing` where OpenGL reports an error
+void check_opengl(const char* doing);
+
+/// A mesh on the graphics card.
+class GlMesh {
+ public:
+  explicit GlMesh(const DrawnMesh& mesh);
+  ~GlMesh();
+  GlMesh(const GlMesh&) = delete;
+  GlMesh& operator=(const GlMesh&) = delete;
+  void draw() const;
+
+ private:
+  unsigned vertices_ = 0, buffer_ = 0;
+  int corners_ = 0;
+};
+
+class GlProgram {
+ public:
+  /// \throws DisplayError with the driver's reason
+  GlProgram(const char* vertex_shader, const char* fragment_shader);
+  ~GlProgram();
+  GlProgram(const GlProgram&) = delete;
+  GlProgram& operator=(const GlProgram&) = delete;
+
+  void use() const;
+  // Of the program in use.
+  void set(const char* name, float value) const;
+  void set(const char* name, int value) const;
+  void set(const char* name, const glm::vec2& value) const;
+  void set(const char* name, const glm::vec3& value) const;
+  void set(const char* name, const glm::vec4& value) const;
+  void set(const char* name, const glm::mat4& value) const;
+
+ private:
+  int place_of(const char* name) const;
+  unsigned program_ = 0;
+};
+
+/// A picture that is drawn into, with several samples a pixel, and its resolved texture.
+class GlCanvas {
+ public:
+  ~GlCanvas();
+  GlCanvas() = default;
+  GlCanvas(const GlCanvas&) = delete;
+  GlCanvas& operator=(const GlCanvas&) = delete;
+
+  /// Makes it this large (px) and binds it. \throws DisplayError: too large for the driver
+  void begin(int width, int height, int samples);
+  /// Resolves the samples into the texture.
+  void end() const;
+  unsigned texture() const { return texture_; }
+  /// Rows from the top, three bytes a pixel: red, green, blue.
+  std::string pixels() const;
+
+ private:
+  void discard();
+  int width_ = 0, height_ = 0, samples_ = 0;
+  unsigned samples_frame_ = 0, samples_colour_ = 0, samples_depth_ = 0, frame_ = 0, texture_ = 0;
+};
+
+/// Distances from a light, for shadows.
+class GlDepthMap {
+ public:
+  explicit GlDepthMap(int size);
+  ~GlDepthMap();
+  GlDepthMap(const GlDepthMap&) = delete;
+  GlDepthMap& operator=(const GlDepthMap&) = delete;
+  void begin() const;
+  /// Makes it the texture that a sampler of shadows reads.
+  void read_as(int unit) const;
+
+ private:
+  int size_;
+  unsigned frame_ = 0, texture_ = 0;
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,44 @@
+#pragma once
+// Text over a picture.
+
+#include <glm/vec2.hpp>
+#include <map>
+#include <string>
+
+#include "runner/display/scene/gl_parts.h"
+#include "runner/display/scene/picture.h"
+
+namespace palpate::runner {
+
+/// Where a point of the text lies: its left end at mid-height, its middle, its lower left corner.
+enum class TextAnchor { left, centre, lower_left };
+
+class GlText {
+ public:
+  GlText();
+  ~GlText();
+  GlText(const GlText&) = delete;
+  GlText& operator=(const GlText&) = delete;
+
+  /// Before the texts of a picture, into what is bound. \param size  px, of the font
+  void begin(const glm::vec2& picture, double size, const Theme& theme);
+  void draw(const std::string& text, const glm::vec2& at, TextAnchor anchor);
+  void end();
+
+ private:
+  struct Known {
+    unsigned texture = 0;
+    glm::vec2 size{0, 0};
+    bool used = false;
+  };
+  const Known& known(const std::string& text);
+
+  GlProgram program_;
+  unsigned nothing_ = 0;  ///< vertices: the shader makes them
+  std::map<std::string, Known> known_;
+  glm::vec2 picture_{1, 1};
+  double size_ = 0;
+  const Theme* theme_ = nullptr;
+};
+
+}  // namespace palpate::runner

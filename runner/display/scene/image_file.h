@@ -1,0 +1,32 @@
+#pragma once
+// Pictures as the bytes of files: PNG (libpng), animated WebP (libwebp).
+
+#include <memory>
+#include <string>
+
+namespace palpate::runner {
+
+/// \param pixels  rows from the top, three bytes a pixel: red, green, blue \throws
+/// std::runtime_error
+std::string png_of(const std::string& pixels, int width, int height);
+
+/// An animated WebP: pictures one after the other, then repeated without end.
+class WebpAnimation {
+ public:
+  /// px \throws std::runtime_error; so do all
+  WebpAnimation(int width, int height);
+  ~WebpAnimation();
+  WebpAnimation(const WebpAnimation&) = delete;
+  WebpAnimation& operator=(const WebpAnimation&) = delete;
+
+  /// \param seconds  since the first picture
+  void add(const std::string& pixels, double seconds);
+  /// \param seconds  since the first picture, at which the last one ends
+  std::string finish(double seconds);
+
+ private:
+  struct Encoder;
+  std::unique_ptr<Encoder> encoder_;
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,86 @@
+#pragma once
+// What a picture of a scene shows, as plain values. Virtual frame, y up, m; colours sRGB, 0 to 1.
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runner/display/scene/drawn_mesh.h"
+
+namespace palpate::runner {
+
+struct DrawnObject {
+  /// Kept by the renderer as long as it is drawn: pass the same one again where nothing has changed.
+  std::shared_ptr<const DrawnMesh> mesh;
+  glm::mat4 place{1};
+  glm::vec3 colour{0.6F};
+  float opacity = 1;  ///< below 1: drawn after what is opaque; the innermost object first
+  /// What lies inside of what, of those with one index: 0 the outermost.
+  int object = 0, layer = 0;
+};
+
+struct DrawnRod {
+  glm::vec3 from{0}, to{0};
+  float radius = 0.001F;
+  glm::vec3 colour{0.2F};
+  /// How much is seen of it inside of or behind objects: 0 nothing, 1 as much as before them.
+  float through = 0;
+};
+
+struct DrawnBall {
+  glm::vec3 centre{0};
+  float radius = 0.001F;
+  glm::vec3 colour{0.2F};
+  float through = 0;  ///< as DrawnRod's
+};
+
+struct DrawnArrow {
+  glm::vec3 from{0}, by{0};
+  float radius = 0.001F;  ///< of the shaft
+  glm::vec3 colour{0.2F};
+};
+
+/// A turn about an axis, as most of a circle with a head. Right-handed about `axis`.
+struct DrawnTurn {
+  glm::vec3 centre{0}, axis{0, 0, 1};
+  float radius = 0.01F, thickness = 0.001F;
+  glm::vec3 colour{0.2F};
+};
+
+struct DrawnLabel {
+  glm::vec3 at{0};
+  std::string text;  ///< UTF-8
+};
+
+struct Theme {
+  glm::vec3 above, below;  ///< of the background
+  glm::vec3 ground;
+  glm::vec3 text, halo;
+  glm::vec3 ideal_tool, virtual_tool, grip;
+  glm::vec3 force, torque, contact;
+};
+const Theme& light_theme();  ///< for files
+const Theme& dark_theme();   ///< for the console
+
+struct ScenePicture {
+  std::vector<DrawnObject> objects;
+  std::vector<DrawnRod> rods;
+  std::vector<DrawnBall> balls;
+  std::vector<DrawnArrow> arrows;
+  std::vector<DrawnTurn> turns;
+  std::vector<DrawnLabel> labels;
+  std::vector<std::string> caption;  ///< lines in the lower left corner
+  /// What casts and gets shadows is within this distance of this place; the ground fades beyond.
+  glm::vec3 middle{0};
+  float size = 0.1F;
+  float ground = 0;  ///< height of the ground, y
+  float grid = 0;    ///< between the lines on the ground; 0: none
+  /// What is on the side of positive dot(plane, (x, y, z, 1)) alone is drawn of objects.
+  std::optional<glm::vec4> cut;
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,303 @@
+#include "runner/display/scene/scene_drawing.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "runner/display/scene/tool_shape.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr std::array<glm::vec3, 8> kObjectColours{{{0.42F, 0.60F, 0.83F},
+                                                   {0.87F, 0.56F, 0.42F},
+                                                   {0.53F, 0.71F, 0.52F},
+                                                   {0.87F, 0.73F, 0.40F},
+                                                   {0.64F, 0.54F, 0.77F},
+                                                   {0.41F, 0.70F, 0.70F},
+                                                   {0.80F, 0.54F, 0.65F},
+                                                   {0.62F, 0.65F, 0.70F}}};
+constexpr std::array<glm::vec3, 4> kLayerColours{
+    {{0.91F, 0.63F, 0.36F}, {0.80F, 0.38F, 0.36F}, {0.50F, 0.33F, 0.55F}, {0.30F, 0.36F, 0.55F}}};
+
+// Of the size of the scene.
+constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.05,
+                 kContactRadius = 0.035, kArrowRadius = 0.024, kTurnThickness = 0.013,
+                 kLongestTurn = 0.4, kLeastTurn = 0.05, kLongestArrow = 1.6;
+constexpr double kLengthOfOneNewton = 0.35;       // of the size
+constexpr double kTurnOfOneNewtonMetre = 3;       // radius, of the size
+constexpr double kLeastForce = 0.005;             // N; less is not drawn
+constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
+
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+glm::mat4 place_of(const Pose& pose) {
+  glm::mat4 out(glm::mat4_cast(glm::quat(pose.orientation)));
+  out[3] = glm::vec4(glm::vec3(pose.position), 1);
+  return out;
+}
+
+const char* name_of(stimuli::ShapeKind kind) {
+  switch (kind) {
+    case stimuli::ShapeKind::sphere:
+      return "sphere";
+    case stimuli::ShapeKind::cone:
+      return "cone";
+    case stimuli::ShapeKind::cylinder:
+      return "cylinder";
+    case stimuli::ShapeKind::cube:
+      return "cube";
+    case stimuli::ShapeKind::box:
+      return "box";
+    case stimuli::ShapeKind::compound:
+      return "compound";
+    case stimuli::ShapeKind::mesh:
+      return "mesh";
+  }
+  return "";
+}
+
+/// 1, 2 or 5 times a power of ten, at most `most`.
+double round_step(double most) {
+  const double power = std::pow(10, std::floor(std::log10(most)));
+  for (const double step : {5.0, 2.0})
+    if (step * power <= most) return step * power;
+  return power;
+}
+
+std::string caption_of(const SceneMoment& moment, double grid) {
+  char text[160];
+  const Sample& sample = moment.sample;
+  const double force = glm::length(sample.device1 + sample.device2);
+  std::snprintf(text, sizeof text, "%.2f s    force %.2f N    torque %.3g mN m    grid %g mm",
+                1e-9 * static_cast<double>(sample.time_ns), force,
+                std::round(1e4 * glm::length(torque_on_hand(moment))) / 10, 1000 * grid);
+  return text;
+}
+
+}  // namespace
+
+std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
+                                         const rendering::RenderState& state,
+                                         const rendering::Rendering& rendering) {
+  if (rendering.contacts == 0) return {};
+  const auto force_of = [](const rendering::LoadedContact& c) {
+    return c.force * c.contact.normal + c.stiffness * c.tangential_offset;
+  };
+  std::vector<ContactPlace> out;
+  if (scene.features().unions) {
+    for (const rendering::PlacedContact& c : state.unions.contacts)
+      out.push_back({c.place + c.loaded.tangential_offset, force_of(c.loaded)});
+  } else if (scene.features().several_parts) {
+    for (const rendering::LoadedContact& c : state.contacts)
+      out.push_back({c.contact.point, force_of(c)});
+  } else {
+    out.push_back({rendering.deepest.point, rendering.force});
+  }
+  return out;
+}
+
+Vec3 torque_on_hand(const SceneMoment& moment) {
+  const rendering::LineProbe& held = moment.held ? *moment.held : moment.sample.probe;
+  return 0.5 * glm::cross(held.tail - held.tip, moment.sample.device2 - moment.sample.device1);
+}
+
+SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rendering::Tool tool)
+    : tool_(std::move(tool)) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    Object object{.mesh = std::make_shared<const DrawnMesh>(triangles_of(objects[i])),
+                  .pose = objects[i].pose,
+                  .colour = kObjectColours[i % kObjectColours.size()],
+                  .label = std::to_string(i) + " " + name_of(objects[i].shape),
+                  .layers = {},
+                  .felt = objects[i].material.stiffness > 0};
+    for (const DrawnVertex& corner : *object.mesh)
+      object.top = std::max(object.top, glm::length(corner.position));
+    objects_.push_back(std::move(object));
+  }
+  const std::vector<glm::vec3> points = outline();
+  if (points.empty()) return;
+  glm::vec3 low = points.front(), high = points.front();
+  for (const glm::vec3& point : points) {
+    low = glm::min(low, point);
+    high = glm::max(high, point);
+  }
+  middle_ = 0.5F * (low + high);
+  float radius = 0;
+  for (const glm::vec3& point : points) radius = std::max(radius, glm::distance(point, middle_));
+  size_ = std::max<double>(radius, 1e-4);
+  ground_ = low.y;
+}
+
+void SceneDrawing::add_layers(const rendering::Scene& scene) {
+  std::vector<std::vector<DrawnMesh>> found(objects_.size());
+  for (const rendering::ScenePart& part : scene.parts()) {
+    if (part.layer < 1) continue;
+    auto& layers = found[static_cast<std::size_t>(part.object)];
+    layers.resize(std::max(layers.size(), static_cast<std::size_t>(part.layer)));
+    // In the frame of the object, which may move.
+    const Pose& of = objects_[static_cast<std::size_t>(part.object)].pose;
+    const Quat back = glm::conjugate(of.orientation);
+    add_facets(*part.mesh,
+               {back * (part.position - of.position), back * glm::quat_cast(part.to_world)},
+               layers[static_cast<std::size_t>(part.layer) - 1]);
+  }
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    objects_[i].layers.clear();
+    for (DrawnMesh& mesh : found[i]) {
+      smooth(mesh);
+      objects_[i].layers.push_back(std::make_shared<const DrawnMesh>(std::move(mesh)));
+    }
+  }
+}
+
+std::vector<glm::vec3> SceneDrawing::outline() const {
+  std::vector<glm::vec3> out;
+  for (const Object& object : objects_) {
+    const glm::mat4 place = place_of(object.pose);
+    for (const DrawnVertex& corner : *object.mesh)
+      out.emplace_back(place * glm::vec4(corner.position, 1));
+  }
+  return out;
+}
+
+void SceneDrawing::add_outline(const SceneMoment& moment, const SceneDrawingSettings& settings,
+                               std::vector<glm::vec3>& points) const {
+  const auto add = [&points](const Vec3& point) {
+    if (finite(point)) points.emplace_back(point);
+  };
+  ScenePicture forces;
+  add_forces(moment, light_theme(), settings, forces);
+  for (const DrawnArrow& arrow : forces.arrows) add(Vec3(arrow.from + arrow.by));
+  const DrawnTool tool = tool_in_hand(tool_, moment.sample);
+  if (moment.held || !tool_.segments.empty()) {
+    for (const rendering::LineProbe& segment : tool.segments) {
+      add(segment.tip);
+      add(segment.tail);
+    }
+  }
+  if (moment.held) {
+    add(moment.held->tail);
+    return;
+  }
+  const Vec3 along = tool.stylus.tail - tool.stylus.tip;
+  const double length = glm::length(along);
+  if (!(length > 0)) return;
+  add(tool.stylus.tip);
+  add(tool.stylus.tip + std::min(1.0, 1.6 * size_ / length) * along);
+}
+
+std::optional<SceneDrawing::Hit> SceneDrawing::hit(const glm::vec3& from, const glm::vec3& along,
+                                                   const std::vector<Pose>& poses) const {
+  std::optional<Hit> nearest;
+  float least = 0;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const glm::mat4 back = glm::inverse(place_of(poses.empty() ? objects_[i].pose : poses[i]));
+    const auto distance = distance_to(*objects_[i].mesh, glm::vec3(back * glm::vec4(from, 1)),
+                                      glm::vec3(back * glm::vec4(along, 0)));
+    if (!distance || (nearest && *distance >= least)) continue;
+    least = *distance;
+    nearest = Hit{i, from + least * along};
+  }
+  return nearest;
+}
+
+void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSettings& settings,
+                               ScenePicture& out) const {
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const Object& object = objects_[i];
+    const glm::mat4 place = place_of(i < moment.poses.size() ? moment.poses[i] : object.pose);
+    const auto index = static_cast<int>(i);
+    const bool skin = !object.layers.empty() || !object.felt;
+    out.objects.push_back(
+        {object.mesh, place, object.colour, skin ? kSkinOpacity : 1.0F, index, 0});
+    for (std::size_t k = 0; k < object.layers.size(); ++k) {
+      if (object.layers[k]->empty()) continue;
+      out.objects.push_back({object.layers[k], place, kLayerColours[k % kLayerColours.size()],
+                             kLayerOpacity, index, static_cast<int>(k) + 1});
+    }
+    if (!settings.labels) continue;
+    const glm::vec3 middle(place[3]);
+    out.labels.push_back({middle + glm::vec3(0, object.top + 0.06F * static_cast<float>(size_), 0),
+                          object.label});
+  }
+}
+
+void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
+                            const SceneDrawingSettings& settings, ScenePicture& out) const {
+  const Sample& sample = moment.sample;
+  if (!finite(sample.probe.tip) || !finite(sample.probe.tail)) return;
+  const bool touching = sample.rendering.contacts > 0 && finite(sample.rendering.ideal.tip) &&
+                        finite(sample.rendering.ideal.tail);
+  const DrawnTool in_hand = tool_in_hand(tool_, sample);
+  const DrawnTool seen = touching ? ideal_tool(tool_, sample) : in_hand;
+  const auto radius = [&](double of_size) {
+    return static_cast<float>(of_size * size_ * settings.thickness);
+  };
+  const auto add_rod = [&](const rendering::LineProbe& line, double thick, const glm::vec3& colour,
+                           float through) {
+    out.rods.push_back({line.tip, line.tail, radius(thick), colour, through});
+  };
+  const bool tip_alone = !settings.sides && tool_.segments.empty();
+  for (const rendering::LineProbe& segment : seen.segments)
+    add_rod(segment, tip_alone ? 0.4 * kIdealRadius : kIdealRadius, theme.ideal_tool, 0.30F);
+  if (tip_alone)
+    out.balls.push_back({seen.stylus.tip, radius(1.8 * kIdealRadius), theme.ideal_tool, 0.30F});
+  // What is held but does not touch.
+  if (!tool_.segments.empty()) add_rod(seen.stylus, 0.4 * kIdealRadius, theme.ideal_tool, 0.2F);
+  if (moment.held && finite(moment.held->tip) && finite(moment.held->tail))
+    add_rod(*moment.held, kHeldRadius, theme.grip, 0);
+  if (!touching) return;
+  for (const rendering::LineProbe& segment : in_hand.segments)
+    add_rod(segment, tip_alone ? 0.5 * kVirtualRadius : kVirtualRadius, theme.virtual_tool, 0.75F);
+  if (tip_alone)
+    out.balls.push_back({in_hand.stylus.tip, radius(1.8 * kIdealRadius), theme.virtual_tool, 0.75F});
+}
+
+void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
+                              const SceneDrawingSettings& settings, ScenePicture& out) const {
+  const double scale = settings.metres_per_newton > 0 ? settings.metres_per_newton
+                                                      : kLengthOfOneNewton * size_;
+  for (const ContactPlace& contact : moment.contacts) {
+    const double force = glm::length(contact.force);
+    if (!finite(contact.place) || !std::isfinite(force)) continue;
+    out.balls.push_back(
+        {contact.place, static_cast<float>(kContactRadius * size_), theme.contact, 0.5F});
+    if (force < kLeastForce) continue;
+    const double length = std::min(scale * force, kLongestArrow * size_);
+    out.arrows.push_back({contact.place, length / force * contact.force,
+                          static_cast<float>(kArrowRadius * size_), theme.force});
+  }
+  const Vec3 torque = torque_on_hand(moment);
+  const double size = glm::length(torque);
+  const double radius =
+      size * (settings.metres_per_newton_metre > 0 ? settings.metres_per_newton_metre
+                                                   : kTurnOfOneNewtonMetre * size_);
+  if (!finite(torque) || radius < kLeastTurn * size_) return;
+  const rendering::LineProbe& held = moment.held ? *moment.held : moment.sample.probe;
+  out.turns.push_back({0.5 * (held.tip + held.tail), torque / size,
+                       static_cast<float>(std::min(radius, kLongestTurn * size_)),
+                       static_cast<float>(kTurnThickness * size_), theme.torque});
+}
+
+ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme,
+                                   const SceneDrawingSettings& settings) const {
+  ScenePicture out;
+  out.middle = middle_;
+  out.size = static_cast<float>(size_);
+  out.ground = ground_;
+  out.grid = static_cast<float>(round_step(size_ / 2.5));
+  add_objects(moment, settings, out);
+  add_tool(moment, theme, settings, out);
+  add_forces(moment, theme, settings, out);
+  out.caption.push_back(caption_of(moment, static_cast<double>(out.grid)));
+  return out;
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,105 @@
+#pragma once
+// Pictures of a scene as it is touched: from what a tick was to what is drawn.
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rendering/scene.h"
+#include "rendering/tool.h"
+#include "runner/display/scene/picture.h"
+#include "runner/servo/sample.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::runner {
+
+/// A place where the tool touches with force.
+struct ContactPlace {
+  Vec3 place;  ///< m, on the ideal tool
+  Vec3 force;  ///< N, on the tool
+};
+
+/// All places of a tick. \param state  after it
+std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
+                                         const rendering::RenderState& state,
+                                         const rendering::Rendering& rendering);
+
+/// What a picture shows of one tick.
+struct SceneMoment {
+  Sample sample;
+  std::vector<ContactPlace> contacts;
+  /// The stylus in the hand, where the virtual one reaches farther.
+  std::optional<rendering::LineProbe> held = std::nullopt;
+  std::vector<Pose> poses = {};  ///< of the objects, where they have moved; empty: as the scene has it
+};
+
+struct SceneDrawingSettings {
+  bool sides = true;              ///< the side of the stylus touches, not its tip alone
+  bool labels = false;            ///< of the objects
+  double thickness = 1;           ///< of the tool, times what files have
+  double metres_per_newton = 0;         ///< of the arrows; 0: by the size of the scene
+  double metres_per_newton_metre = 0;  ///< radius of the turn that shows torque; likewise
+};
+
+/// The parts of a scene that do not change from picture to picture.
+class SceneDrawing {
+ public:
+  /// \throws MeshError, std::runtime_error where a file is no mesh
+  SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rendering::Tool tool);
+
+  /// Layers as they were compiled; the surfaces about them become translucent.
+  void add_layers(const rendering::Scene& scene);
+
+  ScenePicture picture(const SceneMoment& moment, const Theme& theme,
+                       const SceneDrawingSettings& settings) const;
+
+  /// What a camera should have in its picture: of the objects as the scene has them.
+  std::vector<glm::vec3> outline() const;
+  /// Of the tool and the forces at a tick: of the plain stylus what is near the objects.
+  void add_outline(const SceneMoment& moment, const SceneDrawingSettings& settings,
+                   std::vector<glm::vec3>& points) const;
+
+  /// The object, and where, that a line meets first from outside.
+  struct Hit {
+    std::size_t object;
+    glm::vec3 place;
+  };
+  std::optional<Hit> hit(const glm::vec3& from, const glm::vec3& along,
+                         const std::vector<Pose>& poses = {}) const;
+
+  double size() const { return size_; }  ///< m, radius about the objects
+  const std::string& label(std::size_t object) const { return objects_[object].label; }
+  std::size_t objects() const { return objects_.size(); }
+
+ private:
+  struct Object {
+    std::shared_ptr<const DrawnMesh> mesh;  ///< its own frame
+    Pose pose;
+    glm::vec3 colour;
+    std::string label;
+    std::vector<std::shared_ptr<const DrawnMesh>> layers;
+    float top = 0;  ///< m, of its bounding sphere above its origin
+    bool felt = true;
+  };
+  void add_objects(const SceneMoment& moment, const SceneDrawingSettings& settings,
+                   ScenePicture& out) const;
+  void add_tool(const SceneMoment& moment, const Theme& theme,
+                const SceneDrawingSettings& settings, ScenePicture& out) const;
+  void add_forces(const SceneMoment& moment, const Theme& theme,
+                  const SceneDrawingSettings& settings, ScenePicture& out) const;
+
+  std::vector<Object> objects_;
+  rendering::Tool tool_;
+  glm::vec3 middle_{0};
+  double size_ = 0.05;
+  float ground_ = 0;
+};
+
+/// N m, about the middle of the stylus that the hand holds; both devices' forces, so without
+/// torsion about the stylus.
+Vec3 torque_on_hand(const SceneMoment& moment);
+
+}  // namespace palpate::runner
