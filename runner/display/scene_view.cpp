@@ -32,7 +32,8 @@ unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, co
   }
   SceneMoment moment{sample, {}};
   if (sample.rendering.contacts > 0)
-    moment.contacts.push_back({sample.rendering.deepest.point, sample.rendering.force});
+    // The force that was commanded, which may be less than the rendered one.
+    moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});
   ScenePicture picture = drawing_->picture(moment, dark_theme(), {.thickness = kThickness});
   picture.caption.clear();  // the console says it beside the view
   return renderer_.draw(picture, camera, dark_theme(), width, height);

@@ -9,6 +9,7 @@ study that runner/quickstart.sh simulates: the same ones wherever they are made.
 
 import os
 import pathlib
+import shlex
 import shutil
 import sqlite3
 import subprocess
@@ -157,7 +158,20 @@ def example(name):
     return make
 
 
-PICTURES = {"live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
+def scene(name):
+    """The second picture of a path of protocols/scenes, as rendering/README.md has it drawn."""
+    def make(palpate, folder):
+        page = (ROOT / "rendering" / "README.md").read_text().replace("\\\n", " ")
+        command = next(line for line in page.splitlines() if line.startswith(f"palpate explore protocols/scenes/{name}.json"))
+        subprocess.run([palpate, *shlex.split(command)[1:], "--frames", folder / name], cwd=ROOT, stdout=subprocess.DEVNULL, check=True)
+        subprocess.run(["convert", folder / name / "frame-00001.png", "-strip", "-define", "png:compression-level=9",
+                        IMAGES / f"{name}.png"], check=True)
+    return make
+
+
+SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig17a-engine", "fig17b-instrument", "layers"]
+PICTURES = {**{name: scene(name) for name in SCENES},
+            "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 

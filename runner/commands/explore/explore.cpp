@@ -79,7 +79,9 @@ int explore_command(const std::vector<std::string>& args) {
   outputs.put("animation", std::move(drawn.animation));
   outputs.write();
   std::cout << drawn.pictures << " pictures of " << settings.size.width << " x "
-            << settings.size.height << " px, " << drawn.seconds << " s of the path\n";
+            << settings.size.height << " px, " << drawn.seconds << " s of the path\n"
+            << "a tick took " << drawn.tick_median_ns / 1000 << " us in the median, 99 of 100 at most "
+            << drawn.tick_p99_ns / 1000 << " us\n";
   return 0;
 }
 

@@ -31,6 +31,7 @@ struct DrawnFrames {
   std::size_t pictures = 0;
   std::string animation;  ///< WebP; empty: none
   double seconds = 0;     ///< of the path
+  double tick_median_ns = 0, tick_p99_ns = 0;  ///< cost of a row's tick here, by the clock
 };
 
 /// \param scene_path  that faults name. \throws UsageError, DisplayError, MeshError, StoreError
