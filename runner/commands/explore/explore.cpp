@@ -29,7 +29,7 @@ void add_options(CommandLine& line) {
        "between pictures")  //
       ("view", po::value<std::string>()->value_name("YAW,PITCH[,ZOOM]")->default_value("30,22"),
        "where the camera stands, degrees: 0,0 looks along -z with y up; what is touched is in the "
-       "picture")                                                     //
+       "picture")                                                       //
       ("labels", po::bool_switch(), "number and shape at each object")  //
       ("force", "replace existing files and frames");
 }
@@ -80,8 +80,8 @@ int explore_command(const std::vector<std::string>& args) {
   outputs.write();
   std::cout << drawn.pictures << " pictures of " << settings.size.width << " x "
             << settings.size.height << " px, " << drawn.seconds << " s of the path\n"
-            << "a tick took " << drawn.tick_median_ns / 1000 << " us in the median, 99 of 100 at most "
-            << drawn.tick_p99_ns / 1000 << " us\n";
+            << "a tick took " << drawn.tick_median_ns / 1000
+            << " us in the median, 99 of 100 at most " << drawn.tick_p99_ns / 1000 << " us\n";
   return 0;
 }
 

@@ -35,8 +35,8 @@ std::string frame_name(std::size_t index) {
 bool is_frame_name(const std::string& name) {
   constexpr std::string_view kBefore = "frame-", kAfter = ".png";
   if (!name.starts_with(kBefore) || !name.ends_with(kAfter)) return false;
-  const std::string_view number = std::string_view(name).substr(
-      kBefore.size(), name.size() - kBefore.size() - kAfter.size());
+  const std::string_view number =
+      std::string_view(name).substr(kBefore.size(), name.size() - kBefore.size() - kAfter.size());
   return number.size() >= 5 && number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
@@ -116,13 +116,12 @@ std::pair<double, double> tick_costs(const rendering::Scene& scene,
   std::vector<double> costs;
   costs.reserve(poses.size());
   double before = now_ns();
-  render_along(
-      scene, spec, renderer, poses,
-      [&](const TimedPose&, const rendering::Rendering&, const rendering::RenderState&) {
-        const double now = now_ns();
-        costs.push_back(now - before);
-        before = now_ns();
-      });
+  render_along(scene, spec, renderer, poses,
+               [&](const TimedPose&, const rendering::Rendering&, const rendering::RenderState&) {
+                 const double now = now_ns();
+                 costs.push_back(now - before);
+                 before = now_ns();
+               });
   std::ranges::sort(costs);
   return {costs[costs.size() / 2], costs[costs.size() * 99 / 100]};
 }

@@ -16,8 +16,8 @@ struct FrameSettings {
   double every = 0.016;  ///< s, between pictures
   ViewAngles view;
   bool labels = false;
-  std::string folder;      ///< of PNG files; empty: none
-  bool animate = false;    ///< as a WebP as well
+  std::string folder;        ///< of PNG files; empty: none
+  bool animate = false;      ///< as a WebP as well
   bool may_replace = false;  ///< pictures in the folder
 };
 
@@ -29,8 +29,8 @@ void check_frames_folder(const std::string& folder, bool may_replace);
 
 struct DrawnFrames {
   std::size_t pictures = 0;
-  std::string animation;  ///< WebP; empty: none
-  double seconds = 0;     ///< of the path
+  std::string animation;                       ///< WebP; empty: none
+  double seconds = 0;                          ///< of the path
   double tick_median_ns = 0, tick_p99_ns = 0;  ///< cost of a row's tick here, by the clock
 };
 

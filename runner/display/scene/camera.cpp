@@ -30,9 +30,7 @@ void Camera::look_from(float yaw, float pitch) {
   pitch_ = std::clamp(pitch, -kSteepestPitch, kSteepestPitch);
 }
 
-void Camera::zoom(float closer) {
-  distance_ = std::clamp(distance_ / closer, kNearest, kFarthest);
-}
+void Camera::zoom(float closer) { distance_ = std::clamp(distance_ / closer, kNearest, kFarthest); }
 
 void Camera::pan(const glm::vec2& pixels) {
   centre_ += unproject({width_ / 2 - pixels.x, height_ / 2 - pixels.y}, centre_) - centre_;
@@ -59,8 +57,8 @@ void Camera::fit(std::span<const glm::vec3> points) {
   const float middle = (deepest + nearest) / 2;
   const float far_enough =
       std::max((right_of - left_of) / (2 * right), (above - below) / (2 * up)) - middle;
-  centre_ = glm::transpose(to_view) *
-            glm::vec3((right_of + left_of) / 2, (above + below) / 2, middle);
+  centre_ =
+      glm::transpose(to_view) * glm::vec3((right_of + left_of) / 2, (above + below) / 2, middle);
   distance_ =
       std::clamp(std::max(far_enough, (nearest - deepest) / 2 + kNearest), kNearest, kFarthest);
 }

@@ -190,7 +190,8 @@ void GlCanvas::end() const {
 
 std::string GlCanvas::pixels() const {
   const auto row = static_cast<std::size_t>(width_) * 3;
-  std::string from_below(row * static_cast<std::size_t>(height_), '\0'), out(from_below.size(), '\0');
+  std::string from_below(row * static_cast<std::size_t>(height_), '\0'),
+      out(from_below.size(), '\0');
   glBindFramebuffer(GL_READ_FRAMEBUFFER, frame_);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width_, height_, GL_RGB, GL_UNSIGNED_BYTE, from_below.data());

@@ -16,7 +16,8 @@ namespace {
                      "; Debian's packages libegl1 and libgl1-mesa-dri draw on any computer");
 }
 
-// EGL_MESA_platform_surfaceless: no window system at all. Drivers without it have a default display.
+// EGL_MESA_platform_surfaceless: no window system at all. Drivers without it have a default
+// display.
 EGLDisplay surfaceless_display() {
   if (epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless") &&
       epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base"))

@@ -27,8 +27,8 @@ class ScenePainter {
   virtual std::string animation(double seconds) = 0;
 };
 
-/// \param width, height  px, within ScenePainter's limits. \throws DisplayError: not built in, or no
-/// suitable driver; says what to do
+/// \param width, height  px, within ScenePainter's limits. \throws DisplayError: not built in, or
+/// no suitable driver; says what to do
 std::unique_ptr<ScenePainter> make_painter(int width, int height);
 
 }  // namespace palpate::runner

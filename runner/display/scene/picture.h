@@ -14,7 +14,8 @@
 namespace palpate::runner {
 
 struct DrawnObject {
-  /// Kept by the renderer as long as it is drawn: pass the same one again where nothing has changed.
+  /// Kept by the renderer as long as it is drawn: pass the same one again where nothing has
+  /// changed.
   std::shared_ptr<const DrawnMesh> mesh;
   glm::mat4 place{1};
   glm::vec3 colour{0.6F};

@@ -8,7 +8,7 @@
 namespace palpate::runner {
 namespace {
 
-constexpr float kArc = 5;                               // rad
+constexpr float kArc = 5;  // rad
 constexpr int kArcSteps = 42;
 constexpr float kHeadLength = 4.6F, kHeadRadius = 2.1F;  // of the shaft's radius
 
@@ -37,8 +37,7 @@ ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radiu
   const float length = glm::distance(from, to);
   const float head = std::min(kHeadLength * radius, 0.5F * length);
   const glm::vec3 neck = length > 0 ? to - head / length * (to - from) : to;
-  return {rod_place(from, neck, radius),
-          rod_place(neck, to, kHeadRadius / kHeadLength * head)};
+  return {rod_place(from, neck, radius), rod_place(neck, to, kHeadRadius / kHeadLength * head)};
 }
 
 std::vector<glm::vec3> points_of(const DrawnTurn& turn) {

@@ -28,9 +28,9 @@ constexpr std::array<glm::vec3, 4> kLayerColours{
 constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.05,
                  kContactRadius = 0.035, kArrowRadius = 0.024, kTurnThickness = 0.013,
                  kLongestTurn = 0.4, kLeastTurn = 0.05, kLongestArrow = 1.6;
-constexpr double kLengthOfOneNewton = 0.35;       // of the size
-constexpr double kTurnOfOneNewtonMetre = 3;       // radius, of the size
-constexpr double kLeastForce = 0.005;             // N; less is not drawn
+constexpr double kLengthOfOneNewton = 0.35;  // of the size
+constexpr double kTurnOfOneNewtonMetre = 3;  // radius, of the size
+constexpr double kLeastForce = 0.005;        // N; less is not drawn
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
 bool finite(const Vec3& v) {
@@ -224,8 +224,8 @@ void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSett
     }
     if (!settings.labels) continue;
     const glm::vec3 middle(place[3]);
-    out.labels.push_back({middle + glm::vec3(0, object.top + 0.06F * static_cast<float>(size_), 0),
-                          object.label});
+    out.labels.push_back(
+        {middle + glm::vec3(0, object.top + 0.06F * static_cast<float>(size_), 0), object.label});
   }
 }
 
@@ -257,13 +257,14 @@ void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
   for (const rendering::LineProbe& segment : in_hand.segments)
     add_rod(segment, tip_alone ? 0.5 * kVirtualRadius : kVirtualRadius, theme.virtual_tool, 0.75F);
   if (tip_alone)
-    out.balls.push_back({in_hand.stylus.tip, radius(1.8 * kIdealRadius), theme.virtual_tool, 0.75F});
+    out.balls.push_back(
+        {in_hand.stylus.tip, radius(1.8 * kIdealRadius), theme.virtual_tool, 0.75F});
 }
 
 void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
                               const SceneDrawingSettings& settings, ScenePicture& out) const {
-  const double scale = settings.metres_per_newton > 0 ? settings.metres_per_newton
-                                                      : kLengthOfOneNewton * size_;
+  const double scale =
+      settings.metres_per_newton > 0 ? settings.metres_per_newton : kLengthOfOneNewton * size_;
   for (const ContactPlace& contact : moment.contacts) {
     const double force = glm::length(contact.force);
     if (!finite(contact.place) || !std::isfinite(force)) continue;

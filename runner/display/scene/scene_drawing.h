@@ -33,14 +33,15 @@ struct SceneMoment {
   std::vector<ContactPlace> contacts;
   /// The stylus in the hand, where the virtual one reaches farther.
   std::optional<rendering::LineProbe> held = std::nullopt;
-  std::vector<Pose> poses = {};  ///< of the objects, where they have moved; empty: as the scene has it
+  std::vector<Pose> poses =
+      {};  ///< of the objects, where they have moved; empty: as the scene has it
 };
 
 struct SceneDrawingSettings {
-  bool sides = true;              ///< the side of the stylus touches, not its tip alone
-  bool labels = false;            ///< of the objects
-  double thickness = 1;           ///< of the tool, times what files have
-  double metres_per_newton = 0;         ///< of the arrows; 0: by the size of the scene
+  bool sides = true;                   ///< the side of the stylus touches, not its tip alone
+  bool labels = false;                 ///< of the objects
+  double thickness = 1;                ///< of the tool, times what files have
+  double metres_per_newton = 0;        ///< of the arrows; 0: by the size of the scene
   double metres_per_newton_metre = 0;  ///< radius of the turn that shows torque; likewise
 };
 
@@ -86,8 +87,8 @@ class SceneDrawing {
   };
   void add_objects(const SceneMoment& moment, const SceneDrawingSettings& settings,
                    ScenePicture& out) const;
-  void add_tool(const SceneMoment& moment, const Theme& theme,
-                const SceneDrawingSettings& settings, ScenePicture& out) const;
+  void add_tool(const SceneMoment& moment, const Theme& theme, const SceneDrawingSettings& settings,
+                ScenePicture& out) const;
   void add_forces(const SceneMoment& moment, const Theme& theme,
                   const SceneDrawingSettings& settings, ScenePicture& out) const;
 

@@ -46,8 +46,8 @@ glm::mat4 light_view(const ScenePicture& picture, const glm::vec3& towards_light
 }
 
 glm::mat4 to_unit(const glm::mat4& clip) {
-  return glm::translate(glm::mat4(1), glm::vec3(0.5F)) *
-         glm::scale(glm::mat4(1), glm::vec3(0.5F)) * clip;
+  return glm::translate(glm::mat4(1), glm::vec3(0.5F)) * glm::scale(glm::mat4(1), glm::vec3(0.5F)) *
+         clip;
 }
 
 bool translucent(const DrawnObject& object) { return object.opacity < 1; }
@@ -93,8 +93,7 @@ std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& p
     items.push_back({&sphere_, ball_place(at, radius), colour, through});
   };
   for (const DrawnRod& rod : picture.rods) {
-    items.push_back(
-        {&cylinder_, rod_place(rod.from, rod.to, rod.radius), rod.colour, rod.through});
+    items.push_back({&cylinder_, rod_place(rod.from, rod.to, rod.radius), rod.colour, rod.through});
     for (const glm::vec3& end : {rod.from, rod.to}) ball(end, rod.radius, rod.colour, rod.through);
   }
   for (const DrawnBall& drawn : picture.balls)
@@ -116,7 +115,9 @@ std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& p
       ball(path[i + 1], turn.thickness, turn.colour, 0.5F);
     }
     const glm::vec3 &neck = path[path.size() - 4], &end = path.back();
-    items.push_back({&cone_, rod_place(neck, end, std::min(2.8F * turn.thickness, 0.4F * turn.radius)), turn.colour, 0.5F});
+    items.push_back({&cone_,
+                     rod_place(neck, end, std::min(2.8F * turn.thickness, 0.4F * turn.radius)),
+                     turn.colour, 0.5F});
   }
   for (std::size_t i = first_sign; i < items.size(); ++i) items[i].is_sign = true;
   return items;
@@ -206,8 +207,8 @@ void SceneRenderer::draw_ground(const ScenePicture& picture, const Camera& camer
   glDepthMask(GL_FALSE);  // what has sunk into it is seen
   solid_.set("is_ground", 1);
   const glm::vec3 at(picture.middle.x, picture.ground, picture.middle.z);
-  solid_.set("place", glm::scale(glm::translate(glm::mat4(1), at),
-                                 glm::vec3(kGroundEdge * picture.size)));
+  solid_.set("place",
+             glm::scale(glm::translate(glm::mat4(1), at), glm::vec3(kGroundEdge * picture.size)));
   square_.draw();
   solid_.set("is_ground", 0);
   glDepthMask(GL_TRUE);
@@ -267,8 +268,7 @@ void SceneRenderer::draw_translucent_objects(const ScenePicture& picture,
   for (const auto& shells : nested) {
     for (auto it = shells.begin(); it != shells.end(); ++it)
       draw(**it, GL_FRONT, 0.5F * (*it)->opacity);
-    for (auto it = shells.rbegin(); it != shells.rend(); ++it)
-      draw(**it, GL_BACK, (*it)->opacity);
+    for (auto it = shells.rbegin(); it != shells.rend(); ++it) draw(**it, GL_BACK, (*it)->opacity);
   }
   glDisable(GL_CLIP_DISTANCE0);
   glDisable(GL_CULL_FACE);

@@ -21,7 +21,11 @@ using rendering::LineProbe;
 
 rendering::SceneObject object_of(const stimuli::PolygonSoup& soup, const Vec3& at, int index,
                                  double stiffness = 800) {
-  rendering::SceneObject out{std::make_shared<const stimuli::ConvexMesh>(soup), {at, Quat(1, 0, 0, 0)}, {}, index, nullptr};
+  rendering::SceneObject out{std::make_shared<const stimuli::ConvexMesh>(soup),
+                             {at, Quat(1, 0, 0, 0)},
+                             {},
+                             index,
+                             nullptr};
   out.material.stiffness = stiffness;
   return out;
 }
@@ -62,7 +66,8 @@ TEST(CameraTest, WhatIsFittedIsInThePictureAndFillsIt) {
     std::vector<glm::vec3> points;
     const float size = std::pow(10.0F, any(generator));
     for (int i = 0; i < 12; ++i)
-      points.emplace_back(size * any(generator), 2 * size * any(generator), 0.3F * size * any(generator) + 1);
+      points.emplace_back(size * any(generator), 2 * size * any(generator),
+                          0.3F * size * any(generator) + 1);
     camera.fit(points);
     glm::vec2 low(1e9F), high(-1e9F);
     for (const glm::vec3& point : points) {
@@ -89,7 +94,8 @@ TEST(CameraTest, UnprojectIsTheInverseOfProject) {
 
 /// The forces at the places add up to what the hand gets, whatever the scene.
 TEST(ContactPlacesTest, TheirForcesAddUp) {
-  const auto check = [](const rendering::Scene& scene, const std::vector<LineProbe>& path, int least) {
+  const auto check = [](const rendering::Scene& scene, const std::vector<LineProbe>& path,
+                        int least) {
     rendering::RenderState state = scene.initial_state();
     int most = 0;
     for (const LineProbe& probe : path) {
@@ -108,10 +114,15 @@ TEST(ContactPlacesTest, TheirForcesAddUp) {
     EXPECT_GE(most, least);
   };
   std::vector<LineProbe> path;
-  for (double y = 0.04; y > 0.022; y -= 0.0005) path.push_back({{-0.06, y, 0}, {0.07, y + 0.001, 0}});
+  for (double y = 0.04; y > 0.022; y -= 0.0005)
+    path.push_back({{-0.06, y, 0}, {0.07, y + 0.001, 0}});
   check(rendering::Scene({object_of(stimuli::cube(0.05), {0, 0, 0}, 0)}), path, 1);
-  check(rendering::Scene({object_of(stimuli::cube(0.05), {-0.04, 0, 0}, 0), object_of(stimuli::icosphere(0.025, 3), {0.04, 0, 0}, 1)}), path, 2);
-  check(rendering::Scene({object_of(stimuli::cube(0.05), {-0.025, 0, 0}, 0), object_of(stimuli::box({0.05, 0.049, 0.03}), {0.025, 0, 0}, 0, 500)}), path, 1);
+  check(rendering::Scene({object_of(stimuli::cube(0.05), {-0.04, 0, 0}, 0),
+                          object_of(stimuli::icosphere(0.025, 3), {0.04, 0, 0}, 1)}),
+        path, 2);
+  check(rendering::Scene({object_of(stimuli::cube(0.05), {-0.025, 0, 0}, 0),
+                          object_of(stimuli::box({0.05, 0.049, 0.03}), {0.025, 0, 0}, 0, 500)}),
+        path, 1);
 }
 
 TEST(TorqueTest, OfTheDevicesIsThatOfTheContactsButForTorsion) {
@@ -120,7 +131,8 @@ TEST(TorqueTest, OfTheDevicesIsThatOfTheContactsButForTorsion) {
   SceneMoment moment;
   for (double y = 0.04; y > 0.023; y -= 0.0005) {
     moment.sample.probe = {{0.0, y, 0.01}, {0.09, y + 0.06, 0.02}};
-    moment.sample.rendering = rendering::ray_renderer().tick(scene, state, moment.sample.probe, 0.001);
+    moment.sample.rendering =
+        rendering::ray_renderer().tick(scene, state, moment.sample.probe, 0.001);
   }
   const rendering::Rendering& r = moment.sample.rendering;
   ASSERT_GT(r.contacts, 0);

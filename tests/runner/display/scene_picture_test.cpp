@@ -49,8 +49,8 @@ class ScenePictureTest : public ::testing::Test {
   }
   Rgb at(int x, int y) const {
     if (x < 0 || y < 0 || x >= kWide || y >= kHigh) return {};
-    const auto* const p = reinterpret_cast<const unsigned char*>(painter_->pixels().data()) +
-                          3 * (y * kWide + x);
+    const auto* const p =
+        reinterpret_cast<const unsigned char*>(painter_->pixels().data()) + 3 * (y * kWide + x);
     return {p[0], p[1], p[2]};
   }
   Rgb seen(const glm::vec3& point) const {
@@ -133,7 +133,8 @@ TEST_F(ScenePictureTest, TheVirtualToolIsSeenInsideOfTheObject) {
 
 TEST_F(ScenePictureTest, EverySegmentOfTheToolIsDrawn) {
   rendering::Tool tool;
-  tool.segments = {{{0, 0, 0}, {0, 0, 0.1}}, {{0, 0, 0.1}, {0.03, 0, 0.08}}, {{0, 0, 0}, {-0.03, 0, 0.02}}};
+  tool.segments = {
+      {{0, 0, 0}, {0, 0, 0.1}}, {{0, 0, 0.1}, {0.03, 0, 0.08}}, {{0, 0, 0}, {-0.03, 0, 0.02}}};
   const SceneDrawing drawing({ball({0, -0.1, 0}, 0.07)}, tool);
   SceneMoment moment;
   moment.sample.probe = {{0, 0, 0}, {0, 0.05, 0}};
