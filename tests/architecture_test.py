@@ -16,6 +16,7 @@ SERVO = RENDERING | {"runner", "runner/servo"}
 MAY_INCLUDE = {
     "stimuli": set(),
     "rendering": {"stimuli"},
+    "rendering/bodies/soft": RENDERING,
     "rendering/verification": RENDERING,
     "rendering/accuracy": RENDERING | {"rendering/verification"},
     # Stimuli are scene objects in orientations: their types, rotations and generator live there.
@@ -76,7 +77,7 @@ def room_of(name):
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "compose convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/triangulate "
-               "primitives printable random shapes vec",
+               "primitives printable random shapes solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool tool_pose",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",

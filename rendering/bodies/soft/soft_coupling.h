@@ -1,0 +1,51 @@
+#pragma once
+// A soft body at its own rate and a tool at the servo's. Between two steps the servo follows the
+// surface by the body's compliance; the body gets the mean of the forces since its last step. World
+// frame, SI units.
+//
+// With the mean force as the reference, the surface does not jump when a step comes in, as long as
+// the body is linear: where the old view ends with a force held, the new one begins.
+
+#include <memory>
+
+#include "rendering/bodies/soft/soft_contact.h"
+
+namespace palpate::rendering {
+
+/// A soft object of a scene. Immutable.
+struct SoftObject {
+  SoftObject(std::shared_ptr<const SoftBody> what, const SoftContactSettings& how, int index)
+      : body(std::move(what)), surface(*body), contact(how), object(index) {}
+
+  std::shared_ptr<const SoftBody> body;
+  SoftSurface surface;
+  SoftContactSettings contact;
+  int object = 0;  ///< index in the scene
+  /// Of a step: so long after it was asked for its result is used, whether it has been there before
+  /// or not. So a thread of its own has time for it, and a recorded path comes out the same without.
+  double delay = 0.5;
+};
+
+struct SoftObjectState {
+  SoftState body;
+  SoftView view;          ///< that the servo goes by
+  double view_age = 0;    ///< s
+  double since_step = 0;  ///< s, since a step was asked for
+  bool waiting = false;   ///< it was, and is not in the view yet
+  SoftContactMemory contact;
+  std::vector<Vec3> impulse;            ///< N s, on the surface nodes since then
+  std::vector<std::uint32_t> impelled;  ///< those with one
+  std::vector<NodeForce> mean;          ///< N, that the step was asked for with
+  bool off = false;                     ///< no force until the tool has left it once
+  bool started = false;
+};
+
+SoftObjectState initial_state(const SoftObject& object);
+
+/// Goes on for dt with the tool where it is at the end of it. No allocation, nothing thrown.
+/// \param dt    s, at most the body's step. \param step  m, by which the tool moved, at most
+/// \return the force on the tool, N
+Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
+             const PlacedTool& tool, double step, double dt) noexcept;
+
+}  // namespace palpate::rendering

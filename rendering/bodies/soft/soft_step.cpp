@@ -1,0 +1,83 @@
+// One step of a soft body: quasi-Newton with a guard.
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rendering/bodies/soft/soft_body.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr double kArmijo = 1e-4;  // of the decrease that the slope promises
+constexpr int kHalvings = 12;
+constexpr double kRounding = 1e-14;  // of the energy: less is no increase
+// Where a whole step lowers the potential by this share of what the quadratic model says, or less
+// than 1 / it, the model does not hold, and another iteration is worth its time.
+constexpr double kTrusted = 0.9;
+
+double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i], b[i]);
+  return sum;
+}
+
+}  // namespace
+
+/// From state.trial along state.step to what lowers the potential, which is put into state.trial.
+/// \param change  the potential at the trial; changed with it
+SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) const noexcept {
+  const double slope = dot(state.trial_gradient, state.step);
+  const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
+  if (!(-slope > rounding)) return LineSearch::stays;
+  double part = 1;
+  for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
+    for (std::size_t i = 0; i < state.trial.size(); ++i)
+      state.trial[i] += part * state.step[i];
+    const double there = potential_change(state, state.trial, nullptr);
+    if (there <= change + kArmijo * part * slope + rounding) {
+      const double share = (change - there) / (-0.5 * slope);
+      change = there;
+      if (halving > 0) ++state.shortened;
+      return halving == 0 && share > kTrusted && share < 1 / kTrusted ? LineSearch::as_expected
+                                                                      : LineSearch::moves;
+    }
+    for (std::size_t i = 0; i < state.trial.size(); ++i)
+      state.trial[i] -= part * state.step[i];
+  }
+  return LineSearch::stays;
+}
+
+void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const noexcept {
+  const double h = settings_.step;
+  add_forces(state, forces);
+  ++state.steps;
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    state.trial[i] = state.x[i];
+    state.trial_gradient[i] = is_fixed_[i] ? Vec3(0)
+                                           : state.gradient[i] - state.load[i] -
+                                                 solid_.masses()[i] *
+                                                     (state.v[i] / h + settings_.gravity);
+  }
+  state.step = state.ahead;
+  double change = 0;
+  LineSearch found = search_line(state, change);
+  for (int iteration = 1; found == LineSearch::moves && iteration < settings_.iterations;
+       ++iteration) {
+    potential_change(state, state.trial, state.trial_gradient.data());
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      if (is_fixed_[i]) state.trial_gradient[i] = Vec3(0);
+      state.step[i] = -state.trial_gradient[i];
+    }
+    solve(state, state.step);
+    found = search_line(state, change);
+  }
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    state.v[i] = (state.trial[i] - state.x[i]) / h;
+    state.x[i] = state.trial[i];
+  }
+  state.energy = solid_.energy(state.x, state.gradient.data(), state.strains);
+  look_ahead(state);
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,306 @@
+#include "rendering/bodies/soft/solid.h"
+
+#include <algorithm>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include "rendering/bodies/soft/element_shapes.h"
+
+namespace palpate::rendering {
+namespace {
+
+/// Several 3 x 3 matrices side by side: [row][column][which].
+template <int kPoints>
+using Matrices = double[3][3][kPoints];
+
+template <int kPoints>
+void cofactors(const Matrices<kPoints>& f, Matrices<kPoints>& cof, double (&det)[kPoints]) {
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      for (int q = 0; q < kPoints; ++q)
+        cof[i][j][q] = f[i1][j1][q] * f[i2][j2][q] - f[i1][j2][q] * f[i2][j1][q];
+    }
+  }
+  for (int q = 0; q < kPoints; ++q)
+    det[q] = f[0][0][q] * cof[0][0][q] + f[0][1][q] * cof[0][1][q] + f[0][2][q] * cof[0][2][q];
+}
+
+constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+
+/// Green's strain (F^T F - 1) / 2, six components.
+template <int kPoints>
+void green_strain(const Matrices<kPoints>& f, double (&green)[6][kPoints]) {
+  for (int c = 0; c < 6; ++c) {
+    const int i = kPairs[c][0], j = kPairs[c][1];
+    for (int q = 0; q < kPoints; ++q) {
+      green[c][q] = 0.5 * (f[0][i][q] * f[0][j][q] + f[1][i][q] * f[1][j][q] +
+                           f[2][i][q] * f[2][j][q] - (i == j ? 1 : 0));
+    }
+  }
+}
+
+/// Gradient of the deformation at every point of integration.
+template <int kNodes, int kPoints, class Shape>
+void deformation(const Shape& shape, const std::array<std::uint32_t, kNodes>& nodes,
+                 std::span<const Vec3> x, Matrices<kPoints>& f) {
+  for (auto& row : f) {
+    for (auto& entry : row) std::fill(entry, entry + kPoints, 0.0);
+  }
+  for (int a = 0; a < kNodes; ++a) {
+    const Vec3& p = x[nodes[static_cast<std::size_t>(a)]];
+    for (int i = 0; i < 3; ++i) {
+      const double along = p[i];
+      for (int j = 0; j < 3; ++j) {
+        for (int q = 0; q < kPoints; ++q) f[i][j][q] += along * shape.gradient[a][j][q];
+      }
+    }
+  }
+}
+
+template <int kPoints>
+double weighted_mean(const double (&values)[kPoints], const double (&weights)[kPoints],
+                     double volume) {
+  double sum = 0;
+  for (int q = 0; q < kPoints; ++q) sum += weights[q] * values[q];
+  return sum / volume;
+}
+
+}  // namespace
+
+Solid::Solid(const stimuli::SolidMesh& mesh, const SoftMaterial& material)
+    : mu_(material.young / (2 * (1 + material.poisson))),
+      lambda_(material.young * material.poisson /
+              ((1 + material.poisson) * (1 - 2 * material.poisson))),
+      density_(material.density),
+      masses_(mesh.nodes.size(), 0.0) {
+  hexahedra_.nodes = mesh.hexahedra;
+  tetrahedra_.nodes = mesh.tetrahedra;
+  tetrahedra_.first_element = hexahedra_.nodes.size();
+  tetrahedra_.first_point = 8 * hexahedra_.nodes.size();
+  prepare(mesh.nodes, hexahedra_);
+  prepare(mesh.nodes, tetrahedra_);
+}
+
+template <int kNodes, int kPoints>
+void Solid::prepare(const std::vector<Vec3>& nodes, Elements<kNodes, kPoints>& elements) {
+  std::array<Vec3, kNodes> last{};
+  for (std::size_t e = 0; e < elements.nodes.size(); ++e) {
+    const auto& corners = elements.nodes[e];
+    std::array<Vec3, kNodes> own{};
+    double size = 0;
+    for (std::size_t a = 0; a < corners.size(); ++a) {
+      own[a] = nodes[corners[a]] - nodes[corners[0]];
+      size = std::max({size, std::abs(own[a].x), std::abs(own[a].y), std::abs(own[a].z)});
+    }
+    bool same = e > 0;
+    for (std::size_t a = 0; same && a < own.size(); ++a) {
+      const Vec3 off = own[a] - last[a];
+      same = std::max({std::abs(off.x), std::abs(off.y), std::abs(off.z)}) <= 1e-12 * size;
+    }
+    Shape<kNodes, kPoints> shape{};
+    std::array<double, kNodes> share{};  // of the mass: the diagonal, scaled (Hinton 1976)
+    for (int q = 0; q < kPoints; ++q) {
+      const auto d = elements::at_point(std::integral_constant<int, kNodes>(), q);
+      Mat3 jacobian(0);  // column c: derivative of the place by the element's coordinate c
+      for (int a = 0; a < kNodes; ++a) {
+        for (int c = 0; c < 3; ++c)
+          jacobian[c] += own[static_cast<std::size_t>(a)] * d.slope[a][c];
+      }
+      const double det = glm::determinant(jacobian);
+      if (!(det > 0))
+        throw std::invalid_argument("element " + std::to_string(e + 1) + " is flat or inside out");
+      const Mat3 inverse = glm::inverse(jacobian);
+      shape.weight[q] = det * d.weight;
+      shape.volume += shape.weight[q];
+      for (int a = 0; a < kNodes; ++a) {
+        for (int j = 0; j < 3; ++j) {
+          shape.gradient[a][j][q] = d.slope[a][0] * inverse[j][0] + d.slope[a][1] * inverse[j][1] +
+                                    d.slope[a][2] * inverse[j][2];
+        }
+        share[static_cast<std::size_t>(a)] += shape.weight[q] * d.value[a] * d.value[a];
+      }
+    }
+    double all = 0;
+    for (const double s : share) all += s;
+    for (std::size_t a = 0; a < corners.size(); ++a)
+      masses_[corners[a]] += density_ * shape.volume * share[a] / all;
+    volume_ += shape.volume;
+    if (!same) elements.shapes.push_back(shape);
+    elements.shape_of.push_back(static_cast<std::uint32_t>(elements.shapes.size() - 1));
+    if (!same) last = own;
+  }
+}
+
+template <int kNodes, int kPoints, bool kDamped>
+double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<const Vec3> x,
+                        const Strains* before, double rate, Vec3* gradient,
+                        Strains* now) const {
+  double energy = 0;
+  for (std::size_t e = 0; e < elements.nodes.size(); ++e) {
+    const auto& shape = elements.shapes[elements.shape_of[e]];
+    const auto& nodes = elements.nodes[e];
+    Matrices<kPoints> f, cof;
+    double det[kPoints];
+    deformation<kNodes, kPoints>(shape, nodes, x, f);
+    cofactors<kPoints>(f, cof, det);
+    double square[kPoints] = {};
+    for (const auto& row : f) {
+      for (const auto& entry : row) {
+        for (int q = 0; q < kPoints; ++q) square[q] += entry[q] * entry[q];
+      }
+    }
+    const double mean = weighted_mean(det, shape.weight, shape.volume);
+    double local = 0;
+    for (int q = 0; q < kPoints; ++q) {
+      const double j = det[q] - 1;
+      local += shape.weight[q] * (square[q] - 3 - 2 * j + j * j);
+    }
+    energy += 0.5 * mu_ * local + 0.5 * shape.volume * lambda_ * (mean - 1) * (mean - 1);
+    [[maybe_unused]] double change[6][kPoints];
+    double pressure = lambda_ * (mean - 1);
+    if constexpr (kDamped) {
+      green_strain<kPoints>(f, change);
+      double spent = 0;
+      for (int c = 0; c < 6; ++c) {
+        const double* const old =
+            before->green.data() + 6 * (elements.first_point + e * kPoints) + c * kPoints;
+        for (int q = 0; q < kPoints; ++q) {
+          change[c][q] -= old[q];
+          spent += (c < 3 ? 1 : 2) * shape.weight[q] * change[c][q] * change[c][q];
+        }
+      }
+      const double swelling = mean - before->dilation[elements.first_element + e];
+      energy += rate * (mu_ * spent + 0.5 * shape.volume * lambda_ * swelling * swelling);
+      pressure += rate * lambda_ * swelling;
+    }
+    if (now != nullptr) {
+      double green[6][kPoints];
+      green_strain<kPoints>(f, green);
+      std::copy(&green[0][0], &green[0][0] + 6 * kPoints,
+                now->green.begin() +
+                    static_cast<std::ptrdiff_t>(6 * (elements.first_point + e * kPoints)));
+      now->dilation[elements.first_element + e] = mean;
+    }
+    if (gradient == nullptr) continue;
+    Matrices<kPoints> stress;  // first Piola-Kirchhoff, times the weight
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        for (int q = 0; q < kPoints; ++q)
+          stress[i][j][q] = mu_ * f[i][j][q] + (mu_ * (det[q] - 2) + pressure) * cof[i][j][q];
+      }
+    }
+    if constexpr (kDamped) {
+      constexpr int kIndex[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          for (int k = 0; k < 3; ++k) {
+            for (int q = 0; q < kPoints; ++q)
+              stress[i][j][q] += 2 * rate * mu_ * f[i][k][q] * change[kIndex[k][j]][q];
+          }
+        }
+      }
+    }
+    for (auto& row : stress) {
+      for (auto& entry : row) {
+        for (int q = 0; q < kPoints; ++q) entry[q] *= shape.weight[q];
+      }
+    }
+    for (int a = 0; a < kNodes; ++a) {
+      Vec3& g = gradient[nodes[static_cast<std::size_t>(a)]];
+      for (int i = 0; i < 3; ++i) {
+        double sum[kPoints];
+        for (int q = 0; q < kPoints; ++q) {
+          sum[q] = stress[i][0][q] * shape.gradient[a][0][q] +
+                   stress[i][1][q] * shape.gradient[a][1][q] +
+                   stress[i][2][q] * shape.gradient[a][2][q];
+        }
+        double all = 0;
+        for (const double s : sum) all += s;
+        g[i] += all;
+      }
+    }
+  }
+  return energy;
+}
+
+double Solid::energy(std::span<const Vec3> x, Vec3* gradient) const {
+  if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
+  return energy_of<8, 8, false>(hexahedra_, x, nullptr, 0, gradient, nullptr) +
+         energy_of<10, 4, false>(tetrahedra_, x, nullptr, 0, gradient, nullptr);
+}
+
+double Solid::energy(std::span<const Vec3> x, Vec3* gradient, Strains& strains) const {
+  if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
+  strains.green.resize(6 * (8 * hexahedra_.nodes.size() + 4 * tetrahedra_.nodes.size()));
+  strains.dilation.resize(hexahedra_.nodes.size() + tetrahedra_.nodes.size());
+  return energy_of<8, 8, false>(hexahedra_, x, nullptr, 0, gradient, &strains) +
+         energy_of<10, 4, false>(tetrahedra_, x, nullptr, 0, gradient, &strains);
+}
+
+double Solid::energy(std::span<const Vec3> x, const Strains& before, double rate,
+                     Vec3* gradient) const {
+  if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
+  return energy_of<8, 8, true>(hexahedra_, x, &before, rate, gradient, nullptr) +
+         energy_of<10, 4, true>(tetrahedra_, x, &before, rate, gradient, nullptr);
+}
+
+double Solid::volume(std::span<const Vec3> x) const {
+  Strains now;
+  energy(x, nullptr, now);
+  double sum = 0;
+  for (std::size_t e = 0; e < hexahedra_.nodes.size(); ++e)
+    sum += now.dilation[e] * hexahedra_.shapes[hexahedra_.shape_of[e]].volume;
+  for (std::size_t e = 0; e < tetrahedra_.nodes.size(); ++e)
+    sum += now.dilation[hexahedra_.nodes.size() + e] *
+           tetrahedra_.shapes[tetrahedra_.shape_of[e]].volume;
+  return sum;
+}
+
+template <int kNodes, int kPoints>
+void Solid::add_stiffness(const Elements<kNodes, kPoints>& elements,
+                          std::vector<Block>& blocks) const {
+  for (std::size_t e = 0; e < elements.nodes.size(); ++e) {
+    const auto& shape = elements.shapes[elements.shape_of[e]];
+    double mean[kNodes][3] = {};
+    for (int a = 0; a < kNodes; ++a) {
+      for (int i = 0; i < 3; ++i)
+        mean[a][i] = weighted_mean(shape.gradient[a][i], shape.weight, shape.volume);
+    }
+    for (int a = 0; a < kNodes; ++a) {
+      for (int b = 0; b < kNodes; ++b) {
+        Block block{elements.nodes[e][static_cast<std::size_t>(a)],
+                    elements.nodes[e][static_cast<std::size_t>(b)],
+                    {}};
+        for (int i = 0; i < 3; ++i) {
+          for (int j = 0; j < 3; ++j) {
+            double sum = shape.volume * lambda_ * mean[a][i] * mean[b][j];
+            for (int q = 0; q < kPoints; ++q) {
+              double along = shape.gradient[b][i][q] * shape.gradient[a][j][q];
+              if (i == j) {
+                for (int k = 0; k < 3; ++k)
+                  along += shape.gradient[a][k][q] * shape.gradient[b][k][q];
+              }
+              sum += shape.weight[q] * mu_ * along;
+            }
+            block.value[3 * i + j] = sum;
+          }
+        }
+        blocks.push_back(block);
+      }
+    }
+  }
+}
+
+std::vector<Solid::Block> Solid::stiffness() const {
+  std::vector<Block> blocks;
+  add_stiffness(hexahedra_, blocks);
+  add_stiffness(tetrahedra_, blocks);
+  return blocks;
+}
+
+}  // namespace palpate::rendering
