@@ -117,8 +117,7 @@ class GmshReader {
 
   void read_format() {
     if (!next_line() || line_.size() < 2) return fault("4.1 0 8", "less");
-    if (line_[0] != "4.1")
-      return fault("version 4.1 (gmsh -format msh41)", line_[0]);
+    if (line_[0] != "4.1") return fault("version 4.1 (gmsh -format msh41)", line_[0]);
     if (line_[1] != "0") return fault("0, an ASCII file (gmsh without -bin)", line_[1]);
     end_section("$EndMeshFormat");
   }
@@ -150,8 +149,8 @@ class GmshReader {
     for (int c = 0; good && c < 3; ++c)
       good = parse_number(line_[static_cast<std::size_t>(c)], p[c]);
     if (!good) {
-      fault("three coordinates", !there ? "the end of the file"
-                                        : (line_.empty() ? "an empty line" : line_[0]));
+      fault("three coordinates",
+            !there ? "the end of the file" : (line_.empty() ? "an empty line" : line_[0]));
       return;
     }
     if (!index_.try_emplace(tag, nodes_.size()).second)
@@ -197,8 +196,8 @@ class GmshReader {
   }
 
   std::uint32_t middle_of(std::uint32_t a, std::uint32_t b) {
-    const auto [found, is_new] = middles_.try_emplace(std::minmax(a, b),
-                                                      static_cast<std::uint32_t>(mesh_.nodes.size()));
+    const auto [found, is_new] =
+        middles_.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(mesh_.nodes.size()));
     if (is_new) mesh_.nodes.push_back(0.5 * (mesh_.nodes[a] + mesh_.nodes[b]));
     return found->second;
   }

@@ -139,9 +139,9 @@ SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution) {
     case ShapeKind::box: {
       const Vec3 size = spec.shape == ShapeKind::cube ? Vec3(spec.edge) : spec.size;
       const double longest = std::max({size.x, size.y, size.z});
-      return mesh_of_box(size, {count_along(size.x, longest, resolution),
-                                count_along(size.y, longest, resolution),
-                                count_along(size.z, longest, resolution)});
+      return mesh_of_box(
+          size, {count_along(size.x, longest, resolution), count_along(size.y, longest, resolution),
+                 count_along(size.z, longest, resolution)});
     }
     case ShapeKind::cylinder:
       return mesh_of_cylinder(spec.radius, spec.height, resolution);

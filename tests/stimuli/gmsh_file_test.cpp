@@ -56,7 +56,8 @@ TEST(GmshFile, QuadraticTetrahedraKeepTheirMiddles) {
   const std::string text =
       "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 10 1 10\n3 1 0 10\n"
       "1\n2\n3\n4\n5\n6\n7\n8\n9\n10\n0 0 0\n2 0 0\n0 2 0\n0 0 2\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n"
-      "0 1 1\n1 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 11 1\n1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n";
+      "0 1 1\n1 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 11 1\n1 1 2 3 4 5 6 7 8 9 "
+      "10\n$EndElements\n";
   const SolidMesh mesh = read_gmsh("organ.msh", text);
   ASSERT_EQ(mesh.tetrahedra.size(), 1U);
   EXPECT_EQ(mesh.nodes[mesh.tetrahedra[0][8]], Vec3(1, 0, 1));

@@ -24,8 +24,8 @@ Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
   const Matrix lower = cholesky.matrixL();
   order_.resize(size);
   for (std::size_t i = 0; i < size; ++i)
-    order_[i] = static_cast<std::uint32_t>(
-        cholesky.permutationP().indices()[static_cast<Eigen::Index>(i)]);
+    order_[i] =
+        static_cast<std::uint32_t>(cholesky.permutationP().indices()[static_cast<Eigen::Index>(i)]);
   const auto pattern = [&](Eigen::Index column) {
     return std::span<const int>(lower.innerIndexPtr() + lower.outerIndexPtr()[column],
                                 lower.innerIndexPtr() + lower.outerIndexPtr()[column + 1]);

@@ -1,6 +1,6 @@
 #pragma once
-// A symmetric positive definite sparse matrix, factorised once (Cholesky, approximate minimum degree
-// order: Eigen's) and solved with often. Pure.
+// A symmetric positive definite sparse matrix, factorised once (Cholesky, approximate minimum
+// degree order: Eigen's) and solved with often. Pure.
 
 #include <cstdint>
 #include <span>

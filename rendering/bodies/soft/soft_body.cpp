@@ -34,8 +34,7 @@ Factor factorised(const Solid& solid, const std::vector<bool>& is_fixed,
     row[free[i]] = 3 * i;
     const double mass = solid.masses()[free[i]];
     if (!(mass > 0))
-      throw std::invalid_argument("node " + std::to_string(free[i] + 1) +
-                                  " belongs to no element");
+      throw std::invalid_argument("node " + std::to_string(free[i] + 1) + " belongs to no element");
     for (std::uint32_t c = 0; c < 3; ++c)
       entries.push_back({3 * i + c, 3 * i + c, mass / (settings.step * settings.step)});
   }

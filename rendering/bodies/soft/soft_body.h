@@ -3,10 +3,10 @@
 // the state is an argument. World frame, SI units.
 //
 // A step minimises the incremental potential of implicit Euler by quasi-Newton steps with a matrix
-// that is factorised once (Liu, Bouaziz & Kavan 2017, "Quasi-Newton methods for real-time simulation
-// of hyperelastic materials", ACM Trans. Graph. 36(3)); departs: the matrix is mass and stiffness at
-// rest, not a Laplacian. Guarded: it starts from the last positions, and accepts only what lowers
-// the potential, so a step cannot diverge, whatever the forces.
+// that is factorised once (Liu, Bouaziz & Kavan 2017, "Quasi-Newton methods for real-time
+// simulation of hyperelastic materials", ACM Trans. Graph. 36(3)); departs: the matrix is mass and
+// stiffness at rest, not a Laplacian. Guarded: it starts from the last positions, and accepts only
+// what lowers the potential, so a step cannot diverge, whatever the forces.
 
 #include <cstddef>
 #include <cstdint>
@@ -37,11 +37,11 @@ struct NodeForce {
 struct SoftState {
   std::vector<Vec3> x, v;  ///< m, m/s, of all nodes
   Strains strains;
-  double energy = 0;               ///< J, elastic
-  std::vector<Vec3> gradient;      ///< N, of the elastic energy
-  std::vector<Vec3> load;          ///< N, on the nodes in the last step
-  std::vector<Vec3> ahead;         ///< m, where one more step with that load goes, by the linear model
-  std::vector<Vec3> by_load;       ///< m, the part of `ahead` that is that load's
+  double energy = 0;           ///< J, elastic
+  std::vector<Vec3> gradient;  ///< N, of the elastic energy
+  std::vector<Vec3> load;      ///< N, on the nodes in the last step
+  std::vector<Vec3> ahead;     ///< m, where one more step with that load goes, by the linear model
+  std::vector<Vec3> by_load;   ///< m, the part of `ahead` that is that load's
   std::vector<double> pack, work;  ///< of solving
   std::vector<Vec3> trial, step, trial_gradient;
   std::uint64_t steps = 0, shortened = 0;  ///< so far; iterations that the guard cut short

@@ -11,8 +11,8 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kBehind = 0.5;      // of the radius: deeper behind the surface it is another side
-constexpr double kSettled = 1e-7;    // of the largest force: a sweep that changes less is the last
+constexpr double kBehind = 0.5;    // of the radius: deeper behind the surface it is another side
+constexpr double kSettled = 1e-7;  // of the largest force: a sweep that changes less is the last
 constexpr std::uint32_t kEndKey = 0x80000000;
 
 class Search {
@@ -57,8 +57,7 @@ class Search {
       return memory_.local[slot];
     slot = static_cast<std::uint32_t>(memory_.local.size());
     const SoftView& view = moment_.view;
-    const Vec3 base =
-        view.x[index] + moment_.fraction * view.ahead[index] - view.by_load[index];
+    const Vec3 base = view.x[index] + moment_.fraction * view.ahead[index] - view.by_load[index];
     Vec3 by_force(0);
     for (const NodeForce& f : memory_.forces)
       by_force += multiply(moment_.body.compliance(index, f.surface_node), f.force);
@@ -159,10 +158,9 @@ double opening(const SoftBody& body, const SoftContact& i, const SoftContact& j,
   for (std::uint32_t a = 0; a < i.count; ++a) {
     for (std::uint32_t b = 0; b < j.count; ++b) {
       const float* const m = body.compliance(i.nodes[a], j.nodes[b]);
-      const Vec3 moved(
-          m[0] * j.normal.x + m[1] * j.normal.y + m[2] * j.normal.z,
-          m[3] * j.normal.x + m[4] * j.normal.y + m[5] * j.normal.z,
-          m[6] * j.normal.x + m[7] * j.normal.y + m[8] * j.normal.z);
+      const Vec3 moved(m[0] * j.normal.x + m[1] * j.normal.y + m[2] * j.normal.z,
+                       m[3] * j.normal.x + m[4] * j.normal.y + m[5] * j.normal.z,
+                       m[6] * j.normal.x + m[7] * j.normal.y + m[8] * j.normal.z);
       sum += i.weights[a] * j.weights[b] * glm::dot(i.normal, moved);
     }
   }
@@ -216,9 +214,9 @@ void add_node_forces(SoftContactMemory& memory) {
     if (!(contact.force > 0)) continue;
     for (std::uint32_t a = 0; a < contact.count; ++a) {
       const Vec3 force = -contact.weights[a] * contact.force * contact.normal;
-      const auto same = std::find_if(
-          memory.forces.begin(), memory.forces.end(),
-          [&](const NodeForce& f) { return f.surface_node == contact.nodes[a]; });
+      const auto same =
+          std::find_if(memory.forces.begin(), memory.forces.end(),
+                       [&](const NodeForce& f) { return f.surface_node == contact.nodes[a]; });
       if (same != memory.forces.end()) {
         same->force += force;
       } else {

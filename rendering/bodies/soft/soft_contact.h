@@ -35,10 +35,10 @@ struct SoftContact {
 };
 
 struct SoftContactSettings {
-  double radius = 0.002;    ///< m, of the tool
-  double stiffness = 800;   ///< N/m, of the spring between virtual and ideal tool
-  std::size_t most = 64;    ///< contacts at once; beyond it the deepest are kept
-  int sweeps = 60;          ///< of Gauss-Seidel, at most
+  double radius = 0.002;   ///< m, of the tool
+  double stiffness = 800;  ///< N/m, of the spring between virtual and ideal tool
+  std::size_t most = 64;   ///< contacts at once; beyond it the deepest are kept
+  int sweeps = 60;         ///< of Gauss-Seidel, at most
 };
 
 /// What is remembered from tick to tick.

@@ -22,7 +22,8 @@ struct SoftObject {
   SoftContactSettings contact;
   int object = 0;  ///< index in the scene
   /// Of a step: so long after it was asked for its result is used, whether it has been there before
-  /// or not. So a thread of its own has time for it, and a recorded path comes out the same without.
+  /// or not. So a thread of its own has time for it, and a recorded path comes out the same
+  /// without.
   double delay = 0.5;
 };
 

@@ -32,8 +32,7 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
   if (!(-slope > rounding)) return LineSearch::stays;
   double part = 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
-    for (std::size_t i = 0; i < state.trial.size(); ++i)
-      state.trial[i] += part * state.step[i];
+    for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
     const double there = potential_change(state, state.trial, nullptr);
     if (there <= change + kArmijo * part * slope + rounding) {
       const double share = (change - there) / (-0.5 * slope);
@@ -42,8 +41,7 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
       return halving == 0 && share > kTrusted && share < 1 / kTrusted ? LineSearch::as_expected
                                                                       : LineSearch::moves;
     }
-    for (std::size_t i = 0; i < state.trial.size(); ++i)
-      state.trial[i] -= part * state.step[i];
+    for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] -= part * state.step[i];
   }
   return LineSearch::stays;
 }
@@ -54,10 +52,10 @@ void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const n
   ++state.steps;
   for (std::size_t i = 0; i < state.x.size(); ++i) {
     state.trial[i] = state.x[i];
-    state.trial_gradient[i] = is_fixed_[i] ? Vec3(0)
-                                           : state.gradient[i] - state.load[i] -
-                                                 solid_.masses()[i] *
-                                                     (state.v[i] / h + settings_.gravity);
+    state.trial_gradient[i] = is_fixed_[i]
+                                  ? Vec3(0)
+                                  : state.gradient[i] - state.load[i] -
+                                        solid_.masses()[i] * (state.v[i] / h + settings_.gravity);
   }
   state.step = state.ahead;
   double change = 0;

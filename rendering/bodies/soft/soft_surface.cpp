@@ -26,11 +26,10 @@ void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
   }
   const Vec3 size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
-  std::stable_sort(order.begin() + static_cast<std::ptrdiff_t>(from),
-                   order.begin() + static_cast<std::ptrdiff_t>(to),
-                   [&](std::uint32_t a, std::uint32_t b) {
-                     return places[a][axis] < places[b][axis];
-                   });
+  std::stable_sort(
+      order.begin() + static_cast<std::ptrdiff_t>(from),
+      order.begin() + static_cast<std::ptrdiff_t>(to),
+      [&](std::uint32_t a, std::uint32_t b) { return places[a][axis] < places[b][axis]; });
   const std::size_t middle = from + (to - from) / 2;
   halve(order, from, middle, places, ends);
   halve(order, middle, to, places, ends);
@@ -43,8 +42,8 @@ SoftSurface::SoftSurface(const SoftBody& body) {
   std::vector<Vec3> places;
   places.reserve(surface.size());
   for (const stimuli::SurfaceTriangle& t : surface) {
-    places.push_back(
-        (body.mesh().nodes[t[0]] + body.mesh().nodes[t[1]] + body.mesh().nodes[t[2]]) / 3.0);
+    places.push_back((body.mesh().nodes[t[0]] + body.mesh().nodes[t[1]] + body.mesh().nodes[t[2]]) /
+                     3.0);
   }
   std::vector<std::uint32_t> order(surface.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -88,7 +87,8 @@ SoftView SoftSurface::first_view(const SoftBody& body, const SoftState& state) c
   return view;
 }
 
-void SoftSurface::look(const SoftBody& body, const SoftState& state, SoftView& view) const noexcept {
+void SoftSurface::look(const SoftBody& body, const SoftState& state,
+                       SoftView& view) const noexcept {
   const auto& nodes = body.surface_nodes();
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     view.x[i] = state.x[nodes[i]];

@@ -10,12 +10,12 @@
 
 namespace palpate::rendering {
 
-/// What a servo knows of a soft body between two of its steps; all by surface node. With the load of
-/// the last step held, a node goes from x to x + ahead within a step.
+/// What a servo knows of a soft body between two of its steps; all by surface node. With the load
+/// of the last step held, a node goes from x to x + ahead within a step.
 struct SoftView {
   std::vector<Vec3> x, ahead;
-  std::vector<Vec3> by_load;   ///< the part of where a node is that is the load's, by the compliance
-  std::vector<Vec3> normals;   ///< of the triangles, outwards, unit; zero where one is flat
+  std::vector<Vec3> by_load;  ///< the part of where a node is that is the load's, by the compliance
+  std::vector<Vec3> normals;  ///< of the triangles, outwards, unit; zero where one is flat
   struct Box {
     Vec3 low, high;
   };
@@ -28,7 +28,7 @@ class SoftSurface {
   struct Edge {
     std::array<std::uint32_t, 2> nodes;      ///< surface nodes
     std::array<std::uint32_t, 2> triangles;  ///< on both sides
-    std::array<bool, 2> owns;  ///< its ends that no other edge stands for
+    std::array<bool, 2> owns;                ///< its ends that no other edge stands for
   };
   /// Edges and triangles that are near each other.
   struct Cluster {

@@ -108,8 +108,7 @@ void Solid::prepare(const std::vector<Vec3>& nodes, Elements<kNodes, kPoints>& e
       const auto d = elements::at_point(std::integral_constant<int, kNodes>(), q);
       Mat3 jacobian(0);  // column c: derivative of the place by the element's coordinate c
       for (int a = 0; a < kNodes; ++a) {
-        for (int c = 0; c < 3; ++c)
-          jacobian[c] += own[static_cast<std::size_t>(a)] * d.slope[a][c];
+        for (int c = 0; c < 3; ++c) jacobian[c] += own[static_cast<std::size_t>(a)] * d.slope[a][c];
       }
       const double det = glm::determinant(jacobian);
       if (!(det > 0))
@@ -138,8 +137,7 @@ void Solid::prepare(const std::vector<Vec3>& nodes, Elements<kNodes, kPoints>& e
 
 template <int kNodes, int kPoints, bool kDamped>
 double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<const Vec3> x,
-                        const Strains* before, double rate, Vec3* gradient,
-                        Strains* now) const {
+                        const Strains* before, double rate, Vec3* gradient, Strains* now) const {
   double energy = 0;
   for (std::size_t e = 0; e < elements.nodes.size(); ++e) {
     const auto& shape = elements.shapes[elements.shape_of[e]];

@@ -1,7 +1,5 @@
 // A tool on a soft body: Hertz, several contacts, the two rates, what a servo may not do.
 
-#include "rendering/bodies/soft/soft_coupling.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "rendering/bodies/soft/segment_distance.h"
+#include "rendering/bodies/soft/soft_coupling.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/random.h"
 
@@ -118,8 +117,8 @@ TEST(SoftContact, TheBodyHoldsWhatTheHandFeelsAndTheToolRestsOnIt) {
   }
 }
 
-/// Force of a ball pressed into a slab, over that of Hertz with the slab's thickness (Dimitriadis et
-/// al. 2002, bonded, incompressible).
+/// Force of a ball pressed into a slab, over that of Hertz with the slab's thickness (Dimitriadis
+/// et al. 2002, bonded, incompressible).
 double ball_against_theory(int resolution) {
   constexpr double kRadius = 0.02;
   const SoftObject object =

@@ -31,8 +31,8 @@ stimuli::SolidMesh one_tetrahedron() {
   stimuli::SolidMesh mesh;
   mesh.nodes = {{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}, {0, 0, 0.02}};
   for (const auto& [a, b] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
-    mesh.nodes.push_back(0.5 * (mesh.nodes[static_cast<std::size_t>(a)] +
-                                mesh.nodes[static_cast<std::size_t>(b)]));
+    mesh.nodes.push_back(
+        0.5 * (mesh.nodes[static_cast<std::size_t>(a)] + mesh.nodes[static_cast<std::size_t>(b)]));
   mesh.tetrahedra.push_back({0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
   return mesh;
 }
@@ -101,9 +101,9 @@ TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
         std::vector<Vec3> less = x, more = x;
         less[i][c] -= kStep;
         more[i][c] += kStep;
-        const double slope = (solid.energy(more, strains, 3, nullptr) -
-                              solid.energy(less, strains, 3, nullptr)) /
-                             (2 * kStep);
+        const double slope =
+            (solid.energy(more, strains, 3, nullptr) - solid.energy(less, strains, 3, nullptr)) /
+            (2 * kStep);
         EXPECT_NEAR(gradient[i][c], slope, 1e-6 * largest);
       }
     }
@@ -153,8 +153,8 @@ TEST(SoftSolid, PatchTest) {
   solid.energy(x, forces.data());
   double within = 0, outside = 0;
   for (std::size_t i = 0; i < x.size(); ++i)
-    (is_inside[i] ? within : outside) = std::max(is_inside[i] ? within : outside,
-                                                 glm::length(forces[i]));
+    (is_inside[i] ? within : outside) =
+        std::max(is_inside[i] ? within : outside, glm::length(forces[i]));
   EXPECT_GT(outside, 0.1);
   EXPECT_LT(within, 1e-12 * outside);
 }
@@ -173,8 +173,7 @@ TEST(SoftSolid, ATurnIsNoStrain) {
 /// A beam along x, held at one end, with a force at the other; its deflection, m.
 double beam_deflection(int along, int across, double force) {
   constexpr double kLength = 0.1, kSide = 0.01;
-  stimuli::SolidMesh mesh =
-      stimuli::mesh_of_box({kLength, kSide, kSide}, {along, across, across});
+  stimuli::SolidMesh mesh = stimuli::mesh_of_box({kLength, kSide, kSide}, {along, across, across});
   std::vector<std::uint32_t> held, loaded;
   for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
     if (mesh.nodes[i].x < -0.0499) held.push_back(i);
@@ -218,11 +217,11 @@ struct Pressed {
 Pressed pressed_box(double poisson) {
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 0.03}, {6, 6, 3});
   const auto held = nodes_below(mesh, -0.0149);
-  Pressed pressed{SoftBody(mesh, held,
-                           {.material = {.young = 20000, .poisson = poisson},
-                            .step = 0.004,
-                            .compliance = false}),
-                  {}};
+  Pressed pressed{
+      SoftBody(
+          mesh, held,
+          {.material = {.young = 20000, .poisson = poisson}, .step = 0.004, .compliance = false}),
+      {}};
   pressed.state = pressed.body.rest();
   std::vector<NodeForce> forces;
   for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
@@ -237,9 +236,7 @@ Pressed pressed_box(double poisson) {
 TEST(SoftSolid, NearlyIncompressibleKeepsItsVolumeAndDoesNotLock) {
   const Pressed soft = pressed_box(0.3), pressed = pressed_box(0.49);
   const Solid& solid = pressed.body.solid();
-  const auto sunk = [](const Pressed& p) {
-    return farthest(p.state.x, p.body.mesh().nodes);
-  };
+  const auto sunk = [](const Pressed& p) { return farthest(p.state.x, p.body.mesh().nodes); };
   EXPECT_GT(sunk(pressed), 0.003);
   EXPECT_NEAR(solid.volume(pressed.state.x) / solid.volume(), 1, 0.01);
   EXPECT_GT(sunk(pressed), 0.6 * sunk(soft));
@@ -253,7 +250,8 @@ TEST(SoftSolid, TheRestShapeComesBack) {
 
 TEST(SoftSolid, FallsFreelyWithoutSupport) {
   stimuli::SolidMesh mesh = soft_mesh(ShapeKind::sphere, 3);
-  const SoftBody body(mesh, {}, {.material = {}, .step = 0.001, .gravity = {0, 0, -9.81}, .compliance = false});
+  const SoftBody body(
+      mesh, {}, {.material = {}, .step = 0.001, .gravity = {0, 0, -9.81}, .compliance = false});
   SoftState state = body.rest();
   for (int i = 0; i < 100; ++i) body.step(state, {});
   // Implicit Euler: sum of n h^2 g.
@@ -315,8 +313,9 @@ INSTANTIATE_TEST_SUITE_P(All, AbusedSoftBody,
 
 TEST(SoftSolid, NoStepRaisesTheIncrementalPotential) {
   const stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.03, 0.03, 0.03}, {3, 3, 3});
-  const SoftBody body(mesh, nodes_below(mesh, -0.0149),
-                      {.material = {.young = 1e6, .damping = 0}, .step = 0.016, .compliance = false});
+  const SoftBody body(
+      mesh, nodes_below(mesh, -0.0149),
+      {.material = {.young = 1e6, .damping = 0}, .step = 0.016, .compliance = false});
   SoftState state = body.rest();
   set_abused_shape(Abuse::twist, state);
   state.energy = body.solid().energy(state.x, state.gradient.data(), state.strains);
