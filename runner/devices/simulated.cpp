@@ -85,13 +85,21 @@ void SimulatedStylus::reset(const HandTarget& target) {
   position_ = target.grip;
   axis_ = target.axis;
   velocity_ = spin_ = force_ = torque_ = Vec3(0);
+  away_is_known_ = target_turns_ = false;
+  find_away();
+}
+
+void SimulatedStylus::find_away() noexcept {
+  if (away_is_known_) return;
   away_ = rotation_between(target_.axis, axis_);
+  away_is_known_ = true;
 }
 
 void SimulatedStylus::set_target(const HandTarget& target) {
-  const bool turns = target.axis != target_.axis;
+  target_turns_ = target.axis != target_.axis;
   target_ = target;
-  if (turns) away_ = rotation_between(target_.axis, axis_);
+  away_is_known_ &= !target_turns_;
+  find_away();
 }
 
 DeviceReading SimulatedStylus::read() noexcept {
@@ -115,12 +123,15 @@ DeviceReading SimulatedStylus::read() noexcept {
   // Rotation likewise, about the target's axis. Roll about the stylus is neither sensed nor
   // actuated.
   const Vec3 turned_balance = torque_ / hand_.turn_stiffness;
+  find_away();
   Vec3 turned = away_ - turned_balance;
   turn_.advance(turned, spin_);
   axis_ = glm::normalize(rotate(target_.axis, turned + turned_balance));
   spin_ -= glm::dot(spin_, axis_) * axis_;
-  // For the next tick, now: the processor does it while the tick waits for the renderer.
-  away_ = rotation_between(target_.axis, axis_);
+  away_is_known_ = false;
+  // For the next tick, now: the processor does it while the tick waits for the renderer. Not for a
+  // target that turns, which makes it void.
+  if (!target_turns_) find_away();
 
   DeviceReading reading;
   reading.stylus.tip = round_to(position_ - grip_ * axis_, settings_.resolution);

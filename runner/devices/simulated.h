@@ -67,6 +67,8 @@ class SimulatedStylus final : public Device {
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
  private:
+  void find_away() noexcept;
+
   SimulatedDeviceSettings settings_;
   HandImpedance hand_;
   double length_, grip_;
@@ -77,6 +79,7 @@ class SimulatedStylus final : public Device {
   Vec3 position_, velocity_;   ///< m, m/s, of the grip
   Vec3 axis_{0, 0, 1}, spin_;  ///< unit tip to tail; rad/s
   Vec3 away_;                  ///< rad; rotation from the target's axis to axis_
+  bool away_is_known_ = true, target_turns_ = false;
   Vec3 force_, torque_;        ///< N; N m about the grip, held over the tick
 };
 
