@@ -80,7 +80,7 @@ class SimulatedStylus final : public Device {
   Vec3 axis_{0, 0, 1}, spin_;  ///< unit tip to tail; rad/s
   Vec3 away_;                  ///< rad; rotation from the target's axis to axis_
   bool away_is_known_ = true, target_turns_ = false;
-  Vec3 force_, torque_;        ///< N; N m about the grip, held over the tick
+  Vec3 force_, torque_;  ///< N; N m about the grip, held over the tick
 };
 
 }  // namespace palpate::runner
