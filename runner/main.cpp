@@ -41,7 +41,7 @@ constexpr Command kCommands[] = {
      palpate::runner::cluster_command},
     {"devices", "connected devices and their limits; timing of this machine; calibration",
      palpate::runner::devices_command},
-    {"explore", "a scene that is touched: pictures of a recorded path",
+    {"explore", "a window to touch a scene; pictures of it",
      palpate::runner::explore_command},
     {"export", "a database's trials as CSV, BIDS or Psych-DS", palpate::runner::export_command},
     {"forget", "remove a participant who has withdrawn", palpate::runner::forget_command},

@@ -101,7 +101,7 @@ PUBLIC = {
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",
-    "runner/display": "display text_display window",
+    "runner/display": "display explore_window text_display timeline touch_source window",
     "runner/display/scene": "camera display_error painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent settings_document simulated simulated_settings",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "

@@ -4,9 +4,38 @@
 #include <array>
 #include <cstdio>
 
+#include "runner/display/fonts.h"
+
 namespace palpate::runner {
+namespace {
+
+constexpr float kFontSize = 16, kTitleFontSize = 28;  // px at scale 1
+
+/// \param choices  must outlive the atlas' building, which reads the ranges
+void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float size) {
+  ImFontConfig config;
+  for (const FontChoice& choice : choices) {
+    config.FontNo = choice.face;
+    atlas.AddFontFromFileTTF(choice.path.c_str(), size, &config, choice.ranges.data());
+    config.MergeMode = true;
+  }
+  if (!config.MergeMode) {
+    config.SizePixels = size;
+    atlas.AddFontDefault(&config);
+  }
+}
+
+}  // namespace
 
 using namespace console_colour;
+
+void load_console_fonts(const std::vector<std::string>& texts, float scale) {
+  const std::vector<FontChoice> choices = choose_fonts(texts);
+  ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
+  add_font(atlas, choices, kFontSize * scale);
+  add_font(atlas, choices, kTitleFontSize * scale);
+  atlas.Build();
+}
 
 void style_console(float scale) {
   ImGui::StyleColorsDark();

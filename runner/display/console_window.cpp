@@ -11,39 +11,10 @@
 
 #include "runner/display/console_widgets.h"
 #include "runner/display/console_words.h"
-#include "runner/display/fonts.h"
 #include "runner/display/key_names.h"
 #include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
-namespace {
-
-constexpr float kFontSize = 16, kTitleFontSize = 28;  // px at scale 1
-
-/// \param choices  must outlive the atlas' building, which reads the ranges
-void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float size) {
-  ImFontConfig config;
-  for (const FontChoice& choice : choices) {
-    config.FontNo = choice.face;
-    atlas.AddFontFromFileTTF(choice.path.c_str(), size, &config, choice.ranges.data());
-    config.MergeMode = true;
-  }
-  if (!config.MergeMode) {
-    config.SizePixels = size;
-    atlas.AddFontDefault(&config);
-  }
-}
-
-/// The first font is the usual one, the last that of titles.
-void load_fonts(const std::vector<std::string>& texts, float scale) {
-  const std::vector<FontChoice> choices = choose_fonts(texts);
-  ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
-  add_font(atlas, choices, kFontSize * scale);
-  add_font(atlas, choices, kTitleFontSize * scale);
-  atlas.Build();
-}
-
-}  // namespace
 
 ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout& layout,
                              ParticipantWindow& participant)
@@ -55,7 +26,7 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout&
   context_ = ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // writes no file
   const auto scale = static_cast<float>(layout.console_scale);
-  load_fonts(settings.texts, scale);
+  load_console_fonts(settings.texts, scale);
   style_console(scale);
   glfwSetWindowUserPointer(window_, this);
   glfwSetKeyCallback(window_, &ConsoleWindow::on_key);

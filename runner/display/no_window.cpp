@@ -1,3 +1,4 @@
+#include "runner/display/explore_window.h"
 #include "runner/display/scene/display_error.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/window.h"
@@ -14,6 +15,8 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings&) {
 }
 
 std::string missing_letters(const std::vector<std::string>&) { return {}; }
+
+void explore_in_window(ExploreSettings, TouchSource&) { throw DisplayError(kNotBuiltIn); }
 
 std::unique_ptr<ScenePainter> make_painter(int, int) { throw DisplayError(kNotBuiltIn); }
 

@@ -169,9 +169,28 @@ def scene(name):
     return make
 
 
+def explore_window(palpate, folder):
+    """A recorded path in the middle of its contact, paused."""
+    scene = PROTOCOLS / "scenes" / "fig13-two-objects.json"
+    screen = VirtualScreen("1200x760")
+    program = subprocess.Popen([palpate, "explore", scene, "--trajectory", scene.with_suffix(".csv")], env=screen.environment)
+    try:
+        window = screen.window("fig13-two-objects.json - palpate explore")
+        time.sleep(2)
+        screen.click(window, 340, 730)  # a moment of the force plot
+        time.sleep(2)
+        screen.settled_picture(window)
+        subprocess.run(["import", "-silent", "-window", "root", "-colors", "255", "-strip", f"PNG8:{IMAGES / 'explore-window.png'}"],
+                       env=screen.environment, check=True)
+    finally:
+        program.kill()
+        program.wait()
+        screen.close()
+
+
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig17a-engine", "fig17b-instrument", "layers"]
 PICTURES = {**{name: scene(name) for name in SCENES},
-            "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
+            "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 

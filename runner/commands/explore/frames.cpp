@@ -10,6 +10,7 @@
 
 #include "data/files/atomic_file.h"
 #include "data/files/atomic_folder.h"
+#include "runner/commands/explore/recorded_touch.h"
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -55,19 +56,6 @@ std::vector<std::size_t> shown_rows(const std::vector<TimedPose>& poses, double 
     rows.push_back(row);
   }
   return rows;
-}
-
-SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
-                      const rendering::Scene& scene, const rendering::Rendering& rendering,
-                      const rendering::RenderState& state) {
-  SceneMoment out{.sample = {}, .contacts = contact_places(scene, state, rendering)};
-  out.sample.time_ns = std::llround(pose.t * 1e9);
-  out.sample.probe = virtual_stylus(spec, pose.probe);
-  out.sample.rendering = rendering;
-  out.sample.device1 = rendering.device1;
-  out.sample.device2 = rendering.device2;
-  if (spec.reach) out.held = pose.probe;
-  return out;
 }
 
 /// The scene along the path: what is drawn, and what sizes its arrows and the camera.

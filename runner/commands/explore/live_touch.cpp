@@ -1,0 +1,111 @@
+#include "runner/commands/explore/live_touch.h"
+
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <iterator>
+#include <utility>
+
+#include "runner/commands/render/forces.h"
+#include "runner/display/timeline.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr auto kIdle = std::chrono::milliseconds(5);
+// Forces begin wherever the stylus is: an object that it is inside of gives none until it was left.
+constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
+
+}  // namespace
+
+LiveTouch::LiveTouch(Device& device, Clock& clock, Settings settings)
+    : settings_(std::move(settings)),
+      shown_(settings_.spec.objects),
+      servo_(device, clock, settings_.servo) {
+  prepare(shown_);  // faults of the scene are told before there is a window
+  recorder_ = std::jthread([this](const std::stop_token& stop) { record(stop); });
+}
+
+LiveTouch::~LiveTouch() {
+  emergency_zero();
+  recorder_.request_stop();
+}
+
+void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
+  protocols::SceneSpec spec = settings_.spec;
+  spec.objects = objects;
+  if (settings_.limit) settings_.limit(spec.objects);
+  servo_.prepare(build_scene(settings_.scene_path, spec, *settings_.renderer), *settings_.renderer,
+                 kAnywhere);
+}
+
+void LiveTouch::keep(const Sample& sample) {
+  if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
+  last_ns_ = sample.time_ns;
+  SceneMoment moment{.sample = sample, .contacts = {}};
+  // The servo tells the deepest place; the force there is the one that was commanded.
+  if (sample.rendering.contacts > 0)
+    moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});
+  const WorkspaceMap& map = settings_.servo.workspace;
+  if (map.reach) moment.held = unstretched(*map.reach, sample.probe);
+  const std::lock_guard lock(mutex_);
+  if (fresh_.size() == Timeline::kMost)  // of a display that stalls: the last minute is enough
+    fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
+  fresh_.push_back(std::move(moment));
+  recorded_.fetch_add(1);
+}
+
+void LiveTouch::record(const std::stop_token& stop) {
+  bool running = true;
+  while (!stop.stop_requested()) {
+    std::optional<std::vector<stimuli::ObjectSpec>> wanted;
+    {
+      const std::lock_guard lock(mutex_);
+      wanted.swap(wanted_);
+    }
+    const bool held = held_.load();
+    if (held && running) servo_.stop();
+    const bool again = (!held && !running) || (wanted && !held);
+    running = !held;
+    try {
+      const std::vector<stimuli::ObjectSpec>& objects = wanted ? *wanted : shown_;
+      if (again) prepare(objects);
+      if (wanted) shown_ = std::move(*wanted);
+    } catch (const std::exception& fault) {
+      const std::lock_guard lock(mutex_);
+      trouble_ = fault.what();
+    }
+    if (!running) {
+      std::this_thread::sleep_for(kIdle);
+      continue;
+    }
+    keep(servo_.next());
+  }
+}
+
+void LiveTouch::take(std::vector<SceneMoment>& out) {
+  std::vector<SceneMoment> taken;
+  {
+    const std::lock_guard lock(mutex_);
+    taken.swap(fresh_);
+  }
+  out.insert(out.end(), std::make_move_iterator(taken.begin()), std::make_move_iterator(taken.end()));
+}
+
+void LiveTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {
+  const std::lock_guard lock(mutex_);
+  wanted_ = objects;
+  trouble_.clear();
+}
+
+void LiveTouch::emergency_zero() noexcept {
+  servo_.emergency_zero();
+  if (settings_.emergency) settings_.emergency();
+}
+
+std::string LiveTouch::trouble() const {
+  const std::lock_guard lock(mutex_);
+  return trouble_;
+}
+
+}  // namespace palpate::runner

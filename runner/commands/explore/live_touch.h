@@ -1,0 +1,73 @@
+#pragma once
+// A scene that a hand touches through a device.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "protocols/scene_spec.h"
+#include "rendering/renderer.h"
+#include "runner/display/touch_source.h"
+#include "runner/servo/servo_thread.h"
+
+namespace palpate::runner {
+
+/// The servo has a thread of its own, which waits for nothing but the clock and the device. Another
+/// one empties the servo's ring and keeps the samples for the display, so that a display that
+/// stalls loses nothing of the last minute; it also compiles scenes.
+class LiveTouch final : public TouchSource {
+ public:
+  struct Settings {
+    std::string scene_path;  ///< that faults name
+    protocols::SceneSpec spec;
+    const rendering::Renderer* renderer = nullptr;
+    ServoSettings servo;
+    /// Called with the objects before they are shown: limits what the device cannot show.
+    std::function<void(std::vector<stimuli::ObjectSpec>&)> limit;
+    /// Called by emergency_zero() beside the servo's own, as of a guard; may be empty.
+    std::function<void()> emergency;
+  };
+
+  /// \param device, clock  the servo's alone; must outlive this. \throws MeshError
+  LiveTouch(Device& device, Clock& clock, Settings settings);
+  ~LiveTouch() override;  ///< zero force
+  LiveTouch(const LiveTouch&) = delete;
+  LiveTouch& operator=(const LiveTouch&) = delete;
+
+  bool live() const override { return true; }
+  void take(std::vector<SceneMoment>& out) override;
+  void hold(bool held) override { held_.store(held); }
+  void show(const std::vector<stimuli::ObjectSpec>& objects) override;
+  void emergency_zero() noexcept override;
+  void clear_fault() noexcept override { servo_.clear_fault(); }
+  std::string trouble() const override;
+
+  /// Samples that were kept so far, taken or not. From any thread.
+  std::uint64_t recorded() const noexcept { return recorded_.load(); }
+  ServoThread& servo() { return servo_; }  ///< for signal handlers
+
+ private:
+  void record(const std::stop_token& stop);
+  void prepare(const std::vector<stimuli::ObjectSpec>& objects);
+  void keep(const Sample& sample);
+
+  const Settings settings_;
+  mutable std::mutex mutex_;  ///< of the next three; held for a swap or an append
+  std::vector<SceneMoment> fresh_;
+  std::optional<std::vector<stimuli::ObjectSpec>> wanted_;
+  std::string trouble_;
+  std::atomic<bool> held_{false};
+  std::atomic<std::uint64_t> recorded_{0};
+  std::vector<stimuli::ObjectSpec> shown_;  ///< the recorder's; so the next
+  std::int64_t last_ns_ = 0;
+  ServoThread servo_;
+  std::jthread recorder_;  ///< last: ends first
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,62 @@
+#pragma once
+// What the window of a scene shows: its panels, and what they keep from frame to frame.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runner/display/console_view.h"
+#include "runner/display/explore_window.h"
+#include "runner/display/scene/scene_renderer.h"
+#include "runner/display/timeline.h"
+
+namespace palpate::runner {
+
+/// Needs a current OpenGL context.
+class ExploreView {
+ public:
+  ExploreView(ExploreSettings settings, TouchSource& source);
+
+  /// Draws a frame of Dear ImGui. \param seconds  since the last one
+  void draw(double seconds, const Modifiers& modifiers);
+  /// As ConsoleView: the emergency button spans the upper edge and lies over everything.
+  bool in_emergency_button(float y) const { return y >= 0 && y < emergency_bottom_; }
+  void highlight_emergency(bool on) { emergency_highlit_ = on; }
+
+  // What keys do.
+  void pause_or_go_on();
+  void step(int moments);
+  void keep_picture();
+
+ private:
+  void take_moments(double seconds);
+  void draw_scene(const Modifiers& modifiers, float width, float height);
+  void steer(const Modifiers& modifiers, float x, float y);
+  void draw_time(float width);
+  void draw_plot(float width, float height);
+  void draw_side();
+  void draw_state();
+  void draw_values();
+  void draw_looks();
+  void draw_material();
+  ScenePicture picture() const;
+
+  ExploreSettings settings_;
+  TouchSource& source_;
+  SceneRenderer renderer_;
+  Camera camera_;
+  std::optional<PointerControl> control_;
+  Timeline timeline_;
+  std::vector<SceneMoment> fresh_;
+  std::string under_pointer_, note_;
+  bool labels_ = false, dark_ = true;
+  int cut_axis_ = 0;  ///< 0: none; else 1 to 3: x, y, z
+  float cut_at_ = 0;  ///< of the size of the scene
+  int touched_object_ = 0;  ///< whose material the sliders show; the last: all
+  bool dragging_time_ = false;
+  float emergency_bottom_ = 40;
+  bool emergency_highlit_ = false, fitted_ = false;
+};
+
+}  // namespace palpate::runner

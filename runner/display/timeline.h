@@ -1,0 +1,65 @@
+#pragma once
+// The last minute of a scene that is touched: what is shown of it, and how time goes on.
+
+#include <cstddef>
+#include <deque>
+
+#include "runner/display/scene/scene_drawing.h"
+
+namespace palpate::runner {
+
+/// Belongs to the display's thread. Times in s, of the moments.
+class Timeline {
+ public:
+  static constexpr double kSpan = 60;               ///< s; older moments are dropped
+  static constexpr std::size_t kMost = 60'001;      ///< moments
+  static constexpr double kSlowest = 0.001, kFastest = 4;  ///< times as fast
+
+  enum class State {
+    following,  ///< the newest moment is shown
+    playing,    ///< time goes on from an earlier one
+    paused,
+  };
+
+  /// Appends a later moment; one that is not later begins anew.
+  void add(SceneMoment moment);
+  void clear();
+
+  /// The moment to show; none before the first.
+  const SceneMoment* shown() const;
+  bool empty() const { return moments_.empty(); }
+  const std::deque<SceneMoment>& moments() const { return moments_; }
+  double first() const;  ///< 0 where there is none; so the others
+  double last() const;
+  double now() const;  ///< of the moment that is shown
+  State state() const { return state_; }
+  double speed() const { return speed_; }
+
+  void pause();
+  /// From the moment that is shown; at the end from the beginning.
+  void play();
+  void follow();
+  /// Pauses so many moments later, or earlier.
+  void step(int moments);
+  /// Pauses at the last moment not after `time`, or the first.
+  void seek(double time);
+  void set_speed(double speed);
+  /// \param seconds  that have passed outside
+  void advance(double seconds);
+
+ private:
+  std::size_t index_at(double time) const;
+
+  std::deque<SceneMoment> moments_;
+  State state_ = State::following;
+  double time_ = 0;        ///< shown, where it does not follow
+  std::size_t index_ = 0;  ///< likewise
+  double speed_ = 1;
+};
+
+/// s
+inline double time_of(const SceneMoment& moment) {
+  return 1e-9 * static_cast<double>(moment.sample.time_ns);
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,165 @@
+// A scene that a hand touches while the display looks or does not.
+
+#include "runner/commands/explore/live_touch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <thread>
+#include <utility>
+
+#include "runner/servo/servo_fault.h"
+#include "tests/runner/fake_device.h"
+
+namespace palpate::runner {
+namespace {
+
+using std::chrono::steady_clock;
+
+/// The times are those of 1 kHz; in truth ticks come some hundred times as fast.
+class FastClock final : public Clock {
+ public:
+  std::int64_t now_ns() noexcept override { return now_; }
+  void wait_until(std::int64_t when_ns) noexcept override {
+    if (++ticks_ % 64 == 0) std::this_thread::sleep_for(std::chrono::microseconds(100));
+    now_ = std::max(now_, when_ns);
+  }
+ private:
+  std::int64_t now_ = 0;
+  std::uint64_t ticks_ = 0;
+};
+
+/// A hand that comes down onto the cube's upper face and stays 3 mm deep.
+DeviceReading pressing(int tick) {
+  const double y = std::max(0.022, 0.05 - 1e-4 * tick);
+  DeviceReading reading;
+  reading.stylus = {{0, y, 0}, {0, y + 0.12, 0}};
+  return reading;
+}
+
+LiveTouch::Settings settings_of() {
+  LiveTouch::Settings out;
+  out.scene_path = "scene.json";
+  stimuli::ObjectSpec cube;
+  cube.shape = stimuli::ShapeKind::cube;
+  cube.edge = 0.05;
+  cube.material.stiffness = 500;
+  out.spec.objects = {cube};
+  out.renderer = &rendering::ray_renderer();
+  out.servo.realtime = {0, false, -1, false};
+  out.servo.ring = 1 << 17;  // at that pace a recorder without the processor falls far behind
+  return out;
+}
+
+/// Only a hang reaches the end.
+template <class Condition>
+bool comes_true(Condition condition) {
+  const auto end = steady_clock::now() + std::chrono::seconds(60);
+  while (!condition()) {
+    if (steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+class LiveTouchTest : public ::testing::Test {
+ protected:
+  testing::FakeDevice device_{pressing};
+  FastClock clock_;
+};
+
+// Five seconds of ticks in which the display does not look once.
+TEST_F(LiveTouchTest, ADisplayThatStallsMakesNoTickLateAndLosesNone) {
+  LiveTouch touch(device_, clock_, settings_of());
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 5000; }));
+  std::vector<SceneMoment> moments;
+  touch.take(moments);
+  ASSERT_GE(moments.size(), 5000U);
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const Sample& sample = moments[i].sample;
+    ASSERT_EQ(sample.lateness_ns, 0) << i;
+    ASSERT_EQ(sample.faults & (servo_fault::kSamplesLost | servo_fault::kMissedTicks), 0U) << i;
+    const std::int64_t before = i > 0 ? moments[i - 1].sample.time_ns : sample.time_ns - 1'000'000;
+    ASSERT_EQ(sample.time_ns - before, 1'000'000) << i;
+  }
+  EXPECT_NEAR(moments.back().sample.device1.y + moments.back().sample.device2.y, 500 * 0.003, 1e-9);
+  ASSERT_EQ(moments.back().contacts.size(), 1U);
+  EXPECT_NEAR(moments.back().contacts[0].place.y, 0.025, 1e-9);
+}
+
+TEST_F(LiveTouchTest, OfALongStallTheLastPartIsKept) {
+  LiveTouch touch(device_, clock_, settings_of());
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 70'000; }));
+  std::vector<SceneMoment> moments;
+  touch.take(moments);
+  EXPECT_LE(moments.size(), 60'001U);
+  EXPECT_GE(moments.size(), 45'000U);
+  for (std::size_t i = 1; i < moments.size(); ++i)
+    ASSERT_EQ(moments[i].sample.time_ns - moments[i - 1].sample.time_ns, 1'000'000) << i;
+}
+
+TEST_F(LiveTouchTest, AfterAnEmergencyNothingIsFeltUntilItIsTakenBack) {
+  LiveTouch touch(device_, clock_, settings_of());
+  const auto newest = [&] {
+    std::vector<SceneMoment> moments;
+    touch.take(moments);
+    return moments.empty() ? Sample() : moments.back().sample;
+  };
+  ASSERT_TRUE(comes_true([&] { return newest().device1.y > 1; }));
+  touch.emergency_zero();
+  ASSERT_TRUE(comes_true([&] { return (newest().faults & servo_fault::kTripped) != 0; }));
+  const Sample off = newest();
+  EXPECT_EQ(off.device1, Vec3(0));
+  EXPECT_EQ(off.device2, Vec3(0));
+  touch.clear_fault();
+  EXPECT_TRUE(comes_true([&] { return newest().device1.y > 1; }));
+}
+
+TEST_F(LiveTouchTest, WhileItIsHeldNothingIsFeltAndNothingHappens) {
+  LiveTouch touch(device_, clock_, settings_of());
+  std::vector<SceneMoment> moments;
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
+  touch.hold(true);
+  std::uint64_t before = 0;
+  ASSERT_TRUE(comes_true([&] { return std::exchange(before, touch.recorded()) == touch.recorded() && touch.servo().forces_are_off(); }));
+  touch.hold(false);
+  EXPECT_TRUE(comes_true([&] { return touch.recorded() > before + 100; })) << "it goes on";
+}
+
+TEST_F(LiveTouchTest, AnotherMaterialIsFeltOnceTheHandHasLeft) {
+  // Down and up again, so that the object is left.
+  testing::FakeDevice device([](int tick) {
+    const double y = 0.03 - 0.008 * std::sin(0.002 * tick);
+    DeviceReading reading;
+    reading.stylus = {{0, y, 0}, {0, y + 0.12, 0}};
+    return reading;
+  });
+  LiveTouch touch(device, clock_, settings_of());
+  const auto stiffness_becomes = [&](double wanted) {
+    return comes_true([&] {
+      std::vector<SceneMoment> moments;
+      touch.take(moments);
+      for (const SceneMoment& moment : moments) {
+        const rendering::Rendering& r = moment.sample.rendering;
+        if (r.contacts == 1 && std::abs(glm::length(r.force) - wanted * r.deepest.depth) < 1e-9 * wanted) return true;
+      }
+      return false;
+    });
+  };
+  ASSERT_TRUE(stiffness_becomes(500));
+  std::vector<stimuli::ObjectSpec> softer = settings_of().spec.objects;
+  softer[0].material.stiffness = 200;
+  touch.show(softer);
+  EXPECT_TRUE(stiffness_becomes(200));
+  EXPECT_EQ(touch.trouble(), "");
+  softer[0].material.layers = {{0.04, 100, 0}};
+  touch.show(softer);
+  EXPECT_TRUE(comes_true([&] { return !touch.trouble().empty(); })) << "a layer deeper than the cube";
+}
+
+}  // namespace
+}  // namespace palpate::runner

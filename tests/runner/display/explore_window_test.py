@@ -1,0 +1,145 @@
+"""The window of `palpate explore`, on a display in memory.
+
+Usage: explore_window_test.py PALPATE PROTOCOLS
+"""
+
+import json
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+from virtual_screen import VirtualScreen, skip_without_screen, wait_for
+
+PROTOCOLS = pathlib.Path(sys.argv.pop()) if len(sys.argv) > 2 else None
+PALPATE = sys.argv.pop() if len(sys.argv) > 1 else None
+
+SCENE = {"objects": [{"shape": "cube", "edge_m": 0.06, "stiffness_n_per_m": 300}, {"shape": "sphere", "radius_m": 0.02, "position_m": [0.07, 0, 0]}]}
+
+
+def reddish(pixel):
+    return pixel[0] > 2 * pixel[1] and pixel[0] > 2 * pixel[2]
+
+
+class ExploreWindow(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        skip_without_screen()
+
+    def setUp(self):
+        self.screen = VirtualScreen("1200x800")
+        self.addCleanup(self.screen.close)
+        keep = tempfile.TemporaryDirectory()
+        self.addCleanup(keep.cleanup)
+        self.folder = pathlib.Path(keep.name)
+        self.scene = self.folder / "scene.json"
+        self.scene.write_text(json.dumps(SCENE))
+
+    def open(self, *options):
+        scene = options[0] if options and str(options[0]).endswith(".json") else self.scene
+        options = [option for option in options if option != scene]
+        self.program = subprocess.Popen([PALPATE, "explore", scene, *options], env=self.screen.environment, text=True,
+                                        stderr=subprocess.PIPE)
+        self.addCleanup(lambda: (self.program.poll() is None and self.program.kill(), self.program.wait(), self.program.stderr.close()))
+        self.window = self.screen.window(f"{pathlib.Path(scene).name} - palpate explore")
+        self.screen.focus(self.window)
+        self.width, self.height = self.screen.size(self.window)
+        wait_for("the emergency button", lambda: reddish(self.pixel(40, 20)))
+
+    def pixel(self, x, y):
+        return self.screen.pixels(self.window, x, y)[0]
+
+    def pixels(self, left, top, width, height):
+        return self.screen.pixels(self.window, left, top, width, height)
+
+    def end(self):
+        self.program.send_signal(signal.SIGTERM)
+        return self.program.wait(timeout=60)
+
+    def state_is_red(self):
+        """'Forces are off' stands at the top of the panel on the right."""
+        left = int(0.74 * self.width)
+        return sum(r > 200 and g < 140 and b < 140 for r, g, b in self.pixels(left, 70, self.width - left - 5, 90)) > 20
+
+    def test_a_recorded_path_plays_pauses_and_is_kept(self):
+        scene = PROTOCOLS / "scenes" / "fig13-two-objects.json"
+        self.open(scene, "--trajectory", scene.with_suffix(".csv"), "--pictures", self.folder / "kept")
+        view = (20, 80, int(0.6 * self.width), int(0.6 * self.height))
+        first = self.pixels(*view)
+        wait_for("a moving picture", lambda: self.pixels(*view) != first)
+        time.sleep(4)  # to the end of the path
+        self.screen.keep(self.window, "explore_recorded")
+        self.screen.key("space")  # from the beginning
+        self.screen.key("space")
+        paused = self.screen.settled_picture(self.window)
+        self.screen.key("Right")
+        self.screen.settled_picture(self.window, differs_from=paused)
+        self.screen.key("s")
+        wait_for("the picture", lambda: list((self.folder / "kept").glob("scene-1.png")))
+        self.assertEqual((self.folder / "kept" / "scene-1.png").read_bytes()[1:4], b"PNG")
+        self.assertEqual(self.end(), 0)
+
+    def test_the_emergency_is_there_by_key_and_button_and_is_taken_back(self):
+        self.open()
+        self.assertFalse(self.state_is_red())
+        for ask in (lambda: self.screen.key("Escape"), lambda: self.screen.key("F12"),
+                    lambda: self.screen.click(self.window, 30, 25), lambda: self.screen.click(self.window, self.width - 30, 25)):
+            ask()
+            wait_for("forces that are off", self.state_is_red)
+            self.screen.keep(self.window, "explore_emergency")
+            # The button below says 'Allow forces again'.
+            self.screen.click(self.window, int(0.87 * self.width), 135)
+            wait_for("forces that may be on", lambda: not self.state_is_red())
+        self.assertEqual(self.end(), 0)
+
+    def test_the_pointer_touches_what_is_under_it(self):
+        self.open("--labels")
+        middle = int(0.35 * self.width), int(0.42 * self.height)
+        self.screen.point(self.window, middle[0] - 40, middle[1])
+        time.sleep(1)
+        for step in range(12):
+            self.screen.point(self.window, middle[0] - 30 + 5 * step, middle[1] + step)
+            time.sleep(0.1)
+        self.screen.do("click", "--repeat", 4, 4)  # the wheel: press harder
+        self.screen.point(self.window, *middle)
+        yellow = lambda: sum(r > 180 and 120 < g < 210 and b < 110 for r, g, b in self.pixels(20, 80, int(0.68 * self.width), int(0.68 * self.height)))
+        try:
+            wait_for("a force arrow", lambda: yellow() > 30)
+        finally:
+            self.screen.keep(self.window, "explore_mouse")
+        self.assertEqual(self.end(), 0)
+
+    def test_nothing_covers_the_emergency_button(self):
+        self.open()
+        for width, height in ((1200, 800), (700, 480)):
+            self.screen.do("windowsize", self.window, width, height)
+            wait_for("the size", lambda: self.screen.size(self.window) == (width, height))
+            wait_for("the button", lambda: all(reddish(self.pixel(int(share * width), 13)) for share in (0.1, 0.5, 0.9)))
+        self.screen.keep(self.window, "explore_small")
+
+    def test_without_a_display_it_says_so(self):
+        for environment in ({}, {"DISPLAY": ":98765"}):
+            done = subprocess.run([PALPATE, "explore", self.scene], text=True, capture_output=True,
+                                  env=dict({k: v for k, v in self.screen.environment.items() if k != "DISPLAY"}, **environment))
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn("--frames", done.stderr)
+
+    def test_a_display_that_is_lost_ends_it_in_order(self):
+        self.open()
+        self.screen.kill()
+        self.assertEqual(self.program.wait(timeout=60), 1)
+        self.assertIn("forces are off", self.program.stderr.read())
+
+    def test_options_that_do_not_go_together(self):
+        for words, options in (("expected one of them", ["--device", "mouse", "--trajectory", "x.csv"]), ("--frames", ["--size", "20x20"]),
+                               ("no device", ["--device", "hand"]), ("window", ["--frames", "f", "--trajectory", "t", "--device", "mouse"])):
+            done = subprocess.run([PALPATE, "explore", self.scene, *options], text=True, capture_output=True, env=self.screen.environment)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(words, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
