@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "protocols/scene_spec.h"
 #include "runner/display/scene/scene_drawing.h"
 #include "runner/display/touch_source.h"
 #include "runner/display/window.h"

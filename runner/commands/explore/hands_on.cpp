@@ -127,6 +127,9 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
                    }});
   const WatchedForces watched(signals, touch.servo());
   explore_in_window(std::move(window), touch);
+  const ServoHealth& health = touch.servo().health();
+  std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
+            << health.lost_samples() << " not shown\n";
   return 0;
 }
 
@@ -139,6 +142,9 @@ int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer
   ExploreSettings window = window_settings(spec, renderer, settings);
   window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
   explore_in_window(std::move(window), touch);
+  const ServoHealth& health = touch.servo().health();
+  std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
+            << health.lost_samples() << " not shown\n";
   return 0;
 }
 

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "protocols/scene_spec.h"
+#include "protocols/parse.h"
 #include "rendering/renderer.h"
 #include "runner/display/touch_source.h"
 #include "runner/servo/servo_thread.h"

@@ -5,6 +5,7 @@ Usage: explore_window_test.py PALPATE PROTOCOLS
 
 import json
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -42,12 +43,19 @@ class ExploreWindow(unittest.TestCase):
         scene = options[0] if options and str(options[0]).endswith(".json") else self.scene
         options = [option for option in options if option != scene]
         self.program = subprocess.Popen([PALPATE, "explore", scene, *options], env=self.screen.environment, text=True,
-                                        stderr=subprocess.PIPE)
-        self.addCleanup(lambda: (self.program.poll() is None and self.program.kill(), self.program.wait(), self.program.stderr.close()))
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(self.close_program)
         self.window = self.screen.window(f"{pathlib.Path(scene).name} - palpate explore")
         self.screen.focus(self.window)
         self.width, self.height = self.screen.size(self.window)
         wait_for("the emergency button", lambda: reddish(self.pixel(40, 20)))
+
+    def close_program(self):
+        if self.program.poll() is None:
+            self.program.kill()
+        self.program.wait()
+        self.program.stdout.close()
+        self.program.stderr.close()
 
     def pixel(self, x, y):
         return self.screen.pixels(self.window, x, y)[0]
@@ -111,6 +119,20 @@ class ExploreWindow(unittest.TestCase):
         finally:
             self.screen.keep(self.window, "explore_mouse")
         self.assertEqual(self.end(), 0)
+
+    def test_the_servo_does_not_wait_for_a_display_that_stalls(self):
+        self.open("--device", "simulated")
+        self.screen.stall()
+        stalled = time.monotonic()
+        time.sleep(5)
+        stalled = time.monotonic() - stalled
+        self.screen.go_on()
+        self.assertEqual(self.end(), 0)
+        ticks, missed, lost = map(int, re.findall(r"\d+", self.program.stdout.read()))
+        # Each period has a tick or was missed, which a busy machine may do; none waited for the display.
+        self.assertGreater(ticks + missed, 1000 * stalled)
+        self.assertLess(missed, 0.5 * ticks)
+        self.assertEqual(lost, 0)
 
     def test_nothing_covers_the_emergency_button(self):
         self.open()
