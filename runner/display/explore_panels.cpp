@@ -67,7 +67,8 @@ void ExploreView::draw_plot(float width, float height) {
   const float low = at.y + height - 0.6F * font, high = at.y + 1.8F * font;
   const double first = timeline_.first(), span = std::max(timeline_.last() - first, 1e-3);
   if (ImGui::IsItemActive() && to > from) {
-    timeline_.seek(first + span * static_cast<double>((ImGui::GetIO().MousePos.x - from) / (to - from)));
+    timeline_.seek(first +
+                   span * static_cast<double>((ImGui::GetIO().MousePos.x - from) / (to - from)));
     source_.hold(true);
   }
   double most = 0.1;
@@ -88,8 +89,8 @@ void ExploreView::draw_plot(float width, float height) {
   };
   for (const SceneMoment& moment : timeline_.moments()) {
     const auto column = std::min(
-        columns - 1, static_cast<std::size_t>(static_cast<double>(columns) *
-                                              (time_of(moment) - first) / span));
+        columns - 1,
+        static_cast<std::size_t>(static_cast<double>(columns) * (time_of(moment) - first) / span));
     const double force = force_of(moment);
     if (column != here) {
       flush();
@@ -103,8 +104,7 @@ void ExploreView::draw_plot(float width, float height) {
   if (line.size() > 1)
     list.AddPolyline(line.data(), static_cast<int>(line.size()), IM_COL32(247, 199, 66, 255), 0,
                      1.5F);
-  const auto cursor =
-      from + static_cast<float>((timeline_.now() - first) / span) * (to - from);
+  const auto cursor = from + static_cast<float>((timeline_.now() - first) / span) * (to - from);
   list.AddLine({cursor, at.y + 0.3F * font}, {cursor, at.y + height - 0.3F * font},
                IM_COL32(240, 240, 240, 200), 1.5F);
   const std::string words = "Force on the hand, up to " + fixed_point(most, 2) + " N; " +
@@ -126,7 +126,8 @@ void ExploreView::draw_values() {
   table_row("Contacts", std::to_string(r.contacts));
   table_row("Depth", fixed_point(1000 * r.deepest.depth, 3) + " mm");
   table_row("Kind", rendering::to_string(r.deepest.type));
-  const bool known = r.object >= 0 && static_cast<std::size_t>(r.object) < settings_.drawing.objects();
+  const bool known =
+      r.object >= 0 && static_cast<std::size_t>(r.object) < settings_.drawing.objects();
   table_row("Object", known ? settings_.drawing.label(static_cast<std::size_t>(r.object)) : "none");
   table_row("Pointer on", under_pointer_.empty() ? "nothing" : under_pointer_);
   ImGui::EndTable();
@@ -148,7 +149,8 @@ void ExploreView::draw_looks() {
 void ExploreView::draw_material() {
   const int all = static_cast<int>(settings_.objects.size());
   const auto name = [&](int i) {
-    return i == all ? std::string("all objects") : settings_.drawing.label(static_cast<std::size_t>(i));
+    return i == all ? std::string("all objects")
+                    : settings_.drawing.label(static_cast<std::size_t>(i));
   };
   coloured_text(console_colour::kQuiet, "Material");
   if (ImGui::BeginCombo("of", name(touched_object_).c_str())) {
@@ -163,8 +165,8 @@ void ExploreView::draw_material() {
   auto damping = static_cast<float>(example.material.damping);
   auto friction = static_cast<float>(example.material.friction_static);
   bool done = false;
-  const auto slider = [&](const char* label, float& value, float least, float most, const char* form,
-                          const std::function<void(stimuli::Material&)>& change) {
+  const auto slider = [&](const char* label, float& value, float least, float most,
+                          const char* form, const std::function<void(stimuli::Material&)>& change) {
     if (ImGui::SliderFloat(label, &value, least, most, form,
                            least > 0 ? ImGuiSliderFlags_Logarithmic : 0))
       for_each_chosen(settings_.objects, touched_object_, change);

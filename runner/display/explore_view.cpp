@@ -143,9 +143,9 @@ void ExploreView::draw_scene(const Modifiers& modifiers, float width, float heig
     fitted_ = true;
   }
   const ImVec2 at = ImGui::GetCursorScreenPos(), scale = ImGui::GetIO().DisplayFramebufferScale;
-  const unsigned texture = renderer_.draw(picture(), camera_, dark_ ? dark_theme() : light_theme(),
-                                          static_cast<int>(width * scale.x),
-                                          static_cast<int>(height * scale.y));
+  const unsigned texture =
+      renderer_.draw(picture(), camera_, dark_ ? dark_theme() : light_theme(),
+                     static_cast<int>(width * scale.x), static_cast<int>(height * scale.y));
   // OpenGL textures have their origin at the lower left.
   // NOLINTNEXTLINE(performance-no-int-to-ptr): the identity that the OpenGL back end asks for
   const auto image = reinterpret_cast<ImTextureID>(std::uintptr_t{texture});
@@ -189,8 +189,8 @@ void ExploreView::steer(const Modifiers& modifiers, float x, float y) {
   under_pointer_.clear();
   if (over) {
     const glm::vec3 eye = camera_.eye();
-    const auto hit = line_of_sight(
-        eye, glm::normalize(camera_.unproject(pointer.at, camera_.centre()) - eye));
+    const auto hit =
+        line_of_sight(eye, glm::normalize(camera_.unproject(pointer.at, camera_.centre()) - eye));
     if (hit) under_pointer_ = settings_.drawing.label(hit->object);
   }
   if (!touches) {
@@ -222,8 +222,8 @@ void ExploreView::draw_side() {
 
 void ExploreView::draw_state() {
   const SceneMoment* const newest = timeline_.empty() ? nullptr : &timeline_.moments().back();
-  const bool off =
-      newest != nullptr && (newest->sample.faults & (servo_fault::kTripped | servo_fault::kEmergency)) != 0;
+  const bool off = newest != nullptr &&
+                   (newest->sample.faults & (servo_fault::kTripped | servo_fault::kEmergency)) != 0;
   coloured_text(console_colour::kQuiet, settings_.title);
   if (off) {
     coloured_text(console_colour::kBad, "Forces are off");

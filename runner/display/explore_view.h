@@ -51,8 +51,8 @@ class ExploreView {
   std::vector<SceneMoment> fresh_;
   std::string under_pointer_, note_;
   bool labels_ = false, dark_ = true;
-  int cut_axis_ = 0;  ///< 0: none; else 1 to 3: x, y, z
-  float cut_at_ = 0;  ///< of the size of the scene
+  int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z
+  float cut_at_ = 0;        ///< of the size of the scene
   int touched_object_ = 0;  ///< whose material the sliders show; the last: all
   bool dragging_time_ = false;
   float emergency_bottom_ = 40;

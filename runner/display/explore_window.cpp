@@ -140,8 +140,8 @@ class ExploreWindow {
 
   static void on_button(GLFWwindow* window, int button, int action, int mods) {
     auto& self = *static_cast<ExploreWindow*>(glfwGetWindowUserPointer(window));
-    // In the event callback, not in a frame of Dear ImGui, where a drag could hold the pointer and a
-    // slow frame would delay it.
+    // In the event callback, not in a frame of Dear ImGui, where a drag could hold the pointer and
+    // a slow frame would delay it.
     if (action == GLFW_PRESS && self.view_->in_emergency_button(self.pointer_y_)) {
       self.source_.emergency_zero();
       return;

@@ -16,8 +16,8 @@ struct ExploreSettings {
   std::string title;    ///< UTF-8
   double ui_scale = 0;  ///< of text and buttons; 0: taken from the monitor
   std::vector<stimuli::ObjectSpec> objects;
-  SceneDrawing drawing;        ///< of these
-  SceneDrawingSettings looks;  ///< at first
+  SceneDrawing drawing;          ///< of these
+  SceneDrawingSettings looks;    ///< at first
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the scene; nullptr: none
   WorkspaceMap workspace = {};   ///< of the servo, for the mouse
   /// Keeps a picture and says where, or why not; empty: no pictures are kept.

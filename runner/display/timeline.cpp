@@ -36,9 +36,9 @@ double Timeline::now() const {
 }
 
 std::size_t Timeline::index_at(double time) const {
-  const auto after = std::upper_bound(
-      moments_.begin(), moments_.end(), time,
-      [](double t, const SceneMoment& moment) { return t < time_of(moment); });
+  const auto after =
+      std::upper_bound(moments_.begin(), moments_.end(), time,
+                       [](double t, const SceneMoment& moment) { return t < time_of(moment); });
   return after == moments_.begin() ? 0 : static_cast<std::size_t>(after - moments_.begin()) - 1;
 }
 
@@ -56,7 +56,8 @@ void Timeline::step(int moments) {
   pause();
   if (moments_.empty()) return;
   const auto most = static_cast<std::ptrdiff_t>(moments_.size()) - 1;
-  const auto to = std::clamp(static_cast<std::ptrdiff_t>(index_) + moments, std::ptrdiff_t{0}, most);
+  const auto to =
+      std::clamp(static_cast<std::ptrdiff_t>(index_) + moments, std::ptrdiff_t{0}, most);
   index_ = static_cast<std::size_t>(to);
   time_ = time_of(moments_[index_]);
 }

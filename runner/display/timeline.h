@@ -11,8 +11,8 @@ namespace palpate::runner {
 /// Belongs to the display's thread. Times in s, of the moments.
 class Timeline {
  public:
-  static constexpr double kSpan = 60;               ///< s; older moments are dropped
-  static constexpr std::size_t kMost = 60'001;      ///< moments
+  static constexpr double kSpan = 60;                      ///< s; older moments are dropped
+  static constexpr std::size_t kMost = 60'001;             ///< moments
   static constexpr double kSlowest = 0.001, kFastest = 4;  ///< times as fast
 
   enum class State {

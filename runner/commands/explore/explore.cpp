@@ -32,12 +32,12 @@ void add_options(CommandLine& line) {
        "between pictures")  //
       ("view", po::value<std::string>()->value_name("YAW,PITCH[,ZOOM]")->default_value("30,22"),
        "where the camera of the pictures stands, degrees: 0,0 looks along -z with y up; what is "
-       "touched is in the picture")                                   //
+       "touched is in the picture")                                     //
       ("labels", po::bool_switch(), "number and shape at each object")  //
       ("pictures", po::value<std::string>()->value_name("DIR"),
        "where the window keeps pictures: scene-1.png and so on")  //
       ("calibration", po::value<std::string>()->value_name("FILE"),
-       "of the device, as for palpate run")  //
+       "of the device, as for palpate run")                                                       //
       ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used")  //
       ("force", "replace existing files and frames");
 }
@@ -71,8 +71,8 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   outputs.write();
   std::cout << drawn.pictures << " pictures of " << settings.size.width << " x "
             << settings.size.height << " px, " << drawn.seconds << " s of the path\n"
-            << "a tick took " << drawn.tick_median_ns / 1000 << " us in the median, 99 of 100 at most "
-            << drawn.tick_p99_ns / 1000 << " us\n";
+            << "a tick took " << drawn.tick_median_ns / 1000
+            << " us in the median, 99 of 100 at most " << drawn.tick_p99_ns / 1000 << " us\n";
   return 0;
 }
 
@@ -97,7 +97,8 @@ int explore_command(const std::vector<std::string>& args) {
   line.usage =
       "palpate explore SCENE.json [--device NAME | --trajectory T.csv] [--renderer point|ray]\n"
       "               [--labels] [--pictures DIR]\n"
-      "       palpate explore SCENE.json --trajectory T.csv (--frames DIR | --animation FILE.webp)\n"
+      "       palpate explore SCENE.json --trajectory T.csv (--frames DIR | --animation "
+      "FILE.webp)\n"
       "               [--renderer point|ray] [--size 1280x720] [--every 16ms]\n"
       "               [--view YAW,PITCH[,ZOOM]] [--labels] [--force]";
   line.summary =

@@ -89,7 +89,8 @@ void LiveTouch::take(std::vector<SceneMoment>& out) {
     const std::lock_guard lock(mutex_);
     taken.swap(fresh_);
   }
-  out.insert(out.end(), std::make_move_iterator(taken.begin()), std::make_move_iterator(taken.end()));
+  out.insert(out.end(), std::make_move_iterator(taken.begin()),
+             std::make_move_iterator(taken.end()));
 }
 
 void LiveTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {

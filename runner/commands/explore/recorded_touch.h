@@ -15,7 +15,8 @@ SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
                       const rendering::Scene& scene, const rendering::Rendering& rendering,
                       const rendering::RenderState& state);
 
-/// A recorded path, touched in one go. Of a long path at most Timeline::kMost rows are kept, evenly.
+/// A recorded path, touched in one go. Of a long path at most Timeline::kMost rows are kept,
+/// evenly.
 class RecordedTouch final : public TouchSource {
  public:
   /// \throws MeshError

@@ -28,6 +28,7 @@ class FastClock final : public Clock {
     if (++ticks_ % 64 == 0) std::this_thread::sleep_for(std::chrono::microseconds(100));
     now_ = std::max(now_, when_ns);
   }
+
  private:
   std::int64_t now_ = 0;
   std::uint64_t ticks_ = 0;
@@ -125,7 +126,10 @@ TEST_F(LiveTouchTest, WhileItIsHeldNothingIsFeltAndNothingHappens) {
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
   touch.hold(true);
   std::uint64_t before = 0;
-  ASSERT_TRUE(comes_true([&] { return std::exchange(before, touch.recorded()) == touch.recorded() && touch.servo().forces_are_off(); }));
+  ASSERT_TRUE(comes_true([&] {
+    return std::exchange(before, touch.recorded()) == touch.recorded() &&
+           touch.servo().forces_are_off();
+  }));
   touch.hold(false);
   EXPECT_TRUE(comes_true([&] { return touch.recorded() > before + 100; })) << "it goes on";
 }
@@ -145,7 +149,9 @@ TEST_F(LiveTouchTest, AnotherMaterialIsFeltOnceTheHandHasLeft) {
       touch.take(moments);
       for (const SceneMoment& moment : moments) {
         const rendering::Rendering& r = moment.sample.rendering;
-        if (r.contacts == 1 && std::abs(glm::length(r.force) - wanted * r.deepest.depth) < 1e-9 * wanted) return true;
+        if (r.contacts == 1 &&
+            std::abs(glm::length(r.force) - wanted * r.deepest.depth) < 1e-9 * wanted)
+          return true;
       }
       return false;
     });
@@ -158,7 +164,8 @@ TEST_F(LiveTouchTest, AnotherMaterialIsFeltOnceTheHandHasLeft) {
   EXPECT_EQ(touch.trouble(), "");
   softer[0].material.layers = {{0.04, 100, 0}};
   touch.show(softer);
-  EXPECT_TRUE(comes_true([&] { return !touch.trouble().empty(); })) << "a layer deeper than the cube";
+  EXPECT_TRUE(comes_true([&] { return !touch.trouble().empty(); }))
+      << "a layer deeper than the cube";
 }
 
 }  // namespace
