@@ -142,9 +142,6 @@ int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer
   ExploreSettings window = window_settings(spec, renderer, settings);
   window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
   explore_in_window(std::move(window), touch);
-  const ServoHealth& health = touch.servo().health();
-  std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
-            << health.lost_samples() << " not shown\n";
   return 0;
 }
 
