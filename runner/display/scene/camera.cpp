@@ -13,7 +13,7 @@ namespace {
 constexpr float kFieldOfView = 0.45F;               // rad, vertical
 constexpr float kNear = 0.03F, kFar = 40;           // of the distance
 constexpr float kSteepestPitch = 1.5F;              // rad
-constexpr float kNearest = 0.01F, kFarthest = 100;  // m, of the camera from the centre
+constexpr float kNearest = 1e-4F, kFarthest = 1e5F;  // m, of the camera from the centre
 constexpr float kMargin = 1.12F;                    // of a picture about what must be in it
 
 }  // namespace

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
-#include <map>
+#include <span>
+#include <utility>
 
 #include "stimuli/compose.h"
 #include "stimuli/parts/triangulate.h"
@@ -77,12 +79,13 @@ void smooth(DrawnMesh& mesh) {
                               std::abs(corner.position.z));
   if (!(size > 0)) return;
   const float cell = 1e-4F * size;
-  std::map<std::array<long, 3>, std::vector<std::size_t>> places;
+  using Place = std::array<std::int64_t, 3>;
+  std::vector<std::pair<Place, std::size_t>> places(mesh.size());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const glm::vec3& p = mesh[i].position;
-    places[{std::lround(p.x / cell), std::lround(p.y / cell), std::lround(p.z / cell)}].push_back(
-        i);
+    places[i] = {{std::llround(p.x / cell), std::llround(p.y / cell), std::llround(p.z / cell)}, i};
   }
+  std::ranges::sort(places);
   // Each triangle weighs by its angle at the corner, so that how a face is cut does not matter.
   std::vector<float> angles(mesh.size());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
@@ -93,10 +96,12 @@ void smooth(DrawnMesh& mesh) {
     angles[i] = std::acos(std::clamp(glm::dot(a, b), -1.0F, 1.0F));
   }
   const DrawnMesh flat = mesh;
-  for (const auto& [place, corners] : places) {
-    for (const std::size_t i : corners) {
+  for (std::size_t first = 0, last = 0; first < places.size(); first = last) {
+    while (last < places.size() && places[last].first == places[first].first) ++last;
+    const std::span<const std::pair<Place, std::size_t>> corners(&places[first], last - first);
+    for (const auto& [place, i] : corners) {
       glm::vec3 sum(0);
-      for (const std::size_t k : corners) {
+      for (const auto& [same_place, k] : corners) {
         if (glm::dot(flat[i].normal, flat[k].normal) > kFlattest) sum += angles[k] * flat[k].normal;
       }
       if (glm::length(sum) > 0) mesh[i].normal = glm::normalize(sum);
