@@ -10,11 +10,11 @@
 namespace palpate::runner {
 namespace {
 
-constexpr float kFieldOfView = 0.45F;               // rad, vertical
-constexpr float kNear = 0.03F, kFar = 40;           // of the distance
-constexpr float kSteepestPitch = 1.5F;              // rad
+constexpr float kFieldOfView = 0.45F;                // rad, vertical
+constexpr float kNear = 0.03F, kFar = 40;            // of the distance
+constexpr float kSteepestPitch = 1.5F;               // rad
 constexpr float kNearest = 1e-4F, kFarthest = 1e5F;  // m, of the camera from the centre
-constexpr float kMargin = 1.12F;                    // of a picture about what must be in it
+constexpr float kMargin = 1.12F;                     // of a picture about what must be in it
 
 }  // namespace
 

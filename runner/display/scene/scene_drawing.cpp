@@ -78,8 +78,8 @@ std::string caption_of(const SceneMoment& moment, double grid) {
   const double torque = glm::length(torque_on_hand(moment));
   const bool large = torque >= 1;
   std::snprintf(text, sizeof text, "%.2f s    force %.2f N    torque %.*f %s    grid %g mm",
-                1e-9 * static_cast<double>(sample.time_ns), force, large ? 2 : 1, large ? torque : 1000 * torque,
-                large ? "N m" : "mN m", 1000 * grid);
+                1e-9 * static_cast<double>(sample.time_ns), force, large ? 2 : 1,
+                large ? torque : 1000 * torque, large ? "N m" : "mN m", 1000 * grid);
   return text;
 }
 
