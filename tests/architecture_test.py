@@ -30,7 +30,7 @@ MAY_INCLUDE = {
     "data/merge": {"data", "data/files", "data/store"},
     "analysis": {"stimuli"},
     "analysis/input": {"analysis", "stimuli", "protocols", "data", "data/files", "data/store"},
-    "analysis/statistics": {"analysis", "analysis/input", "stimuli"},
+    "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols"},
     "runner": RENDERING | {"protocols"},
@@ -82,7 +82,7 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space",
-    "protocols/procedures": "procedure_spec",
+    "protocols/procedures": "procedure_spec psychometric",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",

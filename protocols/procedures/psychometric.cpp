@@ -50,11 +50,7 @@ double level_at(LevelScale scale, double position) {
   return twelve_digits(portable_exp(in_log10(scale, position) * kLn10));
 }
 
-double psychometric_core(const PsychometricFunction& function, double level, double threshold,
-                         double slope) {
-  const double above =
-      scale_position(function.scale, level) - scale_position(function.scale, threshold);
-  const double distance = function.easier == Easier::higher ? above : -above;
+double psychometric_share(const PsychometricFunction& function, double distance, double slope) {
   switch (function.shape) {
     case PsychometricShape::logistic:
       return 1 / (1 + portable_exp(-slope * distance));
@@ -64,6 +60,13 @@ double psychometric_core(const PsychometricFunction& function, double level, dou
       return 1 - portable_exp(-portable_exp(slope * in_log10(function.scale, distance) * kLn10));
   }
   return 0;
+}
+
+double psychometric_core(const PsychometricFunction& function, double level, double threshold,
+                         double slope) {
+  const double above =
+      scale_position(function.scale, level) - scale_position(function.scale, threshold);
+  return psychometric_share(function, function.easier == Easier::higher ? above : -above, slope);
 }
 
 double psychometric_probability(const PsychometricFunction& function,

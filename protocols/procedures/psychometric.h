@@ -35,7 +35,9 @@ struct PsychometricParameters {
   double lapse = 0;      ///< share of failures at the easiest; guess + lapse < 1
 };
 
-/// F alone, without guess and lapse.
+/// F, without guess and lapse, at a distance from the threshold on the scale towards the easier.
+double psychometric_share(const PsychometricFunction& function, double distance, double slope);
+/// F at a level.
 double psychometric_core(const PsychometricFunction& function, double level, double threshold,
                          double slope);
 double psychometric_probability(const PsychometricFunction& function,

@@ -1,0 +1,81 @@
+#pragma once
+// Psychometric functions fitted by maximum likelihood, with intervals by the profile likelihood and
+// the deviance as goodness of fit.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/statistics/paired.h"
+#include "protocols/procedures/psychometric.h"
+
+namespace palpate::analysis {
+
+/// Answers at one level.
+struct LevelCount {
+  double level = 0;
+  int trials = 0, successes = 0;
+};
+
+/// Sums the trials of equal levels; in order of level.
+std::vector<LevelCount> sum_by_level(std::vector<LevelCount> counts);
+
+/// The guess or lapse rate: a constant, or free from 0 to `most`.
+struct RateModel {
+  double value = 0;
+  bool free = false;
+  double most = 0.1;
+};
+
+struct PsychometricModel {
+  protocols::PsychometricFunction function;
+  RateModel guess, lapse;
+};
+
+struct PsychometricFit {
+  std::string undefined;  ///< why there is no fit; empty: fitted
+  protocols::PsychometricParameters parameters;
+  double log_likelihood = 0;  ///< of the answers in their order: without binomial coefficients
+  int trials = 0;
+  /// 95 %, where twice the loss of profile log likelihood is the 0.95 quantile of chi squared with
+  /// one degree of freedom. An end is infinite (threshold: +-, or 0 and infinity on a logarithmic
+  /// scale) where the data exclude no value on that side.
+  Interval threshold_ci95, slope_ci95;
+  bool slope_at_bound =
+      false;  ///< answers change between two levels at once: no slope is too steep
+};
+
+PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
+                                 const PsychometricModel& model);
+
+/// Deviance from the saturated model and its place in the distribution of refitted simulations.
+struct GoodnessOfFit {
+  double deviance = 0;
+  int levels = 0;
+  std::optional<double> p;  ///< (1 + number at least as large) / (1 + simulations)
+  int simulations = 0;
+};
+
+/// \param simulations  0: without p
+GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model,
+                              const PsychometricFit& fit, int simulations, std::uint64_t seed);
+
+/// What is read off a fitted function. JND: half the distance between the levels of F = 0.25 and
+/// 0.75, on a linear scale in its unit. On a logarithmic scale the ratio of half of it less 1 is
+/// the Weber fraction.
+struct Discrimination {
+  double pse = 0;  ///< level of F = 0.5
+  Interval pse_ci95;
+  std::optional<double> jnd;
+  std::optional<Interval> jnd_ci95;
+  std::optional<double> weber_fraction;  ///< linear scale: JND / standard, where that is above 0
+  std::optional<Interval> weber_fraction_ci95;
+};
+
+/// \param standard  the level it was compared with; nullopt: the PSE
+Discrimination discrimination(const PsychometricFit& fit,
+                              const protocols::PsychometricFunction& function,
+                              std::optional<double> standard);
+
+}  // namespace palpate::analysis

@@ -1,0 +1,225 @@
+// Psychometric fits against R (glm, psyphy's links, optim on the definition), and what their
+// intervals cover.
+
+#include "analysis/statistics/psychometric_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "analysis/statistics/psychometric_bayes.h"
+#include "stimuli/random.h"
+
+namespace palpate::analysis {
+namespace {
+
+using protocols::Easier;
+using protocols::LevelScale;
+using protocols::PsychometricShape;
+using PsychometricJson = nlohmann::json;
+
+PsychometricJson psychophysics_fixture() {
+  return PsychometricJson::parse(
+      std::ifstream(PALPATE_SOURCE_DIR "/tests/analysis/fixtures/psychophysics.json"));
+}
+
+PsychometricModel model_of(const PsychometricJson& one) {
+  PsychometricModel model;
+  const std::string shape = one["shape"];
+  model.function.shape = shape == "logistic" ? PsychometricShape::logistic
+                         : shape == "normal" ? PsychometricShape::normal
+                                             : PsychometricShape::weibull;
+  if (one["scale"] == "log") model.function.scale = LevelScale::log10;
+  if (one.value("easier", "higher") == "lower") model.function.easier = Easier::lower;
+  model.guess = {one["guess"], one["free_guess"], one.value("most", 0.1)};
+  model.lapse = {one["lapse"], one["free_lapse"], one.value("most", 0.1)};
+  return model;
+}
+
+std::vector<LevelCount> counts_of(const PsychometricJson& one) {
+  std::vector<LevelCount> counts;
+  for (std::size_t i = 0; i < one["levels"].size(); ++i)
+    counts.push_back({one["levels"][i], one["n"][i], one["k"][i]});
+  return counts;
+}
+
+TEST(PsychometricFit, AgreesWithR) {
+  const PsychometricJson fixture = psychophysics_fixture();
+  ASSERT_EQ(fixture["psychometric"].size(), 12u);
+  for (const auto& one : fixture["psychometric"]) {
+    SCOPED_TRACE(one["name"].get<std::string>());
+    const PsychometricModel model = model_of(one);
+    const auto counts = counts_of(one);
+    const PsychometricFit fit = fit_psychometric(counts, model);
+    ASSERT_EQ(fit.undefined, "");
+    const double threshold = one["threshold"], slope = one["slope"];
+    EXPECT_NEAR(fit.parameters.threshold / threshold, 1, 2e-5);
+    EXPECT_NEAR(fit.parameters.slope / slope, 1, 1e-4);
+    if (one.contains("deviance")) {
+      const GoodnessOfFit good = goodness_of_fit(counts, model, fit, 0, 1);
+      EXPECT_NEAR(good.deviance, one["deviance"].get<double>(), 1e-6);
+    } else {
+      EXPECT_NEAR(fit.log_likelihood, one["log_likelihood"].get<double>(), 1e-6);
+    }
+    const auto near = [&one](double value, const char* key) {
+      if (one.contains(key) && one[key].is_number()) {
+        EXPECT_NEAR(value / one[key].get<double>(), 1, 1e-3) << key;
+      }
+    };
+    near(fit.threshold_ci95.low, "threshold_low");
+    near(fit.threshold_ci95.high, "threshold_high");
+    near(fit.slope_ci95.low, "slope_low");
+    near(fit.slope_ci95.high, "slope_high");
+  }
+}
+
+TEST(PsychometricFit, SaysWhereThereIsNone) {
+  EXPECT_EQ(fit_psychometric({}, {}).undefined, "no trials");
+  EXPECT_EQ(fit_psychometric({{1, 9, 4}}, {}).undefined, "fewer than two levels");
+  EXPECT_EQ(fit_psychometric({{1, 9, 0}, {2, 9, 0}}, {}).undefined, "no success at any level");
+  EXPECT_EQ(fit_psychometric({{1, 9, 9}, {2, 9, 9}}, {}).undefined, "no failure at any level");
+}
+
+TEST(PsychometricFit, AStepHasASlopeAtItsBoundAndAThresholdBetween) {
+  const PsychometricFit fit = fit_psychometric({{1, 9, 0}, {2, 9, 0}, {3, 9, 9}, {4, 9, 9}}, {});
+  EXPECT_GT(fit.parameters.threshold, 2);
+  EXPECT_LT(fit.parameters.threshold, 3);
+  EXPECT_TRUE(std::isinf(fit.slope_ci95.high));
+  EXPECT_GT(fit.slope_ci95.low, 0);
+}
+
+TEST(PsychometricFit, AThresholdOutsideTheLevelsHasAnOpenInterval) {
+  // Hardly anything above chance: how far the threshold is away, nobody knows.
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  const PsychometricFit fit =
+      fit_psychometric({{1, 20, 10}, {2, 20, 11}, {3, 20, 10}, {4, 20, 12}}, model);
+  EXPECT_TRUE(std::isinf(fit.threshold_ci95.high));
+}
+
+TEST(PsychometricFit, DiscriminationIsReadOffTheFunction) {
+  PsychometricFit fit;
+  fit.parameters = {510, 0.02, 0, 0};
+  fit.threshold_ci95 = {500, 520};
+  fit.slope_ci95 = {0.01, 0.04};
+  const Discrimination logistic = discrimination(fit, {}, 500.0);
+  EXPECT_NEAR(logistic.pse, 510, 1e-9);
+  EXPECT_NEAR(*logistic.jnd, std::log(3) / 0.02, 1e-9);
+  EXPECT_NEAR(logistic.jnd_ci95->high, std::log(3) / 0.01, 1e-9);
+  EXPECT_NEAR(*logistic.weber_fraction, std::log(3) / 0.02 / 500, 1e-12);
+  const Discrimination on_logs =
+      discrimination(fit, {PsychometricShape::normal, LevelScale::log10}, std::nullopt);
+  EXPECT_NEAR(*on_logs.weber_fraction, std::pow(10, 0.6744897501960817 / 0.02) - 1,
+              1e-9 * *on_logs.weber_fraction);
+  // The Weibull function's PSE is not its threshold: 1 - exp(-(x / t)^s) = 1/2.
+  const Discrimination weibull =
+      discrimination(fit, {PsychometricShape::weibull, LevelScale::log10}, std::nullopt);
+  EXPECT_NEAR(weibull.pse, 510 * std::pow(std::log(2), 1 / 0.02), 1e-6);
+}
+
+/// A simulated study of constant stimuli.
+std::vector<LevelCount> simulate_counts(const PsychometricModel& truth,
+                                        const protocols::PsychometricParameters& parameters,
+                                        stimuli::Random& random) {
+  std::vector<LevelCount> counts;
+  for (int level = 0; level <= 8; ++level) {
+    LevelCount count{static_cast<double>(level), 30, 0};
+    const double p = psychometric_probability(truth.function, parameters, level);
+    for (int i = 0; i < count.trials; ++i) count.successes += random.unit() < p ? 1 : 0;
+    counts.push_back(count);
+  }
+  return counts;
+}
+
+bool holds(const Interval& interval, double value) {
+  return interval.low <= value && value <= interval.high;
+}
+
+TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
+  struct Case {
+    const char* name;
+    PsychometricModel model;
+    protocols::PsychometricParameters truth;
+  };
+  const Case cases[] = {
+      {"yes/no", {}, {4, 1.2, 0, 0}},
+      {"2AFC, lapses free",
+       {{PsychometricShape::normal}, {0.5, false, 0.1}, {0, true, 0.1}},
+       {4, 0.7, 0.5, 0.03}},
+  };
+  for (const Case& one : cases) {
+    int threshold = 0, slope = 0, bayes_threshold = 0, bayes_slope = 0;
+    for (const std::uint64_t seed : {1U, 2U}) {
+      stimuli::Random random(seed, {0xc0});
+      for (int study = 0; study < 200; ++study) {
+        const auto counts = simulate_counts(one.model, one.truth, random);
+        const PsychometricFit fit = fit_psychometric(counts, one.model);
+        ASSERT_EQ(fit.undefined, "");
+        threshold += holds(fit.threshold_ci95, one.truth.threshold) ? 1 : 0;
+        slope += holds(fit.slope_ci95, one.truth.slope) ? 1 : 0;
+        const PsychometricPosterior posterior = psychometric_posterior(counts, one.model);
+        bayes_threshold += holds(posterior.threshold_ci95, one.truth.threshold) ? 1 : 0;
+        bayes_slope += holds(posterior.slope_ci95, one.truth.slope) ? 1 : 0;
+      }
+      std::printf("%s, up to seed %llu: intervals hold threshold %d, slope %d; Bayes %d, %d\n",
+                  one.name, static_cast<unsigned long long>(seed), threshold, slope,
+                  bayes_threshold, bayes_slope);
+    }
+    // Of 400 intervals 380 are expected, with a standard deviation of 4.4.
+    for (const int covered : {threshold, slope, bayes_threshold, bayes_slope})
+      EXPECT_GE(covered, 367);
+    for (const int covered : {threshold, slope}) EXPECT_LE(covered, 393);
+  }
+}
+
+TEST(PsychometricFit, DevianceOfARightModelHasAnEvenPAndOfAWrongOneASmall) {
+  stimuli::Random random(4);
+  int below_fifth = 0;
+  for (int study = 0; study < 60; ++study) {
+    const auto counts = simulate_counts({}, {4, 1.2, 0, 0}, random);
+    const PsychometricFit fit = fit_psychometric(counts, {});
+    const GoodnessOfFit good = goodness_of_fit(counts, {}, fit, 99, 7);
+    EXPECT_EQ(good.levels, 9);
+    below_fifth += *good.p <= 0.2 ? 1 : 0;
+  }
+  EXPECT_NEAR(below_fifth, 12, 4 * std::sqrt(60 * 0.2 * 0.8));
+  // Answers that rise and fall again are no function of this kind.
+  const std::vector<LevelCount> bent{{0, 30, 1}, {2, 30, 28}, {4, 30, 4}, {6, 30, 27}, {8, 30, 29}};
+  EXPECT_LT(*goodness_of_fit(bent, {}, fit_psychometric(bent, {}), 199, 7).p, 0.02);
+}
+
+TEST(PsychometricPosterior, EqualsADenseGrid) {
+  const std::vector<LevelCount> counts{
+      {1, 20, 11}, {2, 20, 12}, {3, 20, 15}, {4, 20, 17}, {5, 20, 20}};
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  const PsychometricPosterior posterior = psychometric_posterior(counts, model);
+  // The same priors on a grid of 800 x 800 by the definition: thresholds -1 .. 7, slopes by their
+  // log from 0.1 / 4 to 40 / 1.
+  double sum = 0, mean_threshold = 0, square = 0, mean_log_slope = 0;
+  for (int i = 0; i < 800; ++i) {
+    const double t = -1 + 8 * (i + 0.5) / 800;
+    for (int j = 0; j < 800; ++j) {
+      const double s = std::log(0.025) + std::log(1600) * (j + 0.5) / 800;
+      double weight = 1;
+      for (const auto& [level, n, k] : counts) {
+        const double p = 0.5 + 0.5 / (1 + std::exp(-std::exp(s) * (level - t)));
+        weight *= std::pow(p, k) * std::pow(1 - p, n - k);
+      }
+      sum += weight;
+      mean_threshold += weight * t;
+      square += weight * t * t;
+      mean_log_slope += weight * s;
+    }
+  }
+  mean_threshold /= sum;
+  EXPECT_NEAR(posterior.mean.threshold, mean_threshold, 2e-3);
+  EXPECT_NEAR(posterior.threshold_scale_sd,
+              std::sqrt(square / sum - mean_threshold * mean_threshold), 2e-3);
+  EXPECT_NEAR(std::log(posterior.mean.slope), mean_log_slope / sum, 5e-3);
+}
+
+}  // namespace
+}  // namespace palpate::analysis
