@@ -90,10 +90,10 @@ PUBLIC = {
     "data/export": "bids csv psychds sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
-    "analysis/input": "csv_reader renderers study_record sweep_table trials",
-    "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis",
+    "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
+    "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis task_analysis",
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures",
-    "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables",
+    "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source triple_buffer",

@@ -3,17 +3,21 @@
 #include <cmath>
 #include <cstdint>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
 #include "analysis/input/study_record.h"
+#include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"
+#include "analysis/report/task_report.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/task_analysis.h"
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -51,6 +55,29 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
   if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
 }
 
+constexpr int kRefits = 199;  // of each goodness of fit
+constexpr std::uint64_t kRefitSeed = 2026;
+
+/// An export of a study of version 2.
+void analyze_tasks_of(const std::string& csv, Outputs& outputs) {
+  if (outputs.wanted("report") || outputs.wanted("figures"))
+    throw UsageError("--report, --figures: trials with a column 'task' have text and --json");
+  const analysis::TaskAnalysis found =
+      analysis::analyze_tasks(analysis::read_task_trials_csv(csv), kRefits, kRefitSeed);
+  if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
+  outputs.write();
+  std::cout << task_report_text(found);
+}
+
+/// Whether a CSV file is one; what cannot be read is told by who reads it.
+bool is_of_tasks(const std::string& csv) {
+  try {
+    return !csv.empty() && analysis::has_task_column(csv);
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
@@ -65,7 +92,10 @@ int analyze_command(const std::vector<std::string>& args) {
       "and the tables go to stdout. Existing files are replaced only with --force.\n"
       "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and "
       "what\n"
-      "they depend on (Sobol indices of a saltelli design, rank correlations of others).";
+      "they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
+      "Of a CSV file with a column 'task' (exports of protocols of version 2): thresholds, PSE "
+      "and\n"
+      "JND, d', magnitude estimation, adjustment, information and confidence, by task.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
@@ -99,6 +129,10 @@ int analyze_command(const std::vector<std::string>& args) {
     const std::string text = analyze_sweep_file(sweep, pattern, outputs);
     outputs.write();
     std::cout << text;
+    return 0;
+  }
+  if (is_of_tasks(csv)) {
+    analyze_tasks_of(csv, outputs);
     return 0;
   }
 

@@ -1,0 +1,33 @@
+#pragma once
+// Trials of protocols of version 2: what was asked, at which level, and what was answered.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::analysis {
+
+/// One completed trial that is not practice.
+struct TaskTrial {
+  std::string participant, task, block_name, renderer, shape, response;
+  std::string track;
+  std::optional<double> level, standard_level, number, confidence;
+  bool catch_trial = false, success = false, correct = false, answered = false;
+};
+
+struct TaskTable {
+  std::string source;             ///< path as the user gave it
+  std::vector<TaskTrial> trials;  ///< in the order of the source
+  std::size_t n_practice = 0;     ///< left out
+  bool simulated = false;         ///< some of them
+};
+
+/// Whether a CSV file has a column "task" (an export of a study of version 2).
+bool has_task_column(const std::string& path);
+
+/// Reads an export of trials. Needs participant_id, task, renderer and shape; of level,
+/// standard_level, success, number, confidence, ... what is there. \throws protocols::InputError
+/// with every fault.
+TaskTable read_task_trials_csv(const std::string& path);
+
+}  // namespace palpate::analysis

@@ -1,0 +1,161 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "analysis/report/task_report.h"
+
+namespace palpate::analysis {
+namespace {
+
+using TaskJson = nlohmann::ordered_json;
+
+TaskJson finite(double value) { return std::isfinite(value) ? TaskJson(value) : TaskJson(nullptr); }
+
+TaskJson maybe(const std::optional<double>& value) {
+  return value ? finite(*value) : TaskJson(nullptr);
+}
+
+TaskJson ends_json(const std::optional<Interval>& interval) {
+  if (!interval) return nullptr;
+  return {finite(interval->low), finite(interval->high)};
+}
+
+void put_status(TaskJson& out, const std::string& undefined) {
+  out["status"] = undefined.empty() ? "ok" : "undefined";
+  if (!undefined.empty()) out["reason"] = undefined;
+}
+
+TaskJson fit_json(const ParticipantFunction& one) {
+  TaskJson fit;
+  put_status(fit, one.fit.undefined);
+  if (!one.fit.undefined.empty()) return fit;
+  fit["function"] = "logistic";
+  fit["threshold"] = one.fit.parameters.threshold;
+  fit["threshold_ci95"] = ends_json(one.fit.threshold_ci95);
+  fit["slope"] = one.fit.parameters.slope;
+  fit["slope_ci95"] = ends_json(one.fit.slope_ci95);
+  fit["slope_at_bound"] = one.fit.slope_at_bound;
+  fit["guess"] = one.fit.parameters.guess;
+  fit["lapse"] = one.fit.parameters.lapse;
+  fit["log_likelihood"] = one.fit.log_likelihood;
+  fit["deviance"] = one.goodness.deviance;
+  fit["deviance_p"] = maybe(one.goodness.p);
+  fit["pse"] = one.discrimination.pse;
+  fit["pse_ci95"] = ends_json(one.discrimination.pse_ci95);
+  fit["jnd"] = maybe(one.discrimination.jnd);
+  fit["jnd_ci95"] = ends_json(one.discrimination.jnd_ci95);
+  fit["weber_fraction"] = maybe(one.discrimination.weber_fraction);
+  fit["weber_fraction_ci95"] = ends_json(one.discrimination.weber_fraction_ci95);
+  return fit;
+}
+
+TaskJson function_json(const ParticipantFunction& one) {
+  TaskJson out{{"participant_id", one.participant}};
+  for (const LevelCount& count : one.counts)
+    out["levels"].push_back(
+        {{"level", count.level}, {"trials", count.trials}, {"successes", count.successes}});
+  out["fit"] = fit_json(one);
+  out["track"] = one.track;
+  TaskJson detection;
+  put_status(detection, one.detectability.undefined);
+  if (one.detectability.undefined.empty()) {
+    detection["d_prime"] = maybe(one.detectability.d_prime);
+    detection["d_prime_ci95"] = ends_json(one.detectability.d_prime_ci95);
+    detection["criterion"] = maybe(one.detectability.criterion);
+    detection["criterion_ci95"] = ends_json(one.detectability.criterion_ci95);
+  }
+  out["detectability"] = detection;
+  return out;
+}
+
+TaskJson magnitude_json(const TaskCell& cell) {
+  TaskJson out{{"exponent", maybe(cell.magnitude->exponent)},
+               {"exponent_ci95", ends_json(cell.magnitude->exponent_ci95)},
+               {"n_without_logarithm", cell.magnitude->without_logarithm}};
+  for (const StevensLine& line : cell.magnitude->lines)
+    out["participants"].push_back({{"participant_id", cell.participants[line.participant]},
+                                   {"exponent", maybe(line.exponent)},
+                                   {"exponent_se", maybe(line.exponent_se)},
+                                   {"log10_scale", maybe(line.log10_scale)},
+                                   {"r_squared", maybe(line.r_squared)}});
+  for (const MagnitudeMean& one : cell.magnitude->means)
+    out["levels"].push_back({{"level", one.level},
+                             {"geometric_mean", one.geometric_mean},
+                             {"ci95", ends_json(one.ci95)},
+                             {"n_participants", one.participants}});
+  return out;
+}
+
+TaskJson cell_json(const TaskCell& cell) {
+  TaskJson out{{"task", cell.task},
+               {"block_name", cell.block_name},
+               {"shape", cell.shape},
+               {"renderer", cell.renderer},
+               {"n_trials", cell.trials},
+               {"n_answered", cell.answered},
+               {"n_correct", cell.correct},
+               {"standard_level", maybe(cell.standard_level)},
+               {"forced_choice", cell.forced_choice}};
+  for (const ParticipantFunction& one : cell.functions)
+    out["psychometric_functions"].push_back(function_json(one));
+  if (cell.magnitude) out["magnitude_estimation"] = magnitude_json(cell);
+  for (const Adjustment& one : cell.adjustments)
+    out["adjustments"].push_back({{"participant_id", cell.participants[one.participant]},
+                                  {"n_settings", one.settings},
+                                  {"pse", one.pse},
+                                  {"pse_ci95", ends_json(one.pse_ci95)},
+                                  {"constant_error", one.constant_error},
+                                  {"sd", maybe(one.sd)},
+                                  {"jnd", maybe(one.jnd)},
+                                  {"start_effect", maybe(one.start_effect)}});
+  if (cell.information)
+    out["information_transfer"] = {{"bits", maybe(cell.information->plain)},
+                                   {"bits_corrected", maybe(cell.information->corrected)},
+                                   {"se", maybe(cell.information->se)},
+                                   {"stimulus_entropy_bits", cell.information->stimulus_entropy},
+                                   {"categories", maybe(cell.information->categories)}};
+  TaskJson confidence;
+  put_status(confidence, cell.confidence.undefined);
+  if (cell.confidence.area) {
+    confidence["type2_roc_area"] = *cell.confidence.area;
+    confidence["ci95"] = ends_json(cell.confidence.area_ci95);
+  }
+  out["confidence"] = confidence;
+  return out;
+}
+
+TaskJson comparison_json(const RendererComparison& one) {
+  TaskJson out{{"block_name", one.block_name},
+               {"shape", one.shape},
+               {"reference", one.renderers[0]},
+               {"natural_logarithms", one.logarithms}};
+  for (const ConditionDifference& difference : one.comparison.differences)
+    out["differences"].push_back({{"renderer", one.renderers[difference.condition]},
+                                  {"n_pairs", difference.n_pairs},
+                                  {"mean", difference.mean},
+                                  {"ci95", ends_json(difference.t_test.log_ratio_ci95)},
+                                  {"t", maybe(difference.t_test.t)},
+                                  {"p", maybe(difference.t_test.p)},
+                                  {"p_holm", maybe(difference.t_test.p_holm)},
+                                  {"mixed_estimate", maybe(difference.mixed_estimate)},
+                                  {"mixed_se", maybe(difference.mixed_se)}});
+  return out;
+}
+
+}  // namespace
+
+std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
+  TaskJson out{{"version", 1},
+               {"simulated", analysis.table.simulated},
+               {"source", analysis.table.source},
+               {"program_version", program_version},
+               {"n_trials", analysis.table.trials.size()},
+               {"n_practice", analysis.table.n_practice},
+               {"cells", TaskJson::array()},
+               {"renderer_comparisons", TaskJson::array()}};
+  for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
+  for (const RendererComparison& one : analysis.comparisons)
+    out["renderer_comparisons"].push_back(comparison_json(one));
+  return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
+}
+
+}  // namespace palpate::analysis

@@ -1,0 +1,150 @@
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "analysis/report/task_report.h"
+#include "analysis/text.h"
+
+namespace palpate::analysis {
+namespace {
+
+/// Four significant digits; levels may be millimetres or kilonewtons.
+std::string short_number(double value) {
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  std::array<char, 32> text{};
+  const auto end =
+      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4);
+  return {text.data(), end.ptr};
+}
+
+std::string with_interval(double value, const Interval& interval) {
+  return short_number(value) + " [" + short_number(interval.low) + ", " +
+         short_number(interval.high) + "]";
+}
+
+std::string optional_interval(const std::optional<double>& value,
+                              const std::optional<Interval>& interval) {
+  if (!value) return "undefined";
+  return interval ? with_interval(*value, *interval) : short_number(*value);
+}
+
+std::string function_text(const TaskCell& cell, const ParticipantFunction& one) {
+  std::string text = "  " + pad_right(stimuli::printable(one.participant), 12);
+  if (!one.fit.undefined.empty()) return text + "no function: " + one.fit.undefined + "\n";
+  if (cell.forced_choice || cell.task == "detect") {
+    text += "threshold " + with_interval(one.fit.parameters.threshold, one.fit.threshold_ci95);
+    if (cell.forced_choice && cell.standard_level)
+      text +=
+          ", JND " + short_number(std::abs(one.fit.parameters.threshold - *cell.standard_level));
+  } else {
+    text += "PSE " + with_interval(one.discrimination.pse, one.discrimination.pse_ci95) + ", JND " +
+            optional_interval(one.discrimination.jnd, one.discrimination.jnd_ci95);
+    if (one.discrimination.weber_fraction)
+      text += ", Weber fraction " + short_number(*one.discrimination.weber_fraction);
+  }
+  text += ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
+  if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
+  if (one.detectability.d_prime)
+    text += ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
+            ", criterion " +
+            optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
+  return text + "\n";
+}
+
+std::string magnitude_text(const TaskCell& cell) {
+  std::string text;
+  const MagnitudeEstimation& magnitude = *cell.magnitude;
+  for (const StevensLine& line : magnitude.lines) {
+    text += "  " + pad_right(stimuli::printable(cell.participants[line.participant]), 12);
+    text += line.exponent ? "exponent " + short_number(*line.exponent) : line.undefined;
+    if (line.r_squared) text += ", r2 " + short_number(*line.r_squared);
+    text += "\n";
+  }
+  if (magnitude.exponent)
+    text += "  exponent over participants " +
+            optional_interval(magnitude.exponent, magnitude.exponent_ci95) + "\n";
+  for (const MagnitudeMean& one : magnitude.means)
+    text += "  level " + short_number(one.level) + ": geometric mean " +
+            optional_interval(one.geometric_mean, one.ci95) + "\n";
+  if (magnitude.without_logarithm > 0)
+    text += "  " + counted(magnitude.without_logarithm, "answer", "answers") +
+            " of 0 or below left out: they have no logarithm\n";
+  return text;
+}
+
+std::string adjustment_text(const TaskCell& cell) {
+  std::string text;
+  for (const Adjustment& one : cell.adjustments) {
+    text += "  " + pad_right(stimuli::printable(cell.participants[one.participant]), 12) + "PSE " +
+            optional_interval(one.pse, one.pse_ci95) + ", constant error " +
+            short_number(one.constant_error);
+    if (one.jnd) text += ", JND " + short_number(*one.jnd);
+    if (one.start_effect) text += ", from above less from below " + short_number(*one.start_effect);
+    text += "\n";
+  }
+  return text;
+}
+
+std::string cell_text(const TaskCell& cell) {
+  std::string text = cell.task;
+  for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
+    if (!name->empty()) text += ", " + stimuli::printable(*name);
+  }
+  text += ": " + counted(cell.trials, "trial", "trials") + " of " +
+          counted(cell.participants.size(), "participant", "participants") + ", " +
+          std::to_string(cell.answered) + " answered\n";
+  for (const ParticipantFunction& one : cell.functions) text += function_text(cell, one);
+  if (cell.magnitude) text += magnitude_text(cell);
+  text += adjustment_text(cell);
+  if (cell.information && cell.information->plain) {
+    text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
+            short_number(cell.information->stimulus_entropy) + "; less the bias of few trials " +
+            short_number(*cell.information->corrected) + " bit, " +
+            short_number(*cell.information->categories) + " categories\n";
+  }
+  if (cell.confidence.area)
+    text += "  confidence: area under the type 2 ROC " +
+            optional_interval(cell.confidence.area, cell.confidence.area_ci95) + "\n";
+  return text + "\n";
+}
+
+std::string comparison_text(const RendererComparison& one) {
+  std::string text = "Thresholds by renderer, " + stimuli::printable(one.block_name) + ", " +
+                     stimuli::printable(one.shape) +
+                     (one.logarithms ? " (ratios)\n" : " (differences)\n");
+  for (const ConditionDifference& difference : one.comparison.differences) {
+    const auto shown = [&](double value) {
+      return short_number(one.logarithms ? std::exp(value) : value);
+    };
+    text += "  " + stimuli::printable(one.renderers[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + stimuli::printable(one.renderers[0]) + ": ";
+    if (difference.n_pairs == 0) {
+      text += "no participant has both\n";
+      continue;
+    }
+    text += shown(difference.mean);
+    if (const auto& ends = difference.t_test.log_ratio_ci95)
+      text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
+    if (difference.t_test.p) text += ", p " + p_text(*difference.t_test.p);
+    if (difference.mixed_estimate) text += "; mixed model " + shown(*difference.mixed_estimate);
+    text += " (" + counted(difference.n_pairs, "pair", "pairs") + ")\n";
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string task_report_text(const TaskAnalysis& analysis) {
+  std::string text;
+  if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
+  for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
+  for (const RendererComparison& one : analysis.comparisons) text += comparison_text(one);
+  text +=
+      "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare "
+      "with "
+      "levels on\none side of the standard: guesses 0.5, the threshold is at half of what is above "
+      "(75 % without lapses);\ndetect: guesses free. d': log-linear correction.\n";
+  return text;
+}
+
+}  // namespace palpate::analysis
