@@ -56,7 +56,7 @@ def rows_of_a_study(seed):
         for shape in ("sphere", "cube"):
             for _ in range(20):
                 right = draw.random() < 0.9
-                add(name, "identify", "shapes", "ray", shape, shape if right else "cone", right)
+                add(name, "identify", "shapes", "ray", shape, shape if right else {"sphere": "cube", "cube": "sphere"}[shape], right)
     return rows
 
 
