@@ -31,7 +31,7 @@ MAY_INCLUDE = {
     "analysis": {"stimuli"},
     "analysis/input": {"analysis", "stimuli", "protocols", "data", "data/files", "data/store"},
     "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
-    "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli"},
+    "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols"},
     "runner": RENDERING | {"protocols"},
     "runner/servo": RENDERING | {"runner"},
@@ -92,7 +92,7 @@ PUBLIC = {
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
     "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis task_analysis",
-    "analysis/figures": "axes figure_svg figures marks palette sweep_figures",
+    "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
     "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "

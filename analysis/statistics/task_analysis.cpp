@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -72,6 +73,17 @@ std::vector<double> first_track(const Trials& trials) {
   return {};
 }
 
+/// Catch trials tell the guess rate: they stand infinitely far on the hard side.
+std::vector<LevelCount> with_catch_trials(std::vector<LevelCount> counts,
+                                          const DetectionCounts& detections,
+                                          protocols::Easier easier) {
+  if (detections.noise_trials == 0) return counts;
+  const double infinity = std::numeric_limits<double>::infinity();
+  counts.push_back({easier == protocols::Easier::higher ? -infinity : infinity,
+                    detections.noise_trials, detections.false_alarms});
+  return counts;
+}
+
 ParticipantFunction function_of(const std::string& participant, const Trials& trials,
                                 const TaskCell& cell, int simulations, std::uint64_t seed) {
   ParticipantFunction result;
@@ -79,15 +91,19 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   result.counts = counts_of_levels(trials);
   result.model.function.easier = easier_of(result.counts);
   if (cell.forced_choice) result.model.guess.value = 0.5;
-  if (cell.task == "detect") result.model.guess = {0, true, 0.5};
+  const DetectionCounts detections = detections_of(trials);
+  std::vector<LevelCount> counts = result.counts;
+  if (cell.task == "detect") {
+    result.model.guess = {0, true, 0.5};
+    counts = with_catch_trials(counts, detections, result.model.function.easier);
+  }
   result.model.lapse = {0, true, 0.06};
-  result.fit = fit_psychometric(result.counts, result.model);
+  result.fit = fit_psychometric(counts, result.model);
   if (result.fit.undefined.empty()) {
-    result.goodness = goodness_of_fit(result.counts, result.model, result.fit, simulations, seed);
+    result.goodness = goodness_of_fit(counts, result.model, result.fit, simulations, seed);
     result.discrimination = discrimination(result.fit, result.model.function, cell.standard_level);
   }
   result.track = first_track(trials);
-  const DetectionCounts detections = detections_of(trials);
   result.detectability =
       cell.task == "detect" ? detectability(detections, DetectionTask::yes_no) : Detectability{};
   if (cell.task != "detect") result.detectability.undefined = "no yes/no task";

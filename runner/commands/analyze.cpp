@@ -9,6 +9,7 @@
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
+#include "analysis/figures/task_figures.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
@@ -60,11 +61,15 @@ constexpr std::uint64_t kRefitSeed = 2026;
 
 /// An export of a study of version 2.
 void analyze_tasks_of(const std::string& csv, Outputs& outputs) {
-  if (outputs.wanted("report") || outputs.wanted("figures"))
-    throw UsageError("--report, --figures: trials with a column 'task' have text and --json");
   const analysis::TaskAnalysis found =
       analysis::analyze_tasks(analysis::read_task_trials_csv(csv), kRefits, kRefitSeed);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
+  if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
+  if (outputs.wanted("figures")) {
+    for (const analysis::Figure& figure : analysis::task_figures(found))
+      outputs.put_into_folder(figure.id + ".svg",
+                              analysis::figure_svg(figure, analysis::light_palette()));
+  }
   outputs.write();
   std::cout << task_report_text(found);
 }

@@ -127,6 +127,18 @@ class Tasks(unittest.TestCase):
                 self.assertEqual(one["fit"]["guess"], 0.5)
                 self.assertAlmostEqual(one["fit"]["threshold"], 600, delta=30)
 
+    def test_report_and_figures_show_points_fits_and_tracks(self):
+        self.write([row for row in rows_of_a_study(4) if row["participant_id"] < "T2"])
+        done = self.analyze("--report", self.path / "report.html", "--figures", self.path / "figures")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        page = (self.path / "report.html").read_text()
+        self.assertIn("SIMULATED PARTICIPANTS", page)
+        self.assertIn("Psychometric functions: compare, stiffness, ball, point", page)
+        names = {file.name for file in (self.path / "figures").iterdir()}
+        self.assertEqual(names, {f"{kind}{i}.svg" for kind in ("function", "track") for i in (1, 2, 3)})
+        drawn = (self.path / "figures" / "function1.svg").read_text()
+        self.assertIn("of 30 trials", drawn)
+
     def test_faults_name_line_and_column(self):
         rows = rows_of_a_study(1)[:20]
         rows[3]["level"] = "soft"
