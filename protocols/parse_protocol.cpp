@@ -9,6 +9,7 @@
 #include "protocols/parse_tool.h"
 #include "protocols/schedule.h"
 #include "protocols/sha256.h"
+#include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
 namespace {
@@ -74,6 +75,7 @@ void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& fil
     const std::string pointer = child_pointer(reader.pointer("stimuli"), i);
     ObjectReader item((*list)[i], pointer, reader.faults());
     protocol.stimuli.push_back(read_stimulus(item, protocol, files));
+    if (protocol.version == 2) protocol.stimulus_texts.push_back((*list)[i].dump());
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
@@ -188,6 +190,33 @@ void read_keys(ObjectReader& response, Protocol& protocol) {
   }
 }
 
+void read_breaks(ObjectReader& reader, Protocol& protocol) {
+  reader.section("breaks", [&](ObjectReader& section) {
+    section.integer("every_trials", protocol.breaks.every_trials, kCount);
+    section.number("min_seconds", protocol.breaks.min_seconds, {0, 3600, "s"});
+  });
+}
+
+void read_texts(ObjectReader& reader, Protocol& protocol) {
+  reader.section("texts", [&](ObjectReader& section) {
+    section.text("instructions", protocol.texts.instructions);
+    section.text("practice", protocol.texts.practice);
+    section.text("break", protocol.texts.break_text);
+    section.text("end", protocol.texts.end);
+    section.text("move_away", protocol.texts.move_away);
+    section.text("ready", protocol.texts.ready);
+    section.text("go", protocol.texts.go);
+    section.text("wait", protocol.texts.wait);
+    section.text("other_key", protocol.texts.other_key);
+    if (protocol.version < 2) return;
+    section.text("next_interval", protocol.texts.next_interval);
+    section.text("answer_now", protocol.texts.answer_now);
+    section.text("type_number", protocol.texts.type_number);
+    section.text("agree", protocol.texts.agree);
+    section.text("disagree", protocol.texts.disagree);
+  });
+}
+
 void read_session_settings(ObjectReader& reader, Protocol& protocol) {
   reader.section("practice", [&](ObjectReader& section) {
     auto& practice = protocol.practice;
@@ -204,10 +233,7 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
     section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
     section.integer("warm_up_trials", protocol.sessions.warm_up_trials, kFewFromZero);
   });
-  reader.section("breaks", [&](ObjectReader& section) {
-    section.integer("every_trials", protocol.breaks.every_trials, kCount);
-    section.number("min_seconds", protocol.breaks.min_seconds, {0, 3600, "s"});
-  });
+  read_breaks(reader, protocol);
   reader.section(
       "response",
       [&](ObjectReader& section) {
@@ -216,17 +242,43 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
         section.boolean("feedback", protocol.response.feedback);
       },
       Presence::required);
-  reader.section("texts", [&](ObjectReader& section) {
-    section.text("instructions", protocol.texts.instructions);
-    section.text("practice", protocol.texts.practice);
-    section.text("break", protocol.texts.break_text);
-    section.text("end", protocol.texts.end);
-    section.text("move_away", protocol.texts.move_away);
-    section.text("ready", protocol.texts.ready);
-    section.text("go", protocol.texts.go);
-    section.text("wait", protocol.texts.wait);
-    section.text("other_key", protocol.texts.other_key);
+  read_texts(reader, protocol);
+}
+
+void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
+  protocol.renderer_order = RendererOrder::fixed;
+  if (protocol.version == 2) return;  // its blocks say it
+  protocol.renderer_order = RendererOrder::counterbalanced;
+  reader.choice("renderer_order", protocol.renderer_order,
+                {{"fixed", RendererOrder::fixed},
+                 {"counterbalanced", RendererOrder::counterbalanced},
+                 {"interleaved", RendererOrder::interleaved}});
+}
+
+/// What version 1 says of the one task that it has.
+void read_identification(ObjectReader& reader, Protocol& protocol) {
+  reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
+  reader.section("order", [&](ObjectReader& section) {
+    section.choice("kind", protocol.order.kind,
+                   {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});
+    section.integer("max_run", protocol.order.max_run, kCount);
+    section.integer("min_distance", protocol.order.min_distance, kCount);
   });
+  reader.integer("blocks_per_renderer", protocol.blocks_per_renderer, kCount);
+  read_orientation(reader, protocol);
+  read_session_settings(reader, protocol);
+}
+
+/// Version 2: blocks of tasks, and pages.
+void read_tasks(ObjectReader& reader, Protocol& protocol) {
+  read_blocks(reader, protocol);
+  read_pages(reader, protocol);
+  read_orientation(reader, protocol);
+  reader.section("sessions", [&](ObjectReader& section) {
+    section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
+  });
+  read_breaks(reader, protocol);
+  read_texts(reader, protocol);
 }
 
 void read_apparatus(ObjectReader& reader, Protocol& protocol) {
@@ -250,6 +302,11 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
     section.boolean("passivity_controller", protocol.passivity_controller);
     section.choice("material_limit", protocol.material_limit,
                    {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
+    if (protocol.version == 2 && protocol.material_limit == MaterialLimit::limit) {
+      section.faults().add(section.pointer("material_limit"),
+                           "expected 'refuse' in version 2: a level that the device limits would "
+                           "not be the one on record");
+    }
   });
   reader.section("masking_noise", [&](ObjectReader& section) {
     MaskingNoise& noise = protocol.masking_noise.emplace();
@@ -266,7 +323,7 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
 }
 
 void read_version(ObjectReader& reader, Protocol& protocol) {
-  reader.integer("version", protocol.version, {1, 1}, Presence::required);
+  reader.integer("version", protocol.version, {1, 2}, Presence::required);
 }
 
 /// Checks of the whole protocol: whether a schedule exists.
@@ -312,28 +369,16 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   reader.text("title", protocol.title);
   reader.text("description", protocol.description);
   read_renderers(reader, protocol);
-  reader.choice("renderer_order", protocol.renderer_order,
-                {{"fixed", RendererOrder::fixed},
-                 {"counterbalanced", RendererOrder::counterbalanced},
-                 {"interleaved", RendererOrder::interleaved}});
+  read_renderer_order(reader, protocol);
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, {folder_of(file_name), stored});
-  reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
-  reader.section("order", [&](ObjectReader& section) {
-    section.choice("kind", protocol.order.kind,
-                   {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});
-    section.integer("max_run", protocol.order.max_run, kCount);
-    section.integer("min_distance", protocol.order.min_distance, kCount);
-  });
-  reader.integer("blocks_per_renderer", protocol.blocks_per_renderer, kCount);
-  read_orientation(reader, protocol);
-  read_session_settings(reader, protocol);
+  (protocol.version == 2 ? read_tasks : read_identification)(reader, protocol);
   read_apparatus(reader, protocol);
   reader.boolean("samples", protocol.samples);
   reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
-  if (faults.empty()) check_schedule(protocol, faults);
+  if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
   faults.throw_if_any();
 
   protocol.source_text = text;

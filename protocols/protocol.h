@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "protocols/scene_spec.h"
+#include "protocols/tasks/task_block.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::protocols {
@@ -100,10 +101,22 @@ struct Protocol {
     std::string go = "Go";
     std::string wait = "Please wait.";
     std::string other_key = "This key does nothing now.";
+    // Version 2.
+    std::string next_interval = "Space bar: on to the next.";
+    std::string answer_now = "Your answer?";
+    std::string type_number = "Type a number, then Enter.";
+    std::string agree = "I agree";
+    std::string disagree = "I do not agree";
   } texts;
   std::optional<MaskingNoise> masking_noise;
   bool samples = false;
   std::uint64_t seed = 0;
+
+  // Version 2; empty in version 1.
+  std::vector<TaskBlock> blocks;
+  bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
+  std::vector<PageSpec> pages;
+  std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
 
   std::string source_text;  ///< the file as it was read, byte for byte
   std::string sha256;       ///< of source_text, lower-case hexadecimal

@@ -252,6 +252,8 @@ std::vector<Trial> practice_round(const Protocol& protocol, int participant_numb
 
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
   if (participant_number < 1) throw std::invalid_argument("participants are numbered from 1");
+  if (protocol.version == 2)
+    throw std::invalid_argument("answers choose the trials of a protocol of version 2");
   const std::vector<Group> groups = groups_in_order(protocol, participant_number);
   std::vector<Trial> trials;
   int session = 0, block = 0, trial = 0, practised = 0;

@@ -11,12 +11,21 @@
 // The limits max_run and min_distance hold within each block and each round of practice, not across
 // their borders, where there are breaks or instructions.
 
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {
+
+/// One presentation within a trial of version 2.
+struct Interval {
+  int stimulus = 0;  ///< index into Protocol::stimuli; -1: nothing
+  RendererKind renderer = RendererKind::point;
+  std::optional<double> level = std::nullopt;  ///< none: the stimulus as it is
+  bool standard = false;                       ///< what the other interval is compared with
+};
 
 /// One scheduled presentation. Numbers count from 1; `trial` counts within the session.
 struct Trial {
@@ -25,6 +34,12 @@ struct Trial {
   int stimulus = 0;  ///< index into Protocol::stimuli
   Quat orientation{1, 0, 0, 0};
   bool practice = false;  ///< practice or warm-up: excluded from analysis
+  // Version 2; stimulus and renderer are then those of what is asked about.
+  int task_block = -1;  ///< index into Protocol::blocks; -1: version 1
+  int track = 0;        ///< 1, 2, ...: stimulus, renderer and procedure
+  std::optional<double> level = std::nullopt;  ///< adjust: where it starts
+  bool catch_trial = false;
+  std::vector<Interval> intervals = {};  ///< in the order in which they are felt
 };
 
 /// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
@@ -32,8 +47,8 @@ class ScheduleError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The trials of participant number 1, 2, ... in order. Depends on the protocol's seed and the
-/// number alone. Practice appears once, as its first round.
+/// Version 1: the trials of participant number 1, 2, ... in order. Depends on the protocol's seed
+/// and the number alone; in version 2 answers count, too (tasks/task_plan.h). Practice appears once, as its first round.
 /// \throws ScheduleError where the constraints have no solution, std::invalid_argument for a
 /// participant number below 1.
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number);

@@ -81,8 +81,8 @@ PUBLIC = {
     "rendering": "first_contact probe reach render_fault renderer scene tool tool_pose",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",
-    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space",
-    "protocols/procedures": "procedure_spec psychometric",
+    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan",
+    "protocols/procedures": "procedure procedure_spec psychometric",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
@@ -103,7 +103,7 @@ PUBLIC = {
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display explore_window text_display timeline touch_source window",
     "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
-    "runner/participants": "keyboard respondent settings_document simulated simulated_settings",
+    "runner/participants": "keyboard respondent settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay_comparison session_plan simulated_session simulated_study station",
     "runner/sweep": "design swept_study",

@@ -16,6 +16,10 @@ PROGRAM_ONLY = {
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
     "too-many-trials", "tool-segment-without-length", "two-keys",
+    "v2-adjust-limits", "v2-answer-without-key", "v2-labels-alike", "v2-level-of-another-shape", "v2-level-out-of-range",
+    "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
+    "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
+    "v2-standard-without-the-number", "v2-two-keys", "v2-unknown-stimuli",
 }
 # The same, of sweep spaces.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}
@@ -52,6 +56,18 @@ def load_schemas(folder):
     return jsonschema.Draft202012Validator(scene), jsonschema.Draft202012Validator(bundled)
 
 
+def load_version_2(folder, bundled):
+    """The schema of version 2, with the others inside."""
+    schema = read(folder / "protocol.v2.schema.json")
+    jsonschema.Draft202012Validator.check_schema(schema)
+    inner = rewrite(bundled, lambda ref: ref.replace("#/", "#/$defs/one/"))
+    inner.pop("$schema")
+    schema = rewrite(schema, lambda ref: ref.replace("protocol.schema.json#/", "#/$defs/one/").replace(
+        "scene.schema.json#/$defs/", "#/$defs/one/$defs/scene/$defs/"))
+    schema["$defs"]["one"] = inner
+    return jsonschema.Draft202012Validator(schema)
+
+
 def properties(schema):
     """All keys that a schema names."""
     found = set()
@@ -74,6 +90,7 @@ def keys(value):
 def main(source):
     tests = source / "tests" / "protocols"
     scene, protocol = load_schemas(source / "protocols")
+    version_2 = load_version_2(source / "protocols", protocol.schema)
     failures = []
 
     def faults(path):
@@ -84,6 +101,8 @@ def main(source):
             return [str(error)]
         if "1e999" in path.read_text(encoding="utf-8"):
             return ["Python reads a number that is too large as infinity"]
+        if isinstance(document, dict) and document.get("version") == 2:
+            validator = version_2
         return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
 
     good = sorted((tests / "good").glob("*.json")) + [
@@ -117,6 +136,11 @@ def main(source):
     unused -= {"objects"}  # of scenes
     if unused:
         failures.append(f"everything.json lacks {sorted(unused)}")
+    own = {k: v for k, v in version_2.schema.items() if k != "$defs"}
+    own["$defs"] = {k: v for k, v in version_2.schema["$defs"].items() if k != "one"}
+    unused = properties(own) - keys(read(tests / "good" / "everything-v2.json"))
+    if unused:
+        failures.append(f"everything-v2.json lacks {sorted(unused)}")
     if len(good) < 7 or len(bad) < 40:
         failures.append(f"only {len(good)} good and {len(bad)} bad files were found")
 

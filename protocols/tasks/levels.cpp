@@ -1,0 +1,128 @@
+#include "protocols/tasks/levels.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <numbers>
+#include <utility>
+
+#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
+#include "protocols/parse_object.h"
+
+namespace palpate::protocols {
+namespace {
+
+using nlohmann::json;
+
+/// What its mesh files hold, by name.
+void add_files(const stimuli::ObjectSpec& object, StoredFiles& files) {
+  if (object.file_bytes) files.emplace(object.file_name, *object.file_bytes);
+  for (const stimuli::ObjectSpec& part : object.parts) add_files(part, files);
+}
+
+json number_of(double level) {
+  constexpr double kExact = 9007199254740992;
+  if (std::floor(level) == level && std::abs(level) < kExact)
+    return static_cast<std::int64_t>(level);
+  return level;
+}
+
+/// The folder is of no matter: what a stimulus's files hold was read with the protocol.
+stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
+                               const stimuli::ObjectSpec& before, const std::string& name) {
+  MeshFiles files{before.file.empty() ? "" : folder_of(before.file), {}};
+  add_files(before, files.stored);
+  FaultList faults("stimulus '" + name + "'");
+  ObjectReader reader(value, "", faults);
+  std::string same_name;
+  reader.name("name", same_name);
+  stimuli::Material material = protocol.material;
+  reader.section("material", [&](ObjectReader& section) { read_material(section, material); });
+  stimuli::ObjectSpec object = read_object(reader, material, files);
+  reader.refuse_unknown_keys();
+  faults.throw_if_any();
+  return object;
+}
+
+}  // namespace
+
+std::string level_text(double level) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, level).ptr};
+}
+
+StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stimulus,
+                      double level) {
+  const StimulusSpec& plain = protocol.stimuli[static_cast<std::size_t>(stimulus)];
+  StimulusSpec varied = plain;
+  varied.name += " at " + level_text(level);
+  if (block.level->orientation) {
+    const double half = level * std::numbers::pi / 360;
+    const Quat turn(std::cos(half), std::sin(half) * block.level->axis);
+    varied.object.pose.orientation = turn * varied.object.pose.orientation;
+    return varied;
+  }
+  json value = json::parse(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  try {
+    value[json::json_pointer(block.level->pointer)] = number_of(level);
+  } catch (const json::exception&) {
+    throw InputError({{"stimulus '" + plain.name + "'", block.level->pointer,
+                       "expected a number of the stimulus: it has no such place", 0}});
+  }
+  varied.object = read_again(value, protocol, plain.object, plain.name);
+  return varied;
+}
+
+std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus) {
+  if (!block.level) return std::nullopt;
+  if (block.level->orientation) return 0;
+  const json value = json::parse(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  try {
+    const json& number = value.at(json::json_pointer(block.level->pointer));
+    if (number.is_number()) return number.get<double>();
+  } catch (const json::exception&) {  // a default
+  }
+  const stimuli::Material& material =
+      protocol.stimuli[static_cast<std::size_t>(stimulus)].object.material;
+  if (block.level->pointer == "/stiffness_n_per_m") return material.stiffness;
+  if (block.level->pointer == "/damping_ns_per_m") return material.damping;
+  if (block.level->pointer == "/friction_static") return material.friction_static;
+  if (block.level->pointer == "/friction_dynamic") return material.friction_dynamic;
+  return std::nullopt;
+}
+
+std::vector<double> levels_of(const TaskBlock& block) {
+  if (!block.level) return {};
+  std::vector<double> levels = block.starts;
+  if (block.task == TaskKind::adjust) {
+    levels.push_back(*block.least);
+    levels.push_back(*block.most);
+  }
+  for (const ProcedureSpec& procedure : block.procedures) {
+    const std::vector<double> more = levels_to_check(procedure);
+    levels.insert(levels.end(), more.begin(), more.end());
+  }
+  std::sort(levels.begin(), levels.end());
+  levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+  return levels;
+}
+
+Protocol with_all_levels(const Protocol& protocol) {
+  Protocol all = protocol;
+  for (const TaskBlock& block : protocol.blocks) {
+    for (const int stimulus : block.stimuli) {
+      for (const double level : levels_of(block)) {
+        StimulusSpec varied = at_level(protocol, block, stimulus, level);
+        const auto known = [&](const StimulusSpec& s) { return s.name == varied.name; };
+        if (std::any_of(all.stimuli.begin(), all.stimuli.end(), known))
+          varied.name += " (" + block.name + ")";
+        all.stimuli.push_back(std::move(varied));
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace palpate::protocols

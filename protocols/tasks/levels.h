@@ -1,0 +1,28 @@
+#pragma once
+// A stimulus at a level: one number of it is another.
+
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+
+namespace palpate::protocols {
+
+/// Stimulus `stimulus` of the protocol with the block's varied number at `level`; named
+/// "NAME at LEVEL". \throws InputError: the stimulus cannot have it.
+StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stimulus, double level);
+
+/// Levels that a block may show: what cannot be shown at one of them is refused before the first
+/// trial. Ascending, each once; empty: nothing is varied.
+std::vector<double> levels_of(const TaskBlock& block);
+
+/// The level that a stimulus has by itself; none: the number has no place in it.
+std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus);
+
+/// The protocol with a stimulus more for every level of every block; version 1: as it is.
+Protocol with_all_levels(const Protocol& protocol);
+
+/// A level as it is printed: the shortest text that reads back as it.
+std::string level_text(double level);
+
+}  // namespace palpate::protocols

@@ -1,0 +1,352 @@
+#include "protocols/tasks/task_plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "protocols/latin_square.h"
+#include "protocols/order.h"
+#include "protocols/tasks/levels.h"
+#include "stimuli/orientation.h"
+#include "stimuli/random.h"
+
+namespace palpate::protocols {
+namespace {
+
+// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1 to 4.
+constexpr std::uint64_t kTaskStream = 5;
+enum TaskUse : std::uint64_t {
+  kTaskOrder = 1,
+  kTaskPosition = 2,
+  kTaskOrientation = 3,
+  kTaskCatch = 4,
+  kTaskTracks = 5
+};
+
+constexpr std::size_t kCatchWindow = 20;  // trials
+
+stimuli::Random task_stream(const Protocol& protocol, int participant, std::uint64_t block,
+                            TaskUse use, std::uint64_t number = 0) {
+  return stimuli::Random(protocol.seed, {static_cast<std::uint64_t>(participant), kTaskStream,
+                                         block, use, number});
+}
+
+/// What a track varies the level of.
+struct Track {
+  int stimulus = 0;
+  RendererKind renderer = RendererKind::point;
+  const ProcedureSpec* procedure = nullptr;
+};
+
+std::vector<Track> tracks_of(const TaskBlock& block) {
+  std::vector<Track> tracks;
+  for (const int stimulus : block.stimuli) {
+    for (const RendererKind renderer : block.renderers) {
+      if (block.procedures.empty()) tracks.push_back({stimulus, renderer, nullptr});
+      for (const ProcedureSpec& procedure : block.procedures)
+        tracks.push_back({stimulus, renderer, &procedure});
+    }
+  }
+  return tracks;
+}
+
+long long with_catch_trials(const TaskBlock& block, long long trials) {
+  return trials + std::llround(static_cast<double>(trials) * block.catch_trials /
+                               (1 - block.catch_trials));
+}
+
+/// The intervals of a trial whose stimulus, renderer and level are set.
+/// \param position  of the comparison, from 0
+void set_intervals(const TaskBlock& block, int position, Trial& trial) {
+  const Interval asked{trial.stimulus, trial.renderer, trial.level};
+  const Interval standard{block.standard.value_or(-1),
+                          block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
+  switch (block.task) {
+    case TaskKind::identify:
+      trial.intervals = {asked};
+      break;
+    case TaskKind::compare:
+      trial.intervals.assign(static_cast<std::size_t>(block.intervals), standard);
+      if (!trial.catch_trial) trial.intervals[static_cast<std::size_t>(position)] = asked;
+      break;
+    case TaskKind::detect:
+      trial.intervals = {asked};
+      if (trial.catch_trial) trial.intervals[0] = {block.absent.value_or(-1), trial.renderer};
+      break;
+    case TaskKind::rate:
+      trial.intervals = {asked};
+      if (block.standard) trial.intervals.insert(trial.intervals.begin(), standard);
+      break;
+    case TaskKind::adjust:
+      trial.intervals = {asked, standard};  // in turn, as the participant wants it
+      break;
+  }
+  if (trial.catch_trial) trial.level.reset();
+}
+
+Quat drawn_orientation(const Protocol& protocol, stimuli::Random random) {
+  switch (protocol.orientation) {
+    case OrientationKind::uniform:
+      return stimuli::uniform_rotation(random);
+    case OrientationKind::listed:
+      return protocol.orientations[random.below(protocol.orientations.size())];
+    case OrientationKind::fixed:
+      break;
+  }
+  return Quat(1, 0, 0, 0);
+}
+
+/// Trials that are alike: a track at a level, or the catch trials.
+struct Category {
+  std::string name;
+  Trial trial;
+  int count = 0;
+};
+
+void add_levels(const TaskBlock& block, const Track& track, Category category,
+                std::vector<Category>& categories) {
+  if (track.procedure == nullptr) {
+    category.count = block.repetitions;
+    categories.push_back(category);
+    return;
+  }
+  const auto& constant = std::get<ConstantStimuli>(*track.procedure);
+  for (const double level : constant.levels) {
+    Category one = category;
+    one.name += " at " + level_text(level);
+    one.trial.level = level;
+    one.count = constant.repetitions;
+    categories.push_back(std::move(one));
+  }
+}
+
+std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& block) {
+  std::vector<Category> categories;
+  int number = 0;
+  long long trials = 0;
+  for (const Track& track : tracks_of(block)) {
+    Category category;
+    category.name = protocol.stimuli[static_cast<std::size_t>(track.stimulus)].name + " (" +
+                    to_string(track.renderer) + ")";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = ++number;
+    add_levels(block, track, category, categories);
+  }
+  for (const Category& category : categories) trials += category.count;
+  const auto catch_trials = static_cast<int>(with_catch_trials(block, trials) - trials);
+  if (catch_trials == 0) return categories;
+  // Shown as evenly as they go with every track.
+  const int tracks = number;
+  for (int t = 0; t < tracks; ++t) {
+    const Track track = tracks_of(block)[static_cast<std::size_t>(t)];
+    Category category;
+    category.name = "catch trial";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = t + 1;
+    category.trial.catch_trial = true;
+    category.count = catch_trials / tracks + (t < catch_trials % tracks ? 1 : 0);
+    if (category.count > 0) categories.push_back(std::move(category));
+  }
+  return categories;
+}
+
+std::vector<int> ordered_categories(const std::vector<Category>& categories, const TaskBlock& block,
+                                    stimuli::Random random) {
+  Protocol::Order order;
+  order.max_run = block.max_run;
+  order.min_distance = block.min_distance;
+  std::vector<int> counts;
+  std::vector<std::string> names;
+  counts.reserve(categories.size());
+  names.reserve(categories.size());
+  for (const Category& category : categories) {
+    counts.push_back(category.count);
+    names.push_back(category.name);
+  }
+  return order_block(counts, order, names, random);
+}
+
+/// Where the comparison stands in each of `count` trials: everywhere equally often, by chance.
+std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
+  std::vector<int> all, places;
+  for (int i = 0; i < intervals; ++i) places.push_back(i);
+  while (static_cast<int>(all.size()) < count) {
+    random.shuffle(places);
+    all.insert(all.end(), places.begin(), places.end());
+  }
+  all.resize(static_cast<std::size_t>(count));
+  random.shuffle(all);
+  return all;
+}
+
+std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const auto number = static_cast<std::uint64_t>(index);
+  std::vector<Category> categories = categories_of(protocol, block);
+  stimuli::Random places = task_stream(protocol, participant, number, kTaskPosition);
+  std::vector<std::vector<int>> left;
+  left.reserve(categories.size());
+  for (const Category& category : categories)
+    left.push_back(positions(category.count, block.intervals, places));
+  std::vector<std::size_t> shown(categories.size(), static_cast<std::size_t>(participant - 1));
+  std::vector<Trial> trials;
+  for (const int which : ordered_categories(
+           categories, block, task_stream(protocol, participant, number, kTaskOrder))) {
+    const auto c = static_cast<std::size_t>(which);
+    Trial trial = categories[c].trial;
+    // Starts in turn; the next participant begins with the next one.
+    if (block.task == TaskKind::adjust) trial.level = block.starts[shown[c]++ % block.starts.size()];
+    set_intervals(block, left[c].back(), trial);
+    left[c].pop_back();
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+/// Whether trial `shown` (from 0) of an adaptive block is a catch trial.
+bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t block,
+                    std::size_t shown) {
+  const double share = protocol.blocks[static_cast<std::size_t>(block)].catch_trials;
+  if (!(share > 0)) return false;
+  const auto window = std::max(kCatchWindow, static_cast<std::size_t>(std::lround(1 / share)));
+  const auto count = std::max(std::size_t{1}, static_cast<std::size_t>(std::lround(
+                                                  share * static_cast<double>(window))));
+  std::vector<int> marks(window, 0);
+  std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
+  stimuli::Random random = task_stream(protocol, participant, block, kTaskCatch, shown / window);
+  random.shuffle(marks);
+  return marks[shown % window] == 1;
+}
+
+}  // namespace
+
+bool is_adaptive(const TaskBlock& block) {
+  return std::any_of(block.procedures.begin(), block.procedures.end(), [](const auto& spec) {
+    return !std::holds_alternative<ConstantStimuli>(spec);
+  });
+}
+
+long long most_trials_of(const TaskBlock& block) {
+  long long trials = 0;
+  for (const Track& track : tracks_of(block)) {
+    trials += track.procedure == nullptr ? block.repetitions
+                                         : static_cast<long long>(most_trials(*track.procedure));
+  }
+  return with_catch_trials(block, trials);
+}
+
+void check_order(const Protocol& protocol, int block) {
+  if (!is_adaptive(protocol.blocks[static_cast<std::size_t>(block)]))
+    fixed_trials(protocol, 1, block);
+}
+
+std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
+  std::vector<std::vector<int>> units(1);  // each a block with the practice before it
+  for (int i = 0; i < static_cast<int>(protocol.blocks.size()); ++i) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
+    if (block.session != session) continue;
+    units.back().push_back(i);
+    if (!block.practice) units.emplace_back();
+  }
+  const std::vector<int> last = std::move(units.back());  // practice after the last block
+  units.pop_back();
+  std::vector<int> order;
+  const int count = static_cast<int>(units.size());
+  const std::vector<int> row = protocol.blocks_counterbalanced && count > 1
+                                   ? latin_square_row(count, participant_number)
+                                   : std::vector<int>();
+  for (int i = 0; i < count; ++i) {
+    const int at = row.empty() ? i : row[static_cast<std::size_t>(i)];
+    const auto& unit = units[static_cast<std::size_t>(at)];
+    order.insert(order.end(), unit.begin(), unit.end());
+  }
+  order.insert(order.end(), last.begin(), last.end());
+  return order;
+}
+
+TaskPlan::TaskPlan(const Protocol& protocol, int participant_number, int session)
+    : protocol_(&protocol),
+      participant_number_(participant_number),
+      session_(session),
+      order_(blocks_in_order(protocol, participant_number, session)) {
+  first_block_ += static_cast<int>(
+      std::count_if(protocol.blocks.begin(), protocol.blocks.end(),
+                    [session](const TaskBlock& block) { return block.session < session; }));
+  if (!order_.empty()) begin_block();
+  find_next();
+}
+
+const TaskBlock& TaskPlan::block() const { return protocol_->blocks[block_index()]; }
+
+void TaskPlan::begin_block() {
+  shown_ = 0;
+  fixed_.clear();
+  tracks_.reset();
+  if (!is_adaptive(block())) {
+    fixed_ = fixed_trials(*protocol_, participant_number_, order_[at_]);
+    return;
+  }
+  std::vector<ProcedureSpec> specs;
+  for (const Track& track : tracks_of(block())) specs.push_back(*track.procedure);
+  tracks_.emplace(specs,
+                  task_stream(*protocol_, participant_number_, block_index(), kTaskTracks).next());
+}
+
+Trial TaskPlan::adaptive_trial() const {
+  const TrackLevel wanted = *tracks_->next();
+  const Track track = tracks_of(block())[wanted.track];
+  Trial trial;
+  trial.stimulus = track.stimulus;
+  trial.renderer = track.renderer;
+  trial.track = static_cast<int>(wanted.track) + 1;
+  trial.level = wanted.level;
+  trial.catch_trial = is_catch_trial(*protocol_, participant_number_, block_index(), shown_);
+  stimuli::Random random = task_stream(*protocol_, participant_number_, block_index(),
+                                       kTaskPosition, shown_ + 1);
+  set_intervals(block(),
+                static_cast<int>(random.below(static_cast<std::uint64_t>(block().intervals))),
+                trial);
+  return trial;
+}
+
+void TaskPlan::find_next() {
+  next_.reset();
+  while (at_ < order_.size()) {
+    const bool more = tracks_ ? tracks_->next().has_value() : shown_ < fixed_.size();
+    if (more) break;
+    if (++at_ < order_.size()) begin_block();
+  }
+  if (at_ >= order_.size()) return;
+  Trial trial = tracks_ ? adaptive_trial() : fixed_[shown_];
+  trial.session = session_;
+  trial.block = first_block_ + static_cast<int>(at_);
+  trial.trial = static_cast<int>(done_) + 1;
+  trial.practice = block().practice;
+  trial.task_block = order_[at_];
+  trial.orientation = drawn_orientation(
+      *protocol_, task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation,
+                              shown_ + 1));
+  next_ = std::move(trial);
+}
+
+void TaskPlan::answered(const TrialOutcome& outcome) {
+  if (tracks_ && outcome.answered && !next_->catch_trial)
+    tracks_->record({*next_->level, outcome.success});
+  ++shown_;
+  ++done_;
+  find_next();
+}
+
+std::size_t TaskPlan::size() const {
+  if (finished()) return done_;
+  long long left = 0;
+  for (std::size_t i = at_; i < order_.size(); ++i)
+    left += most_trials_of(protocol_->blocks[static_cast<std::size_t>(order_[i])]);
+  left -= static_cast<long long>(shown_);
+  return done_ + static_cast<std::size_t>(std::max(1LL, left));
+}
+
+}  // namespace palpate::protocols

@@ -1,0 +1,67 @@
+#pragma once
+// The trials of a session of version 2, one after the other: a pure function of protocol, session,
+// participant number and the answers so far, the same on every machine and compiler.
+//
+// Blocks without adaptive procedures have their trials in an order by chance under the limits of
+// the block; those of adaptive ones are mixed in rounds, one trial of each track. Catch trials of
+// an adaptive block are spread by chance over every 20 trials.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "protocols/procedures/procedure.h"
+#include "protocols/schedule.h"
+
+namespace palpate::protocols {
+
+/// What became of a trial, as far as the next ones depend on it.
+struct TrialOutcome {
+  bool correct = false;
+  bool success = false;   ///< of what is asked about: the comparison chosen, "yes", "different"
+  bool answered = true;   ///< false: a time-out; an adaptive level comes again
+};
+
+class TaskPlan {
+ public:
+  /// \param protocol  of version 2; must outlive it
+  TaskPlan(const Protocol& protocol, int participant_number, int session);
+
+  bool finished() const { return !next_.has_value(); }
+  const Trial& next() const { return *next_; }  ///< \pre not finished()
+  std::size_t done() const { return done_; }
+  std::size_t size() const;  ///< at most, as far as is known now
+  int last_block() const { return first_block_ + static_cast<int>(order_.size()) - 1; }
+  bool block_begins() const { return shown_ == 0; }
+  void answered(const TrialOutcome& outcome);
+  /// The tracks of an adaptive block under way.
+  const std::optional<InterleavedTracks>& tracks() const { return tracks_; }
+
+ private:
+  void begin_block();
+  void find_next();
+  Trial adaptive_trial() const;
+  const TaskBlock& block() const;
+  std::uint64_t block_index() const { return static_cast<std::uint64_t>(order_[at_]); }
+
+  const Protocol* protocol_;
+  int participant_number_, session_;
+  std::vector<int> order_;  ///< of the session's blocks: indices into Protocol::blocks
+  int first_block_ = 1;     ///< number of the first
+  std::size_t at_ = 0;      ///< into order_
+  std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the block
+  std::vector<Trial> fixed_;          ///< of the block; empty: adaptive
+  std::optional<InterleavedTracks> tracks_;
+  std::optional<Trial> next_;
+};
+
+/// The blocks of a session in the order in which a participant gets them: indices.
+std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session);
+/// Whether answers choose its levels.
+bool is_adaptive(const TaskBlock& block);
+/// No participant has more trials in it.
+long long most_trials_of(const TaskBlock& block);
+/// \throws ScheduleError: the limits on the order of its trials cannot be met
+void check_order(const Protocol& protocol, int block);
+
+}  // namespace palpate::protocols
