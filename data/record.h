@@ -29,6 +29,42 @@ struct SampleRecord {
   std::uint32_t faults = 0;  ///< fault bits of the tick
 };
 
+/// One presentation within a trial of version 2 of protocols.
+struct IntervalRecord {
+  std::string stimulus;  ///< "": nothing was shown
+  std::string renderer;
+  std::optional<double> level;  ///< none: the stimulus as the protocol has it
+  bool standard = false;
+  std::int64_t onset_ns = 0, end_ns = 0;  ///< forces on, forces off; session clock; 0: not yet
+};
+
+/// What a trial of version 2 has besides. Onset, response time and contact are those of the
+/// interval that was felt last.
+struct TaskRecord {
+  std::string task;                      ///< "identify", "compare", "detect", "rate", "adjust"
+  std::string block_name;
+  int track = 1;                         ///< stimulus, renderer and procedure
+  std::optional<double> level;           ///< asked about; adjust: where it started
+  std::optional<double> standard_level;  ///< of the standard, where it has one
+  bool catch_trial = false;
+  std::vector<IntervalRecord> intervals;  ///< in order; adjust: one for each stimulus felt
+  /// The comparison was chosen, "yes", "different", the right stimulus: what procedures count.
+  bool success = false;
+  std::optional<double> number;  ///< rate: as answered; adjust: the level left
+  std::optional<double> confidence;
+  std::optional<std::int64_t> confidence_ns;  ///< session clock
+};
+
+/// An answer to a question of a page, or the consent given. Personal data: never exported unless
+/// asked.
+struct PageAnswer {
+  std::string page, item;   ///< names; consent: item "consent"
+  std::string version;      ///< of a consent
+  std::string text_sha256;  ///< of what was shown
+  std::string answer;       ///< "": left out
+  std::int64_t at_ns = 0;   ///< session clock
+};
+
 /// One presentation of one trial. All numbers are finite; the store returns -0.0 as 0.
 struct TrialRecord {
   int session = 1, block = 1, trial = 1;
@@ -53,6 +89,7 @@ struct TrialRecord {
   /// where the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;
   std::vector<SampleRecord> samples;  ///< empty unless recorded and requested
+  std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
 };
 
 /// A file that a protocol names, such as a mesh.

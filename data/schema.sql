@@ -1,5 +1,5 @@
--- palpate's database (PRAGMA user_version = 4, application_id = 'PLPT'): this file, version 1, then
--- withdrawal.sql, version 2, provenance.sql, version 3, and contact.sql, version 4.
+-- palpate's database (PRAGMA user_version = 5, application_id = 'PLPT'): this file, version 1, then
+-- withdrawal.sql, version 2, provenance.sql, version 3, contact.sql, version 4, and tasks.sql, version 5.
 -- SI units; *_ns are nanoseconds of the session's monotonic clock, *_utc_ns since 1970; booleans 0 or 1.
 -- The program embeds them when it is built; a change is a new version with a migration (schema.cpp).
 

@@ -19,7 +19,9 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kBidsVersion = "1.9.0";
 
 /// The columns of trials.csv without participant_id, which is in the file name.
-std::span<const Column> beh_columns(Times times) { return trial_columns(times).subspan(1); }
+std::span<const Column> beh_columns(const ExportClock& clock) {
+  return trial_columns(clock.times(), clock.tasks()).subspan(1);
+}
 
 const Column kOnset{"onset", "First tick with forces on, from that of the first row", "s"};
 const Column kDuration{"duration", "From onset to the response, or the limit for a time-out", "s"};
@@ -181,7 +183,7 @@ void BidsWriter::write_table() {
   std::stable_sort(rows.begin(), rows.end(),
                    [](const Row& a, const Row& b) { return a.onset_ns < b.onset_ns; });
   FileSink file(folder_.prepare(table_.stem + "_beh.tsv"));
-  row_ << kOnset.name << kDuration.name << beh_columns(settings_.times);
+  row_ << kOnset.name << kDuration.name << beh_columns(clock_);
   file.write(row_.end());
   for (const Row& row : rows) {
     // Unsigned: damaged times may differ by more than 63 bits.
@@ -208,7 +210,7 @@ void BidsWriter::write_sidecar() {
   for (const Column& column : {kOnset, kDuration}) {
     json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
   }
-  for (const Column& column : beh_columns(settings_.times)) {
+  for (const Column& column : beh_columns(clock_)) {
     Json& about = json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
     const Json levels = recorded_levels(column.name, table_.runs, study);
     if (!levels.is_null()) about["Levels"] = levels;

@@ -17,6 +17,9 @@ class ExportClock {
   ExportClock(Store& store, Times times);
   ExportClock() : times_(Times::absolute) {}
 
+  /// Whether rows of trials have the columns of tasks: the store has a study of version 2.
+  bool tasks() const { return tasks_; }
+
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
   /// ISO 8601 of the onset of a trial, or of the begin of an attempt that was cut off.
@@ -31,6 +34,7 @@ class ExportClock {
  private:
   std::int64_t since_first(const Participant& person, std::int64_t unix_ns) const;  // ns
   Times times_;
+  bool tasks_ = false;
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 

@@ -28,7 +28,8 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
 
 }  // namespace
 
-void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings) {
+void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
+                    bool tasks) {
   DelimitedRow row(DelimitedFormat::csv);
   row << "table"
       << "column"
@@ -36,7 +37,7 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
       << "value"
       << "meaning";
   out.write(row.end());
-  describe_table("trials", trial_columns(settings.times), facts, settings, out);
+  describe_table("trials", trial_columns(settings.times, tasks), facts, settings, out);
   describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
 }
 

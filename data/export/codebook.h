@@ -9,7 +9,8 @@
 namespace palpate::data {
 
 /// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, followed by one
-/// for each of its codes or fault bits.
-void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings);
+/// for each of its codes or fault bits. \param tasks  with the columns of tasks
+void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
+                    bool tasks);
 
 }  // namespace palpate::data

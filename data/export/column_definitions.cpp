@@ -103,6 +103,62 @@ std::vector<Column> make_trials() {
   };
 }
 
+/// With what trials of version 2 of protocols have besides.
+std::vector<Column> with_tasks(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "shape") {
+      column.description = "Name of the stimulus that was shown; compare, adjust: of what was "
+                           "compared with the standard or adjusted to it; detect: of what was to "
+                           "be detected, also in catch trials";
+    } else if (name == "response") {
+      column.description =
+          "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "
+          "or no; rate: a number; adjust: the level left; missing where there was none";
+    } else if (name == "correct") {
+      column.description =
+          "Whether the answer was right; rate and adjust: missing, no answer is right or wrong";
+    }
+  }
+  const std::vector<Column> more = {
+      {"task",
+       "What was asked; missing: a study of version 1, which identifies",
+       "",
+       {{"identify", "which stimulus it was"},
+        {"compare", "which interval held the comparison, or whether they were the same"},
+        {"detect", "whether there was anything"},
+        {"rate", "a number for it"},
+        {"adjust", "a level that equals the standard"}}},
+      {"block_name", "Name of the block in the protocol"},
+      {"track", "Stimulus, renderer and procedure within the block, from 1", "1"},
+      {"level",
+       "The varied number of the stimulus, in the unit that the protocol's path says; adjust: "
+       "where it started; missing in catch trials and where nothing is varied"},
+      {"standard_level", "The same number of the standard"},
+      {"catch_trial",
+       "Whether there was nothing to find",
+       "",
+       {{"0", "no"}, {"1", "yes: nothing to detect, or no difference"}}},
+      {"success",
+       "What procedures count",
+       "",
+       {{"0", "not, or no answer"},
+        {"1", "the comparison was chosen; different; yes; the right stimulus"}}},
+      {"number", "rate: the number answered; adjust: the level left"},
+      {"confidence", "How sure the participant was, a number of the protocol's scale"},
+      {"confidence_delay", "From the response to the answer about confidence", "s"},
+      {"comparison_interval", "compare: which interval held the comparison, from 1", "1"},
+      {"interval_onsets",
+       "First tick with forces on of each interval felt, from that of the first, s, separated by "
+       "semicolons; onset_utc, response_time and contact are those of the last one, adjust: "
+       "onset_utc and response_time of the first"},
+      {"interval_ends", "When its forces went off, likewise"},
+      {"interval_levels", "Level of each interval felt; empty: the stimulus as it is, or nothing"},
+  };
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
 std::vector<Column> make_attempts() {
   return {kParticipant,
           kSession,
@@ -181,8 +237,11 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
 
 }  // namespace
 
-std::span<const Column> trial_columns(Times times) {
+std::span<const Column> trial_columns(Times times, bool tasks) {
   static const std::vector<Column> absolute = make_trials(), relative = made_relative(absolute);
+  static const std::vector<Column> tasks_absolute = with_tasks(absolute),
+                                   tasks_relative = made_relative(tasks_absolute);
+  if (tasks) return times == Times::absolute ? tasks_absolute : tasks_relative;
   return times == Times::absolute ? absolute : relative;
 }
 

@@ -19,8 +19,9 @@ struct Column {
   std::vector<std::pair<const char*, const char*>> levels = {};
 };
 
-/// Of trials.csv, in order; relative times add the column elapsed.
-std::span<const Column> trial_columns(Times times);
+/// Of trials.csv, in order. \param tasks  a protocol of version 2 is among the studies: with the
+/// columns of its tasks. Relative times add the column elapsed.
+std::span<const Column> trial_columns(Times times, bool tasks = false);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
 

@@ -1,6 +1,41 @@
 #include "data/export/column_values.h"
 
+#include <charconv>
+
 namespace palpate::data {
+namespace {
+
+void add_to_list(std::string& list, std::optional<double> value, bool first) {
+  if (!first) list += ';';
+  char text[32];
+  if (value) list.append(text, std::to_chars(text, text + sizeof text, *value).ptr);
+}
+
+}  // namespace
+
+TaskValues::TaskValues(const TrialRecord& record) {
+  if (!record.task) return;
+  const TaskRecord& from = *record.task;
+  task = from.task;
+  block_name = from.block_name;
+  track = from.track;
+  level = from.level;
+  standard_level = from.standard_level;
+  catch_trial = from.catch_trial;
+  success = from.success;
+  number = from.number;
+  confidence = from.confidence;
+  if (from.confidence_ns)
+    confidence_delay = static_cast<double>(*from.confidence_ns - record.response_ns) / 1e9;
+  for (std::size_t i = 0; i < from.intervals.size(); ++i) {
+    const IntervalRecord& interval = from.intervals[i];
+    const std::int64_t zero = from.intervals.front().onset_ns;
+    add_to_list(onsets, static_cast<double>(interval.onset_ns - zero) / 1e9, i == 0);
+    add_to_list(ends, static_cast<double>(interval.end_ns - zero) / 1e9, i == 0);
+    add_to_list(levels, interval.level, i == 0);
+    if (from.task == "compare" && !interval.standard) comparison_interval = static_cast<int>(i) + 1;
+  }
+}
 
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock) {
   const TrialRecord& record = attempt.record;

@@ -69,7 +69,7 @@ std::int64_t write_trials(Store& store, TextSink& out, const ExportClock& clock,
                           ExportedParticipants& participants, ProgressCounter& counter) {
   std::int64_t rows = 0;
   DelimitedRow row(DelimitedFormat::csv);
-  row << trial_columns(clock.times());
+  row << trial_columns(clock.times(), clock.tasks());
   out.write(row.end());
   store.for_each_trial([&](const StoredTrial& trial) {
     put_trial(row, trial, clock);
@@ -106,7 +106,7 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   }
   if (!paths.codebook.empty()) {
     write_file(paths.codebook, [&](TextSink& sink) {
-      write_codebook(sink, all_facts(label_protocols(store, settings)), settings);
+      write_codebook(sink, all_facts(label_protocols(store, settings)), settings, clock.tasks());
     });
   }
   result.simulated = participants.any_simulated();

@@ -96,9 +96,9 @@ void PsychDsWriter::add(const StoredTrial& trial) {
     end_table();
     participant_ = trial.participant.id;
     table_.emplace(folder_.prepare(stem + "_data.csv"));
-    row_ << trial_columns(settings_.times);
+    row_ << trial_columns(settings_.times, clock_.tasks());
     table_->write(row_.end());
-    use(trial_columns(settings_.times));
+    use(trial_columns(settings_.times, clock_.tasks()));
   }
   put_trial(row_, trial, clock_);
   table_->write(row_.end());
@@ -150,7 +150,7 @@ Json PsychDsWriter::variables() const {
       all.push_back(describe_variable(column, facts, settings_.fault_bits));
     }
   };
-  add(trial_columns(settings_.times));
+  add(trial_columns(settings_.times, clock_.tasks()));
   add(attempt_columns(settings_.times));
   add({&kTimeOfTick, 1});
   add(sample_columns());

@@ -105,6 +105,7 @@ class SessionCopier {
     copy_notes();
     copy_attempts();
     copy_samples();
+    copy_page_answers();
   }
 
  private:
@@ -165,10 +166,15 @@ class SessionCopier {
     });
   }
 
+  void copy_page_answers() {
+    Inserter add = inserter("page_answers", 1, "run_id", rows_[4].columns);
+    each_row(rows_[4].select, [&](auto& row) { add({run_of(row)}, row); });
+  }
+
   SQLite::Database& from_;
   const std::int64_t id_;
   SQLite::Database& to_;
-  const std::array<SessionRows, 4> rows_;
+  const std::array<SessionRows, 5> rows_;
   std::int64_t session_ = 0;                                                // new id
   std::vector<std::int64_t> runs_;                                          // new ids, in order
   std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> attempts_;  // (trial, number) -> id
@@ -176,11 +182,11 @@ class SessionCopier {
 
 }  // namespace
 
-std::array<SessionRows, 4> session_rows(SQLite::Database& db) {
+std::array<SessionRows, 5> session_rows(SQLite::Database& db) {
   const std::string which_run =
       "(SELECT count(*) FROM runs q WHERE q.session_id = ?1 AND q.id <= t.run_id), 0, ";
-  std::array<SessionRows, 4> all{
-      {{"runs", "", ""}, {"notes", "", ""}, {"attempts", "", ""}, {"samples", "", ""}}};
+  std::array<SessionRows, 5> all{
+      {{"runs", "", ""}, {"notes", "", ""}, {"attempts", "", ""}, {"samples", "", ""}, {"page_answers", "", ""}}};
   for (SessionRows& one : all) one.columns = columns_but_keys(db, one.table);
   all[0].select =
       "SELECT row_number() OVER (ORDER BY t.id), (SELECT sha256 FROM protocols WHERE id = "
@@ -194,6 +200,9 @@ std::array<SessionRows, 4> session_rows(SQLite::Database& db) {
   all[3].select = "SELECT a.trial, a.attempt, " + all[3].columns +
                   " FROM attempts a JOIN samples t ON t.attempt_id = a.id WHERE a.session_id = ?1 "
                   "ORDER BY a.trial, a.attempt";
+  all[4].select = "SELECT " + which_run + all[4].columns +
+                  " FROM page_answers t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = "
+                  "?1) ORDER BY t.run_id, t.id";
   return all;
 }
 

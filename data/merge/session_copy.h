@@ -18,12 +18,12 @@ struct SessionRows {
   std::string select;
 };
 
-/// Runs: position in the session (1, 2, ...), checksum of a protocol of its own or NULL. Notes and
-/// attempts: position of their run, 0. Samples: trial and number of their attempt.
+/// Runs: position in the session (1, 2, ...), checksum of a protocol of its own or NULL. Notes,
+/// attempts and answers to pages: position of their run, 0. Samples: trial and number of their attempt.
 inline constexpr int kParentColumns = 2;
 
-/// runs, notes, attempts, samples: in the order of insertion that foreign keys need.
-std::array<SessionRows, 4> session_rows(SQLite::Database& db);
+/// runs, notes, attempts, samples, page_answers: in the order of insertion that foreign keys need.
+std::array<SessionRows, 5> session_rows(SQLite::Database& db);
 
 /// Whether two sessions are identical to the bit.
 bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& db_b,

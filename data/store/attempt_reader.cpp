@@ -48,7 +48,7 @@ class AttemptReader {
         find_(db, std::string("SELECT ") + kPlanColumns +
                       ", a.run_id, a.state, a.cut_off_reason, " +
                       (sealed() ? "a.link, a.seal, a.samples_sha256, " : "NULL, NULL, NULL, ") +
-                      outcome_columns(version) +
+                      task_column(version) + outcome_columns(version) +
                       " FROM attempts a WHERE a.session_id = ? ORDER BY a.trial, a.attempt"),
         find_samples_(db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?") {}
 
@@ -66,6 +66,7 @@ class AttemptReader {
   void read_session(std::int64_t id);
   void read_runs(const SessionHead& session, std::optional<ChainCheck>& chain);
   void read_notes(std::int64_t session, ChainCheck& chain);
+  void read_page_answers(std::int64_t session, ChainCheck& chain);
   void require_files(const RunInfo& run, std::int64_t protocol);
   void read_attempt(std::optional<ChainCheck>& chain);
   void read_samples(std::int64_t attempt, const std::optional<Checksum>& sum);
@@ -101,6 +102,23 @@ std::vector<std::int64_t> AttemptReader::sessions() {
   std::vector<std::int64_t> all;
   while (find.executeStep()) all.push_back(find.getColumn(0).getInt64());
   return all;
+}
+
+void AttemptReader::read_page_answers(std::int64_t session, ChainCheck& chain) {
+  if (version_ < 5) return;
+  SQLite::Statement find(
+      db_, std::string("SELECT r.link, ") + kPageAnswerColumns +
+               ", p.link, p.seal FROM page_answers p JOIN runs r ON r.id = p.run_id WHERE "
+               "r.session_id = ? ORDER BY p.run_id, p.id");
+  Binder(find) << session;
+  for (std::int64_t number = 1; find.executeStep(); ++number) {
+    std::int64_t run_link = 0;
+    PageAnswer answer;
+    RowReader row(find);
+    row >> run_link >> answer;
+    put_page_answer(values_, run_link, answer);
+    chain.add(read_link(row), values_, {.kind = "answer to a page", .number = number});
+  }
 }
 
 /// The stored files of the protocol are those that the run recorded as shown.
@@ -210,6 +228,7 @@ void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
   row >> about.cut_off_reason;
   const std::optional<Link> link = read_link(row);
   row >> about.samples;
+  read_task(row, record);
   const bool completed = state == AttemptState::completed;
   if (completed) read_outcome(row, record);
   if (about.cut_off_reason.has_value() == completed) {
@@ -251,7 +270,10 @@ void AttemptReader::read_session(std::int64_t id) {
                   values_.seal({}));
   }
   read_runs(session, chain);
-  if (chain) read_notes(id, *chain);
+  if (chain) {
+    read_notes(id, *chain);
+    read_page_answers(id, *chain);
+  }
   trial_.run.session = session.number;
   find_.reset();
   find_.bind(1, id);

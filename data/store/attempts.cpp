@@ -7,6 +7,7 @@
 #include "data/store/connection.h"
 #include "data/store/samples_codec.h"
 #include "data/store/statement_values.h"
+#include "data/store/task_text.h"
 #include "data/store/validation.h"
 
 namespace palpate::data {
@@ -52,22 +53,23 @@ int insert_attempt(SQLite::Database& db, SQLite::Statement& insert, const Run& r
   bind << run.session_id << run.id << plan.trial << attempt << plan.block << plan.renderer
        << plan.shape << plan.practice;
   for (const double q : plan.orientation_wxyz) bind << q;
-  bind << began_ns;
+  bind << began_ns << (plan.task ? std::optional(task_text(*plan.task)) : std::nullopt);
   insert.exec();
   return attempt;
 }
 
 constexpr const char* kInsertAttempt =
     "INSERT INTO attempts (session_id, run_id, trial, attempt, block, renderer, shape, practice, "
-    "orientation_w, orientation_x, orientation_y, orientation_z, began_ns, state) "
-    "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'running')";
+    "orientation_w, orientation_x, orientation_y, orientation_z, began_ns, task, state) "
+    "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'running')";
 
 constexpr const char* kComplete =
     "UPDATE attempts SET state = 'completed', response = ?, correct = ?, timed_out = ?, "
     "response_time = ?, first_contact_time = ?, onset_ns = ?, response_ns = ?, start_tip_x = ?, "
     "start_tip_y = ?, start_tip_z = ?, start_tail_x = ?, start_tail_y = ?, start_tail_z = ?, "
     "ticks = ?, missed_ticks = ?, longest_period_ns = ?, faults = ?, started_inside = ?, "
-    "max_force = ?, contact_share = ?, edge_dwell = ?, samples_sha256 = ? WHERE id = ?";
+    "max_force = ?, contact_share = ?, edge_dwell = ?, samples_sha256 = ?, task = ? WHERE id "
+    "= ?";
 
 void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
               const TrialRecord& record) {
@@ -84,7 +86,7 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   bind << (count > 0 ? std::optional(checksum_of_samples(kSamplesPacking, count, packed.data(),
                                                          packed.size()))
                      : std::nullopt)
-       << id;
+       << (record.task ? std::optional(task_text(*record.task)) : std::nullopt) << id;
   update.exec();
   if (count == 0) return;
   SQLite::Statement insert(

@@ -48,6 +48,7 @@ void delete_rows(SQLite::Database& db, const std::string& code) {
   for (const std::string& what :
        {"samples WHERE attempt_id IN " + attempt_ids(), "attempts WHERE session_id IN " + sessions,
         "notes WHERE run_id IN (SELECT id FROM runs WHERE session_id IN " + sessions + ")",
+        "page_answers WHERE run_id IN (SELECT id FROM runs WHERE session_id IN " + sessions + ")",
         "runs WHERE session_id IN " + sessions,
         std::string("sessions WHERE participant_id IN ") + kParticipantIds,
         std::string("export_participants WHERE participant_id IN ") + kParticipantIds,

@@ -6,7 +6,10 @@
 
 #include <charconv>
 #include <optional>
+#include <stdexcept>
 #include <string>
+
+#include "data/store/task_text.h"
 
 namespace palpate::data {
 
@@ -80,6 +83,20 @@ std::int64_t read_plan(RowReader& row, TrialRecord& record) {
   return id;
 }
 
+const char* task_column(int version) { return version < 5 ? "NULL, " : "a.task, "; }
+
+void read_task(RowReader& row, TrialRecord& record) {
+  std::optional<std::string> text;
+  row >> text;
+  record.task.reset();
+  if (!text) return;
+  try {
+    record.task = parse_task_text(*text);
+  } catch (const std::invalid_argument& error) {
+    throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
+  }
+}
+
 std::string outcome_columns(int version) {
   return std::string(
              "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, "
@@ -87,6 +104,11 @@ std::string outcome_columns(int version) {
              "a.start_tail_x, a.start_tail_y, a.start_tail_z, a.ticks, a.missed_ticks, "
              "a.longest_period_ns, a.faults, a.started_inside, a.max_force, ") +
          (version < 4 ? "NULL, NULL" : "a.contact_share, a.edge_dwell");
+}
+
+RowReader& operator>>(RowReader& row, PageAnswer& answer) {
+  return row >> answer.page >> answer.item >> answer.version >> answer.text_sha256 >>
+         answer.answer >> answer.at_ns;
 }
 
 void read_outcome(RowReader& row, TrialRecord& record) {

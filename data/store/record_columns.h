@@ -40,8 +40,18 @@ inline constexpr const char* kPlanColumns =
 /// begun until read_outcome sets it. \returns the row id of the attempt
 std::int64_t read_plan(RowReader& row, TrialRecord& record);
 
+/// One column, read by read_task, of every attempt.
+const char* task_column(int version);
+/// \throws SQLite::Exception (damage)
+void read_task(RowReader& row, TrialRecord& record);
+
 std::string outcome_columns(int version);  ///< of the schema
 void read_outcome(RowReader& row, TrialRecord& record);
+
+/// p: page_answers. Read by the operator.
+inline constexpr const char* kPageAnswerColumns =
+    "p.page, p.item, p.version, p.text_sha256, p.answer, p.at_ns";
+RowReader& operator>>(RowReader& row, PageAnswer& answer);
 
 // CROSS JOIN fixes SQLite's join order (https://www.sqlite.org/optoverview.html, 7.3): each level
 // is read in the order of its index, so that nothing is sorted in memory or in a temporary file.

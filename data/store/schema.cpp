@@ -58,10 +58,11 @@ std::string back_up(SQLite::Database& db, const std::string& path, int version) 
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 3> steps = {
+  static const std::array<Migration, 4> steps = {
       {{1, withdrawal_sql()},
        {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); }},
-       {3, contact_sql()}}};
+       {3, contact_sql()},
+       {4, tasks_sql()}}};
   return steps;
 }
 

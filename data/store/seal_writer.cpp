@@ -14,6 +14,8 @@ constexpr int kVersion = 3;  // of the schema that brought the seals
 
 /// Of the schema: the rows of an older database are sealed before it has the columns of today.
 int version_of(SQLite::Database& db) {
+  SQLite::Statement tasks(db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'task'");
+  if (tasks.executeStep()) return 5;
   SQLite::Statement find(
       db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'contact_share'");
   return find.executeStep() ? 4 : kVersion;
@@ -38,12 +40,17 @@ const Link& SealWriter::last_of(std::int64_t session) {
   const auto known = last_.find(session);
   if (known != last_.end()) return known->second;
   Link link;
+  const std::string pages =
+      version_of(db_) < 5 ? ""
+                          : "UNION ALL SELECT p.link, p.seal FROM page_answers p JOIN runs r ON "
+                            "r.id = p.run_id WHERE r.session_id = ?1";
   SQLite::Statement find(db_,
                          "SELECT * FROM (SELECT link, seal FROM attempts WHERE session_id = ?1 "
                          "UNION ALL SELECT link, seal FROM runs WHERE session_id = ?1 UNION ALL "
                          "SELECT end_link, end_seal FROM runs WHERE session_id = ?1 UNION ALL "
                          "SELECT n.link, n.seal FROM notes n JOIN runs r ON r.id = n.run_id WHERE "
-                         "r.session_id = ?1) WHERE link IS NOT NULL ORDER BY link DESC LIMIT 1");
+                         "r.session_id = ?1 " +
+                             pages + ") WHERE link IS NOT NULL ORDER BY link DESC LIMIT 1");
   Binder(find) << session;
   if (find.executeStep()) {
     RowReader(find) >> link.position >> link.seal;
@@ -91,6 +98,19 @@ void SealWriter::note(std::int64_t id) {
   seal("UPDATE notes SET link = ?, seal = ? WHERE id = ?", session, id);
 }
 
+void SealWriter::page_answer(std::int64_t id) {
+  SQLite::Statement find(db_, std::string("SELECT r.session_id, r.link, ") + kPageAnswerColumns +
+                                  " FROM page_answers p JOIN runs r ON r.id = p.run_id WHERE p.id "
+                                  "= ?");
+  Binder(find) << id;
+  require_row(find);
+  std::int64_t session = 0, run_link = 0;
+  PageAnswer answer;
+  RowReader(find) >> session >> run_link >> answer;
+  put_page_answer(values_, run_link, answer);
+  seal("UPDATE page_answers SET link = ?, seal = ? WHERE id = ?", session, id);
+}
+
 void SealWriter::end(std::int64_t run_id) {
   SQLite::Statement find(db_,
                          "SELECT session_id, link, end_reason, ended_ns FROM runs WHERE id = ?");
@@ -108,7 +128,8 @@ void SealWriter::attempt(std::int64_t id) {
   if (!find_attempt_) {
     find_attempt_.emplace(
         db_, std::string("SELECT a.session_id, r.link, ") + kPlanColumns +
-                 ", a.cut_off_reason, a.samples_sha256, " + outcome_columns(version_of(db_)) +
+                 ", a.cut_off_reason, a.samples_sha256, " + task_column(version_of(db_)) +
+                 outcome_columns(version_of(db_)) +
                  " FROM attempts a JOIN runs r ON r.id = a.run_id WHERE a.id = ?");
     seal_attempt_.emplace(db_, "UPDATE attempts SET link = ?, seal = ? WHERE id = ?");
   }
@@ -124,6 +145,7 @@ void SealWriter::attempt(std::int64_t id) {
   read_plan(row, record);
   about.began_ns = record.onset_ns;
   row >> about.cut_off_reason >> about.samples;
+  read_task(row, record);
   if (!about.cut_off_reason) read_outcome(row, record);
   find.reset();
   put_attempt(values_, about, record);

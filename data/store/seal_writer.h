@@ -23,6 +23,7 @@ class SealWriter {
   void note(std::int64_t id);
   void attempt(std::int64_t id);  ///< when it has ended
   void end(std::int64_t run_id);  ///< of a run
+  void page_answer(std::int64_t id);
   void reset_chains() { last_.clear(); }
 
   /// Seals all rows of a database that an earlier schema version wrote without seals.

@@ -6,6 +6,7 @@
 
 #include "data/errors.h"
 #include "data/store/record_columns.h"
+#include "data/store/task_text.h"
 
 namespace palpate::data {
 namespace {
@@ -80,6 +81,12 @@ void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRec
   }
   out << attempt.samples;
   if (record.contact_share || record.edge_dwell) out << record.contact_share << record.edge_dwell;
+  if (record.task) out << task_text(*record.task);
+}
+
+void put_page_answer(SealedValues& out, std::int64_t run_link, const PageAnswer& answer) {
+  out.begin("page") << run_link << answer.page << answer.item << answer.version
+                    << answer.text_sha256 << answer.answer << answer.at_ns;
 }
 
 void put_end(SealedValues& out, std::int64_t run_link, const std::string& reason,

@@ -17,7 +17,8 @@
 //            files_sha256
 //   note     link of its run, at_ns, text
 //   attempt  link of its run, the columns of attempts from trial to samples_sha256; then
-//            contact_share and edge_dwell, unless both are null
+//            contact_share and edge_dwell, unless both are null; then task, unless it is null
+//   page     link of its run, the columns of page_answers from page to at_ns
 //   end      link of its run, end_reason, ended_ns
 
 #include <bit>
@@ -99,6 +100,7 @@ void put_run(SealedValues& out, const RunInfo& info);
 void put_note(SealedValues& out, std::int64_t run_link, std::int64_t at_ns,
               const std::string& text);
 void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRecord& record);
+void put_page_answer(SealedValues& out, std::int64_t run_link, const PageAnswer& answer);
 void put_end(SealedValues& out, std::int64_t run_link, const std::string& reason,
              std::optional<std::int64_t> ended_ns);
 /// Little-endian packing (4 bytes) and count (8), then the data.

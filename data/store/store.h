@@ -67,6 +67,14 @@ struct StoredNote {
   std::string utc, text;
 };
 
+struct StoredPageAnswer {
+  Participant participant;
+  std::string protocol_name;
+  int session = 1;
+  std::string utc;
+  PageAnswer answer;
+};
+
 /// A run and how it ended, for reports.
 struct StoredRun {
   Participant participant;
@@ -164,6 +172,9 @@ class Store {
   /// finish_attempt; a participant who is not simulated.
   void record_simulated(const Run& run, const std::vector<TrialRecord>& records);
 
+  /// Stores the answers to a page, together; on disk when it returns. Personal data.
+  void add_page_answers(const Run& run, const std::vector<PageAnswer>& answers);
+
   /// Stores an experimenter's note. \param at_ns session clock
   void add_note(const Run& run, std::int64_t at_ns, const std::string& text);
 
@@ -189,9 +200,15 @@ class Store {
   /// The files that a protocol names, by name.
   std::vector<ProtocolFile> files(const std::string& protocol_sha256);
   std::vector<Participant> participants(const std::string& protocol_sha256);  ///< by number
+  /// Whether a trial of version 2 of protocols, with a task, is on record.
+  bool has_tasks();
   std::vector<std::string> codes();  ///< of all participants, in the order of insertion
   std::vector<StoredRun> runs();     ///< by protocol, participant number, session, start
   std::vector<StoredNote> notes();   ///< in the same order
+  /// Answers to pages, in the same order.
+  std::vector<StoredPageAnswer> page_answers();
+  /// Names of the pages that a session has answers to.
+  std::vector<std::string> answered_pages(const Participant& participant, int session);
   /// The latest recorded time of live sessions, ns since 1970; simulated sessions use a virtual
   /// clock. To detect a clock that was set back.
   std::optional<std::int64_t> latest_recorded_time();

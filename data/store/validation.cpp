@@ -100,6 +100,31 @@ void validate_plan(Validator& validator, const TrialRecord& record, int session)
   for (const double q : record.orientation_wxyz) validator.finite("orientation", q);
 }
 
+void validate(Validator& validator, const PageAnswer& answer) {
+  validator.present("page", answer.page);
+  validator.present("item", answer.item);
+  validator.text("version", answer.version);
+  validator.text("answer", answer.answer);
+  validator.expect(answer.text_sha256.size() == 64, "text_sha256 must be a SHA-256");
+}
+
+namespace {
+
+void validate_task(Validator& validator, const TaskRecord& task) {
+  validator.present("task", task.task);
+  validator.present("block_name", task.block_name);
+  validator.positive("track", task.track);
+  for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
+    if (value) validator.finite("a number of the task", *value);
+  }
+  for (const IntervalRecord& interval : task.intervals) {
+    validator.text("stimulus", interval.stimulus);
+    if (interval.level) validator.finite("level", *interval.level);
+  }
+}
+
+}  // namespace
+
 void validate_outcome(Validator& validator, const TrialRecord& record) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
   validator.text("response", record.response);
@@ -114,6 +139,7 @@ void validate_outcome(Validator& validator, const TrialRecord& record) {
     validator.amount("contact_share", *record.contact_share);
     validator.expect(!(*record.contact_share > 1), "contact_share must be at most 1");
   }
+  if (record.task) validate_task(validator, *record.task);
   if (record.edge_dwell) validator.amount("edge_dwell", *record.edge_dwell);
   validator.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
   validator.expect(!record.timed_out || (record.response.empty() && !record.correct),

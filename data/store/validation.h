@@ -34,6 +34,7 @@ void validate(Validator& validator, const ProtocolInfo& protocol);
 void validate(Validator& validator, const RunInfo& info, bool simulated);
 /// The fields that are known before the trial is shown.
 void validate_plan(Validator& validator, const TrialRecord& record, int session);
+void validate(Validator& validator, const PageAnswer& answer);
 /// The fields that are known when it has ended.
 void validate_outcome(Validator& validator, const TrialRecord& record);
 

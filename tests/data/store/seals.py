@@ -9,7 +9,7 @@ ATTEMPT = ("trial, attempt, block, renderer, shape, practice, orientation_w, ori
            "orientation_z, began_ns, state, cut_off_reason, response, correct, timed_out, response_time, "
            "first_contact_time, onset_ns, response_ns, start_tip_x, start_tip_y, start_tip_z, start_tail_x, "
            "start_tail_y, start_tail_z, ticks, missed_ticks, longest_period_ns, faults, started_inside, max_force, "
-           "samples_sha256, contact_share, edge_dwell")
+           "samples_sha256, contact_share, edge_dwell, task")
 
 
 def packed(value):
@@ -44,10 +44,14 @@ def rows(base, session):
     for row in base.execute("SELECT n.id, n.link, n.seal, r.link, n.at_ns, n.text FROM notes n JOIN runs r ON r.id = "
                             "n.run_id WHERE r.session_id = ? ORDER BY n.id", (session,)).fetchall():
         yield "notes", row[0], ("link", "seal"), "note", row[3:], row[1], row[2]
+    for row in base.execute("SELECT p.id, p.link, p.seal, r.link, p.page, p.item, p.version, p.text_sha256, p.answer, p.at_ns "
+                            "FROM page_answers p JOIN runs r ON r.id = p.run_id WHERE r.session_id = ? ORDER BY p.id",
+                            (session,)).fetchall():
+        yield "page_answers", row[0], ("link", "seal"), "page", row[3:], row[1], row[2]
     columns = ", ".join("a." + name for name in ATTEMPT.split(", "))
     for row in base.execute(f"SELECT a.id, a.link, a.seal, r.link, {columns} FROM attempts a JOIN runs r ON r.id = "
                             "a.run_id WHERE a.session_id = ? AND a.state <> 'running' ORDER BY a.id", (session,)).fetchall():
-        values = row[3:] if row[-2:] != (None, None) else row[3:-2]
+        values = row[3:-3] + (row[-3:-1] if row[-3:-1] != (None, None) else ()) + (row[-1:] if row[-1] is not None else ())
         yield "attempts", row[0], ("link", "seal"), "attempt", values, row[1], row[2]
     for row in base.execute("SELECT id, end_link, end_seal, link, end_reason, ended_ns FROM runs WHERE session_id = ? "
                             "AND end_reason <> 'running' ORDER BY id", (session,)).fetchall():
@@ -73,7 +77,7 @@ def seal_again(base):
         before, place = first_seal(base, session), 0
         base.execute("UPDATE runs SET end_link = NULL, end_seal = NULL WHERE session_id = ?", (session,))
         for table, key, (link, name), kind, values, _, _ in list(rows(base, session)):
-            if kind in ("note", "attempt", "end"):  # the link of the run may be another one by now
+            if kind in ("note", "page", "attempt", "end"):  # the link of the run may be another one by now
                 run = "id" if kind == "end" else "run_id"
                 (of_run,) = base.execute(f"SELECT r.link FROM runs r WHERE r.id = (SELECT {run} FROM {table} WHERE id = ?)",
                                          (key,)).fetchone()

@@ -1,0 +1,81 @@
+#include "data/store/task_text.h"
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace palpate::data {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <class T>
+void put_if(Json& out, const char* key, const std::optional<T>& value) {
+  if (value) out[key] = *value;
+}
+
+template <class T>
+void take_if(const Json& in, const char* key, std::optional<T>& value) {
+  if (in.contains(key)) value = in.at(key).get<T>();
+}
+
+Json interval_json(const IntervalRecord& interval) {
+  Json out = {{"stimulus", interval.stimulus}, {"renderer", interval.renderer}};
+  put_if(out, "level", interval.level);
+  out["standard"] = interval.standard;
+  out["onset_ns"] = interval.onset_ns;
+  out["end_ns"] = interval.end_ns;
+  return out;
+}
+
+IntervalRecord interval_of(const Json& in) {
+  IntervalRecord interval;
+  interval.stimulus = in.at("stimulus").get<std::string>();
+  interval.renderer = in.at("renderer").get<std::string>();
+  take_if(in, "level", interval.level);
+  interval.standard = in.at("standard").get<bool>();
+  interval.onset_ns = in.at("onset_ns").get<std::int64_t>();
+  interval.end_ns = in.at("end_ns").get<std::int64_t>();
+  return interval;
+}
+
+}  // namespace
+
+std::string task_text(const TaskRecord& task) {
+  Json out = {{"task", task.task}, {"block_name", task.block_name}, {"track", task.track}};
+  put_if(out, "level", task.level);
+  put_if(out, "standard_level", task.standard_level);
+  out["catch_trial"] = task.catch_trial;
+  if (task.intervals.empty()) return out.dump();
+  out["intervals"] = Json::array();
+  for (const IntervalRecord& interval : task.intervals)
+    out["intervals"].push_back(interval_json(interval));
+  out["success"] = task.success;
+  put_if(out, "number", task.number);
+  put_if(out, "confidence", task.confidence);
+  put_if(out, "confidence_ns", task.confidence_ns);
+  return out.dump();
+}
+
+TaskRecord parse_task_text(const std::string& text) {
+  try {
+    const Json in = Json::parse(text);
+    TaskRecord task;
+    task.task = in.at("task").get<std::string>();
+    task.block_name = in.at("block_name").get<std::string>();
+    task.track = in.at("track").get<int>();
+    take_if(in, "level", task.level);
+    take_if(in, "standard_level", task.standard_level);
+    task.catch_trial = in.at("catch_trial").get<bool>();
+    if (!in.contains("intervals")) return task;
+    for (const Json& interval : in.at("intervals")) task.intervals.push_back(interval_of(interval));
+    task.success = in.at("success").get<bool>();
+    take_if(in, "number", task.number);
+    take_if(in, "confidence", task.confidence);
+    take_if(in, "confidence_ns", task.confidence_ns);
+    return task;
+  } catch (const Json::exception& error) {
+    throw std::invalid_argument(std::string("its task is damaged: ") + error.what());
+  }
+}
+
+}  // namespace palpate::data
