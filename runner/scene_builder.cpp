@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <sstream>
 
+#include "protocols/tasks/levels.h"
 #include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
@@ -240,7 +241,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
     : tool_(tool_of(protocol.tool)) {
   SceneBuilder builder;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+  for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
     double reach = 0;
     for (const bool sides : {false, true}) {
       std::vector<rendering::SceneObject> objects;
@@ -270,6 +271,10 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
     }
     reaches_.push_back(reach);
   }
+}
+
+rendering::Scene StimulusLibrary::empty_scene(protocols::RendererKind renderer) const {
+  return rendering::Scene({}, renderer_for(renderer).side_contact(), tool_);
 }
 
 rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {

@@ -56,7 +56,7 @@ class SceneBuilder {
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };
 
-/// The stimuli of a protocol, built once, and the scene of each trial. Threads may share it.
+/// The stimuli of a protocol, and each at every level that can be told before (levels.h), built once, and the scene of each trial. Threads may share it.
 class StimulusLibrary {
  public:
   /// \throws MeshError naming the stimulus.
@@ -64,6 +64,9 @@ class StimulusLibrary {
 
   /// The trial's stimulus in the trial's orientation, about the origin of the workspace.
   rendering::Scene scene(const protocols::Trial& trial) const;
+  std::size_t size() const { return reaches_.size(); }  ///< stimuli
+  /// Nothing to feel, as the trial's renderer has it.
+  rendering::Scene empty_scene(protocols::RendererKind renderer) const;
   /// Radius of the sphere about the origin that contains the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
   /// Of the stimulus as the protocol has it, not turned.

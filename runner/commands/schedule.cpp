@@ -10,6 +10,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/csv_text.h"
 #include "runner/commands/shared/schedule_rows.h"
+#include "runner/commands/shared/task_schedule.h"
 
 namespace palpate::runner {
 namespace {
@@ -73,7 +74,8 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate schedule PROTOCOL.json --participant N [--format table|csv|json]";
-  line.summary = "Prints the trials that a participant will get, in order, without running them.";
+  line.summary = "Prints the trials that a participant will get, in order, without running them.\n"
+                 "Where answers choose the levels: the rule, and an example.";
   line.example =
       "  palpate schedule protocols/ho2000.json --participant 1\n"
       "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv";
@@ -93,6 +95,10 @@ int schedule_command(const std::vector<std::string>& args) {
 
   const protocols::Protocol protocol =
       protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  if (protocol.version == 2) {
+    std::cout << task_schedule_text(protocol, participant, format);
+    return 0;
+  }
   const std::vector<protocols::Trial> trials = protocols::schedule(protocol, participant);
   if (format == "csv") {
     print_csv(protocol, trials, participant);

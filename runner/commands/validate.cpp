@@ -7,6 +7,7 @@
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/task_words.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/session/device_check.h"
@@ -64,7 +65,35 @@ std::string masking(const protocols::Protocol& protocol) {
   return out.str();
 }
 
+/// Of version 2.
+void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) {
+  std::vector<std::string> renderers, stimuli;
+  for (const protocols::RendererKind kind : protocol.renderers)
+    renderers.emplace_back(protocols::to_string(kind));
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
+  long long trials = 0;
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + stimuli::printable(protocol.title))
+      << "\n  renderers   " << list(renderers) << "\n  stimuli     " << list(stimuli)
+      << "\n  blocks      " << protocol.blocks.size() << ", in " << protocol.sessions.count
+      << (protocol.sessions.count == 1 ? " session" : " sessions")
+      << (protocol.blocks_counterbalanced ? ", their order counterbalanced\n" : "\n");
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    trials += protocols::most_trials_of(block);
+    out << "    " << block.name << "\n";
+    for (const std::string& line : in_words(protocol, block)) out << "      " << line << "\n";
+  }
+  for (const protocols::PageSpec& page : protocol.pages) {
+    constexpr std::array kPlaces = {"before the first block", "before block ", "after the last"};
+    out << "  page        " << page.name << ", " << kPlaces[static_cast<std::size_t>(page.when)]
+        << page.before_block << "\n";
+  }
+  out << "  trials      at most " << trials << " for each participant\n"
+      << masking(protocol) << "  seed        " << protocol.seed << "\n"
+      << "  sha256      " << protocol.sha256 << "\n";
+}
+
 void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
+  if (protocol.version == 2) return print_task_summary(protocol, out);
   const std::vector<protocols::Trial> trials = protocols::schedule(protocol, 1);
   const long long counted = protocols::main_trials(protocol);
   const int sessions = protocol.sessions.count;

@@ -128,7 +128,8 @@ void KeyboardRespondent::feedback(bool correct) {
   wait_until(clock_.now_ns() + kFeedback_ns);
 }
 
-void KeyboardRespondent::begin_trial(const protocols::Trial&) {
+void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
+  task_block_ = trial.task_block;
   Page page;
   page.kind = Page::Kind::neutral;
   page.keys = keys_;
@@ -153,6 +154,7 @@ void KeyboardRespondent::show_cue(const Sample& sample) {
   page_.kind = cue == Cue::move_away ? Page::Kind::message : Page::Kind::neutral;
   page_.go = cue == Cue::go;
   page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
+  if (task() != nullptr && cue == Cue::go) page_.text = interval_text();
   screen_.show(page_);
 }
 
@@ -166,8 +168,13 @@ std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
 
 void KeyboardRespondent::listen(const Sample& sample) {
   for (const KeyPress& press : screen_.keys()) {
-    const std::optional<int> stimulus = meaning(press.key);
     if (pending_) continue;
+    if (task() != nullptr && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
+      pending_ = meaning_in_interval(press.key);
+      if (pending_) pending_->time_ns = press.time_ns;
+      continue;
+    }
+    const std::optional<int> stimulus = task() != nullptr ? std::nullopt : meaning(press.key);
     if (stimulus && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
       pending_ = Answer{*stimulus, press.time_ns};
     } else {
@@ -178,6 +185,10 @@ void KeyboardRespondent::listen(const Sample& sample) {
   const unsigned pressed = sample.buttons & ~static_cast<unsigned>(buttons_);
   buttons_ = sample.buttons;
   if (by_ != AnswerBy::buttons || pending_ || onset_ns_ == 0) return;
+  if (task() != nullptr) {
+    listen_to_buttons(pressed, sample.time_ns);
+    return;
+  }
   for (std::size_t i = 0; i < stimuli_.size() && i < 8; ++i) {
     if ((pressed >> i & 1U) != 0) {
       pending_ = Answer{stimuli_[i], sample.time_ns};

@@ -36,7 +36,10 @@ class KeyboardRespondent final : public Respondent {
   void rest(const std::string& text, std::int64_t until_ns) override;
   void feedback(bool correct) override;
   void begin_trial(const protocols::Trial& trial) override;
+  void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const Sample& sample) override;
+  std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
+  std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
   /// Shows a page without answer keys.
   void show_message(const std::string& text);
@@ -58,6 +61,18 @@ class KeyboardRespondent final : public Respondent {
   void wait_for_space(std::int64_t since_ns);
   void listen(const Sample& sample);
   std::optional<int> meaning(const std::string& key) const;
+  // Version 2 (keyboard_tasks.cpp)
+  using Keys = std::vector<std::pair<std::string, std::string>>;
+  const protocols::TaskBlock* task() const;  ///< of the trial under way; nullptr: version 1
+  std::string interval_text() const;
+  /// \return  what it means, if it ends the interval
+  std::optional<Answer> meaning_in_interval(const std::string& key);
+  void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
+  bool type(const std::string& key, bool text);  ///< false: the key is not for typing
+  std::optional<double> typed_number(std::optional<double> least, std::optional<double> most) const;
+  KeyPress wait_for_key(std::int64_t since_ns);
+  int choose(const std::string& question, const Keys& keys, std::int64_t& time_ns);
+  std::string ask_typed(const protocols::PageItem& item);
 
   const protocols::Protocol& protocol_;
   ParticipantScreen& screen_;
@@ -74,6 +89,9 @@ class KeyboardRespondent final : public Respondent {
   std::int64_t onset_ns_ = 0;      ///< of the trial; 0: not yet
   std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
   std::optional<Answer> pending_;  ///< given, until the servo's samples have reached its time
+  int task_block_ = -1;            ///< of the trial; -1: version 1
+  IntervalView view_;
+  std::string typed_;
 };
 
 }  // namespace palpate::runner

@@ -12,8 +12,19 @@
 namespace palpate::runner {
 
 struct Answer {
-  int stimulus = 0;          ///< index into Protocol::stimuli
+  int stimulus = 0;          ///< index into Protocol::stimuli; version 2: into TaskBlock::answers
   std::int64_t time_ns = 0;  ///< session clock, when the event arrived
+  bool goes_on = false;      ///< no answer: on to the next interval
+  double number = 0;         ///< rate: as it was typed
+};
+
+/// What is asked in an interval of a trial of version 2.
+struct IntervalView {
+  int interval = 1, intervals = 1;  ///< from 1; of how many
+  bool answers = true;              ///< an answer ends it; else the participant goes on
+  bool felt = true;                 ///< false: after the last one, forces off
+  const protocols::Interval* shown = nullptr;  ///< none where nothing is felt
+  std::string text = {};            ///< adjust: what is felt now
 };
 
 /// Ends the current attempt of a trial; what() says why.
@@ -33,6 +44,17 @@ class Respondent {
   virtual void feedback(bool correct) = 0;
   /// A trial is about to begin; the stylus must first be in the home zone.
   virtual void begin_trial(const protocols::Trial& trial) = 0;
+  /// Version 2: an interval of that trial is about to begin.
+  virtual void begin_interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
+  /// Version 2: how sure is the participant? \return  step of the scale and when; none: no answer
+  virtual std::optional<Answer> confidence(const protocols::ConfidenceSpec& /*asked*/) {
+    return std::nullopt;
+  }
+  /// Version 2: a question of a page; "": left out. Consent is "agree" or "disagree".
+  virtual std::string ask(const protocols::PageSpec& /*page*/,
+                          const protocols::PageItem& /*item*/) {
+    return "";
+  }
   /// Called with every sample of the servo. Returns the answer once there is one, never one from
   /// before time zero. \throws TrialCutOff if the trial is to be repeated.
   virtual std::optional<Answer> step(const Sample& sample) = 0;

@@ -7,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "protocols/tasks/levels.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -301,8 +303,9 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     add("/servo/rate_hz is ", protocol.servo_rate, "; '", device.name, "' runs at up to ",
         device.max_rate, " Hz");
   }
-  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
+  const std::vector<protocols::StimulusSpec> shown = protocols::with_all_levels(protocol).stimuli;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const protocols::StimulusSpec& stimulus = shown[i];
     bool refused = false;
     const auto check_material = [&](const stimuli::Material& material, const char* of_parts) {
       const ShowableMaterial can = showable(material, device, shown_rate(protocol, device),
@@ -312,7 +315,9 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
       add("stimulus '", stimulus.name, "' has ", of_parts, can.reason, ": soften /material, raise ",
           "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
           passivity_advice(protocol, material, device, can),
-          "or have it limited by /servo/material_limit \"limit\"");
+          protocol.version == 2
+              ? "or keep the levels below"
+              : "or have it limited by /servo/material_limit \"limit\"");
     };
     visit_materials(stimulus.object,
                     [&](const stimuli::Material& material) { check_material(material, ""); });

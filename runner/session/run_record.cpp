@@ -1,5 +1,6 @@
 #include "runner/session/run_record.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace palpate::runner {
@@ -46,6 +47,17 @@ std::vector<std::string> RunRecord::pending_notes() const {
 int RunRecord::begin(const data::TrialRecord& planned, std::int64_t began_ns) {
   begin();
   return store_.begin_attempt(*run_, planned, began_ns);
+}
+
+void RunRecord::answered(const std::vector<data::PageAnswer>& answers) {
+  begin();
+  store_.add_page_answers(*run_, answers);
+}
+
+bool RunRecord::has_answers(const std::string& page) {
+  if (participant_.id == 0) return false;
+  const std::vector<std::string> pages = store_.answered_pages(participant_, info_.session);
+  return std::find(pages.begin(), pages.end(), page) != pages.end();
 }
 
 }  // namespace palpate::runner

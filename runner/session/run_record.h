@@ -39,6 +39,8 @@ class RunRecord final : public TrialLog {
   int begin(const data::TrialRecord& planned, std::int64_t began_ns) override;
   void finish(const data::TrialRecord& record) override { store_.finish_attempt(*run_, record); }
   void cut_off(const std::string& reason) override { store_.cut_off_attempt(*run_, reason); }
+  void answered(const std::vector<data::PageAnswer>& answers) override;
+  bool has_answers(const std::string& page) override;
 
  private:
   struct Note {

@@ -39,7 +39,13 @@ std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
 
 Session::Session(const Station& station, Respondent& participant, SessionEvents* events,
                  double least_reach)
-    : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {}
+    : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {
+  if (station.protocol.version == 1) return;
+  scenes_ = std::make_unique<LevelScenes>(station.protocol);
+  least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
+}
+
+bool Session::ServoState::tripped() const { return (faults & servo_fault::kTripped) != 0; }
 
 Session::State Session::before_trial() const {
   if (station_.plan.finished()) return State::end;
@@ -54,14 +60,20 @@ void Session::step() {
   const auto& texts = station_.protocol.texts;
   switch (state_) {
     case State::instruction:
+      show_pages(protocols::PageSpec::When::before);
       participant_.read(texts.instructions);
       state_ = before_trial();
       break;
     case State::practice:
       participant_.read(texts.practice);
+      begin_task_block();
       state_ = State::trial;
       break;
     case State::block:
+      if (station_.plan.done() > 0) end_rest();
+      begin_task_block();
+      state_ = State::trial;
+      break;
     case State::rest:
       if (station_.plan.done() > 0) end_rest();
       state_ = State::trial;
@@ -72,16 +84,27 @@ void Session::step() {
     case State::response:
       station_.log.finish(record_);
       if (events_ != nullptr) events_->recorded(record_);
-      station_.plan.answered(
-          record_.correct);  // first: whoever leaves during the feedback has answered
-      if (record_.practice || station_.protocol.response.feedback)
-        participant_.feedback(record_.correct);
+      tell_feedback();
       state_ = before_trial();
-      if (state_ == State::end) participant_.read(texts.end);
+      if (state_ == State::end) {
+        show_pages(protocols::PageSpec::When::after);
+        participant_.read(texts.end);
+      }
       break;
     case State::end:
       break;
   }
+}
+
+void Session::tell_feedback() {
+  const bool feedback = record_.task ? station_.protocol
+                                           .blocks[static_cast<std::size_t>(
+                                               station_.plan.next().task_block)]
+                                           .feedback
+                                     : record_.practice || station_.protocol.response.feedback;
+  station_.plan.answered(
+      outcome_of(record_));  // first: whoever leaves during the feedback has answered
+  if (feedback) participant_.feedback(record_.correct);
 }
 
 data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
@@ -94,6 +117,7 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
   record.practice = trial.practice;
   const Quat& q = trial.orientation;
   record.orientation_wxyz = {q.w, q.x, q.y, q.z};
+  if (trial.task_block >= 0) plan_task(trial, record);
   return record;
 }
 
@@ -109,13 +133,21 @@ void Session::cut_off(const std::string& reason) {
   station_.log.cut_off(reason);
 }
 
-std::optional<Answer> Session::wait_for_answer(std::uint32_t& faults, DeviceTrouble& trouble) {
+std::optional<Answer> Session::show_stimulus(const protocols::Trial& trial, ServoState& servo) {
+  contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
+  const HomeZone home{
+      std::max(station_.library.reach(trial.stimulus), least_reach_) + station_.protocol.home.margin,
+      station_.protocol.home.rest};
+  station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
+  return wait_for_answer(servo);
+}
+
+std::optional<Answer> Session::wait_for_answer(ServoState& servo) {
   const std::int64_t limit_ns = std::llround(station_.protocol.response.time_out * kPerSecond_ns);
   while (true) {
     const Sample& sample = station_.servo.next();
-    faults = sample.faults;
-    trouble = sample.trouble;
-    if (faults & servo_fault::kTripped) return std::nullopt;
+    servo = {sample.faults, sample.trouble};
+    if (servo.tripped()) return std::nullopt;
     if (sample.phase == Phase::feeling) {
       record_onset_and_contact(sample);
       contact_.add(sample);
@@ -132,21 +164,15 @@ std::optional<Answer> Session::wait_for_answer(std::uint32_t& faults, DeviceTrou
 
 bool Session::run_trial() {
   const protocols::Trial& trial = station_.plan.next();
-  const protocols::Protocol& protocol = station_.protocol;
   record_ = planned_record(trial);
   record_.attempt = station_.log.begin(record_, station_.clock.now_ns());
+  quality_ = {};
   if (events_ != nullptr) events_->began(trial);
-  const HomeZone home{
-      std::max(station_.library.reach(trial.stimulus), least_reach_) + protocol.home.margin,
-      protocol.home.rest};
   std::optional<Answer> answer;
-  std::uint32_t faults = 0;
-  DeviceTrouble trouble = DeviceTrouble::none;
+  ServoState servo;
   try {
-    contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
     participant_.begin_trial(trial);
-    station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
-    answer = wait_for_answer(faults, trouble);
+    answer = record_.task ? show_intervals(trial, servo) : show_stimulus(trial, servo);
   } catch (const TrialCutOff& again) {
     station_.servo.stop();
     cut_off(again.what());
@@ -156,35 +182,54 @@ bool Session::run_trial() {
     cut_off(error.what());
     throw;
   }
-  const ServoQuality quality = station_.servo.stop();
-  if (faults & servo_fault::kTripped) {
-    const std::string reason = trip_reason(faults, trouble);
+  const ServoQuality last = station_.servo.stop();
+  if (!record_.task) quality_ = last;  // intervals have been added one by one
+  if (servo.tripped()) {
+    const std::string reason = trip_reason(servo.faults, servo.trouble);
     cut_off(reason);
     throw SessionFault("forces are off: " + reason + "; trial " + std::to_string(record_.trial) +
                            " will be shown again",
-                       reason, faults, trouble);
+                       reason, servo.faults, servo.trouble);
   }
-  record_.response_time = protocol.response.time_out;
+  take_answer(trial, answer);
+  record_.ticks = quality_.ticks;
+  record_.missed_ticks = quality_.missed_ticks;
+  record_.longest_period_ns = quality_.longest_period_ns;
+  record_.faults = quality_.faults;
+  record_.started_inside = (quality_.faults & rendering::render_fault::kStartedInside) != 0;
+  record_.max_force = quality_.max_force;
+  record_.contact_share = contact_.contact_share();
+  record_.edge_dwell = contact_.edge_dwell(1 / station_.protocol.servo_rate);
+  if (events_ != nullptr) events_->answered(record_);
+  return true;
+}
+
+void Session::add_quality(const ServoQuality& quality) {
+  quality_.ticks += quality.ticks;
+  quality_.missed_ticks += quality.missed_ticks;
+  quality_.longest_period_ns = std::max(quality_.longest_period_ns, quality.longest_period_ns);
+  quality_.faults |= quality.faults;
+  quality_.max_force = std::max(quality_.max_force, quality.max_force);
+}
+
+void Session::take_answer(const protocols::Trial& trial, const std::optional<Answer>& answer) {
+  record_.response_time =
+      record_.task ? task_of(trial).time_out : station_.protocol.response.time_out;
   if (answer) {
     record_.response_ns = answer->time_ns;
     record_.response_time =
         static_cast<double>(record_.response_ns - record_.onset_ns) / kPerSecond_ns;
-    record_.response = protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
+  }
+  if (record_.task) {
+    take_task_answer(trial, answer);
+  } else if (answer) {
+    record_.response =
+        station_.protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
   // The answer may have come before the tick that was looked at last.
   if (record_.first_contact_time && *record_.first_contact_time > record_.response_time)
     record_.first_contact_time.reset();
-  record_.ticks = quality.ticks;
-  record_.missed_ticks = quality.missed_ticks;
-  record_.longest_period_ns = quality.longest_period_ns;
-  record_.faults = quality.faults;
-  record_.started_inside = (quality.faults & rendering::render_fault::kStartedInside) != 0;
-  record_.max_force = quality.max_force;
-  record_.contact_share = contact_.contact_share();
-  record_.edge_dwell = contact_.edge_dwell(1 / protocol.servo_rate);
-  if (events_ != nullptr) events_->answered(record_);
-  return true;
 }
 
 void Session::record_onset_and_contact(const Sample& sample) {

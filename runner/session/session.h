@@ -2,6 +2,8 @@
 // The trial loop: a session as a state machine, the same for simulated and live participants.
 
 #include <functional>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 #include "data/record.h"
 #include "runner/participants/respondent.h"
 #include "runner/session/contact_log.h"
+#include "runner/session/level_scenes.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {
@@ -75,9 +78,35 @@ class Session {
   State before_trial() const;
   data::TrialRecord planned_record(const protocols::Trial& trial) const;
   bool run_trial();  ///< false: it was cut off
-  std::optional<Answer> wait_for_answer(std::uint32_t& faults, DeviceTrouble& trouble);
+  /// What the servo said last in a trial.
+  struct ServoState {
+    std::uint32_t faults = 0;
+    DeviceTrouble trouble = DeviceTrouble::none;
+    bool tripped() const;
+  };
+  std::optional<Answer> show_stimulus(const protocols::Trial& trial, ServoState& servo);
+  std::optional<Answer> wait_for_answer(ServoState& servo);
+  // Version 2 (session_tasks.cpp)
+  void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
+  std::optional<Answer> show_intervals(const protocols::Trial& trial, ServoState& servo);
+  std::optional<Answer> adjust(const protocols::Trial& trial, ServoState& servo);
+  std::optional<Answer> ask_without_forces(const protocols::Trial& trial, ServoState& servo);
+  void prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
+                        const HomeZone& home);
+  HomeZone task_home(double rest) const;
+  std::optional<Answer> wait_in_interval(const IntervalView& view, std::optional<double> limit,
+                                         ServoState& servo);
+  void end_interval();
+  void take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
+  void ask_confidence(const protocols::ConfidenceSpec& asked);
+  void begin_task_block();
+  void show_pages(protocols::PageSpec::When when, const std::string& block = "");
+  const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   void cut_off(const std::string& reason);
   void end_rest();
+  void tell_feedback();
+  void add_quality(const ServoQuality& quality);
+  void take_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
   void record_onset_and_contact(const Sample& sample);
   void record_sample(const Sample& sample);
 
@@ -88,6 +117,8 @@ class Session {
   State state_ = State::instruction;
   data::TrialRecord record_;  ///< of the trial under way
   ContactLog contact_;        ///< likewise
+  ServoQuality quality_;      ///< likewise, of its intervals so far
+  std::unique_ptr<LevelScenes> scenes_;  ///< version 2
 };
 
 }  // namespace palpate::runner

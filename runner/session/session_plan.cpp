@@ -7,6 +7,10 @@ namespace palpate::runner {
 
 SessionPlan::SessionPlan(const protocols::Protocol& protocol, int participant_number, int session)
     : protocol_(&protocol), participant_number_(participant_number) {
+  if (protocol.version == 2) {
+    tasks_.emplace(protocol, participant_number, session);
+    return;
+  }
   const std::vector<protocols::Trial> all = protocols::schedule(protocol, participant_number);
   std::copy_if(all.begin(), all.end(), std::back_inserter(trials_),
                [session](const protocols::Trial& trial) { return trial.session == session; });
@@ -15,14 +19,20 @@ SessionPlan::SessionPlan(const protocols::Protocol& protocol, int participant_nu
 }
 
 bool SessionPlan::block_begins() const {
+  if (tasks_) return tasks_->block_begins();
   return next_ == 0 || trials_[next_].block != trials_[next_ - 1].block;
 }
 
-void SessionPlan::answered(bool correct) {
+protocols::TrialOutcome outcome_of(const data::TrialRecord& record) {
+  return {record.correct, record.task ? record.task->success : record.correct, !record.timed_out};
+}
+
+void SessionPlan::answered(const protocols::TrialOutcome& outcome) {
+  if (tasks_) return tasks_->answered(outcome);
   const protocols::Trial& trial = trials_[next_++];
   if (!trial.practice || trial.block < first_practice_block_) return;
   ++shown_;
-  correct_ += correct ? 1 : 0;
+  correct_ += outcome.correct ? 1 : 0;
   if (finished() || trials_[next_].block != trial.block) judge_practice();
 }
 

@@ -1,9 +1,12 @@
 #pragma once
 // The schedule of one session as it is worked off.
 
+#include <optional>
 #include <vector>
 
+#include "data/record.h"
 #include "protocols/schedule.h"
+#include "protocols/tasks/task_plan.h"
 
 namespace palpate::runner {
 
@@ -13,16 +16,22 @@ class SessionPlan {
  public:
   SessionPlan(const protocols::Protocol& protocol, int participant_number, int session);
 
-  bool finished() const { return next_ == trials_.size(); }
-  const protocols::Trial& next() const { return trials_[next_]; }  ///< \pre not finished()
-  std::size_t done() const { return next_; }
-  std::size_t size() const { return trials_.size(); }  ///< as far as is known now
+  bool finished() const { return tasks_ ? tasks_->finished() : next_ == trials_.size(); }
+  /// \pre not finished()
+  const protocols::Trial& next() const { return tasks_ ? tasks_->next() : trials_[next_]; }
+  std::size_t done() const { return tasks_ ? tasks_->done() : next_; }
+  /// As far as is known now.
+  std::size_t size() const { return tasks_ ? tasks_->size() : trials_.size(); }
   /// The number of its last block.
-  int blocks() const { return trials_.empty() ? 0 : trials_.back().block; }
+  int blocks() const {
+    if (tasks_) return tasks_->last_block();
+    return trials_.empty() ? 0 : trials_.back().block;
+  }
   /// True at the first trial of a block (of a session, for the first).
   bool block_begins() const;
   /// The next trial has been answered.
-  void answered(bool correct);
+  void answered(const protocols::TrialOutcome& outcome);
+  void answered(bool correct) { answered(protocols::TrialOutcome{correct, correct}); }
 
  private:
   void judge_practice();
@@ -34,6 +43,10 @@ class SessionPlan {
   int first_practice_block_ = 0;  ///< blocks before it are warm-up
   int round_ = 1;                 ///< of the practice under way
   int correct_ = 0, shown_ = 0;   ///< in that round
+  std::optional<protocols::TaskPlan> tasks_;  ///< version 2, instead of all this
 };
+
+/// What became of a trial that is on record, for SessionPlan::answered.
+protocols::TrialOutcome outcome_of(const data::TrialRecord& record);
 
 }  // namespace palpate::runner

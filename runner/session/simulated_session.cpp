@@ -1,10 +1,12 @@
 #include "runner/session/simulated_session.h"
 
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <string>
 
 #include "runner/build_info.h"
+#include "runner/participants/task_participant.h"
 #include "runner/session/session.h"
 #include "runner/session/simulated_study.h"
 
@@ -56,10 +58,16 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   VirtualClock clock(session.clock_ns);
   Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{}, workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
-  SimulatedParticipant participant(own, study.hypotheses, stylus, protocol, study.seed,
-                                   session.participant);
+  std::unique_ptr<Respondent> participant;
+  if (protocol.version == 2) {
+    participant = std::make_unique<TaskParticipant>(own, study.hypotheses, stylus, protocol,
+                                                    study.seed, session.participant);
+  } else {
+    participant = std::make_unique<SimulatedParticipant>(own, study.hypotheses, stylus, protocol,
+                                                         study.seed, session.participant);
+  }
   const Station station{protocol, study.library, session.plan, servo, clock, session.utc, log};
-  Session trials(station, participant);
+  Session trials(station, *participant);
   // A trial that was shown is recorded, also when it is the last for now.
   while (trials.state() != Session::State::end &&
          (trials.state() == Session::State::response || !halting())) {

@@ -24,7 +24,7 @@ namespace {
 struct Work {
   data::Participant participant;
   int session = 1;
-  std::vector<bool> answers;  ///< correct or not, of the trials on record
+  std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
   std::int64_t clock_ns = 0;  ///< where the session's clock stood
   data::RunInfo info;
 };
@@ -84,7 +84,7 @@ class QueueLog final : public TrialLog {
 
 SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
   SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
-  for (const bool correct : work.answers) plan.answered(correct);
+  for (const protocols::TrialOutcome& outcome : work.answers) plan.answered(outcome);
   return plan;
 }
 
@@ -116,7 +116,7 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
             participant.code + " was simulated with other settings; use those or another database");
       }
       for (const data::TrialRecord& record : before.completed)
-        work.answers.push_back(record.correct);
+        work.answers.push_back(outcome_of(record));
       work.clock_ns = before.latest_ns;
       work.info = simulated_run(protocol, settings, number, session);
       const SessionPlan trials = plan_of(protocol, work);
@@ -152,8 +152,10 @@ class Recorder {
       SessionPlan& plan = plans_[index];
       for (const data::TrialRecord& record : records) {
         const std::size_t size = plan.size();
-        plan.answered(record.correct);
-        progress.expected += static_cast<std::int64_t>(plan.size() - size);
+        plan.answered(outcome_of(record));
+        // Fewer where a procedure has ended early.
+        progress.expected +=
+            static_cast<std::int64_t>(plan.size()) - static_cast<std::int64_t>(size);
       }
       progress.recorded += static_cast<std::int64_t>(records.size());
       progress.this_run += static_cast<std::int64_t>(records.size());
@@ -190,6 +192,8 @@ SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
   std::vector<stimuli::ObjectSpec> shapes;
+  // Tasks of version 2 are not answered by the shape: any will do to explore with.
+  if (protocol.version == 2) return {stimuli::ObjectSpec{}};
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     shapes.push_back(stimulus.object);
   return shapes;
@@ -212,6 +216,7 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
   SimulatedStylus device = simulated_stylus(protocol, settings);
   std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (protocol.version == 2) break;  // its tasks are not answered by the shape
     const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
     if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
   }

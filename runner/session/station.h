@@ -22,7 +22,7 @@ namespace palpate::runner {
 /// Of every session, simulated or live.
 struct Station {
   const protocols::Protocol& protocol;  ///< its materials limited to what the device can show
-  const StimulusLibrary& library;       ///< the protocol's stimuli as convex meshes, m
+  const StimulusLibrary& library;  ///< the protocol's stimuli at all levels, as convex meshes, m
   SessionPlan plan;      ///< the schedule, at the first trial that is not on record when it begins
   TickSource& servo;     ///< the servo loop: one sample a tick. Live: the servo thread
   Clock& clock;          ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
@@ -47,7 +47,7 @@ struct LiveStation : Station {
   NoisePlayer* noise;  ///< in the participant's headphones; none where none is wanted
 };
 
-/// The radius about the origin that holds each of the protocol's stimuli in any orientation, m.
+/// The radius about the origin that holds each of the library's stimuli in any orientation, m.
 double largest_reach(const Station& station);
 
 }  // namespace palpate::runner

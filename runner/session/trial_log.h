@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "data/record.h"
 
@@ -18,6 +19,10 @@ class TrialLog {
   virtual void finish(const data::TrialRecord& record) = 0;
   /// The trial will be shown again.
   virtual void cut_off(const std::string& reason) = 0;
+  /// The answers to a page of version 2, together. A log that keeps none loses them.
+  virtual void answered(const std::vector<data::PageAnswer>& /*answers*/) {}
+  /// Whether a page of this session has been answered: it is not shown again.
+  virtual bool has_answers(const std::string& /*page*/) { return false; }
 };
 
 }  // namespace palpate::runner

@@ -224,7 +224,7 @@ int run_command(const std::vector<std::string>& args) {
                    run_info(settings, device, session, began), other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
   SessionPlan plan(protocol, participant.enrolled_number, session);
-  for (const data::TrialRecord& trial : progress.completed) plan.answered(trial.correct);
+  for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
   const std::string resumed = resumption(store, participant, session, plan);
 
   const LiveStation station{{protocol, library, plan, servo, clock, began, record},

@@ -1,0 +1,141 @@
+#include "runner/participants/task_judgement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "protocols/tasks/levels.h"
+
+namespace palpate::runner {
+
+using protocols::TaskBlock;
+using protocols::TaskKind;
+
+void TaskJudgement::begin(const protocols::Trial& trial, const stimuli::Random& random) {
+  trial_ = trial;
+  random_ = random;
+  estimates_.clear();
+  own_.reset();
+  standard_.reset();
+  evidence_ = 0;
+}
+
+const TaskBlock& TaskJudgement::block() const {
+  return protocol_.blocks[static_cast<std::size_t>(trial_.task_block)];
+}
+
+double TaskJudgement::level_of(const protocols::Interval& interval) const {
+  if (interval.level) return *interval.level;
+  if (interval.stimulus < 0) return 0;
+  return protocols::own_level(protocol_, block(), interval.stimulus)
+      .value_or(1 + interval.stimulus);
+}
+
+int TaskJudgement::index_of(const char* name) const {
+  const auto& answers = block().answers;
+  const auto at = std::find_if(answers.begin(), answers.end(),
+                               [name](const auto& answer) { return answer.name == name; });
+  return static_cast<int>(at - answers.begin());
+}
+
+void TaskJudgement::feel(const protocols::Interval& interval, std::optional<double> measured) {
+  last_level_ = measured.value_or(level_of(interval));
+  double reference = last_level_;
+  if (block().standard) {
+    protocols::Interval standard;
+    standard.stimulus = *block().standard;
+    reference = level_of(standard);
+  }
+  const double sd = settings_.weber * std::abs(reference) / std::sqrt(2.0);
+  const double estimate = last_level_ + sd * random_.normal();
+  estimates_.push_back(estimate);
+  feels_standard_ = interval.standard;
+  (interval.standard ? standard_ : own_) = estimate;
+}
+
+/// Index of the interval that is chosen.
+std::optional<int> TaskJudgement::compared() {
+  const TaskBlock& asked = block();
+  if (estimates_.size() < 2) return std::nullopt;
+  const double sd = settings_.weber * std::max(1e-300, std::abs(estimates_.front()));
+  if (asked.same_different) {
+    evidence_ = std::abs(estimates_[0] - estimates_[1]) / sd;
+    return index_of(evidence_ > 1 ? "different" : "same");
+  }
+  const auto [least, most] = std::minmax_element(estimates_.begin(), estimates_.end());
+  evidence_ = (*most - *least) / sd;
+  const auto at = (asked.asks_smaller ? least : most) - estimates_.begin();
+  return index_of(std::to_string(at + 1).c_str());
+}
+
+int TaskJudgement::detected() {
+  const std::vector<double> levels = protocols::levels_of(block());
+  protocols::PsychometricParameters parameters;
+  const double range = levels.empty() ? 1 : levels.back() - levels.front();
+  parameters.threshold = levels.empty() ? 0.5 : levels.front() + settings_.threshold * range;
+  parameters.slope = 1 / (settings_.spread * std::max(range, 1e-12));
+  parameters.guess = settings_.false_alarm;
+  parameters.lapse = settings_.lapse;
+  const protocols::PsychometricFunction function{protocols::PsychometricShape::normal,
+                                                 protocols::LevelScale::linear,
+                                                 protocols::Easier::higher};
+  double yes = settings_.false_alarm;
+  if (!trial_.catch_trial) {
+    yes = trial_.level
+              ? protocols::psychometric_probability(function, parameters, *trial_.level)
+              : 1 - settings_.lapse;
+  }
+  evidence_ = 4 * std::abs(yes - 0.5);
+  return index_of(random_.unit() < yes ? "yes" : "no");
+}
+
+/// Feels the other one first, then turns and feels again.
+int TaskJudgement::adjusted() {
+  if (!own_ || !standard_) return index_of("switch");
+  const double apart = *standard_ - *own_;
+  if (std::abs(apart) <= block().turn / 2) return index_of("done");
+  if (feels_standard_) return index_of("switch");
+  return index_of(apart > 0 ? "up" : "down");
+}
+
+int TaskJudgement::answer() {
+  const auto count = static_cast<std::uint64_t>(std::max<std::size_t>(1, block().answers.size()));
+  if (block().task == TaskKind::adjust) return adjusted();
+  if (block().task == TaskKind::detect) return detected();
+  if (random_.unit() < settings_.lapse) return static_cast<int>(random_.below(count));
+  switch (block().task) {
+    case TaskKind::compare:
+      return compared().value_or(0);
+    case TaskKind::rate: {
+      // The step that is nearest to where the level stands among all levels.
+      const std::vector<double> levels = protocols::levels_of(block());
+      const double range = levels.empty() ? 0 : levels.back() - levels.front();
+      const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;
+      const double step = std::clamp(place, 0.0, 1.0) * static_cast<double>(count - 1);
+      return static_cast<int>(std::lround(step));
+    }
+    default:
+      evidence_ = 2;
+      return index_of(
+          protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str());
+  }
+}
+
+double TaskJudgement::number() {
+  const TaskBlock& asked = block();
+  double scale = 10;
+  if (asked.standard && asked.modulus > 0 && estimates_.size() > 1)
+    scale = asked.modulus / std::pow(std::abs(estimates_.front()), settings_.exponent);
+  const double judged = scale * std::pow(std::abs(last_level_), settings_.exponent) *
+                        std::exp(settings_.number_sd * random_.normal());
+  const double rounded = std::round(judged * 100) / 100;
+  return std::clamp(rounded, asked.least.value_or(rounded), asked.most.value_or(rounded));
+}
+
+int TaskJudgement::confidence(int steps) const {
+  const double share = std::min(evidence_ / 2, 0.999);
+  return static_cast<int>(share * steps);
+}
+
+}  // namespace palpate::runner

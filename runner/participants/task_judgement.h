@@ -1,0 +1,68 @@
+#pragma once
+// How a simulated participant judges levels: one number with noise for each stimulus that is felt.
+// A model that is not fitted to any person.
+//
+//   compare   each interval gives an estimate, its level with noise; the largest (smallest) is
+//             chosen. Of two intervals, the comparison is chosen with probability
+//             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
+//             same_different: differ by more than sd
+//   detect    "yes" by a psychometric function (protocols/procedures/psychometric.h)
+//   rate      number = level^exponent, times exp(noise)
+//   adjust    turns towards the standard until the estimates are less than half a turn apart
+//   identify  right, but for lapses
+// With the share `lapse` any answer is given.
+
+#include <optional>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+#include "stimuli/random.h"
+
+namespace palpate::runner {
+
+struct JudgementSettings {
+  double weber = 0.15;      ///< noise of a difference of two estimates, as a share of the standard
+  double threshold = 0.5;   ///< detect: where, as a share of the range of levels
+  double spread = 0.1;      ///< detect: sd of the function, likewise
+  double false_alarm = 0.05;
+  double lapse = 0.02;
+  double exponent = 0.8;    ///< rate
+  double number_sd = 0.1;   ///< rate: sd of the log
+};
+
+class TaskJudgement {
+ public:
+  /// \param protocol  must outlive it
+  TaskJudgement(const protocols::Protocol& protocol, const JudgementSettings& settings)
+      : protocol_(protocol), settings_(settings) {}
+
+  /// Before the first interval of a trial.
+  void begin(const protocols::Trial& trial, const stimuli::Random& random);
+  /// What an interval is felt as. \param measured  the level as the hand met it; none: the true one
+  void feel(const protocols::Interval& interval, std::optional<double> measured);
+  /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.
+  int answer();
+  double number();  ///< rate: a number typed
+  int confidence(int steps) const;
+
+ private:
+  const protocols::TaskBlock& block() const;
+  double level_of(const protocols::Interval& interval) const;
+  int index_of(const char* name) const;
+  std::optional<int> compared();
+  int detected();
+  int adjusted();
+
+  const protocols::Protocol& protocol_;
+  JudgementSettings settings_;
+  protocols::Trial trial_;
+  stimuli::Random random_{0};
+  std::vector<double> estimates_;  ///< of the intervals so far
+  std::optional<double> own_, standard_;  ///< adjust: as felt last
+  bool feels_standard_ = false;
+  double last_level_ = 0;
+  double evidence_ = 0;  ///< how clear the answer was, in sd
+};
+
+}  // namespace palpate::runner

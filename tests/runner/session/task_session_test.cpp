@@ -1,0 +1,239 @@
+// Sessions of version 2 with simulated participants: every task through servo, store and export,
+// and the same database whatever the interruptions.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "data/export/csv.h"
+#include "data/store/store.h"
+#include "protocols/parse.h"
+#include "runner/participants/simulated_settings.h"
+#include "runner/session/protocol_info.h"
+#include "runner/session/simulated_session.h"
+#include "runner/session/simulated_study.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::json;
+
+json base() {
+  return json::parse(R"({"version": 2, "name": "s", "renderers": ["point"], "seed": 5,
+    "orientation": "fixed", "home": {"rest_s": 0.1},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2,
+                 "stiffness_n_per_m": 300}]})");
+}
+
+json with_blocks(const char* blocks) {
+  json document = base();
+  document["blocks"] = json::parse(blocks);
+  return document;
+}
+
+constexpr const char* kCompare = R"([
+  {"name": "constant", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+   "level": {"path": "/stiffness_n_per_m"},
+   "procedure": {"kind": "constant", "levels": [150, 300, 600], "repetitions": 2},
+   "confidence": {"scale": [{"label": "guess", "number": 0}, {"label": "sure", "number": 5}]}},
+  {"name": "stairs", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+   "level": {"path": "/stiffness_n_per_m"}, "interval_limit_s": 1.2,
+   "procedure": {"kind": "staircase", "start": 500, "min": 300, "max": 600, "steps": [80],
+                 "down": 2, "stop": {"trials": 5}}},
+  {"name": "any", "task": "detect", "stimuli": ["ball"], "catch_trials": 0.4,
+   "level": {"path": "/stiffness_n_per_m"},
+   "procedure": {"kind": "constant", "levels": [20, 400], "repetitions": 3}}])";
+
+protocols::Protocol parsed_study(const json& document) {
+  return protocols::parse_protocol_text(document.dump(), "study.json");
+}
+
+class TaskSession : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("palpate-task-session-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  static void simulate(const protocols::Protocol& protocol, const std::string& database) {
+    data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
+    StudyPlan plan;
+    plan.participants = 1;
+    plan.seed = 3;
+    const std::atomic<bool> stop{false};
+    simulate_study(protocol, store, load_simulated_settings(""), plan, stop, {});
+  }
+  static std::vector<data::TrialRecord> trials_of(const std::string& database) {
+    data::Store store = data::Store::open(database, data::Store::Mode::read_only);
+    std::vector<data::TrialRecord> trials;
+    store.for_each_trial([&](const data::StoredTrial& t) { trials.push_back(t.record); });
+    return trials;
+  }
+  std::string csv_of(const std::string& database) const {
+    data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
+    data::ExportSettings settings;
+    settings.force = true;
+    data::export_csv(store, path("trials.csv"), settings);
+    std::ifstream file(path("trials.csv"));
+    std::ostringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(TaskSession, RecordsEveryIntervalOfAComparison) {
+  simulate(parsed_study(with_blocks(kCompare)), path("a.db"));
+  int compared = 0, detected = 0, catches = 0;
+  for (const data::TrialRecord& trial : trials_of(path("a.db"))) {
+    ASSERT_TRUE(trial.task.has_value());
+    const data::TaskRecord& task = *trial.task;
+    EXPECT_FALSE(trial.response.empty());
+    std::int64_t before = 0;
+    for (const data::IntervalRecord& interval : task.intervals) {
+      EXPECT_GT(interval.onset_ns, before);
+      EXPECT_GT(interval.end_ns, interval.onset_ns);
+      before = interval.end_ns;
+    }
+    EXPECT_EQ(task.intervals.back().onset_ns, trial.onset_ns);
+    if (task.task == "compare") {
+      ++compared;
+      ASSERT_EQ(task.intervals.size(), 2U);
+      const std::size_t chosen = trial.response == "1" ? 0 : 1;
+      EXPECT_EQ(task.success, !task.intervals[chosen].standard);
+      EXPECT_EQ(task.intervals[0].standard, !task.intervals[1].standard);
+      EXPECT_EQ(task.standard_level, 300);
+      EXPECT_EQ(trial.correct, task.success == (*task.level >= 300));
+      EXPECT_EQ(task.confidence.has_value(), task.block_name == "constant");
+      if (task.block_name == "stairs") {
+        // Forces go off at the limit, and the answer is given without them.
+        for (const data::IntervalRecord& i : task.intervals)
+          EXPECT_NEAR(static_cast<double>(i.end_ns - i.onset_ns), 1.2e9, 2e6);
+        EXPECT_GE(trial.response_time, 1.2);
+      }
+    } else {
+      ++detected;
+      catches += task.catch_trial ? 1 : 0;
+      EXPECT_EQ(task.intervals[0].stimulus.empty(), task.catch_trial);
+      EXPECT_EQ(trial.correct, (trial.response == "yes") != task.catch_trial);
+      if (task.catch_trial) EXPECT_EQ(trial.max_force, 0);
+      if (!task.catch_trial) EXPECT_GT(trial.max_force, 0) << "trial " << trial.trial;
+    }
+  }
+  EXPECT_EQ(compared, 11);
+  EXPECT_EQ(detected, 10);
+  EXPECT_EQ(catches, 4);
+}
+
+/// Keeps what it is given.
+class KeptTrials final : public TrialLog {
+ public:
+  int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
+  void finish(const data::TrialRecord& record) override { trials.push_back(record); }
+  void cut_off(const std::string& reason) override { FAIL() << reason; }
+  std::vector<data::TrialRecord> trials;
+};
+
+TEST_F(TaskSession, GivesTheSameDatabaseWhereverItIsInterrupted) {
+  const protocols::Protocol protocol = parsed_study(with_blocks(kCompare));
+  const SimulatedSettings settings = load_simulated_settings("");
+  simulate(protocol, path("whole.db"));
+  const std::string expected = csv_of(path("whole.db"));
+  const std::size_t count = trials_of(path("whole.db")).size();
+  ASSERT_EQ(count, 21U);
+  const SimulatedStudy study(protocol, settings, 3);
+  const data::ClockStamp utc = simulated_run(protocol, settings, 1, 1).clock;
+  for (std::size_t stop = 0; stop < count; ++stop) {
+    KeptTrials before;
+    run_simulated_session(study, {1, SessionPlan(protocol, 1, 1), 0, utc}, before,
+                          [&] { return before.trials.size() >= stop; });
+    ASSERT_EQ(before.trials.size(), stop);
+    const std::string database = path("stop-" + std::to_string(stop) + ".db");
+    {
+      data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
+      const auto person = store.enrol(info_of(protocol), "S001", 1, true, 3);
+      const auto run = store.begin_run(person, simulated_run(protocol, settings, 1, 1));
+      store.record_simulated(run, before.trials);
+    }  // killed
+    simulate(protocol, database);
+    EXPECT_EQ(csv_of(database), expected) << "interrupted after trial " << stop;
+  }
+}
+
+TEST_F(TaskSession, JudgesStifferBallsByWhatTheHandMet) {
+  json document = with_blocks(kCompare);
+  document["blocks"] = json::array({json(document["blocks"][0])});
+  document["blocks"][0]["procedure"]["levels"] = {100, 900};
+  document["blocks"][0]["procedure"]["repetitions"] = 10;
+  simulate(parsed_study(document), path("a.db"));
+  int right = 0;
+  for (const data::TrialRecord& trial : trials_of(path("a.db"))) right += trial.correct ? 1 : 0;
+  EXPECT_GE(right, 18);  // of 20: a factor of 3, but for lapses
+}
+
+TEST_F(TaskSession, RatesAndAdjusts) {
+  simulate(parsed_study(with_blocks(R"([
+    {"name": "number", "task": "rate", "stimuli": ["ball"], "level": {"path": "/stiffness_n_per_m"},
+     "procedure": {"kind": "constant", "levels": [100, 400], "repetitions": 3}, "min": 0},
+    {"name": "scale", "task": "rate", "stimuli": ["ball"], "standard": "ball", "modulus": 10,
+     "level": {"path": "/stiffness_n_per_m"},
+     "procedure": {"kind": "constant", "levels": [100, 400], "repetitions": 1},
+     "scale": [{"label": "soft", "number": -1}, {"label": "hard", "number": 1}]},
+    {"name": "equal", "task": "adjust", "stimuli": ["ball"], "standard": "ball",
+     "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 600, "turn": 40,
+     "starts": [150, 550], "repetitions": 2}])")),
+           path("a.db"));
+  double soft = 0, hard = 0;
+  for (const data::TrialRecord& trial : trials_of(path("a.db"))) {
+    const data::TaskRecord& task = *trial.task;
+    ASSERT_TRUE(task.number.has_value()) << task.block_name;
+    if (task.block_name == "number") (*task.level < 200 ? soft : hard) += *task.number;
+    if (task.block_name == "scale") {
+      EXPECT_EQ(std::abs(*task.number), 1);
+      EXPECT_EQ(task.intervals.size(), 2U);
+    }
+    if (task.block_name != "equal") continue;
+    EXPECT_TRUE(task.level == 150 || task.level == 550);
+    EXPECT_NEAR(*task.number, 300, 150);
+    EXPECT_GT(task.intervals.size(), 2U);
+    EXPECT_EQ(task.intervals.front().onset_ns, trial.onset_ns);
+    // From one interval of its own to the next, the level moves by a turn at most.
+    double level = *task.level;
+    for (const data::IntervalRecord& interval : task.intervals) {
+      if (interval.standard) continue;
+      EXPECT_LE(std::abs(*interval.level - level), 40);
+      level = *interval.level;
+    }
+    EXPECT_EQ(level, *task.number);
+  }
+  EXPECT_GT(hard, 1.5 * soft);
+}
+
+TEST_F(TaskSession, ExportsTheColumnsOfTasksForVersion2Only) {
+  simulate(parsed_study(with_blocks(kCompare)), path("a.db"));
+  const std::string csv = csv_of(path("a.db"));
+  EXPECT_NE(csv.find("edge_dwell,task,block_name,track,level,standard_level,catch_trial,success,"
+                     "number,confidence,confidence_delay,comparison_interval,interval_onsets,"
+                     "interval_ends,interval_levels"),
+            std::string::npos);
+  simulate(protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json"), path("one.db"));
+  const std::string plain = csv_of(path("one.db"));
+  EXPECT_EQ(plain.substr(0, plain.find('\n')).find("block_name"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate::runner
