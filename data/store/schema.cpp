@@ -111,7 +111,7 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest) {
 
 std::string migrate(SQLite::Database& db, const std::string& path, int from, int to,
                     std::span<const Migration> steps) {
-  const std::string copy = back_up(db, path, from);
+  std::string copy = back_up(db, path, from);
   guarded(path, [&] {
     // A step may rebuild tables that others refer to: foreign keys are checked once, at the end.
     db.exec("PRAGMA foreign_keys = OFF");
