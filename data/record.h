@@ -41,7 +41,7 @@ struct IntervalRecord {
 /// What a trial of version 2 has besides. Onset, response time and contact are those of the
 /// interval that was felt last.
 struct TaskRecord {
-  std::string task;                      ///< "identify", "compare", "detect", "rate", "adjust"
+  std::string task;  ///< "identify", "compare", "detect", "rate", "adjust"
   std::string block_name;
   int track = 1;                         ///< stimulus, renderer and procedure
   std::optional<double> level;           ///< asked about; adjust: where it started
@@ -88,7 +88,7 @@ struct TrialRecord {
   /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also
   /// where the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;
-  std::vector<SampleRecord> samples;  ///< empty unless recorded and requested
+  std::vector<SampleRecord> samples;              ///< empty unless recorded and requested
   std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
 };
 

@@ -35,8 +35,8 @@ struct Trial {
   Quat orientation{1, 0, 0, 0};
   bool practice = false;  ///< practice or warm-up: excluded from analysis
   // Version 2; stimulus and renderer are then those of what is asked about.
-  int task_block = -1;  ///< index into Protocol::blocks; -1: version 1
-  int track = 0;        ///< 1, 2, ...: stimulus, renderer and procedure
+  int task_block = -1;                         ///< index into Protocol::blocks; -1: version 1
+  int track = 0;                               ///< 1, 2, ...: stimulus, renderer and procedure
   std::optional<double> level = std::nullopt;  ///< adjust: where it starts
   bool catch_trial = false;
   std::vector<Interval> intervals = {};  ///< in the order in which they are felt
@@ -48,9 +48,9 @@ class ScheduleError : public std::runtime_error {
 };
 
 /// Version 1: the trials of participant number 1, 2, ... in order. Depends on the protocol's seed
-/// and the number alone; in version 2 answers count, too (tasks/task_plan.h). Practice appears once, as its first round.
-/// \throws ScheduleError where the constraints have no solution, std::invalid_argument for a
-/// participant number below 1.
+/// and the number alone; in version 2 answers count, too (tasks/task_plan.h). Practice appears
+/// once, as its first round. \throws ScheduleError where the constraints have no solution,
+/// std::invalid_argument for a participant number below 1.
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number);
 
 /// Round 1, 2, ... of practice with a renderer; round 1 is the one in schedule(). For an

@@ -56,7 +56,8 @@ class SceneBuilder {
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };
 
-/// The stimuli of a protocol, and each at every level that can be told before (levels.h), built once, and the scene of each trial. Threads may share it.
+/// The stimuli of a protocol, and each at every level that can be told before (levels.h), built
+/// once, and the scene of each trial. Threads may share it.
 class StimulusLibrary {
  public:
   /// \throws MeshError naming the stimulus.

@@ -108,9 +108,10 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
   for (Column& column : columns) {
     const std::string_view name = column.name;
     if (name == "shape") {
-      column.description = "Name of the stimulus that was shown; compare, adjust: of what was "
-                           "compared with the standard or adjusted to it; detect: of what was to "
-                           "be detected, also in catch trials";
+      column.description =
+          "Name of the stimulus that was shown; compare, adjust: of what was "
+          "compared with the standard or adjusted to it; detect: of what was to "
+          "be detected, also in catch trials";
     } else if (name == "response") {
       column.description =
           "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "

@@ -185,8 +185,11 @@ class SessionCopier {
 std::array<SessionRows, 5> session_rows(SQLite::Database& db) {
   const std::string which_run =
       "(SELECT count(*) FROM runs q WHERE q.session_id = ?1 AND q.id <= t.run_id), 0, ";
-  std::array<SessionRows, 5> all{
-      {{"runs", "", ""}, {"notes", "", ""}, {"attempts", "", ""}, {"samples", "", ""}, {"page_answers", "", ""}}};
+  std::array<SessionRows, 5> all{{{"runs", "", ""},
+                                  {"notes", "", ""},
+                                  {"attempts", "", ""},
+                                  {"samples", "", ""},
+                                  {"page_answers", "", ""}}};
   for (SessionRows& one : all) one.columns = columns_but_keys(db, one.table);
   all[0].select =
       "SELECT row_number() OVER (ORDER BY t.id), (SELECT sha256 FROM protocols WHERE id = "

@@ -19,7 +19,8 @@ struct SessionRows {
 };
 
 /// Runs: position in the session (1, 2, ...), checksum of a protocol of its own or NULL. Notes,
-/// attempts and answers to pages: position of their run, 0. Samples: trial and number of their attempt.
+/// attempts and answers to pages: position of their run, 0. Samples: trial and number of their
+/// attempt.
 inline constexpr int kParentColumns = 2;
 
 /// runs, notes, attempts, samples, page_answers: in the order of insertion that foreign keys need.

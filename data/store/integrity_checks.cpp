@@ -11,9 +11,10 @@
 namespace palpate::data {
 
 void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later) {
-  for (const char* table : {"protocols", "participants", "sessions", "runs", "notes", "attempts",
-                            "exports", "export_participants", "tombstones", "tombstone_exports",
-                            "files", "protocol_files", "renumberings", "tombstone_secrets", "page_answers"}) {
+  for (const char* table :
+       {"protocols", "participants", "sessions", "runs", "notes", "attempts", "exports",
+        "export_participants", "tombstones", "tombstone_exports", "files", "protocol_files",
+        "renumberings", "tombstone_secrets", "page_answers"}) {
     if (!db.tableExists(table)) continue;  // of a later schema version
     const bool skip_constraints = attempts_later && std::string_view(table) == "attempts";
     db.exec(skip_constraints ? "PRAGMA ignore_check_constraints = ON"

@@ -86,7 +86,9 @@ std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, P
 
 /// 1, 2, ..., 9, 0, then letters: a key of its own for each step.
 std::string step_key(std::size_t i) {
-  return i < 9 ? std::to_string(i + 1) : i == 9 ? "0" : std::string(1, static_cast<char>('a' + i - 10));
+  return i < 9    ? std::to_string(i + 1)
+         : i == 9 ? "0"
+                  : std::string(1, static_cast<char>('a' + i - 10));
 }
 
 void read_rating(ObjectReader& reader, TaskBlock& block) {
@@ -120,8 +122,9 @@ void read_key(const std::string& key, const json& value, const std::string& poin
               std::vector<TaskAnswer>& answers, std::set<std::string>& given, FaultList& faults) {
   const bool taken = std::find(std::begin(kTaken), std::end(kTaken), key) != std::end(kTaken);
   if (taken || !is_label(key, kMostKeyName)) {
-    faults.add(pointer, taken ? "expected another key: '" + key + "' goes on in every task"
-                              : "expected a key's name of 1 to 32 bytes without control characters");
+    faults.add(pointer, taken
+                            ? "expected another key: '" + key + "' goes on in every task"
+                            : "expected a key's name of 1 to 32 bytes without control characters");
   }
   std::string label;
   const std::size_t before = faults.count();
@@ -148,7 +151,8 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
   if (keys == nullptr) return;
   const std::string pointer = reader.pointer("keys");
   if (!keys->is_object()) {
-    reader.faults().add(pointer, "expected an object of an answer for each key" + found_text(*keys));
+    reader.faults().add(pointer,
+                        "expected an object of an answer for each key" + found_text(*keys));
     return;
   }
   std::set<std::string> given;
@@ -173,9 +177,9 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
   std::set<std::string> labels;
   for (const TaskAnswer& answer : block.answers) {
     if (!labels.insert(answer.label).second) {
-      reader.faults().add(reader.pointer(block.task == TaskKind::rate ? "scale" : "keys"),
-                          "expected a label of its own for each answer, found '" + answer.label +
-                              "' again");
+      reader.faults().add(
+          reader.pointer(block.task == TaskKind::rate ? "scale" : "keys"),
+          "expected a label of its own for each answer, found '" + answer.label + "' again");
     }
   }
   reader.section("confidence", [&](ObjectReader& section) {

@@ -39,14 +39,14 @@ std::optional<int> index_of(const Protocol& protocol, const std::string& name) {
 
 std::optional<int> read_stimulus_name(const json& value, const std::string& pointer,
                                       const Protocol& protocol, FaultList& faults) {
-  const auto index = value.is_string() ? index_of(protocol, value.get<std::string>()) : std::nullopt;
+  const auto index =
+      value.is_string() ? index_of(protocol, value.get<std::string>()) : std::nullopt;
   if (!index) faults.add(pointer, "expected the name of a stimulus" + found_text(value));
   return index;
 }
 
 void read_stimulus_names(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
-  const json* const list =
-      reader.array("stimuli", 1, protocol.stimuli.size(), Presence::required);
+  const json* const list = reader.array("stimuli", 1, protocol.stimuli.size(), Presence::required);
   if (list == nullptr) return;
   for (std::size_t i = 0; i < list->size(); ++i) {
     const std::string pointer = child_pointer(reader.pointer("stimuli"), i);
@@ -95,8 +95,8 @@ void read_level(ObjectReader& reader, TaskBlock& block) {
     const json* const path = level.member("path", Presence::required);
     const bool text = path != nullptr && path->is_string();
     target.pointer = text ? path->get<std::string>() : "";
-    if (path != nullptr && (target.pointer.size() < 2 || target.pointer.front() != '/' ||
-                            target.pointer == "/name")) {
+    if (path != nullptr &&
+        (target.pointer.size() < 2 || target.pointer.front() != '/' || target.pointer == "/name")) {
       level.faults().add(level.pointer("path"),
                          "expected a JSON pointer to a number of the stimulus, such as "
                          "'/stiffness_n_per_m' or '/layers/0/depth_m'" +
@@ -157,8 +157,7 @@ void read_compare(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
   block.standard = read_one_stimulus(reader, "standard", protocol, Presence::required, false);
   if (const json* const other = reader.member("standard_renderer")) {
     RendererKind kind{};
-    if (read_renderer(*other, reader.pointer("standard_renderer"), protocol, kind,
-                      reader.faults()))
+    if (read_renderer(*other, reader.pointer("standard_renderer"), protocol, kind, reader.faults()))
       block.standard_renderer = kind;
   }
   reader.integer("intervals", block.intervals, {2, 3});
@@ -291,7 +290,8 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
 
 void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
   if (!name.empty() && !names.insert(name).second)
-    item.faults().add(item.pointer("name"), "expected a name of its own, found '" + name + "' again");
+    item.faults().add(item.pointer("name"),
+                      "expected a name of its own, found '" + name + "' again");
 }
 
 void check_sessions(const Protocol& protocol, FaultList& faults) {
@@ -299,10 +299,10 @@ void check_sessions(const Protocol& protocol, FaultList& faults) {
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const int next = protocol.blocks[i].session;
     if (next != session && next != session + 1) {
-      faults.add(block_pointer(i) + "/session",
-                 "expected session " + std::to_string(session) + " or " +
-                     std::to_string(session + 1) + ", as the block before it stands in session " +
-                     std::to_string(session));
+      faults.add(block_pointer(i) + "/session", "expected session " + std::to_string(session) +
+                                                    " or " + std::to_string(session + 1) +
+                                                    ", as the block before it stands in session " +
+                                                    std::to_string(session));
     }
     session = next;
   }

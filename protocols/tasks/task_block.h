@@ -30,10 +30,10 @@ struct LevelTarget {
 
 /// An answer that a key stands for.
 struct TaskAnswer {
-  std::string key;           ///< as in the protocol
-  std::string name;          ///< as it is stored: "1", "yes", "same", a stimulus, "turn_up", ...
-  std::string label;         ///< what is read
-  double number = 0;         ///< of a step of a scale
+  std::string key;    ///< as in the protocol
+  std::string name;   ///< as it is stored: "1", "yes", "same", a stimulus, "turn_up", ...
+  std::string label;  ///< what is read
+  double number = 0;  ///< of a step of a scale
 };
 
 struct ScaleStep {
@@ -74,7 +74,7 @@ struct TaskBlock {
   double inter_interval = 0.5;           ///< s, forces off and the stylus at rest at home
   std::optional<double> interval_limit;  ///< s, forces on; none: until the participant goes on
 
-  std::vector<TaskAnswer> answers;  ///< keys, in order of key; rate: empty, a number is typed
+  std::vector<TaskAnswer> answers;    ///< keys, in order of key; rate: empty, a number is typed
   std::optional<double> least, most;  ///< rate: of a typed number; adjust: of the level
   double modulus = 0;                 ///< rate: the standard's number; 0: none is given
   double turn = 0;                    ///< adjust: of the level, a key press
@@ -89,7 +89,7 @@ struct PageItem {
   enum class Kind { text, number, choice, scale };
   Kind kind = Kind::text;
   std::string name, question;
-  std::vector<std::string> choices;  ///< choice, and labels of a scale's steps
+  std::vector<std::string> choices;   ///< choice, and labels of a scale's steps
   std::optional<double> least, most;  ///< number
   bool required = true;
 };
@@ -98,11 +98,11 @@ struct PageSpec {
   enum class When { before, between, after };
   Kind kind = Kind::instructions;
   When when = When::before;
-  std::string name;                 ///< unique within the protocol
-  std::string before_block;         ///< between: shown before this block
-  std::string text;                 ///< "\f" between screens of instructions
-  std::string version;              ///< consent
-  std::vector<PageItem> items;      ///< questionnaire
+  std::string name;             ///< unique within the protocol
+  std::string before_block;     ///< between: shown before this block
+  std::string text;             ///< "\f" between screens of instructions
+  std::string version;          ///< consent
+  std::vector<PageItem> items;  ///< questionnaire
 };
 
 }  // namespace palpate::protocols

@@ -14,7 +14,8 @@
 namespace palpate::protocols {
 namespace {
 
-// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1 to 4.
+// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1
+// to 4.
 constexpr std::uint64_t kTaskStream = 5;
 enum TaskUse : std::uint64_t {
   kTaskOrder = 1,
@@ -28,8 +29,8 @@ constexpr std::size_t kCatchWindow = 20;  // trials
 
 stimuli::Random task_stream(const Protocol& protocol, int participant, std::uint64_t block,
                             TaskUse use, std::uint64_t number = 0) {
-  return stimuli::Random(protocol.seed, {static_cast<std::uint64_t>(participant), kTaskStream,
-                                         block, use, number});
+  return stimuli::Random(
+      protocol.seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
 }
 
 /// What a track varies the level of.
@@ -52,8 +53,8 @@ std::vector<Track> tracks_of(const TaskBlock& block) {
 }
 
 long long with_catch_trials(const TaskBlock& block, long long trials) {
-  return trials + std::llround(static_cast<double>(trials) * block.catch_trials /
-                               (1 - block.catch_trials));
+  return trials +
+         std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
 }
 
 /// The intervals of a trial whose stimulus, renderer and level are set.
@@ -198,7 +199,8 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
     const auto c = static_cast<std::size_t>(which);
     Trial trial = categories[c].trial;
     // Starts in turn; the next participant begins with the next one.
-    if (block.task == TaskKind::adjust) trial.level = block.starts[shown[c]++ % block.starts.size()];
+    if (block.task == TaskKind::adjust)
+      trial.level = block.starts[shown[c]++ % block.starts.size()];
     set_intervals(block, left[c].back(), trial);
     left[c].pop_back();
     trials.push_back(std::move(trial));
@@ -212,8 +214,8 @@ bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t blo
   const double share = protocol.blocks[static_cast<std::size_t>(block)].catch_trials;
   if (!(share > 0)) return false;
   const auto window = std::max(kCatchWindow, static_cast<std::size_t>(std::lround(1 / share)));
-  const auto count = std::max(std::size_t{1}, static_cast<std::size_t>(std::lround(
-                                                  share * static_cast<double>(window))));
+  const auto count = std::max(
+      std::size_t{1}, static_cast<std::size_t>(std::lround(share * static_cast<double>(window))));
   std::vector<int> marks(window, 0);
   std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
   stimuli::Random random = task_stream(protocol, participant, block, kTaskCatch, shown / window);
@@ -304,8 +306,8 @@ Trial TaskPlan::adaptive_trial() const {
   trial.track = static_cast<int>(wanted.track) + 1;
   trial.level = wanted.level;
   trial.catch_trial = is_catch_trial(*protocol_, participant_number_, block_index(), shown_);
-  stimuli::Random random = task_stream(*protocol_, participant_number_, block_index(),
-                                       kTaskPosition, shown_ + 1);
+  stimuli::Random random =
+      task_stream(*protocol_, participant_number_, block_index(), kTaskPosition, shown_ + 1);
   set_intervals(block(),
                 static_cast<int>(random.below(static_cast<std::uint64_t>(block().intervals))),
                 trial);
@@ -327,8 +329,8 @@ void TaskPlan::find_next() {
   trial.practice = block().practice;
   trial.task_block = order_[at_];
   trial.orientation = drawn_orientation(
-      *protocol_, task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation,
-                              shown_ + 1));
+      *protocol_,
+      task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation, shown_ + 1));
   next_ = std::move(trial);
 }
 

@@ -18,8 +18,8 @@ namespace palpate::protocols {
 /// What became of a trial, as far as the next ones depend on it.
 struct TrialOutcome {
   bool correct = false;
-  bool success = false;   ///< of what is asked about: the comparison chosen, "yes", "different"
-  bool answered = true;   ///< false: a time-out; an adaptive level comes again
+  bool success = false;  ///< of what is asked about: the comparison chosen, "yes", "different"
+  bool answered = true;  ///< false: a time-out; an adaptive level comes again
 };
 
 class TaskPlan {
@@ -46,9 +46,9 @@ class TaskPlan {
 
   const Protocol* protocol_;
   int participant_number_, session_;
-  std::vector<int> order_;  ///< of the session's blocks: indices into Protocol::blocks
-  int first_block_ = 1;     ///< number of the first
-  std::size_t at_ = 0;      ///< into order_
+  std::vector<int> order_;            ///< of the session's blocks: indices into Protocol::blocks
+  int first_block_ = 1;               ///< number of the first
+  std::size_t at_ = 0;                ///< into order_
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the block
   std::vector<Trial> fixed_;          ///< of the block; empty: adaptive
   std::optional<InterleavedTracks> tracks_;

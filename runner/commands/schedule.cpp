@@ -74,8 +74,9 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate schedule PROTOCOL.json --participant N [--format table|csv|json]";
-  line.summary = "Prints the trials that a participant will get, in order, without running them.\n"
-                 "Where answers choose the levels: the rule, and an example.";
+  line.summary =
+      "Prints the trials that a participant will get, in order, without running them.\n"
+      "Where answers choose the levels: the rule, and an example.";
   line.example =
       "  palpate schedule protocols/ho2000.json --participant 1\n"
       "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv";

@@ -20,11 +20,11 @@ struct Answer {
 
 /// What is asked in an interval of a trial of version 2.
 struct IntervalView {
-  int interval = 1, intervals = 1;  ///< from 1; of how many
-  bool answers = true;              ///< an answer ends it; else the participant goes on
-  bool felt = true;                 ///< false: after the last one, forces off
+  int interval = 1, intervals = 1;             ///< from 1; of how many
+  bool answers = true;                         ///< an answer ends it; else the participant goes on
+  bool felt = true;                            ///< false: after the last one, forces off
   const protocols::Interval* shown = nullptr;  ///< none where nothing is felt
-  std::string text = {};            ///< adjust: what is felt now
+  std::string text = {};                       ///< adjust: what is felt now
 };
 
 /// Ends the current attempt of a trial; what() says why.

@@ -82,9 +82,8 @@ int TaskJudgement::detected() {
                                                  protocols::Easier::higher};
   double yes = settings_.false_alarm;
   if (!trial_.catch_trial) {
-    yes = trial_.level
-              ? protocols::psychometric_probability(function, parameters, *trial_.level)
-              : 1 - settings_.lapse;
+    yes = trial_.level ? protocols::psychometric_probability(function, parameters, *trial_.level)
+                       : 1 - settings_.lapse;
   }
   evidence_ = 4 * std::abs(yes - 0.5);
   return index_of(random_.unit() < yes ? "yes" : "no");
@@ -117,8 +116,7 @@ int TaskJudgement::answer() {
     }
     default:
       evidence_ = 2;
-      return index_of(
-          protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str());
+      return index_of(protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str());
   }
 }
 

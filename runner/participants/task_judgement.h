@@ -22,13 +22,13 @@
 namespace palpate::runner {
 
 struct JudgementSettings {
-  double weber = 0.15;      ///< noise of a difference of two estimates, as a share of the standard
-  double threshold = 0.5;   ///< detect: where, as a share of the range of levels
-  double spread = 0.1;      ///< detect: sd of the function, likewise
+  double weber = 0.15;     ///< noise of a difference of two estimates, as a share of the standard
+  double threshold = 0.5;  ///< detect: where, as a share of the range of levels
+  double spread = 0.1;     ///< detect: sd of the function, likewise
   double false_alarm = 0.05;
   double lapse = 0.02;
-  double exponent = 0.8;    ///< rate
-  double number_sd = 0.1;   ///< rate: sd of the log
+  double exponent = 0.8;   ///< rate
+  double number_sd = 0.1;  ///< rate: sd of the log
 };
 
 class TaskJudgement {
@@ -58,7 +58,7 @@ class TaskJudgement {
   JudgementSettings settings_;
   protocols::Trial trial_;
   stimuli::Random random_{0};
-  std::vector<double> estimates_;  ///< of the intervals so far
+  std::vector<double> estimates_;         ///< of the intervals so far
   std::optional<double> own_, standard_;  ///< adjust: as felt last
   bool feels_standard_ = false;
   double last_level_ = 0;

@@ -6,9 +6,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kLook = 1.5;          // s of feeling in each interval, from the first contact on
-constexpr double kLongestLook = 8;     // s, also without contact
-constexpr double kLeastDepth = 2e-4;   // m; below it force over depth is noise
+constexpr double kLook = 1.5;            // s of feeling in each interval, from the first contact on
+constexpr double kLongestLook = 8;       // s, also without contact
+constexpr double kLeastDepth = 2e-4;     // m; below it force over depth is noise
 constexpr std::uint64_t kJudgement = 9;  // of its random stream; the hand has 1 to 3
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
 
@@ -27,10 +27,10 @@ TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypoth
 void TaskParticipant::begin_trial(const protocols::Trial& trial) {
   trial_ = trial;
   felt_ = 0;
-  judgement_.begin(
-      trial, stimuli::Random(seed_, {static_cast<std::uint64_t>(number_),
-                                     static_cast<std::uint64_t>(trial.session),
-                                     static_cast<std::uint64_t>(trial.trial), kJudgement}));
+  judgement_.begin(trial,
+                   stimuli::Random(seed_, {static_cast<std::uint64_t>(number_),
+                                           static_cast<std::uint64_t>(trial.session),
+                                           static_cast<std::uint64_t>(trial.trial), kJudgement}));
 }
 
 void TaskParticipant::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
@@ -85,8 +85,7 @@ std::optional<Answer> TaskParticipant::confidence(const protocols::ConfidenceSpe
   return given;
 }
 
-std::string TaskParticipant::ask(const protocols::PageSpec& page,
-                                 const protocols::PageItem& item) {
+std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocols::PageItem& item) {
   if (page.kind == protocols::PageSpec::Kind::consent) return "agree";
   switch (item.kind) {
     case protocols::PageItem::Kind::number:

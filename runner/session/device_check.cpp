@@ -315,9 +315,8 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
       add("stimulus '", stimulus.name, "' has ", of_parts, can.reason, ": soften /material, raise ",
           "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
           passivity_advice(protocol, material, device, can),
-          protocol.version == 2
-              ? "or keep the levels below"
-              : "or have it limited by /servo/material_limit \"limit\"");
+          protocol.version == 2 ? "or keep the levels below"
+                                : "or have it limited by /servo/material_limit \"limit\"");
     };
     visit_materials(stimulus.object,
                     [&](const stimuli::Material& material) { check_material(material, ""); });

@@ -57,8 +57,7 @@ const SharpEdges& LevelScenes::edges(const protocols::Trial& trial,
   return interval.stimulus < 0 ? kNone : library(trial, interval).edges(0);
 }
 
-stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol,
-                                 const protocols::Trial& trial,
+stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const protocols::Trial& trial,
                                  const protocols::Interval& interval) {
   stimuli::ObjectSpec object = shown_stimulus(protocol, trial, interval).object;
   object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);

@@ -33,8 +33,7 @@ class LevelScenes {
 };
 
 /// The level as the scene has it, in the world: for whoever draws it.
-stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol,
-                                 const protocols::Trial& trial,
+stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const protocols::Trial& trial,
                                  const protocols::Interval& interval);
 
 }  // namespace palpate::runner

@@ -97,11 +97,11 @@ void Session::step() {
 }
 
 void Session::tell_feedback() {
-  const bool feedback = record_.task ? station_.protocol
-                                           .blocks[static_cast<std::size_t>(
-                                               station_.plan.next().task_block)]
-                                           .feedback
-                                     : record_.practice || station_.protocol.response.feedback;
+  const bool feedback =
+      record_.task
+          ? station_.protocol.blocks[static_cast<std::size_t>(station_.plan.next().task_block)]
+                .feedback
+          : record_.practice || station_.protocol.response.feedback;
   station_.plan.answered(
       outcome_of(record_));  // first: whoever leaves during the feedback has answered
   if (feedback) participant_.feedback(record_.correct);
@@ -135,9 +135,9 @@ void Session::cut_off(const std::string& reason) {
 
 std::optional<Answer> Session::show_stimulus(const protocols::Trial& trial, ServoState& servo) {
   contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
-  const HomeZone home{
-      std::max(station_.library.reach(trial.stimulus), least_reach_) + station_.protocol.home.margin,
-      station_.protocol.home.rest};
+  const HomeZone home{std::max(station_.library.reach(trial.stimulus), least_reach_) +
+                          station_.protocol.home.margin,
+                      station_.protocol.home.rest};
   station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
   return wait_for_answer(servo);
 }
@@ -223,8 +223,7 @@ void Session::take_answer(const protocols::Trial& trial, const std::optional<Ans
   if (record_.task) {
     take_task_answer(trial, answer);
   } else if (answer) {
-    record_.response =
-        station_.protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
+    record_.response = station_.protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
   // The answer may have come before the tick that was looked at last.

@@ -115,9 +115,9 @@ class Session {
   SessionEvents* events_;
   double least_reach_;
   State state_ = State::instruction;
-  data::TrialRecord record_;  ///< of the trial under way
-  ContactLog contact_;        ///< likewise
-  ServoQuality quality_;      ///< likewise, of its intervals so far
+  data::TrialRecord record_;             ///< of the trial under way
+  ContactLog contact_;                   ///< likewise
+  ServoQuality quality_;                 ///< likewise, of its intervals so far
   std::unique_ptr<LevelScenes> scenes_;  ///< version 2
 };
 

@@ -40,9 +40,9 @@ class SessionPlan {
   int participant_number_;
   std::vector<protocols::Trial> trials_;
   std::size_t next_ = 0;
-  int first_practice_block_ = 0;  ///< blocks before it are warm-up
-  int round_ = 1;                 ///< of the practice under way
-  int correct_ = 0, shown_ = 0;   ///< in that round
+  int first_practice_block_ = 0;              ///< blocks before it are warm-up
+  int round_ = 1;                             ///< of the practice under way
+  int correct_ = 0, shown_ = 0;               ///< in that round
   std::optional<protocols::TaskPlan> tasks_;  ///< version 2, instead of all this
 };
 

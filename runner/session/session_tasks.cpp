@@ -196,8 +196,7 @@ void Session::ask_confidence(const protocols::ConfidenceSpec& asked) {
   record_.task->confidence_ns = step->time_ns;
 }
 
-void Session::take_task_answer(const protocols::Trial& trial,
-                               const std::optional<Answer>& answer) {
+void Session::take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer) {
   if (!answer) return;
   const protocols::TaskBlock& block = task_of(trial);
   data::TaskRecord& task = *record_.task;

@@ -25,7 +25,7 @@ struct Work {
   data::Participant participant;
   int session = 1;
   std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
-  std::int64_t clock_ns = 0;  ///< where the session's clock stood
+  std::int64_t clock_ns = 0;                     ///< where the session's clock stood
   data::RunInfo info;
 };
 

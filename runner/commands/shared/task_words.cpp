@@ -99,8 +99,7 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
   return lines;
 }
 
-std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol,
-                                             int participant) {
+std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant) {
   std::vector<protocols::Trial> trials;
   stimuli::Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
   for (int session = 1; session <= protocol.sessions.count; ++session) {

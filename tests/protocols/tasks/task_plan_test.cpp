@@ -243,9 +243,9 @@ TEST(Levels, HoldsEveryLevelThatABlockMayShow) {
   for (const char* name : {"soft", "lump", "soft at 200", "soft at 400", "soft at 400 (stairs)",
                            "soft at 600", "lump at 0.008"})
     EXPECT_EQ(names.count(name), 1U) << name;
-  EXPECT_EQ(with_all_levels(parse_protocol(PALPATE_SOURCE_DIR "/protocols/ho2000.json"))
-                .stimuli.size(),
-            4U);
+  EXPECT_EQ(
+      with_all_levels(parse_protocol(PALPATE_SOURCE_DIR "/protocols/ho2000.json")).stimuli.size(),
+      4U);
 }
 
 }  // namespace
