@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/parse_body.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/shapes.h"
 
@@ -74,6 +75,8 @@ void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
   for (std::size_t i = 0; i < parts->size(); ++i) {
     ObjectReader part((*parts)[i], child_pointer(reader.pointer("parts"), i), reader.faults());
     spec.parts.push_back(read_nested(part, spec.material, files, compounds + 1));
+    if (part.member("body") != nullptr)
+      part.faults().add(part.pointer("body"), "expected at the object: its parts move as one");
     part.refuse_unknown_keys();
   }
 }
@@ -166,7 +169,9 @@ void read_material(ObjectReader& reader, stimuli::Material& material) {
 
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
                                 const MeshFiles& files) {
-  return read_nested(reader, default_material, files, 0);
+  stimuli::ObjectSpec spec = read_nested(reader, default_material, files, 0);
+  read_body(reader, spec.body);
+  return spec;
 }
 
 std::string folder_of(const std::string& file) {

@@ -1,5 +1,6 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "protocols/parse_body.h"
 #include "protocols/parse_object.h"
 #include "protocols/parse_tool.h"
 
@@ -25,6 +26,7 @@ SceneSpec parse_scene_text(const std::string& text, const std::string& path) {
   }
   read_tool(reader, scene.tool);
   read_reach(reader, scene.reach);
+  read_gravity(reader, scene.gravity);
   reader.refuse_unknown_keys();
   faults.throw_if_any();
   return scene;

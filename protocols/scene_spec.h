@@ -39,6 +39,7 @@ struct SceneSpec {
   std::vector<stimuli::ObjectSpec> objects;
   ToolSpec tool;
   std::optional<ReachSpec> reach;
+  Vec3 gravity{0, 0, 0};  ///< m/s^2, on what moves
 };
 
 }  // namespace palpate::protocols

@@ -23,12 +23,19 @@ class ProbeRenderer final : public Renderer {
   }
 
  private:
+  static Rendering render_motion(const Scene& scene, RenderState& state, const LineProbe& probe,
+                                 double dt) noexcept {
+    return scene.motion()->tick(Probe::kSegment ? ray_renderer() : point_renderer(), state, probe,
+                                dt);
+  }
+
   using TickFunction = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
   static constexpr auto kTicks = []<std::size_t... i>(std::index_sequence<i...>) {
-    return std::array<TickFunction, TickFeatures::kCount>{
-        &tick::render_tick<Probe, TickFeatures::of(i)>...};
+    return std::array<TickFunction, 2 * TickFeatures::kCount>{
+        (i < TickFeatures::kCount ? &tick::render_tick<Probe, TickFeatures::of(i)>
+                                  : &render_motion)...};
   }
-  (std::make_index_sequence<TickFeatures::kCount>());
+  (std::make_index_sequence<2 * TickFeatures::kCount>());
 };
 
 }  // namespace

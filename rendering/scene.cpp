@@ -58,8 +58,9 @@ void add_margin(ScenePart& part) {
 
 }  // namespace
 
-Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
-    : tool_(std::move(tool)) {
+Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
+             std::shared_ptr<const SceneMotion> motion)
+    : tool_(std::move(tool)), motion_(std::move(motion)) {
   if (tool_.segments.size() > Tool::kMostSegments)
     throw std::invalid_argument("a tool has 1 to 16 segments");
   for (const ToolSegment& segment : tool_.segments)
@@ -93,6 +94,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool)
                                 [](const PartGroup& group) { return group.by_law; });
   features.several_parts = parts_.size() != 1 || features.unions;
   features_index_ = features.index();
+  if (motion_) features_index_ += TickFeatures::kCount;
 }
 
 void Scene::group_parts() {
@@ -151,6 +153,7 @@ RenderState Scene::initial_state() const {
   state.near_parts.reserve(parts_.size());
   if (!features().several_parts) state.near_parts.push_back(0);  // a single part is always near
   state.contacts.reserve(parts_.size());
+  if (motion_) state.motion = OwnedMotion(motion_->initial_state());
   if (features().unions) {
     std::size_t most_pairs = 0, contacts = 0;
     for (const PartGroup& group : groups_) {

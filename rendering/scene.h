@@ -12,6 +12,7 @@
 #include "rendering/facet_walk.h"
 #include "rendering/first_contact.h"
 #include "rendering/force.h"
+#include "rendering/motion.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 #include "rendering/tool.h"
@@ -121,6 +122,7 @@ struct RenderState {
   Vec3 measured_side;
   UnionMemory unions;                   ///< empty where the scene has none
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
+  OwnedMotion motion;                   ///< empty where nothing moves
 };
 
 /// Immutable; shared by the servo and the display.
@@ -128,10 +130,15 @@ class Scene {
  public:
   /// \param side_contact  false leaves out what only a segment needs (the tree of edges)
   /// \param tool          what the stylus carries; empty: nothing but itself
-  explicit Scene(std::vector<SceneObject> objects, bool side_contact = true, Tool tool = {});
+  /// \param motion        what moves, of objects that stand at first where they are here; null:
+  /// nothing
+  explicit Scene(std::vector<SceneObject> objects, bool side_contact = true, Tool tool = {},
+                 std::shared_ptr<const SceneMotion> motion = nullptr);
 
+  /// Where they stand, at first where they move.
   const std::vector<ScenePart>& parts() const { return parts_; }
-  /// Selects the tick that a renderer runs.
+  const SceneMotion* motion() const { return motion_.get(); }
+  /// Selects the tick that a renderer runs; beyond TickFeatures::kCount it is that of motion().
   TickFeatures features() const { return TickFeatures::of(features_index_); }
   std::size_t features_index() const { return features_index_; }
   /// Parts of one group stand side by side.
@@ -155,6 +162,7 @@ class Scene {
   double tool_reach_ = 0;
   Tool tool_;
   std::size_t features_index_ = 0;
+  std::shared_ptr<const SceneMotion> motion_;
 };
 
 /// Broad phase: whether the probe can touch the part soon, or may have passed it in this tick.

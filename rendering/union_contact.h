@@ -39,6 +39,14 @@ struct UnionTick {
 /// The wrench of all placed contacts, its split on two devices, and the ideal tool of the deepest.
 Rendering sum_unions(const UnionTick& tick, const LineProbe& probe);
 
+/// The force for the device at the tail, where contacts may be off the stylus' axis: with u the
+/// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion
+/// about u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's
+/// lever along u, which is r_i may be negative or beyond L.
+/// \param torque  N m, about the tip \param along  N m, sum of each contact's lever along the
+/// stylus times its force along it \param d  tail - tip, m
+Vec3 tail_force(const Vec3& torque, double along, const Vec3& d);
+
 /// Follows the ideal tool of one group and appends its contacts, with spring forces, to
 /// state.unions.contacts.
 void follow_ideal_tool(UnionTick& tick, std::uint32_t group);

@@ -17,18 +17,14 @@ void show_behind(const UnionMemory& all, bool tool, const Vec3& tip, Rendering& 
   if (tool) out.ideal_side = group.ideal.frame[0];
 }
 
-/// The force for the device at the tail, where contacts may be off the stylus' axis: with u the
-/// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion
-/// about u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's
-/// lever along u, which is r_i may be negative or beyond L.
+}  // namespace
+
 Vec3 tail_force(const Vec3& torque, double along, const Vec3& d) {
   const double length = glm::length(d);
   if (!(length > 0)) return Vec3(0);
   const Vec3 u = d / length;
   return (glm::cross(torque, u) + along * u) / length;
 }
-
-}  // namespace
 
 Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
   const UnionMemory& all = tick.state.unions;

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <sstream>
+#include <stdexcept>
 
 #include "protocols/tasks/levels.h"
 #include "stimuli/compose.h"
@@ -50,6 +51,15 @@ std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
     key += ' ' + key_of(value);
   return key + ' ' + std::to_string(spec.subdivisions) + ' ' + std::to_string(spec.segments) + ' ' +
          spec.file;
+}
+
+/// Those of the objects that move.
+std::vector<rendering::MovingObject> moving_of(const std::vector<stimuli::ObjectSpec>& objects) {
+  std::vector<rendering::MovingObject> moving;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    if (objects[i].body) moving.push_back({static_cast<int>(i), *objects[i].body, objects[i].pose});
+  }
+  return moving;
 }
 
 bool has_layers(const stimuli::ObjectSpec& spec) {
@@ -214,7 +224,8 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
 }
 
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
-                                     bool side_contact, const rendering::Tool& tool) {
+                                     bool side_contact, const rendering::Tool& tool,
+                                     const Vec3& gravity) {
   std::vector<rendering::SceneObject> parts;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
@@ -235,7 +246,12 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
       throw stimuli::MeshError(std::move(faults));
     }
   }
-  return rendering::Scene(std::move(parts), side_contact, tool);
+  try {
+    return rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact,
+                                   tool);
+  } catch (const std::invalid_argument& error) {
+    throw stimuli::MeshError({error.what()});
+  }
 }
 
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
@@ -269,6 +285,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
       }
       (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
     }
+    moving_.push_back(moving_of({stimulus.object}));
     reaches_.push_back(reach);
   }
 }
@@ -283,7 +300,10 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
       (sides ? with_sides_ : without_sides_)[trial.stimulus];
   for (rendering::SceneObject& object : objects)
     object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-  return rendering::Scene(std::move(objects), sides, tool_);
+  std::vector<rendering::MovingObject> moving = moving_[trial.stimulus];
+  for (rendering::MovingObject& object : moving)
+    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
+  return rendering::moving_scene(std::move(objects), moving, Vec3(0), sides, tool_);
 }
 
 }  // namespace palpate::runner

@@ -9,6 +9,7 @@
 
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "rendering/bodies/moving_scene.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
@@ -31,10 +32,11 @@ double grip_from_virtual_tip(const protocols::Protocol& protocol);
 class SceneBuilder {
  public:
   /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
-  /// is left for a layer, or where a layer cannot be made of convex parts (inset_union), with the
-  /// place as a JSON pointer.
+  /// is left for a layer, where a layer cannot be made of convex parts (inset_union), or where what
+  /// moves passes a limit, with the place as a JSON pointer.
+  /// \param gravity  m/s^2, on what moves
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
-                         const rendering::Tool& tool = {});
+                         const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0));
 
  private:
   struct Prepared {
@@ -75,6 +77,7 @@ class StimulusLibrary {
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
+  std::vector<std::vector<rendering::MovingObject>> moving_;  ///< by stimulus: itself or nothing
   std::vector<double> reaches_;
   std::vector<SharpEdges> edges_;
   rendering::Tool tool_;

@@ -35,6 +35,17 @@ struct Material {
   bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
+/// What makes an object move by itself.
+struct Body {
+  std::optional<double> mass = std::nullopt;     ///< kg; or
+  std::optional<double> density = std::nullopt;  ///< kg/m^3
+  Vec3 velocity{0, 0, 0};                        ///< m/s, of the centre of mass, at first
+  Vec3 spin{0, 0, 0};                            ///< rad/s, at first
+  double damping = 0;                            ///< 1/s, of velocity and spin
+  double restitution = 0.5;  ///< of speed along the normal, in collisions with objects
+  double friction = 0.3;     ///< Coulomb's coefficient, against objects; the probe's: Material
+};
+
 /// Local frames: sphere, cube, box and cylinder centred, cylinder axis +z; cone axis +z, apex at
 /// +height/2, base at -height/2.
 struct ObjectSpec {
@@ -54,6 +65,7 @@ struct ObjectSpec {
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
   Pose pose;
   Material material;
+  std::optional<Body> body = std::nullopt;  ///< it moves; else it stands still
 };
 
 }  // namespace palpate::stimuli

@@ -12,11 +12,13 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Room: what it may include beside itself. A room's folder within a folder is a room of its own; what stands in
 # the folder itself ("runner": scene_builder.h) is the base of the rooms within.
 RENDERING = {"stimuli", "rendering"}
+BODIES = RENDERING | {"rendering/bodies"}
 SERVO = RENDERING | {"runner", "runner/servo"}
 MAY_INCLUDE = {
     "stimuli": set(),
     "rendering": {"stimuli"},
     "rendering/bodies/soft": RENDERING,
+    "rendering/bodies": RENDERING,
     "rendering/verification": RENDERING,
     "rendering/accuracy": RENDERING | {"rendering/verification"},
     # Stimuli are scene objects in orientations: their types, rotations and generator live there.
@@ -33,7 +35,7 @@ MAY_INCLUDE = {
     "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols"},
-    "runner": RENDERING | {"protocols"},
+    "runner": BODIES | {"protocols"},
     "runner/servo": RENDERING | {"runner"},
     "runner/safety": SERVO,
     "runner/sound": {"stimuli", "protocols"},
@@ -78,7 +80,8 @@ def room_of(name):
 PUBLIC = {
     "stimuli": "compose convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/triangulate "
                "primitives printable random shapes solids/solid_mesh vec",
-    "rendering": "first_contact probe reach render_fault renderer scene tool tool_pose",
+    "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
+    "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan",

@@ -99,8 +99,16 @@ json values(const stimuli::Material& m) {
 
 json values(const stimuli::ObjectSpec& o) {
   const Quat& q = o.pose.orientation;
-  json parts;
+  json parts, body;
   for (const stimuli::ObjectSpec& part : o.parts) parts.push_back(values(part));
+  if (o.body)
+    body = {value_or_null(o.body->mass),
+            value_or_null(o.body->density),
+            values(o.body->velocity),
+            values(o.body->spin),
+            o.body->damping,
+            o.body->restitution,
+            o.body->friction};
   return {o.shape,
           o.radius,
           o.height,
@@ -111,7 +119,8 @@ json values(const stimuli::ObjectSpec& o) {
           parts,
           values(o.pose.position),
           {q.w, q.x, q.y, q.z},
-          values(o.material)};
+          values(o.material),
+          body};
 }
 
 json values(const Protocol& p) {
@@ -178,7 +187,7 @@ json other_value(const json& key) {
 
 const json kShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["point", "ray"],
   "stimuli": [{"name": "a", "shape": "sphere", "radius_m": 0.02,
-               "layers": [{"depth_m": 0.001, "stiffness_n_per_m": 100}]},
+               "layers": [{"depth_m": 0.001, "stiffness_n_per_m": 100}], "body": {"mass_kg": 0.1}},
               {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03},
               {"name": "c", "shape": "cube", "edge_m": 0.02},
               {"name": "d", "shape": "box", "size_m": [0.02, 0.02, 0.02]}],
@@ -264,10 +273,20 @@ std::optional<std::string> refusal(const std::string& place, const json& value) 
 
 /// The unit that a key's name ends with.
 std::string unit_of(const std::string& place) {
-  const std::pair<const char*, const char*> units[] = {
-      {"_n_per_m", " N/m"}, {"_ns_per_m", " N s/m"}, {"_m", " m"},   {"_m/0", " m"},
-      {"_s", " s"},         {"_seconds", " s"},      {"_hz", " Hz"}, {"_minutes", " min"},
-      {"_db", " dB"}};
+  const std::pair<const char*, const char*> units[] = {{"_m_per_s/0", " m/s"},
+                                                       {"_rad_per_s/0", " rad/s"},
+                                                       {"_per_s", " 1/s"},
+                                                       {"_kg", " kg"},
+                                                       {"_kg_per_m3", " kg/m^3"},
+                                                       {"_n_per_m", " N/m"},
+                                                       {"_ns_per_m", " N s/m"},
+                                                       {"_m", " m"},
+                                                       {"_m/0", " m"},
+                                                       {"_s", " s"},
+                                                       {"_seconds", " s"},
+                                                       {"_hz", " Hz"},
+                                                       {"_minutes", " min"},
+                                                       {"_db", " dB"}};
   for (const auto& [ending, unit] : units)
     if (place.ends_with(ending)) return unit;
   return "";

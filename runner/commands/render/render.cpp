@@ -33,11 +33,12 @@ int render_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate render --scene SCENE.json --renderer point|ray --trajectory T.csv --out O.csv\n"
-      "               [--force]\n"
+      "               [--bodies B.csv] [--force]\n"
       "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
   line.summary =
       "Renders the forces along a recorded path, offline: one row out for each row in, with the "
-      "faults of its tick in the column 'faults'. Or, with --explain, lists the stages of a tick "
+      "faults of its tick in the column 'faults'; --bodies writes where moving objects are. Or, "
+      "with --explain, lists the stages of a tick "
       "over the scene, which are left out and why, and what each costs.";
   line.example =
       "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
@@ -49,8 +50,11 @@ int render_command(const std::vector<std::string>& args) {
        (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
         " (s, m), and for a tool's +x " + (kSideHeader + 1) + "; at most " +
         std::to_string(kMostPoses) + " rows")
-           .c_str())                                                                              //
-      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")                        //
+           .c_str())                                                        //
+      ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")  //
+      ("bodies", po::value<std::string>()->value_name("FILE"),
+       "moving objects, CSV: a row for each row in and each of them, with place, orientation, "
+       "velocity and spin (centre of mass, world)")                                               //
       ("explain", po::bool_switch(), "list the stages of a tick instead of rendering")            //
       ("json", po::value<std::string>()->value_name("FILE"), "with --explain: the same as JSON")  //
       ("force", "replace an existing file");
@@ -58,11 +62,12 @@ int render_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   const rendering::Renderer& renderer = renderer_named((*values)["renderer"].as<std::string>());
   const bool explains = (*values)["explain"].as<bool>();
-  if (explains && (values->count("trajectory") > 0 || values->count("out") > 0))
-    throw UsageError("--explain renders nothing: leave out --trajectory and --out");
+  if (explains &&
+      (values->count("trajectory") > 0 || values->count("out") > 0 || values->count("bodies") > 0))
+    throw UsageError("--explain renders nothing: leave out --trajectory, --out and --bodies");
   if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
   const std::string scene_path = (*values)["scene"].as<std::string>();
-  Outputs outputs(*values, {"out", "json"}, {"scene", "trajectory"});
+  Outputs outputs(*values, {"out", "bodies", "json"}, {"scene", "trajectory"});
   if (explains) {
     const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
     for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
@@ -76,10 +81,20 @@ int render_command(const std::vector<std::string>& args) {
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
   const rendering::Scene scene = build_scene(scene_path, spec, renderer);
   ForceTable table(scene.tool() != nullptr);
+  BodyTable bodies;
   render_along(scene, spec, renderer, poses,
+<<<<<<< HEAD
                [&table](const TimedPose& pose, const rendering::Rendering& rendering,
                         const rendering::RenderState&) { table.add(pose, rendering); });
+=======
+               [&](const TimedPose& pose, const rendering::Rendering& rendering,
+                   std::span<const rendering::BodyPose> moving) {
+                 table.add(pose, rendering);
+                 if (values->count("bodies") > 0) bodies.add(pose.t, moving);
+               });
+>>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
   outputs.put("out", table.text());
+  outputs.put("bodies", bodies.text());
   outputs.write();
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));
   return 0;

@@ -159,4 +159,21 @@ std::string ForceTable::warnings(const std::string& path) const {
   return out;
 }
 
+BodyTable::BodyTable()
+    : csv_(std::array{"t", "object", "x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx",
+                      "wy", "wz"},
+           "\n") {}
+
+void BodyTable::add(double t, std::span<const rendering::BodyPose> bodies) {
+  const auto put = [this](const Vec3& v) { csv_ << v.x << v.y << v.z; };
+  for (const rendering::BodyPose& body : bodies) {
+    csv_ << t << body.object;
+    put(body.centre);
+    csv_ << body.orientation.w << body.orientation.x << body.orientation.y << body.orientation.z;
+    put(body.velocity);
+    put(body.spin);
+    csv_.end_row();
+  }
+}
+
 }  // namespace palpate::runner

@@ -2,9 +2,11 @@
 // CSV files: the path of a stylus, read, and the forces along it, written.
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "rendering/motion.h"
 #include "rendering/renderer.h"
 #include "runner/commands/shared/csv_text.h"
 
@@ -70,6 +72,18 @@ class ForceTable {
   CsvText csv_;
   std::size_t rows_ = 0;
   std::vector<Seen> seen_;  ///< as kRenderFaults
+};
+
+/// Moving objects as CSV: a row for each of them at each time.
+class BodyTable {
+ public:
+  BodyTable();
+  /// \param t  s
+  void add(double t, std::span<const rendering::BodyPose> bodies);
+  const std::string& text() const { return csv_.text(); }
+
+ private:
+  CsvText csv_;
 };
 
 }  // namespace palpate::runner

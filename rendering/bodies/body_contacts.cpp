@@ -1,0 +1,368 @@
+#include "rendering/bodies/body_contacts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate::rendering {
+namespace {
+
+// m; parts that are so near touch. Above rounding, below what is seen or felt.
+constexpr double kTouching = 1e-8;
+constexpr double kUnbounded = 1e300;
+
+/// m/s; the least speed of separation that a contact asks for: it may close its gap, and what
+/// overlaps comes apart slowly.
+double least_speed_of(double gap, double step) {
+  constexpr double kShare = 0.2, kFastest = 0.05;
+  return gap >= 0 ? -gap / step : std::min(kShare * -gap / step, kFastest);
+}
+
+}  // namespace
+
+Pose BodyContacts::pose_of(std::uint32_t body) const {
+  return {state_.motion[body].centre, state_.motion[body].orientation};
+}
+
+Pose BodyContacts::pose_of_other(const BodyPair& pair) const {
+  return pair.obstacle ? Pose{} : pose_of(pair.b);
+}
+
+const CollidingPart& BodyContacts::part_b(const BodyPair& pair, std::uint32_t part) const {
+  return pair.obstacle ? world_.obstacles[pair.b].parts[part] : world_.bodies[pair.b].parts[part];
+}
+
+void BodyContacts::find(double within, double extra) {
+  state_.near.clear();
+  state_.near_parts.clear();
+  state_.contacts.clear();
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i)
+    state_.spin[i] = spin_of(world_.bodies[i].inertia, state_.motion[i]);
+  const double fall = glm::length(world_.gravity) * within * within;
+  for (std::uint32_t index = 0; index < world_.pairs.size(); ++index) {
+    const BodyPair& pair = world_.pairs[index];
+    const BodyMotion& a = state_.motion[pair.a];
+    const Vec3 centre =
+        pair.obstacle ? world_.obstacles[pair.b].centre : state_.motion[pair.b].centre;
+    const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
+    const double radii =
+        world_.bodies[pair.a].radius +
+        (pair.obstacle ? world_.obstacles[pair.b].radius : world_.bodies[pair.b].radius);
+    const double reach = radii + kTouching + extra + (pair.obstacle ? fall : 0) +
+                         within * glm::length(velocity - a.velocity);
+    const Vec3 apart = centre - a.centre;
+    if (glm::dot(apart, apart) > reach * reach) continue;
+    state_.near.push_back(index);
+    find_in_pair(index, within, extra + (pair.obstacle ? fall : 0));
+  }
+}
+
+void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra) {
+  const BodyPair& pair = world_.pairs[index];
+  const MovingBody& body_a = world_.bodies[pair.a];
+  const Pose pose_a = pose_of(pair.a), pose_b = pose_of_other(pair);
+  const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
+  const double turning =
+      glm::length(state_.spin[pair.a]) * body_a.radius +
+      (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+  const double reach = 2 * kTouching + extra +
+                       within * (glm::length(velocity - state_.motion[pair.a].velocity) + turning);
+  for (std::uint32_t k = 0; k < pair.count; ++k) {
+    const PartPair& parts = world_.part_pairs[pair.first + k];
+    const CollidingPart &a = body_a.parts[parts.part_a], &b = part_b(pair, parts.part_b);
+    const Vec3 apart = pose_b.orientation * b.centre + pose_b.position -
+                       (pose_a.orientation * a.centre + pose_a.position);
+    const double near = a.mesh->radius() + b.mesh->radius() + reach;
+    if (glm::dot(apart, apart) > near * near) continue;
+    const ConvexPlace at_a = place_of(a, pose_a), at_b = place_of(b, pose_b);
+    GapMemory& memory = state_.gaps[pair.first + k];
+    const Gap gap = gap_between(at_a, at_b, reach, memory);
+    if (gap.distance > reach) continue;
+    state_.near_parts.push_back({index, pair.first + k, gap.distance});
+    find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
+    for (const ManifoldPoint& point : state_.manifold.points()) {
+      if (state_.contacts.size() == BodyWorldState::kMostContacts) return;
+      state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
+                                 point.place, state_.manifold.normal, point.gap});
+    }
+  }
+}
+
+double BodyContacts::time_to_next(double most) {
+  double next = most;
+  for (const auto& parts : state_.near_parts) {
+    if (parts.gap > kTouching) next = std::min(next, meeting_time(parts, next));
+  }
+  return next;
+}
+
+/// Conservative advancement (Mirtich 1996): as far as the pair can not meet, again and again.
+double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double most) {
+  constexpr int kMostRounds = 40;
+  constexpr double kMet = 0.5 * kTouching;
+  const BodyPair& pair = world_.pairs[near.pair];
+  const PartPair& parts = world_.part_pairs[near.parts];
+  const MovingBody& body_a = world_.bodies[pair.a];
+  const double turning =
+      glm::length(state_.spin[pair.a]) * body_a.radius +
+      (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+  GapMemory memory = state_.gaps[near.parts];
+  double time = 0;
+  for (int round = 0; round < kMostRounds; ++round) {
+    BodyMotion a = state_.motion[pair.a], b;
+    move_freely(body_a.inertia, world_.gravity, body_a.of.damping, time, a);
+    if (!pair.obstacle) {
+      b = state_.motion[pair.b];
+      const MovingBody& body_b = world_.bodies[pair.b];
+      move_freely(body_b.inertia, world_.gravity, body_b.of.damping, time, b);
+    }
+    const Gap gap = gap_between(place_of(body_a.parts[parts.part_a], {a.centre, a.orientation}),
+                                place_of(part_b(pair, parts.part_b),
+                                         pair.obstacle ? Pose{} : Pose{b.centre, b.orientation}),
+                                HUGE_VAL, memory);
+    if (gap.distance <= kTouching) return time;
+    const double fall =
+        pair.obstacle ? std::max(0.0, glm::dot(world_.gravity, gap.normal)) * (most - time) : 0;
+    const double speed =
+        glm::dot(gap.normal, a.velocity - (pair.obstacle ? Vec3(0) : b.velocity)) + turning + fall;
+    if (!(speed * (most - time) > gap.distance - kMet)) return most;
+    time += (gap.distance - kMet) / speed;
+  }
+  return time;
+}
+
+double BodyContacts::separation_speed(const BodyContact& contact) const {
+  const auto velocity = [&](std::uint32_t body) {
+    return body == BodyContact::kStands
+               ? Vec3(0)
+               : state_.velocity[body] +
+                     glm::cross(state_.spin[body], contact.place - state_.motion[body].centre);
+  };
+  return glm::dot(contact.normal, velocity(contact.b) - velocity(contact.a));
+}
+
+/// The velocities after a step without impulses; the present ones for a step of 0.
+void BodyContacts::set_velocities(double step) {
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    const MovingBody& body = world_.bodies[i];
+    BodyMotion motion = state_.motion[i];
+    state_.per_inertia[i] = world_per_inertia(body.inertia, motion.orientation);
+    const double left = std::exp(-body.of.damping * step);
+    state_.spin[i] = left * (state_.per_inertia[i] * motion.spin_momentum);
+    motion.spin_momentum = Vec3(0);
+    move_freely(body.inertia, world_.gravity, body.of.damping, step, motion);
+    state_.velocity[i] = motion.velocity;
+  }
+}
+
+void BodyContacts::find_islands(std::span<const PressingSpring> springs) {
+  (void)springs;  // a spring holds one body
+  for (std::uint32_t i = 0; i < state_.island.size(); ++i) state_.island[i] = i;
+  for (bool more = true; more;) {
+    more = false;
+    for (const BodyContact& contact : state_.contacts) {
+      if (contact.b == BodyContact::kStands) continue;
+      std::uint32_t &a = state_.island[contact.a], &b = state_.island[contact.b];
+      if (a == b) continue;
+      a = b = std::min(a, b);
+      more = true;
+    }
+  }
+}
+
+void BodyContacts::begin_rows() {
+  state_.rows.clear();
+  state_.problem.clear();
+}
+
+void BodyContacts::add_row(std::uint32_t a, std::uint32_t b, const Vec3& place,
+                           const Vec3& direction, double least_speed, double bound, int leader,
+                           int spring) {
+  if (state_.problem.full()) {
+    ++state_.not_converged;
+    return;
+  }
+  Row row;
+  row.a = a;
+  row.b = b;
+  row.direction = direction;
+  row.spring = spring;
+  double speed = 0;
+  if (a != BodyContact::kStands) {
+    row.moment_a = glm::cross(place - state_.motion[a].centre, direction);
+    row.turn_a = state_.per_inertia[a] * row.moment_a;
+    speed -= glm::dot(direction, state_.velocity[a]) + glm::dot(row.moment_a, state_.spin[a]);
+  }
+  if (b != BodyContact::kStands) {
+    row.moment_b = glm::cross(place - state_.motion[b].centre, direction);
+    row.turn_b = state_.per_inertia[b] * row.moment_b;
+    speed += glm::dot(direction, state_.velocity[b]) + glm::dot(row.moment_b, state_.spin[b]);
+  }
+  state_.problem.add_row(least_speed - speed, bound, leader);
+  state_.rows.push_back(row);
+}
+
+void BodyContacts::add_friction(const BodyContact& contact, int leader, double friction) {
+  if (!(friction > 0) || leader < 0) return;
+  Vec3 sliding(0);
+  for (const auto& [body, sign] : {std::pair{contact.a, -1.0}, std::pair{contact.b, 1.0}}) {
+    if (body == BodyContact::kStands) continue;
+    sliding += sign * (state_.velocity[body] +
+                       glm::cross(state_.spin[body], contact.place - state_.motion[body].centre));
+  }
+  sliding -= glm::dot(sliding, contact.normal) * contact.normal;
+  // One direction is that of sliding: the box of bounds then is a cone's where it matters.
+  const Vec3& n = contact.normal;
+  Vec3 first = sliding;
+  if (!(glm::dot(sliding, sliding) > 1e-20))
+    first = glm::cross(n, std::abs(n.x) < 0.6 ? Vec3(1, 0, 0) : Vec3(0, 1, 0));
+  first = glm::normalize(first);
+  for (const Vec3& direction : {first, glm::cross(n, first)})
+    add_row(contact.a, contact.b, contact.place, direction, 0, friction, leader, -1);
+}
+
+void BodyContacts::solve_rows(std::span<PressingSpring> springs, double step) {
+  ComplementarityProblem& problem = state_.problem;
+  if (problem.size() == 0) return;
+  const auto coupling = [this](const Row& row, std::uint32_t body, const Row& other) {
+    if (body == BodyContact::kStands) return 0.0;
+    double sum = 0;
+    const double per_mass = world_.bodies[body].inertia.per_mass;
+    const Vec3& turn = row.a == body ? row.turn_a : row.turn_b;
+    if (other.a == body)
+      sum -= per_mass * glm::dot(row.direction, other.direction) + glm::dot(turn, other.moment_a);
+    if (other.b == body)
+      sum += per_mass * glm::dot(row.direction, other.direction) + glm::dot(turn, other.moment_b);
+    return sum;
+  };
+  const auto compliance = [&](int i) {
+    const PressingSpring& s = springs[static_cast<std::size_t>(i)];
+    return 1 / (step * (step * s.stiffness + s.damping));
+  };
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    for (std::size_t k = 0; k <= i; ++k) {
+      const Row &row = state_.rows[i], &other = state_.rows[k];
+      double sum = coupling(row, row.b, other) - coupling(row, row.a, other);
+      if (row.spring >= 0 && other.spring >= 0) {
+        const PressingSpring& s = springs[static_cast<std::size_t>(row.spring)];
+        const PressingSpring& t = springs[static_cast<std::size_t>(other.spring)];
+        if (i == k)
+          sum += compliance(row.spring);
+        else if (s.body == t.body && s.group == t.group)
+          sum += glm::dot(s.normal, t.normal) *
+                 std::sqrt(compliance(row.spring) * compliance(other.spring));
+      }
+      problem.a(i, k) = problem.a(k, i) = sum;
+    }
+  }
+  if (!problem.solve()) ++state_.not_converged;
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    const double x = problem.x()[i];
+    if (x == 0) continue;
+    const Row& row = state_.rows[i];
+    if (row.spring >= 0) springs[static_cast<std::size_t>(row.spring)].impulse = x;
+    if (row.a != BodyContact::kStands) {
+      state_.push[row.a] -= x * row.direction;
+      state_.twist[row.a] -= x * row.moment_a;
+      state_.pushed[row.a] = 1;
+    }
+    if (row.b != BodyContact::kStands) {
+      state_.push[row.b] += x * row.direction;
+      state_.twist[row.b] += x * row.moment_b;
+      state_.pushed[row.b] = 1;
+    }
+  }
+}
+
+void BodyContacts::add_impulses(std::size_t body) {
+  state_.motion[body].velocity += world_.bodies[body].inertia.per_mass * state_.push[body];
+  state_.motion[body].spin_momentum += state_.twist[body];
+}
+
+/// Impacts go through a group of touching bodies one after another, as through a row of balls:
+/// those that approach part, then those that approach then (Smith, Kaufman, Vouga, Tamstorf &
+/// Grinspun 2012, Reflections on simultaneous impact).
+bool BodyContacts::bounce(double step) {
+  constexpr int kMostRounds = 100;
+  const double resting = 2 * glm::length(world_.gravity) * step + 1e-9;
+  bool bounced = false;
+  for (int round = 0; round < kMostRounds; ++round) {
+    set_velocities(0);
+    std::fill(state_.push.begin(), state_.push.end(), Vec3(0));
+    std::fill(state_.twist.begin(), state_.twist.end(), Vec3(0));
+    std::fill(state_.pushed.begin(), state_.pushed.end(), 0);
+    find_islands({});
+    bool any = false;
+    for (std::uint32_t island = 0; island < state_.island.size(); ++island) {
+      if (state_.island[island] != island) continue;
+      begin_rows();
+      for (const BodyContact& contact : state_.contacts) {
+        if (state_.island[contact.a] != island || contact.gap > kTouching) continue;
+        const double speed = separation_speed(contact);
+        if (speed > -resting) continue;
+        const BodyPair& pair = world_.pairs[contact.pair];
+        const int leader = static_cast<int>(state_.problem.size());
+        add_row(contact.a, contact.b, contact.place, contact.normal, -pair.restitution * speed,
+                kUnbounded, -1, -1);
+        add_friction(contact, leader, pair.friction);
+      }
+      any |= state_.problem.size() > 0;
+      solve_rows({}, 0);
+    }
+    if (!any) break;
+    bounced = true;
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (state_.pushed[i]) add_impulses(i);
+    }
+  }
+  return bounced;
+}
+
+void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
+                              std::span<const char> chosen) {
+  std::fill(state_.push.begin(), state_.push.end(), Vec3(0));
+  std::fill(state_.twist.begin(), state_.twist.end(), Vec3(0));
+  std::fill(state_.pushed.begin(), state_.pushed.end(), 0);
+  if (state_.contacts.empty() && springs.empty()) return;
+  set_velocities(step);
+  find_islands(springs);
+  for (std::uint32_t island = 0; island < state_.island.size(); ++island) {
+    if (state_.island[island] != island || (!chosen.empty() && !chosen[island])) continue;
+    bool closing = false;
+    for (const BodyContact& contact : state_.contacts) {
+      if (state_.island[contact.a] == island)
+        closing |= separation_speed(contact) < least_speed_of(contact.gap, step);
+    }
+    begin_rows();
+    for (std::size_t s = 0; s < springs.size(); ++s) {
+      const PressingSpring& spring = springs[s];
+      if (state_.island[spring.body] != island) continue;
+      closing = true;
+      const double yield = step * (step * spring.stiffness + spring.damping);
+      add_row(
+          BodyContact::kStands, spring.body, spring.place, -spring.normal,
+          spring.free_speed +
+              step * (spring.stiffness * spring.depth + spring.damping * spring.closing) / yield,
+          kUnbounded, -1, static_cast<int>(s));
+    }
+    if (!closing) continue;
+    for (const bool friction : {false, true}) {
+      int row = static_cast<int>(
+          std::count_if(springs.begin(), springs.end(),
+                        [&](const PressingSpring& s) { return state_.island[s.body] == island; }));
+      for (const BodyContact& contact : state_.contacts) {
+        if (state_.island[contact.a] != island) continue;
+        const int leader = row++;
+        if (!friction) {
+          add_row(contact.a, contact.b, contact.place, contact.normal,
+                  least_speed_of(contact.gap, step), kUnbounded, -1, -1);
+        } else if (contact.gap <= 1e-6) {
+          add_friction(contact, leader, world_.pairs[contact.pair].friction);
+        }
+      }
+    }
+    solve_rows(springs, step);
+  }
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,54 @@
+#pragma once
+// The contacts of a step and the impulses in them. Internal to body_step.cpp.
+
+#include <cstddef>
+#include <span>
+
+#include "rendering/bodies/body_world.h"
+
+namespace palpate::rendering {
+
+class BodyContacts {
+ public:
+  BodyContacts(const BodyWorld& world, BodyWorldState& state) : world_(world), state_(state) {}
+
+  /// Sets state.near and state.contacts: what touches or may meet within a time, s.
+  /// \param extra  m; farther away by this as well
+  void find(double within, double extra = 0);
+
+  /// Bodies that touch and approach each other part again, with the restitution of the pair.
+  /// \return whether some did
+  bool bounce(double step);
+
+  /// s, until the next pair meets, at most `most`.
+  double time_to_next(double most);
+
+  /// Impulses that keep all contacts from closing by more than their gap within a step. Sets
+  /// state.push, twist and pushed. \param springs  that press \param chosen  bodies; empty: all
+  void hold_apart(double step, std::span<PressingSpring> springs, std::span<const char> chosen);
+
+  /// Those impulses, on one body.
+  void add_impulses(std::size_t body);
+
+ private:
+  using Row = BodyWorldState::Row;
+
+  Pose pose_of(std::uint32_t body) const;
+  Pose pose_of_other(const BodyPair& pair) const;
+  const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
+  void find_in_pair(std::uint32_t index, double within, double extra);
+  double meeting_time(const BodyWorldState::NearParts& parts, double most);
+  void set_velocities(double step);
+  void find_islands(std::span<const PressingSpring> springs);
+  double separation_speed(const BodyContact& contact) const;
+  void add_row(std::uint32_t a, std::uint32_t b, const Vec3& place, const Vec3& direction,
+               double least_speed, double bound, int leader, int spring);
+  void add_friction(const BodyContact& contact, int leader, double friction);
+  void begin_rows();
+  void solve_rows(std::span<PressingSpring> springs, double step);
+
+  const BodyWorld& world_;
+  BodyWorldState& state_;
+};
+
+}  // namespace palpate::rendering

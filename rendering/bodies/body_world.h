@@ -1,0 +1,136 @@
+#pragma once
+// Bodies that move and collide, without a probe: what is known of them and what changes. World
+// frame, SI units.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "rendering/bodies/complementarity.h"
+#include "rendering/bodies/convex_gap.h"
+#include "rendering/bodies/rigid_motion.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::rendering {
+
+/// A convex part of a body, or one that stands still.
+struct CollidingPart {
+  std::shared_ptr<const stimuli::ConvexMesh> mesh;
+  std::shared_ptr<const ContactTrees> trees;
+  Pose pose;    ///< in the body's frame, whose origin is the centre of mass; of what stands still
+                ///< in the world's
+  Vec3 inside;  ///< mesh frame
+  Vec3 centre;  ///< of the bounding sphere, in the frame of the pose
+};
+
+struct MovingBody {
+  int object = 0;
+  BodyInertia inertia;
+  stimuli::Body of;
+  std::vector<CollidingPart> parts;
+  double radius = 0;  ///< m, about the centre of mass
+  BodyMotion start;
+  Pose placed;           ///< where the scene put the body's frame
+  double stiffness = 0;  ///< N/m, of its surface; what passes limits is refused
+};
+
+/// What stands still: the parts of one object.
+struct Obstacle {
+  std::vector<CollidingPart> parts;
+  Vec3 centre;
+  double radius = 0;
+};
+
+/// Two parts that may touch.
+struct PartPair {
+  std::uint32_t part_a = 0, part_b = 0;
+};
+
+/// A body and another, or an obstacle.
+struct BodyPair {
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;  ///< index of the body, or of the obstacle
+  bool obstacle = false;
+  std::uint32_t first = 0, count = 0;  ///< of the part pairs
+  double restitution = 0, friction = 0;
+};
+
+struct BodyWorld {
+  std::vector<MovingBody> bodies;
+  std::vector<Obstacle> obstacles;
+  std::vector<BodyPair> pairs;
+  std::vector<PartPair> part_pairs;
+  Vec3 gravity{0, 0, 0};
+
+  /// Sets the pairs from bodies and obstacles.
+  void pair_up();
+};
+
+/// A place where two bodies touch or soon will.
+struct BodyContact {
+  static constexpr std::uint32_t kStands = ~std::uint32_t{0};
+  std::uint32_t a = 0, b = kStands;  ///< bodies
+  std::uint32_t pair = 0;
+  Vec3 place, normal;  ///< normal: unit, from a to b
+  double gap = 0;      ///< m
+};
+
+/// A spring that presses on a body within a step: the probe. It acts along -normal.
+struct PressingSpring {
+  std::uint32_t body = 0;
+  int group = 0;          ///< springs of one ideal tool: their depths are of one translation
+  Vec3 place, normal;     ///< normal: out of the body
+  double depth = 0;       ///< m, at the end of the step, were there no spring
+  double free_speed = 0;  ///< m/s, by which the body's place retreats without the spring
+  double stiffness = 0;   ///< N/m
+  double damping = 0;     ///< N s/m
+  double closing = 0;     ///< m/s, by which the depth grows without the spring
+  double impulse = 0;     ///< N s; the result
+};
+
+/// What the step changes and the room it needs.
+struct BodyWorldState {
+  std::vector<BodyMotion> motion;
+  std::vector<GapMemory> gaps;      ///< of each part pair
+  std::uint64_t not_converged = 0;  ///< problems that met the limit of pivots
+
+  // Room. Copies of a state have none until they make it.
+  static constexpr std::size_t kMostContacts = 512;
+  std::size_t most_pairs = 0, most_parts = 0, most_corners = 0;
+  void make_room();
+  std::vector<std::uint32_t> near;  ///< pairs
+  struct NearParts {
+    std::uint32_t pair = 0, parts = 0;
+    double gap = 0;
+  };
+  std::vector<NearParts> near_parts;
+  std::vector<BodyContact> contacts;
+  std::vector<std::uint32_t> island;  ///< of each body, by its first body
+  std::vector<Vec3> velocity, spin;   ///< of each body, as it would be without impulses
+  std::vector<Vec3> push, twist;      ///< N s, N m s; impulses on each body
+  std::vector<Mat3> per_inertia;
+  std::vector<char> pushed;
+  ClipRoom clip;
+  Manifold manifold;
+  ComplementarityProblem problem;
+  struct Row {
+    std::uint32_t a = BodyContact::kStands, b = BodyContact::kStands;
+    Vec3 direction;           ///< impulse on b along it, on a against it
+    Vec3 moment_a, moment_b;  ///< m, of a unit impulse
+    Vec3 turn_a, turn_b;      ///< rad/s, by it
+    int spring = -1;          ///< index of the spring that presses here
+  };
+  std::vector<Row> rows;
+};
+
+BodyWorldState initial_state(const BodyWorld& world);
+
+/// Where a part is now.
+ConvexPlace place_of(const CollidingPart& part, const Pose& frame);
+
+/// kg m^2/s^2 and the like are left out: momentum and energy of all bodies.
+double kinetic_energy(const BodyWorld& world, const BodyWorldState& state);
+Vec3 momentum(const BodyWorld& world, const BodyWorldState& state);
+Vec3 angular_momentum(const BodyWorld& world, const BodyWorldState& state);  ///< about the origin
+
+}  // namespace palpate::rendering

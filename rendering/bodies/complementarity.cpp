@@ -1,0 +1,226 @@
+#include "rendering/bodies/complementarity.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::rendering {
+
+ComplementarityProblem::ComplementarityProblem()
+    : matrix_(kMostRows * kMostRows),
+      factor_(kMostRows * kMostRows),
+      b_(kMostRows),
+      bound_(kMostRows),
+      x_(kMostRows),
+      w_(kMostRows),
+      lower_(kMostRows),
+      upper_(kMostRows),
+      change_(kMostRows),
+      rate_(kMostRows),
+      leader_(kMostRows) {
+  make_room();
+}
+
+void ComplementarityProblem::make_room() {
+  free_.reserve(kMostRows);
+  done_.reserve(kMostRows);
+}
+
+void ComplementarityProblem::add_row(double b, double bound, int leader) {
+  b_[count_] = b;
+  bound_[count_] = bound;
+  leader_[count_++] = leader;
+}
+
+double ComplementarityProblem::slack(std::size_t row) const {
+  double w = -b_[row];
+  for (std::size_t j = 0; j < count_; ++j) w += a(row, j) * x_[j];
+  return w;
+}
+
+void ComplementarityProblem::set_bounds(std::size_t row) {
+  const int leader = leader_[row];
+  upper_[row] = leader < 0 ? bound_[row] : bound_[row] * x_[static_cast<std::size_t>(leader)];
+  lower_[row] = leader < 0 ? 0 : -upper_[row];
+}
+
+/// Rows of the factor from a position on.
+void ComplementarityProblem::refactor(std::size_t from) {
+  constexpr double kRaise = 1e-14;
+  for (std::size_t i = from; i < free_.size(); ++i) {
+    double* const row = &factor_[i * kMostRows];
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double* const other = &factor_[j * kMostRows];
+      double sum = a(free_[i], free_[j]);
+      for (std::size_t k = 0; k < j; ++k) sum -= row[k] * other[k];
+      const double diagonal = a(free_[i], free_[i]);
+      row[j] = j < i ? sum / other[j] : std::sqrt(std::max(sum, 0.0) + kRaise * diagonal);
+    }
+  }
+}
+
+void ComplementarityProblem::free_row(std::size_t row) {
+  free_.push_back(row);
+  refactor(free_.size() - 1);
+}
+
+void ComplementarityProblem::bind_row(std::size_t position) {
+  done_.push_back(free_[position]);
+  free_.erase(free_.begin() + static_cast<std::ptrdiff_t>(position));
+  refactor(position);
+}
+
+/// What the free rows answer to a unit of x of one row: A_ff out = -A_f,column.
+void ComplementarityProblem::solve_free(std::size_t column, double* out) const {
+  const std::size_t n = free_.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum = -a(free_[i], column);
+    for (std::size_t k = 0; k < i; ++k) sum -= factor_[i * kMostRows + k] * out[k];
+    out[i] = sum / factor_[i * kMostRows + i];
+  }
+  for (std::size_t i = n; i-- > 0;) {
+    double sum = out[i];
+    for (std::size_t k = i + 1; k < n; ++k) sum -= factor_[k * kMostRows + i] * out[k];
+    out[i] = sum / factor_[i * kMostRows + i];
+  }
+}
+
+/// Brings one row in. False: no pivots are left.
+bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
+  x_[row] = 0;
+  w_[row] = slack(row);
+  const double scale = std::abs(b_[row]) + std::abs(a(row, row));
+  while (true) {
+    const bool at_lower = x_[row] <= lower_[row], at_upper = x_[row] >= upper_[row];
+    const bool holds = std::abs(w_[row]) <= 1e-15 * scale || (w_[row] > 0 && at_lower) ||
+                       (w_[row] < 0 && at_upper);
+    if (holds) {
+      // In between it must be free, or what comes next would move its slack.
+      if (!at_lower && !at_upper)
+        free_row(row);
+      else
+        done_.push_back(row);
+      return true;
+    }
+    if (--pivots_left < 0) return false;
+    const double direction = w_[row] < 0 ? 1 : -1;
+    solve_free(row, change_.data());
+    const auto rate_of = [&](std::size_t i) {
+      double rate = a(i, row);
+      for (std::size_t k = 0; k < free_.size(); ++k) rate += a(i, free_[k]) * change_[k];
+      return direction * rate;
+    };
+    const double own_rate = rate_of(row);
+    // A row that the free ones already say does not answer: it may go to its bound.
+    const bool answers = std::abs(own_rate) > 1e-12 * std::abs(a(row, row));
+    double step = answers ? -w_[row] / own_rate : HUGE_VAL;
+    enum class Stop { zero, bound, bind, release } stop = answers ? Stop::zero : Stop::bound;
+    std::size_t at = 0;
+    if (!answers) return done_.push_back(row), true;
+    const double room = direction > 0 ? upper_[row] - x_[row] : x_[row] - lower_[row];
+    if (room < step) {
+      step = room;
+      stop = Stop::bound;
+    }
+    for (std::size_t k = 0; k < free_.size(); ++k) {
+      const double change = direction * change_[k];
+      const std::size_t i = free_[k];
+      if (change == 0) continue;
+      const double to_bound = (change > 0 ? upper_[i] - x_[i] : lower_[i] - x_[i]) / change;
+      if (to_bound < step) {
+        step = std::max(0.0, to_bound);
+        stop = Stop::bind;
+        at = k;
+      }
+    }
+    for (std::size_t k = 0; k < done_.size(); ++k) {
+      const std::size_t i = done_[k];
+      rate_[k] = rate_of(i);
+      // At the lower bound slack may not fall below 0, at the upper not rise above.
+      const bool low = x_[i] <= lower_[i], high = x_[i] >= upper_[i];
+      if (low && high) continue;
+      if (low ? rate_[k] >= 0 : rate_[k] <= 0) continue;
+      if (std::abs(rate_[k]) <= 1e-12 * std::abs(a(i, i))) continue;
+      const double to_zero = std::max(0.0, -w_[i] / rate_[k]);
+      if (to_zero < step) {
+        step = to_zero;
+        stop = Stop::release;
+        at = k;
+      }
+    }
+    x_[row] += direction * step;
+    w_[row] += own_rate * step;
+    for (std::size_t k = 0; k < free_.size(); ++k) x_[free_[k]] += direction * step * change_[k];
+    for (std::size_t k = 0; k < done_.size(); ++k) w_[done_[k]] += rate_[k] * step;
+    switch (stop) {
+      case Stop::zero:
+        w_[row] = 0;
+        free_row(row);
+        return true;
+      case Stop::bound:
+        x_[row] = direction > 0 ? upper_[row] : lower_[row];
+        done_.push_back(row);
+        return true;
+      case Stop::bind: {
+        const std::size_t i = free_[at];
+        x_[i] = direction * change_[at] > 0 ? upper_[i] : lower_[i];
+        w_[i] = 0;
+        bind_row(at);
+        break;
+      }
+      case Stop::release: {
+        const std::size_t i = done_[at];
+        done_.erase(done_.begin() + static_cast<std::ptrdiff_t>(at));
+        w_[i] = 0;
+        free_row(i);
+        break;
+      }
+    }
+  }
+}
+
+/// Projected Gauss-Seidel, where pivoting met its limit.
+void ComplementarityProblem::sweep() {
+  constexpr int kSweeps = 200;
+  for (int round = 0; round < kSweeps; ++round) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (!(a(i, i) > 0)) continue;
+      set_bounds(i);
+      x_[i] = std::clamp(x_[i] - slack(i) / a(i, i), lower_[i], upper_[i]);
+    }
+  }
+}
+
+bool ComplementarityProblem::solve() {
+  free_.clear();
+  done_.clear();
+  std::fill_n(x_.begin(), count_, 0.0);
+  int pivots_left = static_cast<int>(20 * count_) + 50;
+  for (const bool friction : {false, true}) {
+    for (std::size_t i = 0; i < count_; ++i) {
+      if ((leader_[i] >= 0) == friction) set_bounds(i);
+    }
+    for (std::size_t i = 0; i < count_; ++i) {
+      if ((leader_[i] >= 0) != friction || drive(i, pivots_left)) continue;
+      sweep();
+      return false;
+    }
+  }
+  return true;
+}
+
+double ComplementarityProblem::residual() const {
+  double worst = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double w = slack(i);
+    if (x_[i] <= lower_[i] && x_[i] >= upper_[i]) continue;
+    if (x_[i] <= lower_[i])
+      worst = std::max(worst, -w);
+    else if (x_[i] >= upper_[i])
+      worst = std::max(worst, w);
+    else
+      worst = std::max(worst, std::abs(w));
+  }
+  return worst;
+}
+
+}  // namespace palpate::rendering

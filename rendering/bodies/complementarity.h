@@ -1,0 +1,61 @@
+#pragma once
+// Linear complementarity problems with bounds, solved exactly by Dantzig's method. Nothing here
+// allocates once there is room.
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace palpate::rendering {
+
+/// Find x with lower <= x <= upper and w = A x - b such that, for each i, w_i = 0, or x_i is at its
+/// lower bound and w_i >= 0, or at its upper and w_i <= 0. A is symmetric, positive semidefinite.
+///
+/// Dantzig's pivoting with friction as in Baraff 1994 (Fast contact force computation): the rows
+/// are brought in one after another, and each step goes on until some row changes from bound to
+/// free or back. A row with a `leader` is friction: its bounds are +-coefficient times x of its
+/// leader, as that is when all rows without leaders are solved. Departs: the free rows' factor is
+/// Cholesky's of a diagonal raised by 1e-14 of itself, so that contacts that say the same twice do
+/// no harm.
+class ComplementarityProblem {
+ public:
+  static constexpr std::size_t kMostRows = 192;
+
+  ComplementarityProblem();
+
+  /// For a copy.
+  void make_room();
+  void clear() { count_ = 0; }
+  std::size_t size() const { return count_; }
+  bool full() const { return count_ == kMostRows; }
+  /// \param leader  index of an earlier row, of which the bounds are multiples; -1: none
+  /// \param bound   upper bound of a row without leader (its lower is 0); coefficient else
+  void add_row(double b, double bound, int leader = -1);
+  double& a(std::size_t row, std::size_t column) { return matrix_[row * kMostRows + column]; }
+  double a(std::size_t row, std::size_t column) const { return matrix_[row * kMostRows + column]; }
+
+  /// False: the limit of pivots was met; x is within its bounds and as good as sweeps make it.
+  bool solve();
+  std::span<const double> x() const { return {x_.data(), count_}; }
+  /// Largest violation of the conditions above, in units of w.
+  double residual() const;
+
+ private:
+  void set_bounds(std::size_t row);
+  bool drive(std::size_t row, int& pivots_left);
+  void free_row(std::size_t row);
+  void bind_row(std::size_t position);
+  void refactor(std::size_t from);
+  void solve_free(std::size_t column, double* out) const;
+  double slack(std::size_t row) const;
+  void sweep();
+
+  std::size_t count_ = 0;
+  std::vector<double> matrix_, factor_;  ///< factor_ by position in free_
+  std::vector<double> b_, bound_, x_, w_, lower_, upper_, change_, rate_;
+  std::vector<int> leader_;
+  std::vector<std::size_t> free_;
+  std::vector<std::size_t> done_;  ///< rows at a bound that are already in
+};
+
+}  // namespace palpate::rendering

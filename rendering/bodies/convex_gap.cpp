@@ -1,0 +1,231 @@
+#include "rendering/bodies/convex_gap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <optional>
+
+#include "rendering/bodies/closest_simplex.h"
+#include "rendering/separation.h"
+
+namespace palpate::rendering {
+namespace {
+
+/// m; of two parts along a direction, with the corners that bound it.
+struct Slab {
+  double distance = 0;
+  Vec3 corner_a, corner_b;  // world
+};
+
+std::uint32_t support_of(const ConvexPlace& part, const Vec3& direction, std::uint32_t start) {
+  return support_vertex(*part.mesh, part.local_vector(direction), start);
+}
+
+/// \param normal  unit
+Slab slab_along(const ConvexPlace& a, const ConvexPlace& b, const Vec3& normal, GapMemory& memory) {
+  memory.support_a = support_of(a, normal, memory.support_a);
+  memory.support_b = support_of(b, -normal, memory.support_b);
+  Slab slab;
+  slab.corner_a = a.world_point(a.mesh->vertices()[memory.support_a]);
+  slab.corner_b = b.world_point(b.mesh->vertices()[memory.support_b]);
+  slab.distance = glm::dot(normal, slab.corner_b - slab.corner_a);
+  return slab;
+}
+
+Vec3 made_smaller(const ConvexPlace& part, std::uint32_t vertex, double scale) {
+  return part.world_point(part.inside + scale * (part.mesh->vertices()[vertex] - part.inside));
+}
+
+/// GJK of both parts scaled. Empty: they overlap still.
+std::optional<GapSimplex> nearest_simplex(const ConvexPlace& a, const ConvexPlace& b, double scale,
+                                          double size, GapMemory& memory) {
+  constexpr int kMostRounds = 64;
+  constexpr double kConverged = 1e-12;
+  Vec3 v = b.world_point(b.inside) - a.world_point(a.inside);
+  if (glm::dot(memory.normal, memory.normal) > 0) v = memory.normal * size;
+  if (!(glm::dot(v, v) > 0)) v = Vec3(size, 0, 0);
+  GapSimplex simplex;
+  for (int round = 0; round < kMostRounds; ++round) {
+    memory.support_a = support_of(a, v, memory.support_a);
+    memory.support_b = support_of(b, -v, memory.support_b);
+    GapSimplex::Corner corner;
+    corner.on_a = made_smaller(a, memory.support_a, scale);
+    corner.on_b = made_smaller(b, memory.support_b, scale);
+    corner.point = corner.on_b - corner.on_a;
+    if (simplex.count > 0) {
+      const double v2 = glm::dot(v, v);
+      if (v2 - glm::dot(v, corner.point) <= kConverged * v2) break;
+      const bool again =
+          std::any_of(simplex.corners.begin(),
+                      simplex.corners.begin() + static_cast<std::ptrdiff_t>(simplex.count),
+                      [&](const auto& known) { return known.point == corner.point; });
+      if (again) break;
+    }
+    const GapSimplex before = simplex;
+    simplex.corners[simplex.count++] = corner;
+    if (!reduce_to_nearest(simplex)) return std::nullopt;
+    const Vec3 nearer = simplex.nearest();
+    const double distance2 = glm::dot(nearer, nearer);
+    if (!(distance2 > 1e-24 * size * size)) return std::nullopt;
+    if (before.count > 0 && distance2 >= glm::dot(v, v)) {  // rounding
+      simplex = before;
+      break;
+    }
+    v = nearer;
+  }
+  return simplex;
+}
+
+/// The point on the whole part of one on the smaller.
+Vec3 made_whole(const ConvexPlace& part, const Vec3& point, double scale) {
+  const Vec3 inside = part.world_point(part.inside);
+  return inside + (point - inside) / scale;
+}
+
+struct BestFacet {
+  std::uint32_t index = 0;
+  double cosine = -2;
+};
+
+/// The facet at a vertex that faces a direction most. \param direction  mesh frame, unit
+BestFacet facet_at(const stimuli::ConvexMesh& mesh, std::uint32_t vertex, const Vec3& direction) {
+  BestFacet best;
+  for (std::uint32_t k = mesh.fan_first()[vertex]; k < mesh.fan_first()[vertex + 1]; ++k) {
+    const stimuli::Edge& edge = mesh.edges()[mesh.fan_edges()[k]];
+    for (const std::uint32_t f : {edge.left, edge.right}) {
+      const double cosine = glm::dot(mesh.facets()[f].normal, direction);
+      if (cosine > best.cosine) best = {f, cosine};
+    }
+  }
+  return best;
+}
+
+/// The facet's corners, world frame.
+void corners_of(const ConvexPlace& part, std::uint32_t f, std::vector<Vec3>& out) {
+  out.clear();
+  const stimuli::Facet& facet = part.mesh->facets()[f];
+  for (std::uint32_t k = 0; k < facet.side_count; ++k) {
+    const stimuli::Edge& edge = part.mesh->edges()[part.mesh->sides()[facet.first_side + k].edge];
+    out.push_back(part.world_point(edge.left == f ? edge.from : edge.to));
+  }
+}
+
+/// Keeps of room.polygon what lies over a facet.
+void clip_to(const ConvexPlace& part, const stimuli::Facet& facet, ClipRoom& room) {
+  for (std::uint32_t k = 0; k < facet.side_count; ++k) {
+    const stimuli::Side& side = part.mesh->sides()[facet.first_side + k];
+    const Vec3 inward = part.axes * side.inward;
+    const double offset = side.offset + glm::dot(inward, part.position);
+    const auto height = [&](const Vec3& p) { return glm::dot(inward, p) - offset; };
+    if (std::all_of(room.polygon.begin(), room.polygon.end(),
+                    [&](const Vec3& p) { return height(p) >= 0; }))
+      continue;
+    room.next.clear();
+    for (std::size_t i = 0; i < room.polygon.size(); ++i) {
+      const Vec3 &p = room.polygon[i], &q = room.polygon[(i + 1) % room.polygon.size()];
+      const double at_p = height(p), at_q = height(q);
+      if (at_p >= 0) room.next.push_back(p);
+      if ((at_p >= 0) != (at_q >= 0)) room.next.push_back(p + at_p / (at_p - at_q) * (q - p));
+    }
+    std::swap(room.polygon, room.next);
+    if (room.polygon.empty()) return;
+  }
+}
+
+/// Few points that hold as much as all: the nearest, and those farthest to four sides.
+void choose_points(const ClipRoom& room, const Vec3& normal, Manifold& out) {
+  const std::vector<ManifoldPoint>& all = room.points;
+  if (all.size() <= 4) {
+    for (const ManifoldPoint& point : all) out.add(point);
+    return;
+  }
+  const Vec3 least = std::abs(normal.x) < 0.6 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
+  const Vec3 u = glm::normalize(glm::cross(normal, least)), v = glm::cross(normal, u);
+  // Turned by what no regular polygon is symmetric to.
+  const Vec3 first = 0.9 * u + 0.4359 * v, second = glm::cross(normal, first);
+  const auto nearest = std::min_element(all.begin(), all.end(),
+                                        [](const auto& a, const auto& b) { return a.gap < b.gap; });
+  std::array<const ManifoldPoint*, 5> chosen{&*nearest};
+  std::size_t count = 1;
+  for (const Vec3& side : {first, -first, second, -second}) {
+    const auto farthest =
+        std::max_element(all.begin(), all.end(), [&](const auto& a, const auto& b) {
+          return glm::dot(a.place, side) < glm::dot(b.place, side);
+        });
+    if (std::find(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(count),
+                  &*farthest) == chosen.begin() + static_cast<std::ptrdiff_t>(count))
+      chosen[count++] = &*farthest;
+  }
+  for (std::size_t i = 0; i < count; ++i) out.add(*chosen[i]);
+}
+
+}  // namespace
+
+Gap gap_between(const ConvexPlace& a, const ConvexPlace& b, double enough, GapMemory& memory) {
+  constexpr double kScales[] = {1 - 1e-4, 1 - 1e-2, 0.8, 0.3, 0.01};
+  const double size = a.mesh->radius() + b.mesh->radius();
+  Gap gap;
+  if (glm::dot(memory.normal, memory.normal) > 0) {
+    const Slab known = slab_along(a, b, memory.normal, memory);
+    if (known.distance >= enough) {
+      gap.normal = memory.normal;
+      gap.distance = known.distance;
+      gap.on_a = known.corner_a;
+      gap.on_b = known.corner_b;
+      return gap;
+    }
+  }
+  Vec3 between = b.world_point(b.inside) - a.world_point(a.inside);
+  if (!(glm::dot(between, between) > 0)) between = Vec3(0, 0, 1);
+  gap.normal = glm::normalize(between);
+  for (const double scale : kScales) {
+    const std::optional<GapSimplex> nearest = nearest_simplex(a, b, scale, size, memory);
+    if (!nearest) {
+      memory.normal = Vec3(0);
+      continue;
+    }
+    gap.normal = glm::normalize(nearest->nearest());
+    for (std::size_t i = 0; i < nearest->count; ++i) {
+      gap.on_a += nearest->weights[i] * nearest->corners[i].on_a;
+      gap.on_b += nearest->weights[i] * nearest->corners[i].on_b;
+    }
+    gap.on_a = made_whole(a, gap.on_a, scale);
+    gap.on_b = made_whole(b, gap.on_b, scale);
+    break;
+  }
+  memory.normal = gap.normal;
+  gap.distance = slab_along(a, b, gap.normal, memory).distance;
+  return gap;
+}
+
+void find_manifold(const ConvexPlace& a, const ConvexPlace& b, const Gap& gap, double reach,
+                   const GapMemory& memory, ClipRoom& room, Manifold& out) {
+  constexpr double kAligned = 1 - 1e-10;  // cosine; 1.4e-5 rad
+  out.clear();
+  out.normal = gap.normal;
+  const BestFacet on_a = facet_at(*a.mesh, memory.support_a, a.local_vector(gap.normal));
+  const BestFacet on_b = facet_at(*b.mesh, memory.support_b, b.local_vector(-gap.normal));
+  if (std::max(on_a.cosine, on_b.cosine) >= kAligned) {
+    const bool first = on_a.cosine >= on_b.cosine;
+    const ConvexPlace &flat = first ? a : b, &other = first ? b : a;
+    const stimuli::Facet& facet = flat.mesh->facets()[first ? on_a.index : on_b.index];
+    const Vec3 normal = flat.axes * facet.normal;
+    const double offset = facet.offset + glm::dot(normal, flat.position);
+    const std::uint32_t vertex = first ? memory.support_b : memory.support_a;
+    const BestFacet across = facet_at(*other.mesh, vertex, other.local_vector(-normal));
+    corners_of(other, across.index, room.polygon);
+    clip_to(flat, facet, room);
+    room.points.clear();
+    for (const Vec3& p : room.polygon) {
+      const double distance = glm::dot(normal, p) - offset;
+      if (distance <= reach) room.points.push_back({p - 0.5 * distance * normal, distance});
+    }
+    out.normal = first ? normal : -normal;
+    choose_points(room, normal, out);
+    if (!out.points().empty()) return;
+    out.normal = gap.normal;
+  }
+  if (gap.distance <= reach) out.add({0.5 * (gap.on_a + gap.on_b), gap.distance});
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,391 @@
+#include "rendering/bodies/moving_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "rendering/bodies/spring_pass.h"
+#include "rendering/tool_pose.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr double kLongestStep = 1.5e-3;  // s
+constexpr double kLongestTick = 1;       // s; time beyond it is lost to what moves
+constexpr double kFarthestPose = 1e6;    // m
+
+bool in_range(const Vec3& v) { return glm::dot(v, v) <= kFarthestPose * kFarthestPose; }
+
+Vec3 into(const Pose& frame, const Vec3& world) {
+  return glm::conjugate(frame.orientation) * (world - frame.position);
+}
+
+Vec3 out_of(const Pose& frame, const Vec3& local) {
+  return frame.orientation * local + frame.position;
+}
+
+LineProbe into(const Pose& frame, const LineProbe& probe) {
+  return {into(frame, probe.tip), into(frame, probe.tail)};
+}
+
+ToolPose into(const Pose& frame, const LineProbe& probe, const Mat3& tool) {
+  const Mat3 back = glm::mat3_cast(glm::conjugate(frame.orientation));
+  const Vec3 tip = into(frame, probe.tip);
+  return {tip, into(frame, probe.tail) - tip, back * tool};
+}
+
+bool is_finite(const BodyMotion& motion) {
+  const Vec3 sum = motion.centre + motion.velocity + motion.spin_momentum;
+  const Quat& q = motion.orientation;
+  return std::isfinite(sum.x + sum.y + sum.z + q.w + q.x + q.y + q.z) && in_range(motion.centre);
+}
+
+}  // namespace
+
+std::unique_ptr<MotionState> BodiesState::clone() const {
+  auto copy = std::make_unique<BodiesState>(*this);
+  copy->world.make_room();
+  copy->contacts.reserve(most_contacts);
+  copy->springs.reserve(most_contacts);
+  return copy;
+}
+
+MovingBodies::MovingBodies(BodyWorld world, Scene fixed, std::vector<Scene> shapes)
+    : world_(std::move(world)), fixed_(std::move(fixed)), shapes_(std::move(shapes)) {}
+
+std::unique_ptr<MotionState> MovingBodies::initial_state() const {
+  auto state = std::make_unique<BodiesState>();
+  state->fixed = fixed_.initial_state();
+  std::size_t contacts = 0;
+  for (const Scene& shape : shapes_) {
+    state->shapes.push_back(shape.initial_state());
+    contacts += std::max<std::size_t>(1, state->shapes.back().unions.contacts.capacity());
+  }
+  state->world = rendering::initial_state(world_);
+  const std::size_t count = world_.bodies.size();
+  state->poses.resize(count);
+  state->before.resize(count);
+  state->ahead.resize(count);
+  state->felt.resize(count);
+  state->shown.resize(count);
+  state->chosen.resize(count);
+  state->held.resize(count);
+  state->most_contacts = contacts;
+  state->contacts.reserve(contacts);
+  state->springs.reserve(contacts);
+  settle(*state, {});
+  return state;
+}
+
+Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const LineProbe& probe,
+                             double dt) const noexcept {
+  auto& state = static_cast<BodiesState&>(*outer.motion.get());
+  const bool valid = in_range(probe.tip) && in_range(probe.tail);
+  const bool tool = fixed_.tool() != nullptr;
+  Mat3 frame = state.last_frame;
+  const bool sided = !tool || in_range(outer.measured_side);
+  if (valid && sided && tool)
+    frame = tool_frame(probe.tail - probe.tip, state.has_last ? &state.last_frame : nullptr,
+                       outer.measured_side);
+  const bool touches = valid && sided;
+  // A reading that is none: the bodies go on untouched.
+  const LineProbe last = state.has_last || !touches ? state.last : probe;
+  const Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
+  const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
+  const int steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
+  for (int i = 0; i < steps; ++i) {
+    const auto at = [&](int k) {
+      if (k == steps) return probe;
+      const double f = static_cast<double>(k) / steps;
+      return LineProbe{last.tip + f * (probe.tip - last.tip),
+                       last.tail + f * (probe.tail - last.tail)};
+    };
+    const auto frame_at = [&](int k) {
+      if (!tool || k == steps) return frame;
+      if (k == 0) return last_frame;
+      const ToolPose from{last.tip, last.tail - last.tip, last_frame};
+      const ToolPose to{probe.tip, probe.tail - probe.tip, frame};
+      return between(from, to, static_cast<double>(k) / steps).frame;
+    };
+    step(renderer, state, {at(i), at(i + 1), frame_at(i), frame_at(i + 1), time / steps, touches});
+  }
+  state.fixed.measured_side = tool && touches ? frame[0] : outer.measured_side;
+  const Rendering fixed = renderer.tick(fixed_, state.fixed, probe, dt);
+  if (touches) {
+    state.last = outer.last = probe;
+    state.last_frame = frame;
+    state.has_last = outer.has_last = true;
+    return sum(renderer, state, fixed, probe);
+  }
+  return fixed;
+}
+
+void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {
+  state.before = state.world.motion;
+  if (stroke.duration > 0) step_bodies(world_, state.world, stroke.duration);
+  if (stroke.touches) {
+    feel(renderer, state, stroke);
+    find_probe_contacts(state, stroke);
+    if (stroke.duration > 0 && !state.contacts.empty()) {
+      state.ahead = state.world.motion;
+      push_held(state, stroke);
+      for (ProbeContact& contact : state.contacts) push_sideways(state, contact, stroke.duration);
+    }
+  }
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    if (is_finite(state.world.motion[i])) continue;
+    // It stays where it was last, at rest: no number that is none goes on from here.
+    state.world.motion[i] = state.before[i];
+    state.world.motion[i].velocity = state.world.motion[i].spin_momentum = Vec3(0);
+    if (!is_finite(state.world.motion[i])) state.world.motion[i] = world_.bodies[i].start;
+  }
+  settle(state, stroke);
+}
+
+/// Renders each body in its frame, where it will be unless the probe holds it up.
+void MovingBodies::feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    const Pose frame = state.shown[i] = pose_of(state, i);
+    RenderState& shape = state.shapes[i];
+    if (fixed_.tool() != nullptr)
+      shape.measured_side = glm::conjugate(frame.orientation) * stroke.frame_to[0];
+    state.felt[i] = renderer.tick(shapes_[i], shape, into(frame, stroke.to), stroke.duration);
+  }
+}
+
+void MovingBodies::find_probe_contacts(BodiesState& state, const Stroke& stroke) const {
+  state.contacts.clear();
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    const Rendering& felt = state.felt[i];
+    const Scene& shape = shapes_[i];
+    const Pose frame = pose_of(state, i);
+    ProbeContact contact;
+    contact.spring.body = static_cast<std::uint32_t>(i);
+    if (felt.contacts == 0) {
+      if (state.held[i].holds) go_on(state, stroke, i);
+      state.held[i].holds = false;
+      continue;
+    }
+    if (!shape.features().unions) {
+      const Contact& c = felt.deepest;
+      contact.force = glm::dot(felt.force, c.normal);
+      contact.tangential = felt.force - contact.force * c.normal;
+      contact.spring.stiffness = shape.parts()[0].material.stiffness;
+      contact.spring.damping = shape.parts()[0].material.damping;
+      contact.spring.depth = c.depth;
+      contact.spring.normal = c.normal;
+      contact.spring.place = c.point;
+      contact.offset = felt.ideal.tip - into(frame, stroke.to.tip) - c.depth * c.normal;
+      place_contact(state, stroke, frame, c.depth * c.normal, contact);
+      continue;
+    }
+    for (const PlacedContact& c : state.shapes[i].unions.contacts) {
+      if (state.contacts.size() == state.most_contacts) return;
+      contact.force = c.loaded.force;
+      contact.offset = c.loaded.tangential_offset;
+      contact.tangential = c.loaded.stiffness * contact.offset;
+      contact.segment = c.segment;
+      contact.spring.group = static_cast<int>(c.group);
+      contact.spring.stiffness = c.loaded.stiffness;
+      contact.spring.damping = shape.parts()[c.loaded.part].material.damping;
+      contact.spring.depth = c.loaded.contact.depth;
+      contact.spring.normal = c.loaded.contact.normal;
+      contact.spring.place = c.place + contact.offset;
+      place_contact(state, stroke, frame, c.shift, contact);
+    }
+  }
+}
+
+/// The contact of the last step, where the probe is beyond its plane at the end of this one: within
+/// the step it still presses.
+void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const {
+  const BodiesState::Held& held = state.held[body];
+  ProbeContact contact = held.contact;
+  const Pose frame = pose_of(state, body);
+  const bool tool = fixed_.tool() != nullptr;
+  const Vec3 on_probe = tool ? stroke.to.tip + stroke.frame_to * held.on_tool
+                             : stroke.to.tip + contact.along * (stroke.to.tail - stroke.to.tip);
+  PressingSpring& spring = contact.spring;
+  const Vec3 shift = glm::dot(spring.normal, spring.place - into(frame, on_probe)) * spring.normal;
+  spring.depth = glm::dot(shift, spring.normal);
+  spring.place = into(frame, on_probe) + shift;
+  contact.force = 0;
+  contact.offset = contact.tangential = Vec3(0);
+  place_contact(state, stroke, frame, shift, contact);
+}
+
+/// Remembers the spring that a body ends the step with, for go_on.
+void MovingBodies::hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact,
+                        bool alone) const {
+  const std::uint32_t body = contact.spring.body;
+  BodiesState::Held& held = state.held[body];
+  held.holds = alone && contact.depth_after > 0;
+  if (!held.holds) return;
+  // In the frame in which the renderer saw the body: there the surface is where it was touched.
+  const Pose& frame = state.shown[body];
+  const Quat back = glm::conjugate(frame.orientation);
+  held.contact = contact;
+  held.contact.spring.normal = back * contact.spring.normal;
+  held.contact.spring.place = into(frame, contact.spring.place);
+  held.on_tool = (contact.on_probe - stroke.to.tip) * stroke.frame_to;
+  if (state.felt[body].contacts > 0) held.type = state.felt[body].deepest.type;
+}
+
+/// Takes a contact out of its body's frame. \param shift  m, from the virtual to the ideal probe,
+/// in the body's frame, without friction
+void MovingBodies::place_contact(BodiesState& state, const Stroke& stroke, const Pose& frame,
+                                 const Vec3& shift, ProbeContact contact) const {
+  PressingSpring& spring = contact.spring;
+  const BodyMotion& motion = state.world.motion[spring.body];
+  for (Vec3* v : {&spring.normal, &contact.offset, &contact.tangential})
+    *v = frame.orientation * *v;
+  spring.place = out_of(frame, spring.place);
+  contact.on_probe = spring.place - contact.offset - frame.orientation * shift;
+  const Vec3 d = stroke.to.tail - stroke.to.tip, from_tip = contact.on_probe - stroke.to.tip;
+  const double length2 = glm::dot(d, d);
+  contact.along = length2 > 0 ? glm::dot(from_tip, d) / length2 : 0;
+  Vec3 moved;  // m, of that place in the step
+  if (fixed_.tool() != nullptr) {
+    moved = contact.on_probe - (stroke.from.tip + stroke.frame_from * (from_tip * stroke.frame_to));
+  } else {
+    moved = (1 - contact.along) * (stroke.to.tip - stroke.from.tip) +
+            contact.along * (stroke.to.tail - stroke.from.tail);
+  }
+  if (stroke.duration > 0) {
+    const Vec3 spin = spin_of(world_.bodies[spring.body].inertia, motion);
+    spring.closing =
+        glm::dot(spring.normal, velocity_at(spin, motion, spring.place) - moved / stroke.duration);
+  }
+  contact.felt_depth = spring.stiffness > 0 ? contact.force / spring.stiffness : 0;
+  if (spring.stiffness > 0 || spring.damping > 0) state.contacts.push_back(contact);
+}
+
+/// One spring on a body that touches nothing else: in closed form. Changes the body's motion.
+void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double duration) const {
+  PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  const Vec3 moment = glm::cross(spring.place - motion.centre, spring.normal);
+  const Vec3 turn = world_per_inertia(body.inertia, motion.orientation) * moment;
+  SpringStart start;
+  start.stiffness = spring.stiffness;
+  start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
+  start.growth = glm::dot(world_.gravity, spring.normal);
+  start.speed = spring.closing - start.growth * duration;
+  start.depth = spring.depth - duration * (start.speed + 0.5 * duration * start.growth);
+  const SpringPass pass = pass_spring(start, duration);
+  spring.impulse = pass.impulse;
+  contact.depth_after = pass.depth;
+  motion.velocity -= pass.impulse * body.inertia.per_mass * spring.normal;
+  motion.spin_momentum -= pass.impulse * moment;
+  motion.centre -= pass.double_impulse * body.inertia.per_mass * spring.normal;
+  motion.orientation = turned(motion.orientation, -pass.double_impulse * turn);
+}
+
+/// Gives the bodies what the probe pushes them with.
+void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
+  const double duration = stroke.duration;
+  std::fill(state.chosen.begin(), state.chosen.end(), 0);
+  state.springs.clear();
+  for (std::size_t first = 0; first < state.contacts.size();) {
+    std::size_t end = first + 1;
+    const std::uint32_t body = state.contacts[first].spring.body;
+    while (end < state.contacts.size() && state.contacts[end].spring.body == body) ++end;
+    ProbeContact& only = state.contacts[first];
+    bool alone = end == first + 1 && only.spring.damping == 0;
+    state.held[body].holds = false;
+    if (alone) {
+      push_freely(state, only, duration);
+      // With that it must not meet anything: seen from where it began.
+      const double way = glm::distance(state.world.motion[body].centre, state.ahead[body].centre);
+      const BodyMotion pushed = state.world.motion[body];
+      std::swap(state.world.motion, state.before);
+      std::vector<char>& marked = state.chosen;
+      const char was = std::exchange(marked[body], 1);
+      alone = !mark_connected(world_, state.world, duration, 2 * way, marked);
+      std::swap(state.world.motion, state.before);
+      if (alone) marked[body] = was;
+      if (alone) hold(state, stroke, only, true);
+      state.world.motion[body] = alone ? pushed : state.ahead[body];
+    } else {
+      state.chosen[body] = 1;
+    }
+    if (!alone) {
+      for (std::size_t k = first; k < end; ++k) {
+        PressingSpring& spring = state.contacts[k].spring;
+        const BodyMotion &from = state.before[body], &to = state.ahead[body];
+        const Vec3 began =
+            from.orientation * (glm::conjugate(to.orientation) * (spring.place - to.centre)) +
+            from.centre;
+        spring.free_speed = -glm::dot(spring.normal, spring.place - began) / duration;
+        spring.impulse = 0;
+        state.springs.push_back(spring);
+      }
+    }
+    first = end;
+  }
+  if (!state.springs.empty()) {
+    std::swap(state.world.motion, state.before);
+    mark_connected(world_, state.world, duration, 0, state.chosen);
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (!state.chosen[i]) state.world.motion[i] = state.before[i];
+    }
+    step_pressed(world_, state.world, state.chosen, state.springs, duration);
+    std::size_t next = 0;
+    for (ProbeContact& contact : state.contacts) {
+      if (next < state.springs.size() && state.springs[next].body == contact.spring.body)
+        contact.spring.impulse = state.springs[next++].impulse;
+    }
+  }
+}
+
+/// The mean force of the step, and friction's share of it. Friction is a spring along the surface;
+/// it yields as the body would within the step, so that a light body does not ring.
+void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, double duration) const {
+  const PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  const double elastic = contact.force;
+  contact.force = spring.impulse / duration;
+  contact.felt_depth = spring.stiffness > 0 ? contact.force / spring.stiffness : 0;
+  const double sideways = glm::length(contact.tangential);
+  if (!(sideways > 0)) return;
+  const Vec3 direction = contact.tangential / sideways;
+  const Vec3 moment = glm::cross(spring.place - motion.centre, direction);
+  const Vec3 turn = world_per_inertia(body.inertia, motion.orientation) * moment;
+  const double per_mass = body.inertia.per_mass + glm::dot(turn, moment);
+  const double yield = 1 + duration * duration * spring.stiffness * per_mass;
+  const double share = elastic > 0 ? std::min(1.0, contact.force / elastic) : 0;
+  contact.tangential *= share / yield;
+  contact.offset *= share / yield;
+  const double impulse = sideways * share / yield * duration;
+  motion.velocity -= impulse * body.inertia.per_mass * direction;
+  motion.spin_momentum -= impulse * moment;
+}
+
+/// What is shown and remembered of the bodies where they have come to.
+void MovingBodies::settle(BodiesState& state, const Stroke& stroke) const {
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    const BodyMotion& motion = state.world.motion[i];
+    const MovingBody& body = world_.bodies[i];
+    BodyPose& pose = state.poses[i];
+    pose.object = body.object;
+    pose.centre = motion.centre;
+    pose.orientation = motion.orientation;
+    pose.velocity = motion.velocity;
+    pose.spin = spin_of(body.inertia, motion);
+    pose.moved.orientation =
+        glm::normalize(motion.orientation * glm::conjugate(body.placed.orientation));
+    pose.moved.position = motion.centre - pose.moved.orientation * body.placed.position;
+    RenderState& shape = state.shapes[i];
+    if (!shape.has_last || !stroke.touches) continue;
+    // From there the next tick's motion counts.
+    const Pose frame = pose_of(state, i);
+    shape.last = into(frame, stroke.to);
+    if (shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())
+      shape.unions.last = into(frame, stroke.to, stroke.frame_to);
+  }
+}
+
+}  // namespace palpate::rendering

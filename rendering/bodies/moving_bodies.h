@@ -1,0 +1,100 @@
+#pragma once
+// Motion of a scene's bodies under the probe. Internal to moving_scene.cpp.
+
+#include <memory>
+#include <vector>
+
+#include "rendering/bodies/body_step.h"
+#include "rendering/bodies/body_world.h"
+#include "rendering/renderer.h"
+#include "rendering/scene.h"
+#include "rendering/union_contact.h"
+
+namespace palpate::rendering {
+
+/// A contact of the probe with a body, world frame.
+struct ProbeContact {
+  PressingSpring spring;
+  Vec3 on_probe;           ///< m; the place on the virtual probe
+  double along = 0;        ///< that, as a fraction of the way from tip to tail
+  Vec3 offset;             ///< m, along the surface, of friction's spring
+  Vec3 tangential;         ///< N, of friction, on the hand
+  double force = 0;        ///< N, along the normal, on the hand
+  double felt_depth = 0;   ///< m; what the force is the stiffness times of
+  double depth_after = 0;  ///< m, at the end of the step; of a spring in closed form
+  int segment = 0;
+};
+
+class BodiesState final : public MotionState {
+ public:
+  std::unique_ptr<MotionState> clone() const override;
+  std::span<const BodyPose> bodies() const override { return poses; }
+
+  RenderState fixed;                ///< of what stands still
+  std::vector<RenderState> shapes;  ///< of each body, in its frame
+  BodyWorldState world;
+  std::vector<BodyPose> poses;
+  std::vector<BodyMotion> before;  ///< at the beginning of the step
+  std::vector<BodyMotion> ahead;   ///< at its end, were there no probe
+  std::vector<Rendering> felt;     ///< of each body, in its frame
+  std::vector<Pose> shown;         ///< that frame
+  std::vector<char> chosen;
+  /// Of each body: the spring that it had at the end of the last step, to be gone on with where the
+  /// probe is out of it at the end of the next, in the body's frame.
+  struct Held {
+    bool holds = false;
+    ProbeContact contact;
+    Vec3 on_tool;  ///< m, of the place on the probe, in the frame of the tool
+    ContactType type = ContactType::none;
+  };
+  std::vector<Held> held;
+  std::size_t most_contacts = 0;
+  std::vector<ProbeContact> contacts;
+  std::vector<PressingSpring> springs;
+  LineProbe last;
+  Mat3 last_frame = Mat3(1);
+  bool has_last = false;
+};
+
+class MovingBodies final : public SceneMotion {
+ public:
+  MovingBodies(BodyWorld world, Scene fixed, std::vector<Scene> shapes);
+  std::unique_ptr<MotionState> initial_state() const override;
+  Rendering tick(const Renderer& renderer, RenderState& state, const LineProbe& probe,
+                 double dt) const noexcept override;
+  const BodyWorld& world() const { return world_; }
+
+ private:
+  /// A step of the bodies with the probe, from one pose to the next.
+  struct Stroke {
+    LineProbe from, to;
+    Mat3 frame_from, frame_to;
+    double duration = 0;
+    bool touches = true;  ///< false: the probe is not where it can be
+  };
+  void step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
+  void feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
+  void find_probe_contacts(BodiesState& state, const Stroke& stroke) const;
+  void go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const;
+  void hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact,
+            bool alone) const;
+  void place_contact(BodiesState& state, const Stroke& stroke, const Pose& frame, const Vec3& shift,
+                     ProbeContact contact) const;
+  void push_freely(BodiesState& state, ProbeContact& contact, double duration) const;
+  void push_held(BodiesState& state, const Stroke& stroke) const;
+  void push_sideways(BodiesState& state, ProbeContact& contact, double duration) const;
+  void settle(BodiesState& state, const Stroke& stroke) const;
+  Rendering sum(const Renderer& renderer, const BodiesState& state, const Rendering& fixed,
+                const LineProbe& probe) const;
+  void add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,
+                const LineProbe& probe, Rendering& out) const;
+  Pose pose_of(const BodiesState& state, std::size_t body) const {
+    return {state.world.motion[body].centre, state.world.motion[body].orientation};
+  }
+
+  BodyWorld world_;
+  Scene fixed_;
+  std::vector<Scene> shapes_;
+};
+
+}  // namespace palpate::rendering

@@ -1,0 +1,173 @@
+#include "rendering/bodies/moving_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "rendering/bodies/moving_bodies.h"
+#include "stimuli/compose.h"
+
+namespace palpate::rendering {
+namespace {
+
+Pose inverse(const Pose& pose) {
+  const Quat back = glm::conjugate(pose.orientation);
+  return {-(back * pose.position), back};
+}
+
+[[noreturn]] void refuse(int object, const std::string& why) {
+  throw std::invalid_argument("/objects/" + std::to_string(object) + "/body: " + why);
+}
+
+CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
+  CollidingPart out;
+  out.mesh = part.mesh;
+  out.trees = part.trees;
+  out.pose = in_frame;
+  for (const Vec3& vertex : part.mesh->vertices())
+    out.inside += vertex / static_cast<double>(part.mesh->vertices().size());
+  out.centre = in_frame.orientation * part.mesh->centre() + in_frame.position;
+  return out;
+}
+
+/// \param parts  of the object, where they are at first
+MovingBody make_body(const MovingObject& moving, const std::vector<SceneObject>& parts) {
+  MovingBody body;
+  body.object = moving.object;
+  body.of = moving.body;
+  std::vector<PlacedMesh> solids;
+  const Pose to_object = inverse(moving.pose);
+  for (const SceneObject& part : parts) {
+    body.stiffness = std::max(body.stiffness, part.material.stiffness);
+    if (part.layer <= 0)
+      solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
+  }
+  if (solids.empty()) refuse(moving.object, "expected an object with a surface");
+  const VolumeMoments moments = moments_of_union(solids);
+  const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
+                                                     : with_density(moments, *moving.body.density);
+  try {
+    body.inertia = inertia_of(properties);
+  } catch (const std::invalid_argument& error) {
+    refuse(moving.object, error.what());
+  }
+  body.placed = {moving.pose.orientation * properties.centre + moving.pose.position,
+                 moving.pose.orientation};
+  body.start.centre = body.placed.position;
+  body.start.orientation = body.placed.orientation;
+  body.start.velocity = moving.body.velocity;
+  body.start.spin_momentum =
+      spin_momentum_of(body.inertia, body.start.orientation, moving.body.spin);
+  const Pose to_body = inverse(body.placed);
+  for (const SceneObject& part : parts) {
+    if (part.layer > 0) continue;
+    body.parts.push_back(colliding(part, stimuli::compose(to_body, part.pose)));
+    const CollidingPart& placed = body.parts.back();
+    for (const Vec3& vertex : part.mesh->vertices())
+      body.radius = std::max(body.radius,
+                             glm::length(placed.pose.orientation * vertex + placed.pose.position));
+  }
+  return body;
+}
+
+Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
+  Obstacle obstacle;
+  for (const SceneObject& part : parts) {
+    if (part.layer > 0) continue;
+    obstacle.parts.push_back(colliding(part, part.pose));
+    obstacle.centre += obstacle.parts.back().centre;
+  }
+  obstacle.centre /= static_cast<double>(std::max<std::size_t>(1, obstacle.parts.size()));
+  for (const CollidingPart& part : obstacle.parts)
+    obstacle.radius =
+        std::max(obstacle.radius, glm::length(part.centre - obstacle.centre) + part.mesh->radius());
+  return obstacle;
+}
+
+/// Limits of what a step of a millisecond can follow.
+void check_limits(const MovingBody& body) {
+  constexpr double kFastest = 100, kFastestTurn = 1000;  // m/s, rad/s
+  constexpr double kLeastTurn = 1e-6;                    // of the largest moment of inertia
+  std::ostringstream text;
+  const Vec3 spin = spin_of(body.inertia, body.start);
+  if (glm::length(body.start.velocity) > kFastest)
+    text << "velocity " << glm::length(body.start.velocity) << " m/s; expected at most "
+         << kFastest;
+  else if (glm::length(spin) > kFastestTurn)
+    text << "spin " << glm::length(spin) << " rad/s; expected at most " << kFastestTurn;
+  else if (body.inertia.mass < 1e-6)
+    text << "mass " << body.inertia.mass << " kg; expected at least 1e-6 kg";
+  const Mat3& inertia = body.inertia.inertia;
+  const double largest = std::max({inertia[0][0], inertia[1][1], inertia[2][2]});
+  const double least = std::min({inertia[0][0], inertia[1][1], inertia[2][2]});
+  if (text.str().empty() && least < kLeastTurn * largest)
+    text << "moments of inertia of a ratio of " << largest / least << "; expected at most 1e6";
+  if (!text.str().empty()) refuse(body.object, text.str());
+}
+
+void check_masses(const BodyWorld& world) {
+  constexpr double kMostRatio = 1e6;
+  const MovingBody *lightest = nullptr, *heaviest = nullptr;
+  for (const MovingBody& body : world.bodies) {
+    if (lightest == nullptr || body.inertia.mass < lightest->inertia.mass) lightest = &body;
+    if (heaviest == nullptr || body.inertia.mass > heaviest->inertia.mass) heaviest = &body;
+  }
+  if (lightest == nullptr || heaviest->inertia.mass <= kMostRatio * lightest->inertia.mass) return;
+  std::ostringstream text;
+  text << "a mass of " << lightest->inertia.mass << " kg beside one of " << heaviest->inertia.mass
+       << " kg (object " << heaviest->object << "); expected a ratio of at most 1e6";
+  refuse(lightest->object, text.str());
+}
+
+}  // namespace
+
+Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
+                   const Vec3& gravity, bool side_contact, const Tool& tool) {
+  if (moving.empty()) return Scene(std::move(parts), side_contact, tool);
+  if (moving.size() > kMostBodies)
+    refuse(moving[kMostBodies].object,
+           "expected at most " + std::to_string(kMostBodies) + " moving objects in a scene");
+  // Search trees are built once and shared.
+  for (SceneObject& part : parts) {
+    if (!part.trees) part.trees = std::make_shared<const ContactTrees>(*part.mesh, side_contact);
+  }
+  BodyWorld world;
+  world.gravity = gravity;
+  std::vector<Scene> shapes;
+  std::vector<SceneObject> fixed;
+  const auto is_of = [](int object) {
+    return [object](const SceneObject& part) { return part.object == object; };
+  };
+  for (const MovingObject& object : moving) {
+    std::vector<SceneObject> own;
+    std::copy_if(parts.begin(), parts.end(), std::back_inserter(own), is_of(object.object));
+    MovingBody body = make_body(object, own);
+    check_limits(body);
+    const Pose to_body = inverse(body.placed);
+    for (SceneObject& part : own) part.pose = stimuli::compose(to_body, part.pose);
+    shapes.emplace_back(std::move(own), side_contact, tool);
+    world.bodies.push_back(std::move(body));
+  }
+  check_masses(world);
+  for (const SceneObject& part : parts) {
+    if (std::none_of(moving.begin(), moving.end(),
+                     [&](const MovingObject& m) { return m.object == part.object; }))
+      fixed.push_back(part);
+  }
+  for (std::size_t i = 0; i < fixed.size(); ++i) {
+    if (i > 0 && fixed[i].object == fixed[i - 1].object) continue;
+    std::vector<SceneObject> own;
+    std::copy_if(fixed.begin(), fixed.end(), std::back_inserter(own), is_of(fixed[i].object));
+    Obstacle obstacle = make_obstacle(own);
+    if (!obstacle.parts.empty()) world.obstacles.push_back(std::move(obstacle));
+  }
+  world.pair_up();
+  auto motion = std::make_shared<const MovingBodies>(
+      std::move(world), Scene(std::move(fixed), side_contact, tool), std::move(shapes));
+  return Scene(std::move(parts), side_contact, tool, std::move(motion));
+}
+
+}  // namespace palpate::rendering

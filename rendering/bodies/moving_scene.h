@@ -1,0 +1,29 @@
+#pragma once
+// A scene of which some objects move: each moving object is rendered in its own frame, where it
+// stands still, so the contact law and the ideal tool go with it; what the hand is pushed with, it
+// is pushed back with.
+
+#include <vector>
+
+#include "rendering/scene.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::rendering {
+
+/// An object that moves.
+struct MovingObject {
+  int object = 0;  ///< index; of SceneObject::object
+  stimuli::Body body;
+  Pose pose;  ///< of the object's frame
+};
+
+/// Bodies of a scene at most: a step's cost grows with the square of those that are near.
+inline constexpr std::size_t kMostBodies = 64;
+
+/// \param parts    of all objects, where they are at first
+/// \param gravity  m/s^2
+/// \throws std::invalid_argument naming the object and the limit that is passed
+Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
+                   const Vec3& gravity, bool side_contact = true, const Tool& tool = {});
+
+}  // namespace palpate::rendering

@@ -1,0 +1,84 @@
+#pragma once
+// Bodies and scenes for tests.
+
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "rendering/bodies/body_world.h"
+#include "rendering/bodies/mass_properties.h"
+#include "rendering/bodies/moving_bodies.h"
+#include "rendering/bodies/moving_scene.h"
+#include "rendering/renderer.h"
+#include "rendering/scene.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/primitives.h"
+
+namespace palpate::rendering::test {
+
+using Mesh = std::shared_ptr<const stimuli::ConvexMesh>;
+
+inline Mesh mesh_of(const stimuli::PolygonSoup& soup) {
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
+}
+inline Mesh box_mesh(const Vec3& size) { return mesh_of(stimuli::box(size)); }
+
+/// Objects that are added one after another; then a scene.
+class BodyScene {
+ public:
+  Vec3 gravity{0, 0, 0};
+  double stiffness = 1000;
+
+  void stands(const Mesh& mesh, const Pose& pose) { add(mesh, pose, next_++); }
+  stimuli::Body& moves(const Mesh& mesh, const Pose& pose, double mass) {
+    return moves(std::vector<std::pair<Mesh, Pose>>{{mesh, Pose{}}}, pose, mass);
+  }
+  /// \param parts  in the object's frame
+  stimuli::Body& moves(const std::vector<std::pair<Mesh, Pose>>& parts, const Pose& pose,
+                       double mass) {
+    for (const auto& [mesh, at] : parts)
+      add(mesh, {pose.orientation * at.position + pose.position, pose.orientation * at.orientation},
+          next_);
+    stimuli::Body body;
+    body.mass = mass;
+    moving_.push_back({next_++, body, pose});
+    return moving_.back().body;
+  }
+  Scene scene(bool sides = true, const Tool& tool = {}) const {
+    return moving_scene(parts_, moving_, gravity, sides, tool);
+  }
+
+ private:
+  void add(const Mesh& mesh, const Pose& pose, int object) {
+    SceneObject part;
+    part.mesh = mesh;
+    part.pose = pose;
+    part.object = object;
+    part.material.stiffness = stiffness;
+    parts_.push_back(part);
+  }
+  std::vector<SceneObject> parts_;
+  std::vector<MovingObject> moving_;
+  int next_ = 0;
+};
+
+inline const BodyWorld& body_world_of(const Scene& scene) {
+  return static_cast<const MovingBodies&>(*scene.motion()).world();
+}
+inline const BodyWorldState& body_state_of(const RenderState& state) {
+  return static_cast<const BodiesState&>(*state.motion.get()).world;
+}
+
+/// A probe far from everything.
+inline LineProbe far_probe() { return {{50, 50, 50}, {50, 50, 50.12}}; }
+
+/// Ticks of the point renderer with a probe that stands still.
+inline void run(const Scene& scene, RenderState& state, double seconds, double dt = 1e-3,
+                const LineProbe& probe = far_probe()) {
+  const int ticks = static_cast<int>(std::lround(seconds / dt));
+  if (!state.has_last) point_renderer().tick(scene, state, probe, 0);
+  for (int i = 0; i < ticks; ++i) point_renderer().tick(scene, state, probe, dt);
+}
+
+}  // namespace palpate::rendering::test

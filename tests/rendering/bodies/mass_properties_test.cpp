@@ -1,0 +1,132 @@
+#include "rendering/bodies/mass_properties.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <numbers>
+#include <vector>
+
+#include "stimuli/orientation.h"
+#include "tests/rendering/bodies/body_fixtures.h"
+
+namespace palpate::rendering::test {
+namespace {
+
+MassProperties whole(const Mesh& mesh, const Pose& pose = {}, double density = 1000) {
+  const PlacedMesh part{mesh.get(), pose};
+  return with_density(moments_of_union({&part, 1}), density);
+}
+
+void expect_matrix(const Mat3& found, const Mat3& expected, double tolerance) {
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(found[i][k], expected[i][k], tolerance) << i << k;
+  }
+}
+
+TEST(MassProperties, BoxIsAsInTheTextbook) {
+  const Vec3 size(0.1, 0.2, 0.05);
+  const MassProperties p = whole(box_mesh(size));
+  const double mass = 1000 * 0.1 * 0.2 * 0.05;
+  EXPECT_NEAR(p.mass, mass, 1e-14);
+  EXPECT_NEAR(glm::length(p.centre), 0, 1e-16);
+  const Vec3 s2 = size * size;
+  expect_matrix(p.inertia,
+                mass / 12 * Mat3(s2.y + s2.z, 0, 0, 0, s2.x + s2.z, 0, 0, 0, s2.x + s2.y), 1e-16);
+}
+
+TEST(MassProperties, SphereIsApproachedWithTheSquareOfTheEdge) {
+  const double r = 0.03;
+  const double volume = 4.0 / 3 * std::numbers::pi * r * r * r;
+  double last = 0;
+  for (int n = 2; n < 5; ++n) {
+    const MassProperties p = whole(mesh_of(stimuli::icosphere(r, n)));
+    const double error = 1 - p.mass / (1000 * volume);
+    EXPECT_GT(error, 0);  // inscribed
+    EXPECT_NEAR(p.inertia[0][0] / (0.4 * p.mass * r * r), 1, 2.2 * error);
+    EXPECT_NEAR(p.inertia[0][1], 0, 1e-12 * p.mass);
+    if (last > 0) {
+      EXPECT_NEAR(last / error, 4, 0.1);
+    }
+    last = error;
+  }
+}
+
+TEST(MassProperties, FarFromTheOriginAndTurnedTheyAreTheSame) {
+  const Mesh mesh = box_mesh({0.1, 0.2, 0.05});
+  const Quat q = glm::normalize(Quat(0.3, 0.4, -0.5, 0.7));
+  const MassProperties here = whole(mesh), there = whole(mesh, {{300, -200, 100}, q});
+  EXPECT_NEAR(there.mass, here.mass, 1e-12 * here.mass);
+  EXPECT_NEAR(glm::distance(there.centre, Vec3(300, -200, 100)), 0, 1e-12);
+  const Mat3 axes = glm::mat3_cast(q);
+  expect_matrix(there.inertia, axes * here.inertia * glm::transpose(axes),
+                1e-12 * here.inertia[0][0]);
+}
+
+/// A cube that is cut, overlapped, or covered with itself is the cube.
+TEST(MassProperties, WhatSeveralPartsCoverCountsOnce) {
+  const Mesh cube = box_mesh(Vec3(0.1)), slab = box_mesh({0.06, 0.1, 0.1});
+  const MassProperties expected = whole(cube);
+  const std::vector<std::vector<PlacedMesh>> covers = {
+      {{cube.get(), {}}, {cube.get(), {}}},
+      {{slab.get(), {{-0.02, 0, 0}, {1, 0, 0, 0}}}, {slab.get(), {{0.02, 0, 0}, {1, 0, 0, 0}}}},
+  };
+  for (std::size_t i = 0; i < covers.size(); ++i) {
+    const MassProperties p = with_density(moments_of_union(covers[i]), 1000);
+    EXPECT_NEAR(p.mass, expected.mass, 1e-13) << i;
+    EXPECT_NEAR(glm::length(p.centre), 0, 1e-14) << i;
+    expect_matrix(p.inertia, expected.inertia, 1e-15);
+  }
+  const Mesh half = box_mesh({0.05, 0.1, 0.1}), inner = box_mesh(Vec3(0.03));
+  const std::vector<PlacedMesh> abut = {
+      {half.get(), {{-0.025, 0, 0}, {1, 0, 0, 0}}},
+      {half.get(), {{0.025, 0, 0}, {1, 0, 0, 0}}},
+      {inner.get(), {{0.01, 0.005, 0}, glm::normalize(Quat(1, 0.2, 0.3, 0.1))}}};
+  const MassProperties p = with_density(moments_of_union(abut), 1000);
+  EXPECT_NEAR(p.mass, expected.mass, 1e-13);
+  expect_matrix(p.inertia, expected.inertia, 1e-15);
+}
+
+/// Against points of a grid, for crossed boxes of which one is turned.
+TEST(MassProperties, UnionOfTurnedBoxesAgreesWithCounting) {
+  const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
+  const Mesh a = box_mesh(size_a), b = box_mesh(size_b);
+  const Pose pose_b{{0.02, 0.015, 0.01}, glm::normalize(Quat(1, 0.3, -0.2, 0.4))};
+  const std::vector<PlacedMesh> parts = {{a.get(), {}}, {b.get(), pose_b}};
+  const VolumeMoments m = moments_of_union(parts);
+  const auto inside = [](const Vec3& p, const Vec3& size) {
+    return std::abs(p.x) < size.x / 2 && std::abs(p.y) < size.y / 2 && std::abs(p.z) < size.z / 2;
+  };
+  const int n = 160;
+  const double edge = 0.16, h = edge / n;
+  double volume = 0;
+  Vec3 first(0);
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < n; ++k)
+      for (int l = 0; l < n; ++l) {
+        const Vec3 p = Vec3(i + 0.5, k + 0.5, l + 0.5) * h - Vec3(edge / 2);
+        if (!inside(p, size_a) &&
+            !inside(glm::conjugate(pose_b.orientation) * (p - pose_b.position), size_b))
+          continue;
+        volume += h * h * h;
+        first += h * h * h * p;
+      }
+  EXPECT_NEAR(m.volume / volume, 1, 2e-3);
+  EXPECT_NEAR(glm::distance(m.first + m.volume * m.about, first), 0, 2e-3 * volume * 0.05);
+}
+
+/// The parallel axis theorem, by two cubes that make a box.
+TEST(MassProperties, MassIsSpreadOverAllParts) {
+  const Mesh cube = box_mesh(Vec3(0.1));
+  const std::vector<PlacedMesh> parts = {{cube.get(), {{0.35, 0, 0}, {1, 0, 0, 0}}},
+                                         {cube.get(), {{0.05, 0, 0}, {1, 0, 0, 0}}}};
+  const MassProperties p = with_mass(moments_of_union(parts), 3);
+  EXPECT_NEAR(p.mass, 3, 1e-14);
+  EXPECT_NEAR(p.centre.x, 0.2, 1e-15);
+  EXPECT_NEAR(p.inertia[0][0], 3 * 0.01 / 6, 1e-14);
+  EXPECT_NEAR(p.inertia[1][1], 3 * 0.01 / 6 + 3 * 0.15 * 0.15, 1e-14);
+}
+
+}  // namespace
+}  // namespace palpate::rendering::test

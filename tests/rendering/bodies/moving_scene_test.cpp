@@ -1,0 +1,165 @@
+// The probe on bodies.
+
+#include "rendering/bodies/moving_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <stdexcept>
+
+#include "tests/rendering/bodies/body_fixtures.h"
+
+namespace palpate::rendering::test {
+namespace {
+
+LineProbe pointing(const Vec3& tip) { return {tip, tip + Vec3(0.12, 0, 0)}; }
+
+/// A cube flies against the tip, held still, and comes back with its speed; the hand gets the
+/// change of its momentum.
+TEST(MovingScene, ACubeComesBackFromTheTipWithItsEnergy) {
+  for (const double mass : {1e-3, 0.1, 10.0}) {
+    for (const double stiffness : {200.0, 3000.0, 5e4}) {
+      for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
+        BodyScene s;
+        s.stiffness = stiffness;
+        s.moves(box_mesh(Vec3(0.05)), {{-0.05, 0, 0}, {1, 0, 0, 0}}, mass).velocity = {0.3, 0, 0};
+        const Scene scene = s.scene(renderer->side_contact());
+        RenderState state = scene.initial_state();
+        const LineProbe probe = pointing({0, 0, 0});
+        Vec3 impulse(0);
+        renderer->tick(scene, state, probe, 0);
+        const BodyPose& body = state.motion.bodies()[0];
+        for (int i = 0; i < 3000 && !(body.velocity.x < 0 && body.centre.x < -0.05); ++i)
+          impulse += 1e-3 * renderer->tick(scene, state, probe, 1e-3).force;
+        EXPECT_NEAR(body.velocity.x / -0.3, 1, 0.5e-9) << mass << " " << stiffness;
+        EXPECT_NEAR(impulse.x / (2 * mass * 0.3), 1, 1e-9);
+        EXPECT_NEAR(glm::length(body.spin), 0, 1e-9);
+      }
+    }
+  }
+}
+
+/// Off its middle it turns as well; what it gives the hand, it loses.
+TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
+  BodyScene s;
+  s.moves(box_mesh({0.05, 0.1, 0.05}), {{-0.05, 0, 0}, {1, 0, 0, 0}}, 0.1);
+  const Scene scene = s.scene();
+  RenderState state = scene.initial_state();
+  Vec3 impulse(0), moment(0);
+  LineProbe probe = pointing({0, 0.03, 0});
+  ray_renderer().tick(scene, state, probe, 0);
+  for (int i = 0; i < 200; ++i) {
+    probe.tip.x -= 0.0003;
+    probe.tail.x -= 0.0003;
+    const Rendering r = ray_renderer().tick(scene, state, probe, 1e-3);
+    impulse += 1e-3 * r.force;
+    moment += 1e-3 * (r.torque + glm::cross(probe.tip, r.force));
+    EXPECT_TRUE(std::isfinite(r.force.x));
+  }
+  const BodyPose& body = state.motion.bodies()[0];
+  EXPECT_LT(body.velocity.x, 0);
+  EXPECT_GT(std::abs(body.spin.z), 0.1);
+  EXPECT_NEAR(glm::distance(0.1 * body.velocity, -impulse), 0, 1e-12);
+  const BodyWorldState& inner = body_state_of(state);
+  EXPECT_NEAR(glm::distance(angular_momentum(body_world_of(scene), inner), -moment), 0, 1e-5);
+}
+
+TEST(MovingScene, BetweenTipAndWallForceIsStiffnessTimesDepth) {
+  for (const double mass : {1e-3, 0.1}) {
+    for (const double stiffness : {1000.0, 5e4}) {
+      BodyScene s;
+      s.stiffness = stiffness;
+      s.stands(box_mesh({0.1, 1, 1}), {{-0.05, 0, 0}, {1, 0, 0, 0}});
+      s.moves(box_mesh(Vec3(0.05)), {{0.025, 0, 0}, {1, 0, 0, 0}}, mass);
+      const Scene scene = s.scene();
+      RenderState state = scene.initial_state();
+      LineProbe probe = pointing({0.051, 0, 0});
+      ray_renderer().tick(scene, state, probe, 0);
+      Rendering r;
+      for (int i = 0; i < 3000; ++i) {
+        const double depth = i < 1000 ? 0.002 * i / 1000 : 0.002;
+        probe = pointing({0.05 - depth, 0, 0});
+        r = ray_renderer().tick(scene, state, probe, 1e-3);
+        EXPECT_TRUE(std::isfinite(r.force.x));
+        EXPECT_LE(r.force.x, 1.2 * stiffness * 0.002);
+        EXPECT_NEAR(state.motion.bodies()[0].centre.x, 0.025, 1e-5) << i;
+      }
+      EXPECT_NEAR(r.force.x, stiffness * 0.002, 1e-3 * stiffness * 0.002) << mass;
+      EXPECT_NEAR(glm::length(state.motion.bodies()[0].velocity), 0, 1e-6);
+    }
+  }
+}
+
+/// A body that nothing acts on feels as one that stands still does.
+TEST(MovingScene, AHeavyBodyFeelsLikeAWall) {
+  const Mesh mesh = mesh_of(stimuli::icosphere(0.03, 3));
+  const Quat q = glm::normalize(Quat(1, 0.2, 0.3, 0.4));
+  BodyScene moving, still;
+  moving.moves(mesh, {{0.01, 0.02, 0.03}, q}, 1e4);
+  still.stands(mesh, {{0.01, 0.02, 0.03}, q});
+  const Scene a = moving.scene(), b = still.scene();
+  EXPECT_EQ(b.motion(), nullptr);
+  RenderState sa = a.initial_state(), sb = b.initial_state();
+  double most = 0;
+  for (int i = 0; i < 400; ++i) {
+    const double t = i * 1e-3;
+    const LineProbe probe{{0.05 - 0.06 * t, 0.02 * t, 0.04}, {0.15, 0.05, 0.06}};
+    const Rendering ra = ray_renderer().tick(a, sa, probe, 1e-3);
+    const Rendering rb = ray_renderer().tick(b, sb, probe, 1e-3);
+    most = std::max(most, glm::length(rb.force));
+    EXPECT_NEAR(glm::distance(ra.force, rb.force), 0, 0.1) << i;
+    EXPECT_NEAR(glm::distance(ra.torque, rb.torque), 0, 0.01) << i;
+    EXPECT_EQ(ra.object, rb.object) << i;
+  }
+  EXPECT_GT(most, 1);
+}
+
+TEST(MovingScene, ATailOfNoNumberReachesNeitherHandNorBody) {
+  BodyScene s;
+  s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 0.1).velocity = {0.1, 0, 0};
+  const Scene scene = s.scene();
+  RenderState state = scene.initial_state();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int i = 0; i < 300; ++i) {
+    LineProbe probe = pointing({0.04, 0, 0});
+    if (i % 7 == 3) probe.tail.y = nan;
+    if (i % 11 == 5) probe.tip.x = std::numeric_limits<double>::infinity();
+    const Rendering r = ray_renderer().tick(scene, state, probe, 1e-3);
+    for (const Vec3& v : {r.force, r.torque, r.device1, r.device2})
+      EXPECT_TRUE(std::isfinite(v.x + v.y + v.z)) << i;
+    const BodyPose& body = state.motion.bodies()[0];
+    EXPECT_TRUE(std::isfinite(body.centre.x + body.velocity.x + body.orientation.w));
+  }
+}
+
+TEST(MovingScene, WhatPassesALimitIsRefusedWithIt) {
+  BodyScene s;
+  s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 1e-3);
+  s.moves(box_mesh(Vec3(0.05)), {{1, 0, 0}, {1, 0, 0, 0}}, 1e4);
+  try {
+    s.scene();
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("ratio of at most 1e6"), std::string::npos);
+  }
+}
+
+TEST(MovingScene, ACopiedStateGoesOnAlike) {
+  BodyScene s;
+  s.gravity = {0, 0, -9.81};
+  s.stands(box_mesh({1, 1, 0.1}), {{0, 0, -0.05}, {1, 0, 0, 0}});
+  s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0.1}, {1, 0, 0, 0}}, 0.1).spin = {3, 1, 2};
+  const Scene scene = s.scene();
+  RenderState a = scene.initial_state();
+  run(scene, a, 0.05);
+  RenderState b = a;
+  run(scene, a, 0.3);
+  run(scene, b, 0.3);
+  EXPECT_EQ(a.motion.bodies()[0].centre, b.motion.bodies()[0].centre);
+  EXPECT_EQ(a.motion.bodies()[0].orientation, b.motion.bodies()[0].orientation);
+}
+
+}  // namespace
+}  // namespace palpate::rendering::test
