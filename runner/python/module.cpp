@@ -98,11 +98,7 @@ py::dict render(const Document& given, const std::vector<TimedPose>& poses,
     Interruption interruption;
     render_along(scene, spec, renderer, poses,
                  [&](const TimedPose& pose, const rendering::Rendering& rendering,
-<<<<<<< HEAD
                      const rendering::RenderState&) {
-=======
-                     std::span<const rendering::BodyPose>) {
->>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
                    put_forces(*table, pose.t, rendering, tool);
                    interruption.check();
                  });

@@ -41,4 +41,14 @@ void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spe
                                            std::span<const rendering::BodyPose>)>& visit);
 >>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
 
+/// The same for who does not ask where the bodies are.
+inline void render_along(
+    const rendering::Scene& scene, const protocols::SceneSpec& spec,
+    const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
+    const std::function<void(const TimedPose&, const rendering::Rendering&)>& visit) {
+  render_along(scene, spec, renderer, poses,
+               [&visit](const TimedPose& pose, const rendering::Rendering& rendering,
+                        std::span<const rendering::BodyPose>) { visit(pose, rendering); });
+}
+
 }  // namespace palpate::runner
