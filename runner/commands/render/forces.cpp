@@ -48,12 +48,7 @@ rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec
 
 void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spec,
                   const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
-<<<<<<< HEAD
                   const TickVisitor& visit) {
-=======
-                  const std::function<void(const TimedPose&, const rendering::Rendering&,
-                                           std::span<const rendering::BodyPose>)>& visit) {
->>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
   rendering::RenderState state = scene.initial_state();
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double dt = i > 0 ? poses[i].t - poses[i - 1].t : 0;
@@ -61,11 +56,7 @@ void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spe
     const rendering::Rendering rendering =
         spec.reach ? extended_tick(scene, state, renderer, *spec.reach, poses[i].probe, dt)
                    : renderer.tick(scene, state, poses[i].probe, dt);
-<<<<<<< HEAD
     visit(poses[i], rendering, state);
-=======
-    visit(poses[i], rendering, state.motion.bodies());
->>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
   }
 }
 

@@ -83,16 +83,11 @@ int render_command(const std::vector<std::string>& args) {
   ForceTable table(scene.tool() != nullptr);
   BodyTable bodies;
   render_along(scene, spec, renderer, poses,
-<<<<<<< HEAD
-               [&table](const TimedPose& pose, const rendering::Rendering& rendering,
-                        const rendering::RenderState&) { table.add(pose, rendering); });
-=======
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                   std::span<const rendering::BodyPose> moving) {
+                   const rendering::RenderState& state) {
                  table.add(pose, rendering);
-                 if (values->count("bodies") > 0) bodies.add(pose.t, moving);
+                 if (values->count("bodies") > 0) bodies.add(pose.t, state.motion.bodies());
                });
->>>>>>> 7557149 (Objects that move: exact mass properties, free motion, collisions solved as a complementarity problem, the probe pushes and is pushed back; scene keys body and gravity, render --bodies)
   outputs.put("out", table.text());
   outputs.put("bodies", bodies.text());
   outputs.write();
