@@ -17,6 +17,7 @@ constexpr NumberRange kGravity{-1000, 1000, "m/s^2"};
 
 void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body) {
   reader.section("body", [&](ObjectReader& section) {
+    if (!reader.member("body")->is_object()) return;
     stimuli::Body& read = body.emplace();
     const auto number = [&section](const char* key, std::optional<double>& out,
                                    const NumberRange& range) {

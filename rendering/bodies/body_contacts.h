@@ -37,6 +37,8 @@ class BodyContacts {
   Pose pose_of_other(const BodyPair& pair) const;
   const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
   void find_in_pair(std::uint32_t index, double within, double extra);
+  Gap gap_after(const BodyWorldState::NearParts& near, double time, GapMemory& memory,
+                Vec3& closing) const;
   double meeting_time(const BodyWorldState::NearParts& parts, double most);
   void set_velocities(double step);
   void find_islands(std::span<const PressingSpring> springs);

@@ -9,7 +9,7 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr int kMostEvents = 16;  // in a step; then what meets is held apart without a bounce
+constexpr int kMostEvents = 8;  // in a step; then what meets is held apart without a bounce
 
 Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& velocity,
                     double duration) {

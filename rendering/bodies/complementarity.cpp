@@ -4,10 +4,28 @@
 #include <cmath>
 
 namespace palpate::rendering {
+namespace {
+
+/// Four sums at a time: one would wait for itself.
+double dot_product(const double* a, const double* b, std::size_t count) {
+  double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+  std::size_t k = 0;
+  for (; k + 4 <= count; k += 4) {
+    s0 += a[k] * b[k];
+    s1 += a[k + 1] * b[k + 1];
+    s2 += a[k + 2] * b[k + 2];
+    s3 += a[k + 3] * b[k + 3];
+  }
+  for (; k < count; ++k) s0 += a[k] * b[k];
+  return (s0 + s1) + (s2 + s3);
+}
+
+}  // namespace
 
 ComplementarityProblem::ComplementarityProblem()
     : matrix_(kMostRows * kMostRows),
       factor_(kMostRows * kMostRows),
+      first_(kMostRows),
       b_(kMostRows),
       bound_(kMostRows),
       x_(kMostRows),
@@ -32,9 +50,7 @@ void ComplementarityProblem::add_row(double b, double bound, int leader) {
 }
 
 double ComplementarityProblem::slack(std::size_t row) const {
-  double w = -b_[row];
-  for (std::size_t j = 0; j < count_; ++j) w += a(row, j) * x_[j];
-  return w;
+  return dot_product(&matrix_[row * count_], x_.data(), count_) - b_[row];
 }
 
 void ComplementarityProblem::set_bounds(std::size_t row) {
@@ -47,14 +63,19 @@ void ComplementarityProblem::set_bounds(std::size_t row) {
 void ComplementarityProblem::refactor(std::size_t from) {
   constexpr double kRaise = 1e-14;
   for (std::size_t i = from; i < free_.size(); ++i) {
-    double* const row = &factor_[i * kMostRows];
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double* const other = &factor_[j * kMostRows];
-      double sum = a(free_[i], free_[j]);
-      for (std::size_t k = 0; k < j; ++k) sum -= row[k] * other[k];
-      const double diagonal = a(free_[i], free_[i]);
-      row[j] = j < i ? sum / other[j] : std::sqrt(std::max(sum, 0.0) + kRaise * diagonal);
+    double* const row = &factor_[i * count_];
+    std::size_t first = 0;
+    while (first < i && a(free_[i], free_[first]) == 0) ++first;
+    first_[i] = first;
+    for (std::size_t j = first; j < i; ++j) {
+      const double* const other = &factor_[j * count_];
+      const std::size_t begin = std::max(first, first_[j]);
+      const double known = begin < j ? dot_product(row + begin, other + begin, j - begin) : 0;
+      row[j] = (a(free_[i], free_[j]) - known) / other[j];
     }
+    const double diagonal = a(free_[i], free_[i]);
+    const double rest = diagonal - dot_product(row + first, row + first, i - first);
+    row[i] = std::sqrt(std::max(rest, 0.0) + kRaise * diagonal);
   }
 }
 
@@ -73,14 +94,25 @@ void ComplementarityProblem::bind_row(std::size_t position) {
 void ComplementarityProblem::solve_free(std::size_t column, double* out) const {
   const std::size_t n = free_.size();
   for (std::size_t i = 0; i < n; ++i) {
-    double sum = -a(free_[i], column);
-    for (std::size_t k = 0; k < i; ++k) sum -= factor_[i * kMostRows + k] * out[k];
-    out[i] = sum / factor_[i * kMostRows + i];
+    const double* const row = &factor_[i * count_];
+    const double known = dot_product(row + first_[i], out + first_[i], i - first_[i]);
+    out[i] = (-a(column, free_[i]) - known) / row[i];
   }
   for (std::size_t i = n; i-- > 0;) {
-    double sum = out[i];
-    for (std::size_t k = i + 1; k < n; ++k) sum -= factor_[k * kMostRows + i] * out[k];
-    out[i] = sum / factor_[i * kMostRows + i];
+    const double* const row = &factor_[i * count_];
+    out[i] /= row[i];
+    for (std::size_t k = first_[i]; k < i; ++k) out[k] -= row[k] * out[i];
+  }
+}
+
+/// Of the slack of every row, by a unit of x of one row and what the free ones answer.
+void ComplementarityProblem::find_rates(std::size_t row) {
+  std::copy_n(&matrix_[row * count_], count_, rate_.begin());
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    const double change = change_[k];
+    const double* const column = &matrix_[free_[k] * count_];
+    if (change == 0) continue;
+    for (std::size_t i = 0; i < count_; ++i) rate_[i] += change * column[i];
   }
 }
 
@@ -104,12 +136,8 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     if (--pivots_left < 0) return false;
     const double direction = w_[row] < 0 ? 1 : -1;
     solve_free(row, change_.data());
-    const auto rate_of = [&](std::size_t i) {
-      double rate = a(i, row);
-      for (std::size_t k = 0; k < free_.size(); ++k) rate += a(i, free_[k]) * change_[k];
-      return direction * rate;
-    };
-    const double own_rate = rate_of(row);
+    find_rates(row);
+    const double own_rate = direction * rate_[row];
     // A row that the free ones already say does not answer: it may go to its bound.
     const bool answers = std::abs(own_rate) > 1e-12 * std::abs(a(row, row));
     double step = answers ? -w_[row] / own_rate : HUGE_VAL;
@@ -134,13 +162,13 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     }
     for (std::size_t k = 0; k < done_.size(); ++k) {
       const std::size_t i = done_[k];
-      rate_[k] = rate_of(i);
+      const double rate = direction * rate_[i];
       // At the lower bound slack may not fall below 0, at the upper not rise above.
       const bool low = x_[i] <= lower_[i], high = x_[i] >= upper_[i];
       if (low && high) continue;
-      if (low ? rate_[k] >= 0 : rate_[k] <= 0) continue;
-      if (std::abs(rate_[k]) <= 1e-12 * std::abs(a(i, i))) continue;
-      const double to_zero = std::max(0.0, -w_[i] / rate_[k]);
+      if (low ? rate >= 0 : rate <= 0) continue;
+      if (std::abs(rate) <= 1e-12 * std::abs(a(i, i))) continue;
+      const double to_zero = std::max(0.0, -w_[i] / rate);
       if (to_zero < step) {
         step = to_zero;
         stop = Stop::release;
@@ -150,7 +178,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     x_[row] += direction * step;
     w_[row] += own_rate * step;
     for (std::size_t k = 0; k < free_.size(); ++k) x_[free_[k]] += direction * step * change_[k];
-    for (std::size_t k = 0; k < done_.size(); ++k) w_[done_[k]] += rate_[k] * step;
+    for (std::size_t k = 0; k < done_.size(); ++k) w_[done_[k]] += direction * rate_[done_[k]] * step;
     switch (stop) {
       case Stop::zero:
         w_[row] = 0;

@@ -31,8 +31,9 @@ class ComplementarityProblem {
   /// \param leader  index of an earlier row, of which the bounds are multiples; -1: none
   /// \param bound   upper bound of a row without leader (its lower is 0); coefficient else
   void add_row(double b, double bound, int leader = -1);
-  double& a(std::size_t row, std::size_t column) { return matrix_[row * kMostRows + column]; }
-  double a(std::size_t row, std::size_t column) const { return matrix_[row * kMostRows + column]; }
+  /// To be filled in when all rows are there.
+  double& a(std::size_t row, std::size_t column) { return matrix_[row * count_ + column]; }
+  double a(std::size_t row, std::size_t column) const { return matrix_[row * count_ + column]; }
 
   /// False: the limit of pivots was met; x is within its bounds and as good as sweeps make it.
   bool solve();
@@ -47,11 +48,13 @@ class ComplementarityProblem {
   void bind_row(std::size_t position);
   void refactor(std::size_t from);
   void solve_free(std::size_t column, double* out) const;
+  void find_rates(std::size_t row);
   double slack(std::size_t row) const;
   void sweep();
 
   std::size_t count_ = 0;
   std::vector<double> matrix_, factor_;  ///< factor_ by position in free_
+  std::vector<std::size_t> first_;       ///< of each row of factor_: where it is not zero any more
   std::vector<double> b_, bound_, x_, w_, lower_, upper_, change_, rate_;
   std::vector<int> leader_;
   std::vector<std::size_t> free_;
