@@ -91,7 +91,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   const bool touches = valid && sided;
   // A reading that is none: the bodies go on untouched.
   const LineProbe last = state.has_last || !touches ? state.last : probe;
-  const Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
+  Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
   const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
   const int steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
   for (int i = 0; i < steps; ++i) {
@@ -111,7 +111,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
     step(renderer, state, {at(i), at(i + 1), frame_at(i), frame_at(i + 1), time / steps, touches});
   }
   state.fixed.measured_side = tool && touches ? frame[0] : outer.measured_side;
-  const Rendering fixed = renderer.tick(fixed_, state.fixed, probe, dt);
+  Rendering fixed = renderer.tick(fixed_, state.fixed, probe, dt);
   if (touches) {
     state.last = outer.last = probe;
     state.last_frame = frame;
