@@ -109,9 +109,9 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
   };
   const BodyMotion a = moved(pair.a), b = pair.obstacle ? BodyMotion{} : moved(pair.b);
   closing = a.velocity - b.velocity;
-  return gap_between(
-      place_of(world_.bodies[pair.a].parts[parts.part_a], {a.centre, a.orientation}),
-      place_of(part_b(pair, parts.part_b), {b.centre, b.orientation}), HUGE_VAL, memory);
+  return gap_between(place_of(world_.bodies[pair.a].parts[parts.part_a], {a.centre, a.orientation}),
+                     place_of(part_b(pair, parts.part_b), {b.centre, b.orientation}), HUGE_VAL,
+                     memory);
 }
 
 /// Conservative advancement (Mirtich 1996): as far as the pair can not meet, again and again. Where

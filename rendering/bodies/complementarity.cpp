@@ -178,7 +178,8 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     x_[row] += direction * step;
     w_[row] += own_rate * step;
     for (std::size_t k = 0; k < free_.size(); ++k) x_[free_[k]] += direction * step * change_[k];
-    for (std::size_t k = 0; k < done_.size(); ++k) w_[done_[k]] += direction * rate_[done_[k]] * step;
+    for (std::size_t k = 0; k < done_.size(); ++k)
+      w_[done_[k]] += direction * rate_[done_[k]] * step;
     switch (stop) {
       case Stop::zero:
         w_[row] = 0;
