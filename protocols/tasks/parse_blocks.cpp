@@ -69,6 +69,7 @@ std::optional<int> read_one_stimulus(ObjectReader& reader, const char* key,
 bool read_renderer(const json& value, const std::string& pointer, const Protocol& protocol,
                    RendererKind& kind, FaultList& faults) {
   std::vector<std::pair<const char*, RendererKind>> options;
+  options.reserve(protocol.renderers.size());
   for (const RendererKind one : protocol.renderers) options.emplace_back(to_string(one), one);
   return read_choice(value, pointer, kind, options, faults);
 }

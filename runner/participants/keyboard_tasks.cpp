@@ -16,6 +16,7 @@ constexpr std::size_t kMostTyped = 200;
 /// "1", "2", ... with the texts, as keys of a page.
 std::vector<std::pair<std::string, std::string>> numbered(const std::vector<std::string>& texts) {
   std::vector<std::pair<std::string, std::string>> keys;
+  keys.reserve(texts.size());
   for (std::size_t i = 0; i < texts.size(); ++i) {
     const std::string key =
         i < 9 ? std::to_string(i + 1) : std::string(1, static_cast<char>('a' + i - 9));
@@ -171,6 +172,7 @@ int KeyboardRespondent::choose(const std::string& question, const Keys& keys,
 
 std::optional<Answer> KeyboardRespondent::confidence(const protocols::ConfidenceSpec& asked) {
   std::vector<std::string> labels;
+  labels.reserve(asked.scale.size());
   for (const protocols::ScaleStep& step : asked.scale) labels.push_back(step.label);
   Answer answer;
   answer.stimulus = choose(asked.question, numbered(labels), answer.time_ns);

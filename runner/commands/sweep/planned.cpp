@@ -37,6 +37,8 @@ std::string sha256_of_files(const protocols::Protocol& protocol) {
 
 data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& study,
                               const Design& design, const protocols::Protocol& protocol) {
+  if (protocol.version == 2)
+    throw UsageError("sweeps measure how shapes are identified: expected a protocol of version 1");
   data::SweepPlan plan;
   plan.protocol = study.protocol().dump();
   plan.files_sha256 = sha256_of_files(protocol);
