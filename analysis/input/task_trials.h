@@ -30,4 +30,10 @@ bool has_task_column(const std::string& path);
 /// with every fault.
 TaskTable read_task_trials_csv(const std::string& path);
 
+/// Whether a database holds a protocol of version 2. \throws what data::Store::open throws.
+bool has_tasks(const std::string& database);
+/// Reads the completed trials of a database. \throws protocols::InputError if there are none, and
+/// what data::Store::open throws.
+TaskTable read_task_trials_store(const std::string& path);
+
 }  // namespace palpate::analysis

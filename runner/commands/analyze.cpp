@@ -59,10 +59,12 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
 constexpr int kRefits = 199;  // of each goodness of fit
 constexpr std::uint64_t kRefitSeed = 2026;
 
-/// An export of a study of version 2.
-void analyze_tasks_of(const std::string& csv, Outputs& outputs) {
+/// A study of version 2, or its export.
+void analyze_tasks_of(const std::string& database, const std::string& csv, Outputs& outputs) {
   const analysis::TaskAnalysis found =
-      analysis::analyze_tasks(analysis::read_task_trials_csv(csv), kRefits, kRefitSeed);
+      analysis::analyze_tasks(csv.empty() ? analysis::read_task_trials_store(database)
+                                          : analysis::read_task_trials_csv(csv),
+                              kRefits, kRefitSeed);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
@@ -74,10 +76,10 @@ void analyze_tasks_of(const std::string& csv, Outputs& outputs) {
   std::cout << task_report_text(found);
 }
 
-/// Whether a CSV file is one; what cannot be read is told by who reads it.
-bool is_of_tasks(const std::string& csv) {
+/// Whether it is one; what cannot be read is told by who reads it.
+bool is_of_tasks(const std::string& database, const std::string& csv) {
   try {
-    return !csv.empty() && analysis::has_task_column(csv);
+    return csv.empty() ? analysis::has_tasks(database) : analysis::has_task_column(csv);
   } catch (const std::runtime_error&) {
     return false;
   }
@@ -136,8 +138,8 @@ int analyze_command(const std::vector<std::string>& args) {
     std::cout << text;
     return 0;
   }
-  if (is_of_tasks(csv)) {
-    analyze_tasks_of(csv, outputs);
+  if (is_of_tasks(database, csv)) {
+    analyze_tasks_of(database, csv, outputs);
     return 0;
   }
 

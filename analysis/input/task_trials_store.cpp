@@ -1,0 +1,64 @@
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "analysis/input/task_trials.h"
+#include "data/store/store.h"
+#include "protocols/parse.h"
+
+namespace palpate::analysis {
+namespace {
+
+TaskTrial task_trial_of(const data::StoredTrial& stored) {
+  const data::TrialRecord& record = stored.record;
+  TaskTrial trial;
+  trial.participant = stored.participant.code;
+  trial.task = "identify";  // of a study of version 1
+  trial.renderer = record.renderer;
+  trial.shape = record.shape;
+  trial.response = record.response;
+  trial.correct = record.correct;
+  if (record.task) {
+    trial.task = record.task->task;
+    trial.block_name = record.task->block_name;
+    trial.track = std::to_string(record.task->track);
+    trial.level = record.task->level;
+    trial.standard_level = record.task->standard_level;
+    trial.number = record.task->number;
+    trial.confidence = record.task->confidence;
+    trial.catch_trial = record.task->catch_trial;
+    trial.success = record.task->success;
+  }
+  trial.answered = !record.timed_out && (!trial.response.empty() || trial.number);
+  return trial;
+}
+
+}  // namespace
+
+bool has_tasks(const std::string& database) {
+  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
+  for (const data::ProtocolInfo& protocol : store.protocols()) {
+    const auto json = nlohmann::json::parse(protocol.text, nullptr, false);
+    if (json.is_object() && json.contains("version") && json["version"] == 2) return true;
+  }
+  return false;
+}
+
+TaskTable read_task_trials_store(const std::string& path) {
+  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
+  TaskTable table;
+  table.source = path;
+  store.for_each_trial([&](const data::StoredTrial& stored) {
+    table.simulated |= stored.participant.simulated;
+    if (stored.record.practice) {
+      ++table.n_practice;
+    } else {
+      table.trials.push_back(task_trial_of(stored));
+    }
+  });
+  if (table.trials.empty())
+    throw protocols::InputError(
+        {{path, "trials", "expected at least one completed trial that is not practice"}});
+  return table;
+}
+
+}  // namespace palpate::analysis
