@@ -100,7 +100,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and "
       "what\n"
       "they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
-      "Of a CSV file with a column 'task' (exports of protocols of version 2): thresholds, PSE "
+      "Of protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE "
       "and\n"
       "JND, d', magnitude estimation, adjustment, information and confidence, by task.";
   line.example =
