@@ -21,6 +21,7 @@ SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
   out.sample.device1 = rendering.device1;
   out.sample.device2 = rendering.device2;
   if (spec.reach) out.held = pose.probe;
+  out.poses = object_poses(spec.objects, state);
   return out;
 }
 

@@ -7,8 +7,10 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <span>
 
 #include "runner/display/scene/tool_shape.h"
+#include "stimuli/compose.h"
 
 namespace palpate::runner {
 namespace {
@@ -93,7 +95,9 @@ std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
     return c.force * c.contact.normal + c.stiffness * c.tangential_offset;
   };
   std::vector<ContactPlace> out;
-  if (scene.features().unions) {
+  if (scene.motion() != nullptr) {
+    out.push_back({rendering.deepest.point, rendering.force});
+  } else if (scene.features().unions) {
     for (const rendering::PlacedContact& c : state.unions.contacts)
       out.push_back({c.place + c.loaded.tangential_offset, force_of(c.loaded)});
   } else if (scene.features().several_parts) {
@@ -101,6 +105,19 @@ std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
       out.push_back({c.contact.point, force_of(c)});
   } else {
     out.push_back({rendering.deepest.point, rendering.force});
+  }
+  return out;
+}
+
+std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
+                               const rendering::RenderState& state) {
+  const std::span<const rendering::BodyPose> bodies = state.motion.bodies();
+  if (bodies.empty()) return {};
+  std::vector<Pose> out;
+  for (const stimuli::ObjectSpec& object : objects) out.push_back(object.pose);
+  for (const rendering::BodyPose& body : bodies) {
+    Pose& pose = out[static_cast<std::size_t>(body.object)];
+    pose = stimuli::compose(body.moved, pose);
   }
   return out;
 }

@@ -22,10 +22,15 @@ struct ContactPlace {
   Vec3 force;  ///< N, on the tool
 };
 
-/// All places of a tick. \param state  after it
+/// All places of a tick; of a scene in which something moves the deepest alone, with all of the
+/// force. \param state  after it
 std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
                                          const rendering::RenderState& state,
                                          const rendering::Rendering& rendering);
+
+/// Of the objects after a tick. Empty where nothing moves.
+std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
+                               const rendering::RenderState& state);
 
 /// What a picture shows of one tick.
 struct SceneMoment {
