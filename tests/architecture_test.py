@@ -20,7 +20,7 @@ MAY_INCLUDE = {
     "rendering/bodies/soft": RENDERING,
     "rendering/bodies": RENDERING,
     "rendering/verification": RENDERING,
-    "rendering/accuracy": RENDERING | {"rendering/verification"},
+    "rendering/accuracy": BODIES | {"rendering/verification"},
     # Stimuli are scene objects in orientations: their types, rotations and generator live there.
     "protocols": {"stimuli", "protocols/procedures"},
     # Which level comes next: pure functions of plain values.
@@ -83,7 +83,7 @@ PUBLIC = {
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
-    "rendering/accuracy": "paper_first_contact peers study union_study",
+    "rendering/accuracy": "body_study paper_first_contact peers study union_study",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data": "column_table record sweep_record",

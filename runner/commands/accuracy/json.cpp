@@ -191,6 +191,17 @@ Json accuracy_json(const AccuracyReport& report) {
   for (const rendering::AccuracyRow& row : report.rows) json["rows"].push_back(row_json(row));
   if (!report.first_contacts.empty()) json["first_contact"] = first_contact_json(report);
   if (!report.unions.empty()) json["unions"] = unions_json(report);
+  for (const rendering::BodyRow& row : report.bodies) {
+    json["bodies"]["rows"].push_back({{"case", row.name},
+                                      {"measure", row.measure},
+                                      {"engine", row.engine},
+                                      {"error", row.error},
+                                      {"us_per_step", row.us_per_step}});
+  }
+  if (!report.bodies.empty()) {
+    const rendering::BodyTickCost& cost = report.body_tick;
+    json["bodies"]["eleven_us"] = {{"median", cost.median}, {"p99", cost.p99}, {"max", cost.most}};
+  }
   for (const ExtremeRow& row : report.extremes) json["extremes"].push_back(extreme_json(row));
   if (report.search) json["search"] = search_json(*report.search, report.search_seed);
   if (report.union_search)

@@ -145,6 +145,12 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
     report.unions = rendering::union_study(report.union_settings, now_ns,
                                            [&](double done) { progress.show(done); });
   }
+  {
+    ProgressLine progress("bodies");
+    report.bodies =
+        rendering::body_study(quick, now_ns, [&](double done) { progress.show(done); });
+    report.body_tick = rendering::body_tick_cost(quick, now_ns);
+  }
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;
   report.search_seed = seed;

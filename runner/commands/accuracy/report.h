@@ -11,6 +11,7 @@
 #include "analysis/report/tables.h"
 #include "rendering/accuracy/paper_first_contact.h"
 #include "rendering/accuracy/study.h"
+#include "rendering/accuracy/body_study.h"
 #include "rendering/accuracy/union_study.h"
 #include "rendering/verification/extreme_cases.h"
 #include "rendering/verification/search.h"
@@ -39,6 +40,8 @@ struct AccuracyReport {
   rendering::UnionSettings union_settings;
   std::vector<rendering::UnionRow> unions;
   std::vector<ExtremeRow> extremes;
+  std::vector<rendering::BodyRow> bodies;
+  rendering::BodyTickCost body_tick;
   std::optional<rendering::SearchCounts> search;
   std::optional<rendering::UnionCounts> union_search;
   std::uint64_t search_seed = 0;  ///< of both
@@ -69,6 +72,8 @@ std::string recommendation(const AccuracyReport& report, const std::string& shap
 std::vector<std::string> recommendations(const AccuracyReport& report);
 /// Contact with unions of convex parts, and its search.
 analysis::Table union_table(const AccuracyReport& report);
+/// Bodies that move and collide, beside other engines.
+analysis::Table body_table(const AccuracyReport& report);
 analysis::Table union_search_table(const rendering::UnionCounts& counts, std::uint64_t seed);
 /// All that was measured, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);

@@ -1,0 +1,68 @@
+#pragma once
+// Bodies that move and collide, against known answers: error and run time of our own step, beside
+// Bullet and ODE where they are found. World frame, SI units.
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stimuli/vec.h"
+
+namespace palpate::rendering {
+
+/// A box, which every engine has.
+struct BodyBox {
+  Vec3 size;
+  double mass = 0;  ///< kg; 0: it stands still
+  Pose pose;
+  Vec3 velocity{0, 0, 0}, spin{0, 0, 0};
+  double restitution = 1, friction = 0;
+};
+
+/// Where a box has come to; its centre is that of its mass.
+struct BoxMotion {
+  Vec3 centre;
+  Quat orientation;
+  Vec3 velocity, spin;
+};
+
+struct BodyCase {
+  std::string name, measure;  ///< "head-on", "speed, relative"
+  Vec3 gravity{0, 0, 0};
+  std::vector<BodyBox> boxes;
+  double duration = 0;  ///< s
+  /// Of the boxes that move, in order; the largest over all steps counts where `always`.
+  std::function<double(std::span<const BoxMotion>)> error;
+  bool always = false;
+};
+/// \param quick  shorter ones
+std::vector<BodyCase> body_cases(bool quick);
+
+/// Steps boxes of a case.
+class BodyEngine {
+ public:
+  virtual ~BodyEngine() = default;
+  virtual void step(double dt) = 0;
+  virtual std::vector<BoxMotion> motion() const = 0;
+};
+
+struct BodyRow {
+  std::string name, measure, engine;
+  double error = 0;
+  double us_per_step = 0;
+};
+
+/// All cases, steps of 1 ms. \param now  a clock, ns
+std::vector<BodyRow> body_study(bool quick, const std::function<double()>& now,
+                                const std::function<void(double)>& progress);
+
+/// What a tick of the ray renderer costs with eleven bodies, ten dumbbells and a rocket of nine
+/// parts, that the probe pushes among each other. us.
+struct BodyTickCost {
+  double median = 0, p99 = 0, most = 0;
+  std::size_t ticks = 0;
+};
+BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now);
+
+}  // namespace palpate::rendering
