@@ -147,8 +147,7 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
   }
   {
     ProgressLine progress("bodies");
-    report.bodies =
-        rendering::body_study(quick, now_ns, [&](double done) { progress.show(done); });
+    report.bodies = rendering::body_study(quick, now_ns, [&](double done) { progress.show(done); });
     report.body_tick = rendering::body_tick_cost(quick, now_ns);
   }
   run_extreme_cases(report, quick);

@@ -9,9 +9,9 @@
 
 #include "analysis/figures/figures.h"
 #include "analysis/report/tables.h"
+#include "rendering/accuracy/body_study.h"
 #include "rendering/accuracy/paper_first_contact.h"
 #include "rendering/accuracy/study.h"
-#include "rendering/accuracy/body_study.h"
 #include "rendering/accuracy/union_study.h"
 #include "rendering/verification/extreme_cases.h"
 #include "rendering/verification/search.h"
