@@ -186,9 +186,44 @@ def layers():
     write_path("layers", 3.2, pose)
 
 
+def dumbbells():
+    """Fig. 14: two floating dumbbells, touched and moved at the same time with one stylus."""
+    def dumbbell(x, y, turn):
+        return {"shape": "compound", "position_m": [x, y, 0], "orientation_wxyz": [math.cos(turn / 2), 0, math.sin(turn / 2), 0],
+                "stiffness_n_per_m": 400, "body": {"mass_kg": 0.15, "damping_per_s": 1.5, "restitution": 0.4}, "parts": [
+                    {"shape": "cylinder", "radius_m": 0.006, "height_m": 0.05, "segments": 24},
+                    {"shape": "sphere", "radius_m": 0.016, "subdivisions": 3, "position_m": [0, 0, -0.028]},
+                    {"shape": "sphere", "radius_m": 0.016, "subdivisions": 3, "position_m": [0, 0, 0.028]}]}
+    write_scene("fig14-dumbbells", {"objects": [dumbbell(-0.045, 0.05, 0.3), dumbbell(0.045, 0.05, -0.5)]})
+
+    def pose(t):
+        left, right, z = along(t, (0, (0.085, 0.08, 0.006)), (0.7, (0.062, 0.060, 0.006)), (1.4, (0.053, 0.055, 0.006)), (2.0, (0.048, 0.046, 0.01)),
+                               (2.6, (0.05, 0.042, 0.0)), (3.2, (0.08, 0.08, 0.0)))
+        return (-0.09, left, z), (0.11, right, z)
+
+    write_path("fig14-dumbbells", 3.2, pose)
+
+
+def rocket():
+    """Fig. 16: the flying rocket, a body of several convex parts, steered with the side of the stylus."""
+    turn = 0.9
+    write_scene("fig16-rocket", {"objects": [
+        {"shape": "mesh", "file": "../shapes/rocket.obj", "position_m": [0, 0.06, 0],
+         "orientation_wxyz": [math.cos(turn / 2), 0, math.sin(turn / 2), 0], "stiffness_n_per_m": 400,
+         "body": {"mass_kg": 1, "velocity_m_per_s": [0.02, 0, 0.016], "damping_per_s": 8, "restitution": 0}}]})
+
+    def pose(t):
+        tip = along(t, (0, (0.03, 0.11, 0.03)), (0.8, (0.016, 0.074, 0.012)), (2.4, (0.03, 0.05, 0.02)), (3.2, (0.06, 0.1, 0.05)))
+        return tip, add(tip, unit((0.3, 1, 0.3)), 0.12)
+
+    write_path("fig16-rocket", 3.2, pose)
+
+
 if __name__ == "__main__":
     extended_probe()
     two_objects()
+    dumbbells()
+    rocket()
     engine()
     surgery()
     layers()

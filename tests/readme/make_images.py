@@ -188,7 +188,7 @@ def explore_window(palpate, folder):
         screen.close()
 
 
-SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig17a-engine", "fig17b-instrument", "layers"]
+SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
 PICTURES = {**{name: scene(name) for name in SCENES},
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power,
