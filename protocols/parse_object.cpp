@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "protocols/parse_body.h"
+#include "protocols/parse_soft.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/shapes.h"
+#include "stimuli/solids/gmsh_file.h"
 
 namespace palpate::protocols {
 namespace {
@@ -41,7 +43,8 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   if (value == nullptr || !value->is_string()) return;
   const std::filesystem::path path = std::filesystem::path(files.folder) / name;
   std::error_code error;
-  if (!stimuli::is_mesh_file_name(path.string())) {
+  if (!stimuli::is_mesh_file_name(path.string()) &&
+      !stimuli::is_gmsh_file_name(path.string())) {
     reader.faults().add(reader.pointer("file"), std::string("expected a file ") +
                                                     stimuli::kMeshExtensions + found_text(*value));
   } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
@@ -75,6 +78,8 @@ void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
   for (std::size_t i = 0; i < parts->size(); ++i) {
     ObjectReader part((*parts)[i], child_pointer(reader.pointer("parts"), i), reader.faults());
     spec.parts.push_back(read_nested(part, spec.material, files, compounds + 1));
+    if (part.member("soft") != nullptr)
+      part.faults().add(part.pointer("soft"), "expected at an object, not at a part of a compound");
     if (part.member("body") != nullptr)
       part.faults().add(part.pointer("body"), "expected at the object: its parts move as one");
     part.refuse_unknown_keys();
@@ -171,6 +176,7 @@ stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& d
                                 const MeshFiles& files) {
   stimuli::ObjectSpec spec = read_nested(reader, default_material, files, 0);
   read_body(reader, spec.body);
+  read_soft(reader, spec);
   return spec;
 }
 

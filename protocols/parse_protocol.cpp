@@ -375,6 +375,9 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   read_stimuli(reader, protocol, {folder_of(file_name), stored});
   (protocol.version == 2 ? read_tasks : read_identification)(reader, protocol);
   read_apparatus(reader, protocol);
+  check_radius(reader, protocol.tool,
+               std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
+                           [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
   reader.boolean("samples", protocol.samples);
   reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();

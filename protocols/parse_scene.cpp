@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/parse_body.h"
@@ -25,6 +27,9 @@ SceneSpec parse_scene_text(const std::string& text, const std::string& path) {
     }
   }
   read_tool(reader, scene.tool);
+  check_radius(reader, scene.tool,
+               std::any_of(scene.objects.begin(), scene.objects.end(),
+                           [](const auto& object) { return object.soft.has_value(); }));
   read_reach(reader, scene.reach);
   read_gravity(reader, scene.gravity);
   reader.refuse_unknown_keys();

@@ -10,6 +10,8 @@ using nlohmann::json;
 constexpr NumberRange kPlace{-10, 10, "m"};
 constexpr NumberRange kWorld{-1000, 1000, "m"};
 constexpr NumberRange kFactor{0, 100, "", true};
+constexpr double kThinnest = 0.0005;  // m; thinner than any mesh can follow
+constexpr NumberRange kRadius{0, 0.05, "m"};
 constexpr double kShortest = 1e-6;  // m: a shorter segment is a slip of the decimal point
 
 ToolSegmentSpec read_segment(ObjectReader& reader) {
@@ -20,21 +22,11 @@ ToolSegmentSpec read_segment(ObjectReader& reader) {
   return segment;
 }
 
-/// Until soft bodies exist, every object is rigid, and what touches it are lines.
-void refuse_radius(ObjectReader& reader) {
-  const json* const value = reader.member("radius_m");
-  if (value == nullptr || (value->is_number() && value->get<double>() == 0)) return;
-  reader.faults().add(reader.pointer("radius_m"),
-                      "expected 0: objects are rigid, and rigid objects are touched by segments "
-                      "without thickness" +
-                          found_text(*value));
-}
-
 }  // namespace
 
 void read_tool(ObjectReader& reader, ToolSpec& tool) {
   reader.section("tool", [&](ObjectReader& section) {
-    refuse_radius(section);
+    section.number("radius_m", tool.radius, kRadius);
     const json* const list =
         section.array("segments", 1, ToolSpec::kMostSegments, Presence::required);
     if (list == nullptr) return;
@@ -52,6 +44,15 @@ void read_tool(ObjectReader& reader, ToolSpec& tool) {
       tool.segments.push_back(segment);
     }
   });
+}
+
+void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft) {
+  if (soft ? tool.radius == 0 || tool.radius >= kThinnest : tool.radius == 0) return;
+  reader.faults().add(
+      reader.pointer("tool") + "/radius_m",
+      soft ? "expected 0.0005 to 0.05 m, or 0 for 0.002 m: what touches a soft object has a radius"
+           : "expected 0: objects are rigid, and rigid objects are touched by segments without "
+             "thickness");
 }
 
 void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach) {

@@ -20,7 +20,12 @@ struct ToolSegmentSpec {
 struct ToolSpec {
   static constexpr std::size_t kMostSegments = 16;
   std::vector<ToolSegmentSpec> segments;
+  double radius = 0;  ///< m, on soft objects; 0: kSoftRadius. Rigid ones are touched by lines
 };
+
+/// m, of a tool or stylus on soft objects that gives none: a line without thickness would sink into
+/// an elastic solid without end.
+inline constexpr double kSoftRadius = 0.002;
 
 /// The extended probe: the virtual stylus is the real one stretched by `factor` about a pivot.
 struct ReachSpec {

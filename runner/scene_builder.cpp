@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "protocols/tasks/levels.h"
+#include "rendering/bodies/soft/soft_build.h"
 #include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
@@ -223,19 +224,36 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
   if (!spec.material.layers.empty()) placing.shapes.push_back({&spec, pose});
 }
 
+std::vector<rendering::SceneObject> SceneBuilder::placed(const stimuli::ObjectSpec& spec,
+                                                         int object, bool side_contact) {
+  std::vector<rendering::SceneObject> parts;
+  // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
+  if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return parts;
+  Placing placing{object, side_contact, has_layers(spec), parts};
+  place(spec, Pose{}, placing);
+  place_layers(placing);
+  // The parts of a layer stand side by side.
+  std::stable_sort(parts.begin(), parts.end(),
+                   [](const auto& a, const auto& b) { return a.layer < b.layer; });
+  return parts;
+}
+
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
                                      bool side_contact, const rendering::Tool& tool,
-                                     const Vec3& gravity) {
-  std::vector<rendering::SceneObject> parts;
+                                     const Vec3& gravity, double soft_radius) {
+  std::vector<rendering::SceneObject> parts, shown;
+  std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
-      Placing placing{static_cast<int>(i), side_contact, has_layers(objects[i]), parts};
-      const auto first = static_cast<std::ptrdiff_t>(parts.size());
-      place(objects[i], Pose{}, placing);
-      place_layers(placing);
-      // The parts of a layer stand side by side.
-      std::stable_sort(parts.begin() + first, parts.end(),
-                       [](const auto& a, const auto& b) { return a.layer < b.layer; });
+      const int object = static_cast<int>(i);
+      const std::vector<rendering::SceneObject> own = placed(objects[i], object, side_contact);
+      shown.insert(shown.end(), own.begin(), own.end());
+      if (objects[i].soft) {
+        soft.push_back(rendering::build_soft_object(objects[i], objects[i].pose,
+                                                    {soft_radius, gravity, object}));
+      } else {
+        parts.insert(parts.end(), own.begin(), own.end());
+      }
     } catch (const stimuli::MeshError& error) {
       std::string where = "/objects/" + std::to_string(i);
       if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
@@ -247,22 +265,34 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
     }
   }
   try {
-    return rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact,
-                                   tool);
+    rendering::Scene others =
+        rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool);
+    if (soft.empty()) return others;
+    return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft),
+                                 side_contact, tool);
   } catch (const std::invalid_argument& error) {
     throw stimuli::MeshError({error.what()});
   }
 }
 
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
-    : tool_(tool_of(protocol.tool)) {
+    : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
+      tool_(tool_of(protocol.tool)) {
   SceneBuilder builder;
   for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
     double reach = 0;
+    soft_.emplace_back();
+    specs_.emplace_back();
+    if (stimulus.object.soft) specs_.back() = stimulus.object;
     for (const bool sides : {false, true}) {
       std::vector<rendering::SceneObject> objects;
       try {
-        const rendering::Scene scene = builder.build({stimulus.object}, sides);
+        const rendering::Scene scene =
+            builder.build({stimulus.object}, sides, {}, Vec3(0), soft_radius_);
+        for (const auto& object : rendering::soft_objects(scene)) {
+          soft_.back() = object;
+          for (const Vec3& node : object->rest) reach = std::max(reach, glm::length(node));
+        }
         for (const rendering::ScenePart& part : scene.parts()) {
           objects.push_back({part.mesh,
                              {part.position, glm::quat_cast(part.to_world)},
@@ -303,7 +333,16 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
   std::vector<rendering::MovingObject> moving = moving_[trial.stimulus];
   for (rendering::MovingObject& object : moving)
     object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-  return rendering::moving_scene(std::move(objects), moving, Vec3(0), sides, tool_);
+  std::shared_ptr<const rendering::SoftObject> soft = soft_[trial.stimulus];
+  if (soft == nullptr)
+    return rendering::moving_scene(std::move(objects), moving, Vec3(0), sides, tool_);
+  if (trial.orientation != Quat(1, 0, 0, 0)) {
+    const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
+    soft = rendering::build_soft_object(
+        spec, stimuli::compose({Vec3(0), trial.orientation}, spec.pose), {soft_radius_, Vec3(0), 0});
+  }
+  return rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects), {soft},
+                               sides, tool_);
 }
 
 }  // namespace palpate::runner

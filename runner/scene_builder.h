@@ -10,6 +10,7 @@
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 #include "rendering/bodies/moving_scene.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
@@ -34,9 +35,11 @@ class SceneBuilder {
   /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
   /// is left for a layer, where a layer cannot be made of convex parts (inset_union), or where what
   /// moves passes a limit, with the place as a JSON pointer.
-  /// \param gravity  m/s^2, on what moves
+  /// \param gravity  m/s^2, on what moves or gives
+  /// \param soft_radius  m, of the tool where it touches what gives
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
-                         const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0));
+                         const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
+                         double soft_radius = protocols::kSoftRadius);
 
  private:
   struct Prepared {
@@ -53,6 +56,8 @@ class SceneBuilder {
                                        bool side_contact);
   struct Placing;
   void place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing);
+  std::vector<rendering::SceneObject> placed(const stimuli::ObjectSpec& spec, int object,
+                                             bool side_contact);
   void place_layers(Placing& placing);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
@@ -77,6 +82,10 @@ class StimulusLibrary {
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
+  /// By stimulus: itself as it stands in the protocol, or nothing.
+  std::vector<std::shared_ptr<const rendering::SoftObject>> soft_;
+  std::vector<stimuli::ObjectSpec> specs_;  ///< of the soft ones; others are left empty
+  double soft_radius_;
   std::vector<std::vector<rendering::MovingObject>> moving_;  ///< by stimulus: itself or nothing
   std::vector<double> reaches_;
   std::vector<SharpEdges> edges_;

@@ -35,6 +35,22 @@ struct Material {
   bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
+/// What makes an object give.
+struct Soft {
+  enum class Fixed {
+    base,    ///< the lowest nodes, local frame; of a sphere a tenth of its height
+    none,    ///< it moves freely
+    points,  ///< the node nearest to each of `points`
+  };
+  double young = 20000;             ///< Pa
+  double poisson = 0.45;            ///< 0 to 0.495
+  double density = 1000;            ///< kg/m^3
+  double damping = 0.01;            ///< s; stress by rate of strain over stress by strain
+  Fixed fixed = Fixed::base;
+  std::vector<Vec3> points;         ///< m, local frame
+  int resolution = 10;              ///< elements along the longest side
+};
+
 /// What makes an object move by itself.
 struct Body {
   std::optional<double> mass = std::nullopt;     ///< kg; or
@@ -66,6 +82,7 @@ struct ObjectSpec {
   Pose pose;
   Material material;
   std::optional<Body> body = std::nullopt;  ///< it moves; else it stands still
+  std::optional<Soft> soft = std::nullopt;  ///< it gives; else it is rigid
 };
 
 }  // namespace palpate::stimuli

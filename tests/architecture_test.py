@@ -17,10 +17,10 @@ SERVO = RENDERING | {"runner", "runner/servo"}
 MAY_INCLUDE = {
     "stimuli": set(),
     "rendering": {"stimuli"},
-    "rendering/bodies/soft": RENDERING,
     "rendering/bodies": RENDERING,
+    "rendering/bodies/soft": RENDERING,
     "rendering/verification": RENDERING,
-    "rendering/accuracy": BODIES | {"rendering/verification"},
+    "rendering/accuracy": BODIES | {"rendering/verification", "rendering/bodies/soft"},
     # Stimuli are scene objects in orientations: their types, rotations and generator live there.
     "protocols": {"stimuli", "protocols/procedures"},
     # Which level comes next: pure functions of plain values.
@@ -35,7 +35,7 @@ MAY_INCLUDE = {
     "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols"},
-    "runner": BODIES | {"protocols"},
+    "runner": BODIES | {"protocols", "rendering/bodies/soft"},
     "runner/servo": RENDERING | {"runner"},
     "runner/safety": SERVO,
     "runner/sound": {"stimuli", "protocols"},
@@ -79,11 +79,12 @@ def room_of(name):
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "compose convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/triangulate "
-               "primitives printable random shapes solids/solid_mesh vec",
+               "primitives printable random shapes solids/gmsh_file solids/solid_mesh vec",
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
-    "rendering/accuracy": "body_study paper_first_contact peers study union_study",
+    "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
+    "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data": "column_table record sweep_record",

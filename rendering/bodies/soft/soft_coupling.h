@@ -7,6 +7,8 @@
 // the body is linear: where the old view ends with a force held, the new one begins.
 
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "rendering/bodies/soft/soft_contact.h"
 
@@ -15,11 +17,14 @@ namespace palpate::rendering {
 /// A soft object of a scene. Immutable.
 struct SoftObject {
   SoftObject(std::shared_ptr<const SoftBody> what, const SoftContactSettings& how, int index)
-      : body(std::move(what)), surface(*body), contact(how), object(index) {}
+      : body(std::move(what)), surface(*body), contact(how), object(index) {
+    for (const std::uint32_t node : body->surface_nodes()) rest.push_back(body->mesh().nodes[node]);
+  }
 
   std::shared_ptr<const SoftBody> body;
   SoftSurface surface;
   SoftContactSettings contact;
+  std::vector<Vec3> rest;  ///< m, of the nodes of the surface
   int object = 0;  ///< index in the scene
   /// Of a step: so long after it was asked for its result is used, whether it has been there before
   /// or not. So a thread of its own has time for it, and a recorded path comes out the same

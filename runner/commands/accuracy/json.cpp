@@ -150,6 +150,22 @@ Json unions_json(const AccuracyReport& report) {
   return json;
 }
 
+Json soft_json(const AccuracyReport& report) {
+  Json rows = Json::array();
+  for (const rendering::SoftRow& row : report.soft) {
+    rows.push_back({{"case", row.name},
+                    {"truth", row.truth},
+                    {"nodes", row.nodes},
+                    {"elements", row.elements},
+                    {"value", row.value},
+                    {"reference", row.reference},
+                    {"unit", row.unit},
+                    {"error", row.error},
+                    {"ns_per_step", row.step_ns}});
+  }
+  return rows;
+}
+
 Json union_search_json(const rendering::UnionCounts& c, std::uint64_t seed) {
   return {{"seed", seed},
           {"ticks", c.ticks},
@@ -202,6 +218,7 @@ Json accuracy_json(const AccuracyReport& report) {
     const rendering::BodyTickCost& cost = report.body_tick;
     json["bodies"]["eleven_us"] = {{"median", cost.median}, {"p99", cost.p99}, {"max", cost.most}};
   }
+  if (!report.soft.empty()) json["soft"] = soft_json(report);
   for (const ExtremeRow& row : report.extremes) json["extremes"].push_back(extreme_json(row));
   if (report.search) json["search"] = search_json(*report.search, report.search_seed);
   if (report.union_search)

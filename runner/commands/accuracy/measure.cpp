@@ -150,6 +150,11 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
     report.bodies = rendering::body_study(quick, now_ns, [&](double done) { progress.show(done); });
     report.body_tick = rendering::body_tick_cost(quick, now_ns);
   }
+  {
+    ProgressLine progress("soft bodies");
+    report.soft = rendering::soft_study(quick, now_ns,
+                                        [&progress](double done) { progress.show(done); });
+  }
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;
   report.search_seed = seed;

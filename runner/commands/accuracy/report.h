@@ -11,6 +11,7 @@
 #include "analysis/report/tables.h"
 #include "rendering/accuracy/body_study.h"
 #include "rendering/accuracy/paper_first_contact.h"
+#include "rendering/accuracy/soft_study.h"
 #include "rendering/accuracy/study.h"
 #include "rendering/accuracy/union_study.h"
 #include "rendering/verification/extreme_cases.h"
@@ -39,6 +40,7 @@ struct AccuracyReport {
   double paper_test_ns = 0, exact_test_ns = 0;  ///< of a test for first contact with a cube
   rendering::UnionSettings union_settings;
   std::vector<rendering::UnionRow> unions;
+  std::vector<rendering::SoftRow> soft;
   std::vector<ExtremeRow> extremes;
   std::vector<rendering::BodyRow> bodies;
   rendering::BodyTickCost body_tick;
@@ -75,6 +77,8 @@ analysis::Table union_table(const AccuracyReport& report);
 /// Bodies that move and collide, beside other engines.
 analysis::Table body_table(const AccuracyReport& report);
 analysis::Table union_search_table(const rendering::UnionCounts& counts, std::uint64_t seed);
+/// Bodies that give.
+analysis::Table soft_table(const AccuracyReport& report);
 /// All that was measured, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 

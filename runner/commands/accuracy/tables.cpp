@@ -277,6 +277,7 @@ std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
   if (!report.first_contacts.empty()) tables.push_back(first_contact_table(report));
   if (!report.unions.empty()) tables.push_back(union_table(report));
   if (!report.bodies.empty()) tables.push_back(body_table(report));
+  if (!report.soft.empty()) tables.push_back(soft_table(report));
   if (!report.extremes.empty()) tables.push_back(extreme_table(report));
   if (report.search) tables.push_back(search_table(*report.search, report.search_seed));
   if (report.union_search)

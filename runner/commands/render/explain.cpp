@@ -7,6 +7,8 @@
 #include <map>
 #include <set>
 
+#include "rendering/bodies/soft/soft_scene.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -59,6 +61,18 @@ void pad(std::string& line, std::size_t column) {
   line.append(line.size() < column ? column - line.size() : 1, ' ');
 }
 
+StageCost soft_stage(const rendering::SoftObject& object) {
+  const rendering::SoftBody& body = *object.body;
+  const auto& mesh = body.mesh();
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "object %d: %zu nodes, %zu elements, %g steps a second; between them the surface "
+                "gives by its compliance",
+                object.object, mesh.nodes.size(), mesh.hexahedra.size() + mesh.tetrahedra.size(),
+                1 / body.settings().step);
+  return {{"soft body", rendering::StageTime::tick, true, text}, std::nullopt};
+}
+
 }  // namespace
 
 Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer) {
@@ -73,8 +87,11 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   }
   explanation.objects = objects.size();
   std::map<std::string, double> costs;
-  for (const rendering::StageTiming& timing : rendering::stage_timings(scene, renderer)) {
-    if (timing.calls > 0) costs[timing.name] = cost_of(timing);
+  const auto soft = rendering::soft_objects(scene);
+  if (soft.empty()) {  // else the stages are a scene's within, whose parts are not the ones shown
+    for (const rendering::StageTiming& timing : rendering::stage_timings(scene, renderer)) {
+      if (timing.calls > 0) costs[timing.name] = cost_of(timing);
+    }
   }
   const auto cost = [&](const std::string& name) -> std::optional<double> {
     const auto found = costs.find(name);
@@ -88,6 +105,7 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
     if (with.stage.runs) with.ns = cost(with.stage.name);
     explanation.stages.push_back(std::move(with));
   }
+  for (const auto& object : soft) explanation.stages.push_back(soft_stage(*object));
   explanation.rest_ns = explanation.contact_ns;
   for (const StageCost& c : explanation.stages) {
     if (share_of_contact(explanation, c)) *explanation.rest_ns -= *c.ns;
