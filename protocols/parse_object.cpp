@@ -43,8 +43,7 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   if (value == nullptr || !value->is_string()) return;
   const std::filesystem::path path = std::filesystem::path(files.folder) / name;
   std::error_code error;
-  if (!stimuli::is_mesh_file_name(path.string()) &&
-      !stimuli::is_gmsh_file_name(path.string())) {
+  if (!stimuli::is_mesh_file_name(path.string()) && !stimuli::is_gmsh_file_name(path.string())) {
     reader.faults().add(reader.pointer("file"), std::string("expected a file ") +
                                                     stimuli::kMeshExtensions + found_text(*value));
   } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {

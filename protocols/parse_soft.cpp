@@ -52,7 +52,8 @@ void read_fixed(ObjectReader& reader, stimuli::Soft& soft) {
     const nlohmann::json& point = (*list)[i];
     Vec3 read(0);
     if (!point.is_array() || point.size() != 3) {
-      reader.faults().add(pointer, "expected [x, y, z], m, in the object's frame" + found_text(point));
+      reader.faults().add(pointer,
+                          "expected [x, y, z], m, in the object's frame" + found_text(point));
       continue;
     }
     for (int c = 0; c < 3; ++c) {
@@ -89,9 +90,10 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
                 "expected none: a .msh file brings its elements");
   });
   if (!can_be_soft(spec)) {
-    reader.faults().add(reader.pointer("soft"),
-                        "expected a cube, box, sphere, cylinder or a mesh with a .msh file; found " +
-                            std::string(stimuli::traits_of(spec.shape).name));
+    reader.faults().add(
+        reader.pointer("soft"),
+        "expected a cube, box, sphere, cylinder or a mesh with a .msh file; found " +
+            std::string(stimuli::traits_of(spec.shape).name));
   }
   if (!(spec.material.stiffness >= kSpring.min && spec.material.stiffness <= kSpring.max)) {
     reader.faults().add(reader.pointer("stiffness_n_per_m"),
@@ -104,8 +106,7 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
               "expected none on a soft object: friction on what gives is not rendered");
   refuse_with(reader, spec.material.damping > 0, "damping_ns_per_m",
               "expected none on a soft object: its damping is soft/damping_s");
-  refuse_with(reader, !spec.material.layers.empty(), "layers",
-              "expected none on a soft object");
+  refuse_with(reader, !spec.material.layers.empty(), "layers", "expected none on a soft object");
 }
 
 }  // namespace palpate::protocols

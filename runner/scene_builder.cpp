@@ -268,8 +268,8 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
     rendering::Scene others =
         rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool);
     if (soft.empty()) return others;
-    return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft),
-                                 side_contact, tool);
+    return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft), side_contact,
+                                 tool);
   } catch (const std::invalid_argument& error) {
     throw stimuli::MeshError({error.what()});
   }
@@ -338,8 +338,9 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
     return rendering::moving_scene(std::move(objects), moving, Vec3(0), sides, tool_);
   if (trial.orientation != Quat(1, 0, 0, 0)) {
     const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
-    soft = rendering::build_soft_object(
-        spec, stimuli::compose({Vec3(0), trial.orientation}, spec.pose), {soft_radius_, Vec3(0), 0});
+    soft = rendering::build_soft_object(spec,
+                                        stimuli::compose({Vec3(0), trial.orientation}, spec.pose),
+                                        {soft_radius_, Vec3(0), 0});
   }
   return rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects), {soft},
                                sides, tool_);

@@ -42,13 +42,13 @@ struct Soft {
     none,    ///< it moves freely
     points,  ///< the node nearest to each of `points`
   };
-  double young = 20000;             ///< Pa
-  double poisson = 0.45;            ///< 0 to 0.495
-  double density = 1000;            ///< kg/m^3
-  double damping = 0.01;            ///< s; stress by rate of strain over stress by strain
+  double young = 20000;   ///< Pa
+  double poisson = 0.45;  ///< 0 to 0.495
+  double density = 1000;  ///< kg/m^3
+  double damping = 0.01;  ///< s; stress by rate of strain over stress by strain
   Fixed fixed = Fixed::base;
-  std::vector<Vec3> points;         ///< m, local frame
-  int resolution = 10;              ///< elements along the longest side
+  std::vector<Vec3> points;  ///< m, local frame
+  int resolution = 10;       ///< elements along the longest side
 };
 
 /// What makes an object move by itself.

@@ -27,10 +27,10 @@ std::vector<std::uint32_t> nodes_where(const stimuli::SolidMesh& mesh,
   return nodes;
 }
 
-SoftRow row_of(std::string name, std::string truth, const stimuli::SolidMesh& mesh,
-               double value, double reference, std::string unit) {
-  return {std::move(name), std::move(truth), mesh.nodes.size(), mesh.hexahedra.size(), value,
-          reference, std::move(unit), std::abs(value / reference - 1)};
+SoftRow row_of(std::string name, std::string truth, const stimuli::SolidMesh& mesh, double value,
+               double reference, std::string unit) {
+  return {std::move(name), std::move(truth), mesh.nodes.size(), mesh.hexahedra.size(),
+          value,           reference,        std::move(unit),   std::abs(value / reference - 1)};
 }
 
 SoftRow patch_test() {
@@ -92,8 +92,8 @@ SoftRow cantilever(int across, const Clock& now) {
 /// A slab on a table with a tool on it.
 struct PressedSlab {
   std::shared_ptr<const SoftBody> body;
-  double force = 0;    ///< N
-  double sunk = 0;     ///< m, of the ideal tool
+  double force = 0;  ///< N
+  double sunk = 0;   ///< m, of the ideal tool
   double step_ns = 0;
 };
 
@@ -143,9 +143,9 @@ SoftRow ball(int resolution, const Clock& now) {
   const double thin = 1 + x * (1.133 + x * (1.283 + x * (0.769 + x * 0.0975)));
   const double hertz = 4.0 / 3 * kYoungModulus / (1 - kPoissonRatio * kPoissonRatio) *
                        std::sqrt(kBall) * std::pow(pressed.sunk, 1.5) * thin;
-  SoftRow row = row_of("ball on a slab, resolution " + std::to_string(resolution),
-                       "Hertz with the slab's thickness", pressed.body->mesh(), pressed.force,
-                       hertz, "N");
+  SoftRow row =
+      row_of("ball on a slab, resolution " + std::to_string(resolution),
+             "Hertz with the slab's thickness", pressed.body->mesh(), pressed.force, hertz, "N");
   row.step_ns = pressed.step_ns;
   return row;
 }
@@ -154,9 +154,8 @@ PressedSlab lying(int resolution, const Clock& now) {
   PlacedTool tool;
   tool.count = 1;
   tool.segments[0] = {Vec3(-0.06, 0, 0), Vec3(0.12, 0, 0)};
-  return press_slab({0.1, 0.1, 0.04}, resolution,
-                    {.radius = 0.01, .stiffness = 1e5, .most = 128}, tool, {0, 0.0002, 0}, 0.008,
-                    now);
+  return press_slab({0.1, 0.1, 0.04}, resolution, {.radius = 0.01, .stiffness = 1e5, .most = 128},
+                    tool, {0, 0.0002, 0}, 0.008, now);
 }
 
 /// A cylinder lying across, pressed by a fifth of the thickness; the truth is the finest mesh's.
@@ -187,8 +186,8 @@ void add_pressed(const Clock& now, std::vector<SoftRow>& rows) {
   SoftState state = body.rest();
   std::vector<NodeForce> forces;
   for (const std::uint32_t node : top)
-    forces.push_back({body.surface_index(node),
-                      Vec3(0, 0, -9.0 / static_cast<double>(top.size()))});
+    forces.push_back(
+        {body.surface_index(node), Vec3(0, 0, -9.0 / static_cast<double>(top.size()))});
   constexpr int kSteps = 500;
   const double start = now();
   for (int i = 0; i < kSteps; ++i) body.step(state, forces);

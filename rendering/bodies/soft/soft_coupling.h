@@ -25,7 +25,7 @@ struct SoftObject {
   SoftSurface surface;
   SoftContactSettings contact;
   std::vector<Vec3> rest;  ///< m, of the nodes of the surface
-  int object = 0;  ///< index in the scene
+  int object = 0;          ///< index in the scene
   /// Of a step: so long after it was asked for its result is used, whether it has been there before
   /// or not. So a thread of its own has time for it, and a recorded path comes out the same
   /// without.

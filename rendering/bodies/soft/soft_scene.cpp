@@ -73,8 +73,7 @@ void add_contacts(const SoftObject& object, const SoftObjectState& state, const 
   r.deepest.normal = depth > 0 ? state.contact.shift / depth : strongest->normal;
   r.deepest.depth = depth;
   r.deepest.along = sides ? glm::dot(r.deepest.point - tool.tip - state.contact.shift, axis) : 0;
-  r.deepest.type =
-      at_end || !sides ? ContactType::point_polygon : ContactType::segment_edge;
+  r.deepest.type = at_end || !sides ? ContactType::point_polygon : ContactType::segment_edge;
   r.ideal = {tool.tip + state.contact.shift, tool.tip + tool.d + state.contact.shift};
   r.object = object.object;
   if (has_tool) r.segment = strongest->segment;
@@ -113,8 +112,8 @@ class SoftMotion final : public SceneMotion {
     const Tool* const tool = others_.tool();
     ToolPose pose{probe.tip, probe.tail - probe.tip};
     if (tool != nullptr)
-      pose.frame = tool_frame(pose.d, state.has_last ? &state.last.frame : nullptr,
-                              outer.measured_side);
+      pose.frame =
+          tool_frame(pose.d, state.has_last ? &state.last.frame : nullptr, outer.measured_side);
     follow(state, pose, tool, sides, std::max(0.0, dt));
     if (tool != nullptr) result.ideal_side = pose.frame[0];
     for (std::size_t i = 0; i < soft_.size(); ++i)
@@ -141,8 +140,8 @@ class SoftMotion final : public SceneMotion {
     const double moved = way(place(tool, sides, from), from.tip, place(tool, sides, to), to.tip);
     for (std::size_t i = 0; i < soft_.size(); ++i) {
       const double stride = std::min(soft_[i]->contact.radius * kStride, kLongestStride);
-      const double wanted = std::max({1.0, std::ceil(moved / stride - 1e-9),
-                                      std::ceil(dt / kLongestTick - 1e-6)});
+      const double wanted =
+          std::max({1.0, std::ceil(moved / stride - 1e-9), std::ceil(dt / kLongestTick - 1e-6)});
       const int pieces = static_cast<int>(std::min<double>(wanted, kMostPieces));
       for (int k = 1; k <= pieces; ++k) {
         const ToolPose at = k < pieces ? between(from, to, static_cast<double>(k) / pieces) : to;

@@ -13,8 +13,8 @@ namespace palpate::rendering {
 
 /// A soft object as it is now, to be drawn.
 struct SoftShape {
-  int object = 0;                                       ///< index in the scene
-  std::span<const Vec3> rest, now;                      ///< m, of the nodes of the surface
+  int object = 0;                                           ///< index in the scene
+  std::span<const Vec3> rest, now;                          ///< m, of the nodes of the surface
   std::span<const std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise from outside
 };
 

@@ -47,7 +47,8 @@ int accuracy_command(const std::vector<std::string>& args) {
       "Error of the rendered forces against run time: every method over every tessellation of\n"
       "every analytic shape, and which tessellation to choose; contact with concave objects and "
       "with\n"
-      "tools of several segments, beside simpler ways to do it; soft bodies. Takes four minutes, with --quick "
+      "tools of several segments, beside simpler ways to do it; soft bodies. Takes four minutes, "
+      "with --quick "
       "half\n"
       "a minute. Status 1 when a tick of the search is wrong or an extreme case fails.";
   line.example =

@@ -152,8 +152,8 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
   }
   {
     ProgressLine progress("soft bodies");
-    report.soft = rendering::soft_study(quick, now_ns,
-                                        [&progress](double done) { progress.show(done); });
+    report.soft =
+        rendering::soft_study(quick, now_ns, [&progress](double done) { progress.show(done); });
   }
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;

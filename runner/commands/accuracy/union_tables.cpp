@@ -77,7 +77,8 @@ analysis::Table union_search_table(const rendering::UnionCounts& c, std::uint64_
 analysis::Table soft_table(const AccuracyReport& report) {
   analysis::Table table;
   table.caption = "Soft bodies: what is known of them against what is computed";
-  table.header = {"case", "truth", "nodes", "elements", "value", "reference", "unit", "error %", "ms a step"};
+  table.header = {"case",      "truth", "nodes",   "elements", "value",
+                  "reference", "unit",  "error %", "ms a step"};
   table.n_names = 2;
   for (const rendering::SoftRow& row : report.soft) {
     table.rows.push_back({row.name, row.truth, thousands(static_cast<long long>(row.nodes)),

@@ -36,7 +36,8 @@ rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec
                              const rendering::Renderer& renderer) {
   try {
     return SceneBuilder().build(spec.objects, renderer.side_contact(), tool_of(spec.tool),
-                                spec.gravity, spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius);
+                                spec.gravity,
+                                spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius);
   } catch (const stimuli::MeshError& error) {
     std::vector<std::string> faults;
     for (const std::string& fault : error.faults()) {

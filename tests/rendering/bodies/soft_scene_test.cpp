@@ -133,8 +133,9 @@ TEST(SoftScene, ShapesToBeDrawnMoveUnderTheTool) {
     most = std::max(most, glm::distance(shapes[0].rest[i], shapes[0].now[i]));
   EXPECT_GT(most, 0.001);
   EXPECT_LT(most, 0.005);
-  EXPECT_TRUE(soft_shapes(Scene({rigid_cube(Vec3(0))}), Scene({rigid_cube(Vec3(0))}).initial_state())
-                  .empty());
+  EXPECT_TRUE(
+      soft_shapes(Scene({rigid_cube(Vec3(0))}), Scene({rigid_cube(Vec3(0))}).initial_state())
+          .empty());
 }
 
 TEST(SoftScene, WhatCannotBeSteppedInTimeIsRefused) {
