@@ -132,6 +132,7 @@ struct SceneBuilder::Placing {
 std::vector<SceneBuilder::Prepared> SceneBuilder::with_trees(
     const std::vector<std::shared_ptr<const stimuli::ConvexMesh>>& meshes, bool side_contact) {
   std::vector<Prepared> parts;
+  parts.reserve(meshes.size());
   for (const auto& mesh : meshes)
     parts.push_back({mesh, std::make_shared<const rendering::ContactTrees>(*mesh, side_contact)});
   return parts;

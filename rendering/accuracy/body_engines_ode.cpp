@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdarg>
 
 #include "rendering/accuracy/body_engines.h"
 
@@ -85,9 +86,13 @@ class OdeBodies final : public BodyEngine {
     bodies_.push_back(body);
   }
 
-  /// The library is set up once for the program.
+  /// The library is set up once for the program. What it has to say of contacts that it does not
+  /// solve is in its error.
   struct Library {
-    Library() { dInitODE2(0); }
+    Library() {
+      dSetMessageHandler([](int, const char*, va_list) {});
+      dInitODE2(0);
+    }
     ~Library() { dCloseODE(); }
     Library(const Library&) = delete;
     Library& operator=(const Library&) = delete;

@@ -185,6 +185,7 @@ void add_pressed(const Clock& now, std::vector<SoftRow>& rows) {
                        .compliance = false});
   SoftState state = body.rest();
   std::vector<NodeForce> forces;
+  forces.reserve(top.size());
   for (const std::uint32_t node : top)
     forces.push_back(
         {body.surface_index(node), Vec3(0, 0, -9.0 / static_cast<double>(top.size()))});

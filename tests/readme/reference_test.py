@@ -70,6 +70,17 @@ class Dictionary(unittest.TestCase):
             header = file.readline().strip().split(",")
         self.assertEqual(set(header), set(self.documented("trials")) - {"elapsed"})
 
+    def test_columns_of_tasks_with_their_units(self):
+        output_of("simulate", ROOT / "protocols/stiffness-2afc.json", "--db", "tasks.db", "--participants", 1,
+                  folder=self.folder)
+        output_of("export", "--db", "tasks.db", "--format", "csv", "--out", "tasks.csv", "--codebook", "tasks-codebook.csv",
+                  folder=self.folder)
+        with open(self.folder / "tasks-codebook.csv", newline="") as file:
+            units = {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
+        documented = self.documented("trials of tasks")
+        self.assertEqual(set(documented), set(units) - set(self.documented("trials")))
+        self.assertEqual(documented, {column: units[column] for column in documented})
+
     def test_columns_of_samples_with_their_units(self):
         output_of("export", "--db", "one.db", "--format", "bids", "--out", "bids", folder=self.folder)
         about = json.loads(next(self.folder.glob("bids/sub-*/ses-1/beh/*_physio.json")).read_text())
