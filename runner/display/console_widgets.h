@@ -4,7 +4,6 @@
 #include <imgui.h>
 
 #include <string>
-#include <vector>
 
 namespace palpate::runner {
 
@@ -18,13 +17,6 @@ inline const ImVec4 kDue{0.16F, 0.42F, 0.27F, 1};
 inline const ImVec4 kRed{0.74F, 0.16F, 0.15F, 1};
 inline const ImVec4 kRedLit{0.86F, 0.23F, 0.21F, 1};
 }  // namespace console_colour
-
-/// Sets colours and sizes of the whole console. \param scale  of sizes
-void style_console(float scale);
-
-/// Of the whole console: the first font is the usual one, the last that of titles. \param texts
-/// UTF-8, whose characters are needed
-void load_console_fonts(const std::vector<std::string>& texts, float scale);
 
 void coloured_text(const ImVec4& colour, const std::string& words);
 /// Breaks lines at spaces only: Dear ImGui would break "0.5" apart.

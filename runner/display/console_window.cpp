@@ -9,8 +9,8 @@
 
 #include <algorithm>
 
-#include "runner/display/console_widgets.h"
 #include "runner/display/console_words.h"
+#include "runner/display/imgui_context.h"
 #include "runner/display/key_names.h"
 #include "runner/display/x11_errors.h"
 
@@ -23,21 +23,12 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout&
       window_(make_window(settings.title + " - console", layout.console)) {
   glfwSetWindowSizeLimits(window_, std::min(700, layout.console.width),
                           std::min(480, layout.console.height), GLFW_DONT_CARE, GLFW_DONT_CARE);
-  context_ = ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // writes no file
-  const auto scale = static_cast<float>(layout.console_scale);
-  load_console_fonts(settings.texts, scale);
-  style_console(scale);
+  context_ = begin_imgui(window_, settings.texts, static_cast<float>(layout.console_scale));
   glfwSetWindowUserPointer(window_, this);
   glfwSetKeyCallback(window_, &ConsoleWindow::on_key);
   glfwSetCharCallback(window_, &ConsoleWindow::on_character);
-  glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
-  glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
   glfwSetCursorPosCallback(window_, &ConsoleWindow::on_pointer);
   glfwSetMouseButtonCallback(window_, &ConsoleWindow::on_button);
-  glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
-  ImGui_ImplGlfw_InitForOpenGL(window_, false);
-  ImGui_ImplOpenGL3_Init("#version 330 core");
   view_ = std::make_unique<ConsoleView>(settings, layout.shared);
 }
 
@@ -53,9 +44,7 @@ ConsoleWindow::~ConsoleWindow() {
 void ConsoleWindow::destroy() {
   glfwMakeContextCurrent(window_);
   view_.reset();
-  ImGui_ImplOpenGL3_Shutdown();
-  ImGui_ImplGlfw_Shutdown();
-  ImGui::DestroyContext(context_);
+  end_imgui(context_);
   glfwDestroyWindow(window_);
   window_ = nullptr;
 }

@@ -10,8 +10,8 @@
 #include <algorithm>
 #include <chrono>
 
-#include "runner/display/console_widgets.h"
 #include "runner/display/explore_view.h"
+#include "runner/display/imgui_context.h"
 #include "runner/display/window_layout.h"
 #include "runner/display/x11_errors.h"
 
@@ -88,21 +88,12 @@ class ExploreWindow {
     window_ = make_window(settings.title + " - palpate explore", geometry);
     glfwSetWindowSizeLimits(window_, std::min(700, geometry.width), std::min(480, geometry.height),
                             GLFW_DONT_CARE, GLFW_DONT_CARE);
-    context_ = ImGui::CreateContext();
-    ImGui::GetIO().IniFilename = nullptr;  // writes no file
-    const auto scale = static_cast<float>(layout.console_scale);
-    load_console_fonts({settings.title}, scale);
-    style_console(scale);
+    context_ = begin_imgui(window_, {settings.title}, static_cast<float>(layout.console_scale));
     glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window_, &ExploreWindow::on_key);
     glfwSetCharCallback(window_, &ImGui_ImplGlfw_CharCallback);
-    glfwSetWindowFocusCallback(window_, &ImGui_ImplGlfw_WindowFocusCallback);
-    glfwSetCursorEnterCallback(window_, &ImGui_ImplGlfw_CursorEnterCallback);
     glfwSetCursorPosCallback(window_, &ExploreWindow::on_pointer);
     glfwSetMouseButtonCallback(window_, &ExploreWindow::on_button);
-    glfwSetScrollCallback(window_, &ImGui_ImplGlfw_ScrollCallback);
-    ImGui_ImplGlfw_InitForOpenGL(window_, false);
-    ImGui_ImplOpenGL3_Init("#version 330 core");
     view_ = std::make_unique<ExploreView>(std::move(settings), source_);
     flag_when_destroyed(window_, gone_);
     handle_display_errors();
@@ -111,9 +102,7 @@ class ExploreWindow {
 
   void close() {
     view_.reset();
-    ImGui_ImplOpenGL3_Shutdown();
-    ImGui_ImplGlfw_Shutdown();
-    ImGui::DestroyContext(context_);
+    end_imgui(context_);
     glfwDestroyWindow(window_);
     glfwTerminate();
   }

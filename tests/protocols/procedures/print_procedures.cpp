@@ -1,4 +1,4 @@
-// Prints the levels of some procedures with all their digits, for procedure_compilers.sh.
+// Prints the levels of some procedures with all their digits, for compilers.sh.
 
 #include <cstdio>
 
