@@ -1,0 +1,48 @@
+#pragma once
+// What the tests of the guard process share: a scripted hand that visits a cube, and memory shared
+// with a forked runner.
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+
+#include "runner/safety/guarded_device.h"
+#include "tests/runner/recording_device.h"
+
+namespace palpate::runner::testing {
+
+inline DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
+/// At rest outside for 0.15 s at 1 kHz, then down into the cube, for a second in all.
+inline DeviceReading visiting(int tick) {
+  const int at = tick % 1000;
+  return stylus_at(at < 150 ? 0.1 : std::max(0.029, 0.1 - 4e-4 * (at - 150)));
+}
+
+/// Shared with the runner's process.
+struct Shared {
+  DeviceRecord record;
+  std::atomic<bool> felt{false};  ///< there has been force for a while, and is
+  std::atomic<bool> go{false};    ///< the runner is to do what ends it
+};
+struct Stage {
+  Stage()
+      : shared(new (mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE,
+                         MAP_SHARED | MAP_ANONYMOUS, -1, 0)) Shared) {}
+  ~Stage() { munmap(shared, sizeof(Shared)); }
+  Shared* shared;
+};
+
+inline void nap(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+inline GuardSettings no_rights() {
+  GuardSettings settings;
+  settings.linger = 0.3;
+  settings.priority = 0;
+  return settings;
+}
+
+}  // namespace palpate::runner::testing
