@@ -19,6 +19,7 @@ changed. Not in comments, preprocessor lines, raw strings, assertions, `using`, 
 declarations. Places are drawn line by line, so a line with many tokens counts once; lines on which only
 text could change (messages, labels) count a quarter.
 
+The standard library's assertions are on, as in CI's sanitizer build: reading past an end is noticed.
 What counts as killed: a test that passes without the mutant fails, twice, or does not end within ten
 times its usual time and half a minute. Tests of the clock (label "clock") are left out, as are those
 that fail or take longer than --longest seconds without a mutant. With --with-commands what survives the
@@ -303,7 +304,7 @@ class Copy:
 
     def configure(self):
         (self.folder / "apart.cmake").write_text(APART)
-        command = ["cmake", "--preset", "release", "-DPALPATE_TESTS=ON",
+        command = ["cmake", "--preset", "release", "-DPALPATE_TESTS=ON", "-DCMAKE_CXX_FLAGS=-D_GLIBCXX_ASSERTIONS",
                    f"-DCMAKE_PROJECT_palpate_INCLUDE={self.folder / 'apart.cmake'}"]
         if shutil.which("ccache"):
             command.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")

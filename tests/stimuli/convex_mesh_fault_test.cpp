@@ -266,6 +266,7 @@ TEST(ConvexMeshFaults, NamesFacesWithTooFewOrCrossedCorners) {
   soup = cube(0.06);
   soup.faces[0] = {0, 3, 2, 1, 3};
   EXPECT_FAULT(soup, "crossed face: face 0");
+  EXPECT_FAULT(soup, "open: edge 1-2 of face 3");  // a crossed face closes nothing
 }
 
 TEST(ConvexMeshFaults, NamesAFaceThatIsNotPlane) {
