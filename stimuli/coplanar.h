@@ -28,7 +28,7 @@ double plane_deviation_at(const HalfEdges& mesh, const std::vector<FaceShape>& s
                           HalfEdges::Index h);
 
 /// For each face the number of the maximal planar region that it belongs to; regions are numbered
-/// from 0. \param[out] count the number of regions.
+/// from 0 in the order of their first faces. \param[out] count the number of regions.
 std::vector<HalfEdges::Index> coplanar_regions(const HalfEdges& mesh,
                                                const std::vector<FaceShape>& shapes,
                                                HalfEdges::Index& count);

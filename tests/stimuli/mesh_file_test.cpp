@@ -120,6 +120,18 @@ std::string as_binary_stl(const PolygonSoup& soup, std::string header = "solid n
 
 std::size_t facets_of(const PolygonSoup& soup) { return ConvexMesh(soup).facets().size(); }
 
+TEST_F(MeshFile, AFileThatIsTooLargeIsRefusedBeforeItIsRead) {
+  const std::string path = write("huge.stl", "");
+  std::filesystem::resize_file(path, (std::uintmax_t{1} << 31) + 1);  // takes no room on the disk
+  try {
+    read_mesh_file(path);
+    FAIL();
+  } catch (const MeshError& error) {
+    EXPECT_STREQ(error.what(),
+                 (path + ": expected a file of at most 2 GiB, found 2147483649").c_str());
+  }
+}
+
 TEST_F(MeshFile, ReadsWhatWasWritten) {
   const PolygonSoup soup = triangulated(cube(0.06));
   const PolygonSoup obj = read("cube.obj", as_obj(soup));
