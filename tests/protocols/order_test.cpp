@@ -223,6 +223,17 @@ void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget
       << ::testing::PrintToString(c.counts);
 }
 
+// A session that goes on with a newer program must meet the order that it began with.
+TEST(Order, StaysTheSameFromOneVersionOfTheProgramToTheNext) {
+  stimuli::Random one(5), two(5), three(5);
+  EXPECT_EQ(order_block({6, 6, 6}, limits(1), kNames, one, 0),
+            (Sequence{0, 2, 1, 2, 0, 1, 0, 1, 2, 1, 2, 0, 1, 0, 2, 1, 0, 2}));
+  EXPECT_EQ(order_block({4, 4, 4, 4}, limits({}, 3), kNames, two, 0),
+            (Sequence{1, 0, 3, 2, 1, 3, 0, 1, 2, 3, 0, 1, 2, 0, 3, 2}));
+  EXPECT_EQ(order_block({4, 4, 4, 4}, limits({}), kNames, three),
+            (Sequence{3, 0, 3, 2, 2, 3, 1, 2, 0, 2, 0, 3, 1, 0, 1, 1}));
+}
+
 // The seeds are fixed: a failure (p < 1e-4) means that the draw is biased.
 TEST(Order, EveryValidOrderIsEquallyLikely) {
   for (const Case& c : {Case{{1, 1, 1, 1, 1}, limits({})}, Case{{2, 2, 2}, limits({})},
