@@ -177,24 +177,20 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
 
 std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
                                const std::vector<Group>& groups) {
-  const auto participant = static_cast<std::uint64_t>(participant_number);
   std::vector<Block> blocks;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     for (int b = 0; b < protocol.blocks_per_renderer; ++b) {
-      stimuli::Random random(protocol.seed,
-                             {participant, kOrder, code(groups[g]), static_cast<std::uint64_t>(b)});
       const int repetitions = part_size(protocol.repetitions, protocol.blocks_per_renderer, b);
-      blocks.push_back({1, static_cast<int>(g),
-                        ordered_trials(protocol, groups[g],
-                                       equal_counts(protocol, groups[g], repetitions), random)});
+      blocks.push_back(
+          {1, static_cast<int>(g),
+           block_of_trials(protocol, participant_number, groups[g], b, repetitions)});
     }
   }
   std::vector<Trial*> all;
   for (Block& block : blocks) {
     for (Trial& trial : block.trials) all.push_back(&trial);
   }
-  stimuli::Random random(protocol.seed, {participant, kOrientation});
-  orient(protocol, all, random);
+  draw_orientations(protocol, participant_number, all);
   return blocks;
 }
 
@@ -230,6 +226,20 @@ std::vector<Block> into_sessions(const Protocol& protocol, std::vector<Block> bl
 }
 
 }  // namespace
+
+std::vector<Trial> block_of_trials(const Protocol& protocol, int participant_number,
+                                   const Group& group, int number, int repetitions) {
+  stimuli::Random random(protocol.seed, {static_cast<std::uint64_t>(participant_number), kOrder,
+                                         code(group), static_cast<std::uint64_t>(number)});
+  return ordered_trials(protocol, group, equal_counts(protocol, group, repetitions), random);
+}
+
+void draw_orientations(const Protocol& protocol, int participant_number,
+                       const std::vector<Trial*>& trials) {
+  stimuli::Random random(protocol.seed,
+                         {static_cast<std::uint64_t>(participant_number), kOrientation});
+  orient(protocol, trials, random);
+}
 
 int renderer_orders(const Protocol& protocol) {
   if (protocol.renderer_order != RendererOrder::counterbalanced) return 1;

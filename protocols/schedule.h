@@ -60,6 +60,16 @@ std::vector<Trial> schedule(const Protocol& protocol, int participant_number);
 std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
                                   RendererKind renderer, int round);
 
+/// A block of trials for analysis without numbers and orientations: `repetitions` of each stimulus
+/// with each renderer of `group`, mixed. \param number  from 0, of the blocks of such renderers.
+/// \throws ScheduleError
+std::vector<Trial> block_of_trials(const Protocol& protocol, int participant_number,
+                                   const std::vector<RendererKind>& group, int number,
+                                   int repetitions);
+/// Draws the orientations of a participant's trials for analysis, all of them in order.
+void draw_orientations(const Protocol& protocol, int participant_number,
+                       const std::vector<Trial*>& trials);
+
 /// After how many successive participant numbers the orders of renderers repeat.
 int renderer_orders(const Protocol& protocol);
 

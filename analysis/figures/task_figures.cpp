@@ -12,7 +12,7 @@
 namespace palpate::analysis {
 namespace {
 
-constexpr std::size_t kDrawnParticipants = 12;
+constexpr std::size_t kDrawnParticipants = 12, kDrawnTracks = 4;
 constexpr double kPanelWidth = 230, kPanelHeight = 170;
 
 /// Least and greatest level with trials.
@@ -61,21 +61,37 @@ Panel function_panel(const ParticipantFunction& one) {
   return panel;
 }
 
-Panel track_panel(const ParticipantFunction& one) {
+/// Levels in the order of a track: a circle where the answer was a success, a diamond where it turned.
+Panel track_panel(const ParticipantFunction& one, const Track& track) {
   Panel panel;
   panel.title = stimuli::printable(one.participant);
-  const auto [low, high] = std::minmax_element(one.track.begin(), one.track.end());
-  const double margin = *low < *high ? 0 : 0.5;
-  panel.x = linear_axis(0, static_cast<double>(one.track.size()), "trial of the track");
+  if (one.tracks.size() > 1) panel.title += ", track " + stimuli::printable(track.name);
+  const auto [low, high] = std::minmax_element(track.levels.begin(), track.levels.end());
+  const double margin = *low < *high ? 0.06 * (*high - *low) : 0.5;
+  panel.x = linear_axis(0, static_cast<double>(track.levels.size() + 1), "trial of the track");
   panel.y = linear_axis(*low - margin, *high + margin, "level");
   panel.width = kPanelWidth;
   panel.height = kPanelHeight;
-  Mark line = line_mark(Role::ray, {}, {}, 1.5);
-  for (std::size_t i = 0; i < one.track.size(); ++i) {
+  Mark line = line_mark(Role::soft, {}, {}, 1);
+  for (std::size_t i = 0; i < track.levels.size(); ++i) {
     line.x.push_back(static_cast<double>(i + 1));
-    line.y.push_back(one.track[i]);
+    line.y.push_back(track.levels[i]);
   }
   panel.marks.push_back(std::move(line));
+  for (std::size_t i = 0; i < track.levels.size(); ++i) {
+    const bool success = track.successes[i];
+    const bool turned =
+        std::find(track.reversals.begin(), track.reversals.end(), i) != track.reversals.end();
+    const auto trial = static_cast<double>(i + 1);
+    if (turned)
+      panel.marks.push_back(symbol(Role::amber, MarkerShape::diamond, trial, track.levels[i], 6,
+                                   "reversal at trial " + std::to_string(i + 1)));
+    panel.marks.push_back(symbol(success ? Role::ray : Role::point,
+                                 success ? MarkerShape::circle : MarkerShape::saltire, trial,
+                                 track.levels[i], 3,
+                                 "trial " + std::to_string(i + 1) +
+                                     (success ? ": success" : ": no success")));
+  }
   return panel;
 }
 
@@ -109,10 +125,14 @@ std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
     functions.notes.insert(functions.notes.begin(),
                            "Circles: share of successes, larger where there are more trials. Line: "
                            "fitted function, with the 95 % interval of its threshold.");
+    tracks.notes.insert(tracks.notes.begin(),
+                        "Circles: successes (the comparison chosen, yes, different). Crosses: no "
+                        "success. Diamonds: reversals of a staircase.");
     for (std::size_t i = 0; i < std::min(cell.functions.size(), kDrawnParticipants); ++i) {
       const ParticipantFunction& one = cell.functions[i];
       if (!one.counts.empty()) functions.panels.push_back(function_panel(one));
-      if (!one.track.empty()) tracks.panels.push_back(track_panel(one));
+      for (std::size_t t = 0; t < std::min(one.tracks.size(), kDrawnTracks); ++t)
+        tracks.panels.push_back(track_panel(one, one.tracks[t]));
       functions.description +=
           stimuli::printable(one.participant) + ": " +
           (one.fit.undefined.empty() ? "threshold " + fixed(one.fit.parameters.threshold, 4)

@@ -4,9 +4,11 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <stdexcept>
 #include <string_view>
 
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/trial_table_builder.h"
 #include "analysis/text.h"
 #include "protocols/parse.h"
 
@@ -50,6 +52,17 @@ class TaskRow {
     return std::nullopt;
   }
 
+  /// From 1; 1 where there is none.
+  int whole(std::string_view column) {
+    const std::string_view field = text(column);
+    int value = 1;
+    if (field.empty()) return value;
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    if (error == std::errc() && end == field.data() + field.size() && value >= 1) return value;
+    add_fault(column, "expected a whole number from 1, or nothing");
+    return 1;
+  }
+
   bool yes(std::string_view column) {
     const std::string_view field = text(column);
     if (field.empty() || field == "0") return false;
@@ -88,7 +101,14 @@ TaskTrial read_trial(TaskRow& row) {
   trial.catch_trial = row.yes("catch_trial");
   trial.success = row.yes("success");
   trial.correct = row.yes("correct");
-  trial.answered = !row.yes("timed_out") && (!trial.response.empty() || trial.number);
+  trial.timed_out = row.yes("timed_out");
+  trial.answered = !trial.timed_out && (!trial.response.empty() || trial.number);
+  trial.session = row.whole("session");
+  trial.block = row.whole("block");
+  trial.trial = row.whole("trial");
+  trial.response_time = row.number("response_time");
+  if (trial.response_time && *trial.response_time < 0)
+    row.add_fault("response_time", "expected a time in s, 0 or more");
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
     row.add_fault("task", "expected identify, compare, detect, rate or adjust");
@@ -104,7 +124,7 @@ bool has_task_column(const std::string& path) {
 
 TaskTable read_task_trials_csv(const std::string& path) {
   TaskTable table;
-  table.source = path;
+  table.source = table.provenance.source = path;
   std::vector<protocols::Fault> faults;
   CsvReader reader(path);
   const Columns columns = read_header(reader);
@@ -118,11 +138,13 @@ TaskTable read_task_trials_csv(const std::string& path) {
       faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
       continue;
     }
-    table.simulated |= row.yes("simulated");
+    const bool simulated = row.yes("simulated");
+    table.simulated |= simulated;
     if (row.yes("practice")) {
       ++table.n_practice;
     } else {
       table.trials.push_back(read_trial(row));
+      table.trials.back().simulated = simulated;
     }
   }
   if (faults.empty() && !reader.fault().empty())
@@ -131,6 +153,35 @@ TaskTable read_task_trials_csv(const std::string& path) {
     faults.push_back({path, "line 1", "expected at least one trial that is not practice"});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   return table;
+}
+
+std::optional<TrialTable> identification_of(const TaskTable& table) {
+  TrialTableBuilder builder;
+  std::size_t n = 0;
+  for (const TaskTrial& trial : table.trials) {
+    if (trial.task != "identify" || trial.level) continue;
+    if (!trial.response_time && !trial.timed_out) return std::nullopt;
+    RawTrial raw;
+    raw.participant = trial.participant;
+    raw.renderer = trial.renderer;
+    raw.shape = trial.shape;
+    raw.response = trial.response;
+    raw.session = trial.session;
+    raw.block = trial.block;
+    raw.trial = trial.trial;
+    raw.correct = trial.correct;
+    raw.timed_out = trial.timed_out;
+    raw.simulated = trial.simulated;
+    raw.response_time = trial.response_time.value_or(kNoTime);
+    builder.add(raw);
+    ++n;
+  }
+  if (n == 0) return std::nullopt;
+  try {
+    return builder.finish(table.provenance);
+  } catch (const std::runtime_error&) {  // rows that are there twice, without numbers
+    return std::nullopt;
+  }
 }
 
 }  // namespace palpate::analysis

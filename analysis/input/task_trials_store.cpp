@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -29,7 +30,23 @@ TaskTrial task_trial_of(const data::StoredTrial& stored) {
     trial.success = record.task->success;
   }
   trial.answered = !record.timed_out && (!trial.response.empty() || trial.number);
+  trial.session = record.session;
+  trial.block = record.block;
+  trial.trial = record.trial;
+  trial.timed_out = record.timed_out;
+  trial.response_time = record.response_time;
   return trial;
+}
+
+std::string listed(const std::vector<std::string>& parts) {
+  std::string all;
+  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
+  return all;
+}
+
+void note_once(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end())
+    known.push_back(value);
 }
 
 }  // namespace
@@ -46,15 +63,23 @@ bool has_tasks(const std::string& database) {
 TaskTable read_task_trials_store(const std::string& path) {
   data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   TaskTable table;
-  table.source = path;
+  table.source = table.provenance.source = path;
+  std::vector<std::string> names, observers;
   store.for_each_trial([&](const data::StoredTrial& stored) {
     table.simulated |= stored.participant.simulated;
     if (stored.record.practice) {
       ++table.n_practice;
     } else {
       table.trials.push_back(task_trial_of(stored));
+      table.trials.back().simulated = stored.participant.simulated;
+      note_once(stored.protocol_name, names);
+      note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
+      note_once(stored.run.program_version, table.provenance.program_versions);
+      note_once(stored.run.observer_sha256, observers);
     }
   });
+  table.provenance.protocol_name = listed(names);
+  table.provenance.observer_sha256 = listed(observers);
   if (table.trials.empty())
     throw protocols::InputError(
         {{path, "trials", "expected at least one completed trial that is not practice"}});

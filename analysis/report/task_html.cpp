@@ -1,3 +1,4 @@
+#include "analysis/figures/figures.h"
 #include "analysis/figures/task_figures.h"
 #include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
@@ -17,6 +18,10 @@ std::string task_report_html(const TaskAnalysis& analysis, const std::string& pr
   page.body() += "<pre tabindex=\"0\">" + escaped(task_report_text(analysis)) + "</pre>\n";
   page.end_section();
   for (const Figure& figure : task_figures(analysis)) page.put_figure_section(figure, figure.id);
+  if (analysis.identification) {
+    for (const Figure& figure : figures_of(*analysis.identification, {}))
+      page.put_figure_section(figure, figure.id);
+  }
   return page.html("Analysed with palpate " + program_version + ".");
 }
 

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "analysis/report/report_json.h"
 #include "analysis/report/task_report.h"
 
 namespace palpate::analysis {
@@ -48,13 +49,36 @@ TaskJson fit_json(const ParticipantFunction& one) {
   return fit;
 }
 
+TaskJson posterior_json(const PsychometricPosterior& posterior) {
+  TaskJson out;
+  put_status(out, posterior.undefined);
+  if (!posterior.undefined.empty()) return out;
+  out["threshold"] = posterior.mean.threshold;
+  out["threshold_ci95"] = ends_json(posterior.threshold_ci95);
+  out["slope"] = posterior.mean.slope;
+  out["slope_ci95"] = ends_json(posterior.slope_ci95);
+  out["guess"] = posterior.mean.guess;
+  out["guess_ci95"] = ends_json(posterior.guess_ci95);
+  out["lapse"] = posterior.mean.lapse;
+  out["lapse_ci95"] = ends_json(posterior.lapse_ci95);
+  return out;
+}
+
 TaskJson function_json(const ParticipantFunction& one) {
   TaskJson out{{"participant_id", one.participant}};
   for (const LevelCount& count : one.counts)
     out["levels"].push_back(
         {{"level", count.level}, {"trials", count.trials}, {"successes", count.successes}});
   out["fit"] = fit_json(one);
-  out["track"] = one.track;
+  out["bayes"] = posterior_json(one.posterior);
+  for (const Track& track : one.tracks) {
+    out["tracks"].push_back({{"track", track.name},
+                             {"levels", track.levels},
+                             {"successes", track.successes},
+                             {"reversal_trials", TaskJson::array()}});
+    for (const std::size_t at : track.reversals)
+      out["tracks"].back()["reversal_trials"].push_back(at + 1);
+  }
   TaskJson detection;
   put_status(detection, one.detectability.undefined);
   if (one.detectability.undefined.empty()) {
@@ -123,21 +147,53 @@ TaskJson cell_json(const TaskCell& cell) {
   return out;
 }
 
-TaskJson comparison_json(const RendererComparison& one) {
-  TaskJson out{{"block_name", one.block_name},
-               {"shape", one.shape},
-               {"reference", one.renderers[0]},
-               {"natural_logarithms", one.logarithms}};
+TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
+  const char* const condition = of_renderers ? "renderer" : "condition";
+  TaskJson out{{"task", one.task}, {"measure", one.measure}};
+  if (of_renderers) {
+    out["block_name"] = one.block_name;
+    out["shape"] = one.shape;
+  } else {
+    out["renderer"] = one.renderer;
+  }
+  out["reference"] = one.conditions[0];
+  out["natural_logarithms"] = one.logarithms;
+  put_status(out, one.comparison.undefined);
+  out["participant_sd"] = maybe(one.comparison.participant_sd);
+  out["residual_sd"] = maybe(one.comparison.residual_sd);
   for (const ConditionDifference& difference : one.comparison.differences)
-    out["differences"].push_back({{"renderer", one.renderers[difference.condition]},
+    out["differences"].push_back({{condition, one.conditions[difference.condition]},
                                   {"n_pairs", difference.n_pairs},
-                                  {"mean", difference.mean},
+                                  {"mean", finite(difference.mean)},
                                   {"ci95", ends_json(difference.t_test.log_ratio_ci95)},
                                   {"t", maybe(difference.t_test.t)},
                                   {"p", maybe(difference.t_test.p)},
                                   {"p_holm", maybe(difference.t_test.p_holm)},
+                                  {"dz", maybe(difference.effect_size.dz)},
                                   {"mixed_estimate", maybe(difference.mixed_estimate)},
                                   {"mixed_se", maybe(difference.mixed_se)}});
+  return out;
+}
+
+/// As R's lme4 prints it: correct ~ renderer + shape + (1 | participant).
+TaskJson accuracy_json(const MixedLogistic& model) {
+  TaskJson out{{"model", "correct ~ renderer + shape + (1 | participant)"}};
+  out["status"] = !model.undefined.empty() ? "undefined" : model.singular ? "singular" : "ok";
+  if (!model.undefined.empty()) {
+    out["reason"] = model.undefined;
+    return out;
+  }
+  out["n_participants"] = model.participants;
+  out["n_trials"] = model.trials;
+  out["logLik"] = finite(model.log_likelihood);
+  out["participant_sd"] = model.random_sds.empty() ? TaskJson() : finite(model.random_sds[0]);
+  for (const LogisticCoefficient& one : model.coefficients)
+    out["fixed_effects"][one.name] = {{"log_odds", finite(one.estimate)},
+                                      {"se", finite(one.se)},
+                                      {"z", finite(one.z)},
+                                      {"p", finite(one.p)},
+                                      {"ci95", ends_json(one.ci95)},
+                                      {"odds_ratio", finite(std::exp(one.estimate))}};
   return out;
 }
 
@@ -151,10 +207,16 @@ std::string task_report_json(const TaskAnalysis& analysis, const std::string& pr
                {"n_trials", analysis.table.trials.size()},
                {"n_practice", analysis.table.n_practice},
                {"cells", TaskJson::array()},
-               {"renderer_comparisons", TaskJson::array()}};
+               {"renderer_comparisons", TaskJson::array()},
+               {"condition_comparisons", TaskJson::array()}};
   for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
-  for (const RendererComparison& one : analysis.comparisons)
-    out["renderer_comparisons"].push_back(comparison_json(one));
+  for (const TaskComparison& one : analysis.renderers)
+    out["renderer_comparisons"].push_back(comparison_json(one, true));
+  for (const TaskComparison& one : analysis.conditions)
+    out["condition_comparisons"].push_back(comparison_json(one, false));
+  if (analysis.accuracy) out["accuracy_model"] = accuracy_json(*analysis.accuracy);
+  if (analysis.identification)
+    out["identification"] = TaskJson::parse(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
 }
 

@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "analysis/report/report_text.h"
 #include "analysis/report/task_report.h"
 #include "analysis/text.h"
 
@@ -44,6 +45,8 @@ std::string function_text(const TaskCell& cell, const ParticipantFunction& one) 
   }
   text += ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
   if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
+  if (one.posterior.undefined.empty())
+    text += "; Bayes " + with_interval(one.posterior.mean.threshold, one.posterior.threshold_ci95);
   if (one.detectability.d_prime)
     text += ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
             ", criterion " +
@@ -108,16 +111,29 @@ std::string cell_text(const TaskCell& cell) {
   return text + "\n";
 }
 
-std::string comparison_text(const RendererComparison& one) {
-  std::string text = "Thresholds by renderer, " + stimuli::printable(one.block_name) + ", " +
-                     stimuli::printable(one.shape) +
-                     (one.logarithms ? " (ratios)\n" : " (differences)\n");
+std::string measure_name(const TaskComparison& one) {
+  if (one.measure == "threshold") return "Thresholds";
+  if (one.measure == "jnd") return "JNDs";
+  return one.measure == "pse" ? "PSEs" : "Exponents";
+}
+
+std::string comparison_text(const TaskComparison& one, bool of_renderers) {
+  std::string text = measure_name(one) + " by " + (of_renderers ? "renderer" : "block and stimulus");
+  const auto add = [&](const std::string& name) {
+    if (!name.empty()) text += ", " + stimuli::printable(name);
+  };
+  add(one.task);
+  add(one.block_name);
+  add(one.shape);
+  add(one.renderer);
+  text += one.logarithms ? " (ratios)\n" : " (differences)\n";
+  if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);
     };
-    text += "  " + stimuli::printable(one.renderers[difference.condition]) +
-            (one.logarithms ? " / " : " - ") + stimuli::printable(one.renderers[0]) + ": ";
+    text += "  " + stimuli::printable(one.conditions[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + stimuli::printable(one.conditions[0]) + ": ";
     if (difference.n_pairs == 0) {
       text += "no participant has both\n";
       continue;
@@ -126,9 +142,30 @@ std::string comparison_text(const RendererComparison& one) {
     if (const auto& ends = difference.t_test.log_ratio_ci95)
       text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
     if (difference.t_test.p) text += ", p " + p_text(*difference.t_test.p);
+    if (difference.t_test.p_holm && one.comparison.differences.size() > 1)
+      text += " (Holm " + p_text(*difference.t_test.p_holm) + ")";
     if (difference.mixed_estimate) text += "; mixed model " + shown(*difference.mixed_estimate);
     text += " (" + counted(difference.n_pairs, "pair", "pairs") + ")\n";
   }
+  return text + "\n";
+}
+
+std::string accuracy_text(const MixedLogistic& model) {
+  std::string text =
+      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
+      "participant)\n";
+  if (!model.undefined.empty()) return text + "  undefined: " + model.undefined + "\n\n";
+  for (const LogisticCoefficient& one : model.coefficients) {
+    const bool intercept = one.name == "(Intercept)";
+    text += "  " + pad_right(stimuli::printable(one.name), 18) +
+            (intercept ? "odds " : "odds ratio ") +
+            with_interval(std::exp(one.estimate),
+                          {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
+            ", p " + p_text(one.p) + "\n";
+  }
+  if (!model.random_sds.empty())
+    text += "  standard deviation of the participants' log odds " +
+            short_number(model.random_sds[0]) + (model.singular ? " (singular)" : "") + "\n";
   return text + "\n";
 }
 
@@ -138,12 +175,17 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
-  for (const RendererComparison& one : analysis.comparisons) text += comparison_text(one);
+  for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
+  for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
+  if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
   text +=
       "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare "
       "with "
       "levels on\none side of the standard: guesses 0.5, the threshold is at half of what is above "
-      "(75 % without lapses);\ndetect: guesses free. d': log-linear correction.\n";
+      "(75 % without lapses);\ndetect: guesses free. d': log-linear correction. Bayes: posterior "
+      "mean of the threshold on a grid.\n";
+  if (analysis.identification)
+    text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);
   return text;
 }
 

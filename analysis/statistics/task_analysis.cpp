@@ -61,16 +61,43 @@ DetectionCounts detections_of(const Trials& trials) {
   return counts;
 }
 
-std::vector<double> first_track(const Trials& trials) {
+/// A staircase goes one way after a success, if at all, and the other way after a failure: whatever
+/// does not is none.
+std::vector<std::size_t> reversals_of(const Track& track) {
+  std::vector<std::size_t> turns;
+  int after_success = 0, last = 0;
+  for (std::size_t i = 1; i < track.levels.size(); ++i) {
+    const double change = track.levels[i] - track.levels[i - 1];
+    if (change == 0) continue;
+    const int way = change > 0 ? 1 : -1;
+    const int meaning = track.successes[i - 1] ? way : -way;
+    if (after_success == 0) after_success = meaning;
+    if (meaning != after_success) return {};
+    if (last != 0 && way != last) turns.push_back(i - 1);
+    last = way;
+  }
+  return turns;
+}
+
+std::vector<Track> tracks_of(const Trials& trials) {
+  std::vector<Track> tracks;
   for (const auto& [name, own] :
        grouped<std::string>(trials, [](const TaskTrial& trial) { return trial.track; })) {
-    std::vector<double> levels;
+    Track track;
+    track.name = name;
     for (const TaskTrial* trial : own) {
-      if (trial->level && !trial->catch_trial) levels.push_back(*trial->level);
+      if (!trial->level || trial->catch_trial || !trial->answered) continue;
+      track.levels.push_back(*trial->level);
+      track.successes.push_back(trial->success);
     }
-    if (levels.size() > 1) return levels;
+    if (track.levels.size() < 2) continue;
+    track.reversals = reversals_of(track);
+    tracks.push_back(std::move(track));
   }
-  return {};
+  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
+    return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);  // as numbers
+  });
+  return tracks;
 }
 
 /// Catch trials tell the guess rate: they stand infinitely far on the hard side.
@@ -103,7 +130,8 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
     result.goodness = goodness_of_fit(counts, result.model, result.fit, simulations, seed);
     result.discrimination = discrimination(result.fit, result.model.function, cell.standard_level);
   }
-  result.track = first_track(trials);
+  result.posterior = psychometric_posterior(counts, result.model);
+  result.tracks = tracks_of(trials);
   result.detectability =
       cell.task == "detect" ? detectability(detections, DetectionTask::yes_no) : Detectability{};
   if (cell.task != "detect") result.detectability.undefined = "no yes/no task";
@@ -197,40 +225,10 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std:
   return cell;
 }
 
-/// Thresholds of a block and stimulus with all its renderers.
-std::vector<RendererComparison> compare_renderers(const std::vector<TaskCell>& cells) {
-  std::map<std::pair<std::string, std::string>, std::vector<const TaskCell*>> groups;
-  for (const TaskCell& cell : cells) {
-    if (!cell.functions.empty()) groups[{cell.block_name, cell.shape}].push_back(&cell);
-  }
-  std::vector<RendererComparison> results;
-  for (const auto& [names, own] : groups) {
-    if (own.size() < 2) continue;
-    RendererComparison result{names.first, names.second, {}, true, {}};
-    std::vector<ParticipantFigure> figures;
-    std::map<std::string, std::size_t> numbers;
-    for (const TaskCell* cell : own) {
-      for (const ParticipantFunction& one : cell->functions) {
-        const auto number = numbers.emplace(one.participant, numbers.size()).first->second;
-        if (!one.fit.undefined.empty()) continue;
-        const double threshold = one.fit.parameters.threshold;
-        figures.push_back({number, result.renderers.size(), threshold});
-        result.logarithms &= threshold > 0;
-      }
-      result.renderers.push_back(cell->renderer);
-    }
-    if (result.logarithms) {
-      for (ParticipantFigure& figure : figures) figure.value = std::log(figure.value);
-    }
-    result.comparison = compare_thresholds(figures, result.renderers.size());
-    results.push_back(std::move(result));
-  }
-  return results;
-}
-
 }  // namespace
 
-TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed) {
+TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
+                           const AnalysisSettings& settings, const std::string& program_version) {
   TaskAnalysis result;
   result.table = std::move(table);
   Trials all;
@@ -242,7 +240,12 @@ TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed)
   };
   for (const auto& [key, trials] : grouped<CellKey>(all, key_of))
     result.cells.push_back(cell_of(key, trials, simulations, seed));
-  result.comparisons = compare_renderers(result.cells);
+  result.renderers = compare_renderers(result.cells);
+  result.conditions = compare_conditions(result.cells);
+  if (auto shapes = identification_of(result.table)) {
+    result.accuracy = accuracy_model(*shapes);
+    result.identification = analyze(std::move(*shapes), settings, program_version);
+  }
   return result;
 }
 

@@ -7,13 +7,25 @@
 #include <vector>
 
 #include "analysis/input/task_trials.h"
+#include "analysis/statistics/analysis.h"
 #include "analysis/statistics/information.h"
+#include "analysis/statistics/mixed_logistic.h"
+#include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/scaling.h"
 #include "analysis/statistics/signal_detection.h"
-#include "analysis/statistics/threshold_comparison.h"
+#include "analysis/statistics/task_comparisons.h"
 
 namespace palpate::analysis {
+
+/// The trials of a track in order, those without an answer left out.
+struct Track {
+  std::string name;
+  std::vector<double> levels;
+  std::vector<bool> successes;
+  /// Of a staircase: where it turned, as indices. Empty where levels do not follow the answers.
+  std::vector<std::size_t> reversals;
+};
 
 /// A psychometric function of a participant.
 struct ParticipantFunction {
@@ -23,8 +35,8 @@ struct ParticipantFunction {
   PsychometricFit fit;
   GoodnessOfFit goodness;
   Discrimination discrimination;
-  /// The levels in the order in which they were shown, of the first track with more than one.
-  std::vector<double> track;
+  PsychometricPosterior posterior;  ///< of the same counts and model
+  std::vector<Track> tracks;        ///< of more than one trial
   Detectability detectability;  ///< detect with catch trials; else undefined
 };
 
@@ -44,22 +56,19 @@ struct TaskCell {
   Type2Roc confidence;                             ///< undefined: nobody was asked
 };
 
-/// Thresholds with the renderers of a block and stimulus, natural logarithms where all are
-/// positive.
-struct RendererComparison {
-  std::string block_name, shape;
-  std::vector<std::string> renderers;  ///< the first is the reference
-  bool logarithms = false;
-  ThresholdComparison comparison;
-};
-
 struct TaskAnalysis {
   TaskTable table;
   std::vector<TaskCell> cells;
-  std::vector<RendererComparison> comparisons;
+  std::vector<TaskComparison> renderers, conditions;
+  /// What version 1 reports of identification, over all its blocks; none: no identification.
+  std::optional<Analysis> identification;
+  std::optional<MixedLogistic> accuracy;  ///< likewise
 };
 
-/// \param simulations  of each goodness of fit
-TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed);
+/// \param simulations  of each goodness of fit. \param settings, program_version  of the analysis of
+/// identification
+TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
+                           const AnalysisSettings& settings = {},
+                           const std::string& program_version = {});
 
 }  // namespace palpate::analysis

@@ -25,7 +25,8 @@ enum TaskUse : std::uint64_t {
   kTaskTracks = 5
 };
 
-constexpr std::size_t kCatchWindow = 20;  // trials
+constexpr std::size_t kCatchWindow = 20;   // trials
+constexpr long long kLeastUnanswered = 10;  // trials
 
 stimuli::Random task_stream(const Protocol& protocol, int participant, std::uint64_t block,
                             TaskUse use, std::uint64_t number = 0) {
@@ -208,6 +209,79 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
   return trials;
 }
 
+/// Identification as version 1 has it, whose order it then has: whatever is the same in two
+/// protocols gives the same trials. Limits on the order of several renderers are of other things.
+bool has_order_of_version_1(const TaskBlock& block) {
+  return block.task == TaskKind::identify && block.procedures.empty() &&
+         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
+}
+
+/// What of a protocol of version 1 an order follows from. \param block  none: all stimuli
+Protocol version_1_view(const Protocol& protocol, const TaskBlock* block) {
+  Protocol view;
+  view.seed = protocol.seed;
+  view.renderers = protocol.renderers;
+  view.orientation = protocol.orientation;
+  view.orientations = protocol.orientations;
+  const auto add = [&](const StimulusSpec& stimulus) { view.stimuli.push_back({stimulus.name, {}}); };
+  if (block == nullptr) {
+    for (const StimulusSpec& stimulus : protocol.stimuli) add(stimulus);
+    return view;
+  }
+  for (const int stimulus : block->stimuli)
+    add(protocol.stimuli[static_cast<std::size_t>(stimulus)]);
+  view.renderers = block->renderers;
+  view.renderer_order =
+      block->renderers.size() > 1 ? RendererOrder::interleaved : RendererOrder::fixed;
+  view.order.max_run = block->max_run;
+  view.order.min_distance = block->min_distance;
+  view.practice.repetitions = block->repetitions;
+  return view;
+}
+
+/// Practice has its orientations, main trials get theirs from orientations_of_version_1.
+std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const Protocol view = version_1_view(protocol, &block);
+  const auto before = std::count_if(
+      protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
+        return has_order_of_version_1(other) && other.practice == block.practice &&
+               other.renderers == block.renderers;
+      });
+  const int number = static_cast<int>(before);
+  std::vector<Trial> trials =
+      block.practice
+          ? practice_round(view, participant, block.renderers.front(), number + 1)
+          : block_of_trials(view, participant, block.renderers, number, block.repetitions);
+  const std::vector<Track> tracks = tracks_of(block);
+  for (Trial& trial : trials) {
+    trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
+    const auto is_its = [&](const Track& track) {
+      return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
+    };
+    const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
+    trial.track = static_cast<int>(track - tracks.begin()) + 1;
+    set_intervals(block, 0, trial);
+  }
+  return trials;
+}
+
+/// Of the main trials of a block, which are drawn over all blocks of a participant.
+void draw_orientations_of_version_1(const Protocol& protocol, int participant, int index,
+                                    std::vector<Trial>& trials) {
+  std::vector<std::vector<Trial>> others;
+  std::vector<Trial*> all;
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    for (const int other : blocks_in_order(protocol, participant, session)) {
+      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(other)];
+      if (block.practice || !has_order_of_version_1(block)) continue;
+      if (other != index) others.push_back(trials_of_version_1(protocol, participant, other));
+      for (Trial& trial : other == index ? trials : others.back()) all.push_back(&trial);
+    }
+  }
+  draw_orientations(version_1_view(protocol, nullptr), participant, all);
+}
+
 /// Whether trial `shown` (from 0) of an adaptive block is a catch trial.
 bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t block,
                     std::size_t shown) {
@@ -240,9 +314,17 @@ long long most_trials_of(const TaskBlock& block) {
   return with_catch_trials(block, trials);
 }
 
+std::size_t most_unanswered(const TaskBlock& block) {
+  return static_cast<std::size_t>(std::max(kLeastUnanswered, most_trials_of(block) / 4));
+}
+
 void check_order(const Protocol& protocol, int block) {
-  if (!is_adaptive(protocol.blocks[static_cast<std::size_t>(block)]))
+  const TaskBlock& checked = protocol.blocks[static_cast<std::size_t>(block)];
+  if (has_order_of_version_1(checked)) {
+    trials_of_version_1(protocol, 1, block);
+  } else if (!is_adaptive(checked)) {
     fixed_trials(protocol, 1, block);
+  }
 }
 
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
@@ -284,9 +366,15 @@ TaskPlan::TaskPlan(const Protocol& protocol, int participant_number, int session
 const TaskBlock& TaskPlan::block() const { return protocol_->blocks[block_index()]; }
 
 void TaskPlan::begin_block() {
-  shown_ = 0;
+  shown_ = unanswered_ = 0;
   fixed_.clear();
   tracks_.reset();
+  if (has_order_of_version_1(block())) {
+    fixed_ = trials_of_version_1(*protocol_, participant_number_, order_[at_]);
+    if (!block().practice)
+      draw_orientations_of_version_1(*protocol_, participant_number_, order_[at_], fixed_);
+    return;
+  }
   if (!is_adaptive(block())) {
     fixed_ = fixed_trials(*protocol_, participant_number_, order_[at_]);
     return;
@@ -317,7 +405,8 @@ Trial TaskPlan::adaptive_trial() const {
 void TaskPlan::find_next() {
   next_.reset();
   while (at_ < order_.size()) {
-    const bool more = tracks_ ? tracks_->next().has_value() : shown_ < fixed_.size();
+    const bool more = tracks_ ? tracks_->next().has_value() && unanswered_ < most_unanswered(block())
+                              : shown_ < fixed_.size();
     if (more) break;
     if (++at_ < order_.size()) begin_block();
   }
@@ -328,13 +417,16 @@ void TaskPlan::find_next() {
   trial.trial = static_cast<int>(done_) + 1;
   trial.practice = block().practice;
   trial.task_block = order_[at_];
-  trial.orientation = drawn_orientation(
-      *protocol_,
-      task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation, shown_ + 1));
+  if (!has_order_of_version_1(block())) {
+    trial.orientation = drawn_orientation(
+        *protocol_,
+        task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation, shown_ + 1));
+  }
   next_ = std::move(trial);
 }
 
 void TaskPlan::answered(const TrialOutcome& outcome) {
+  if (tracks_ && !outcome.answered) ++unanswered_;
   if (tracks_ && outcome.answered && !next_->catch_trial)
     tracks_->record({*next_->level, outcome.success});
   ++shown_;
@@ -347,7 +439,7 @@ std::size_t TaskPlan::size() const {
   long long left = 0;
   for (std::size_t i = at_; i < order_.size(); ++i)
     left += most_trials_of(protocol_->blocks[static_cast<std::size_t>(order_[i])]);
-  left -= static_cast<long long>(shown_);
+  left -= static_cast<long long>(shown_ - unanswered_);
   return done_ + static_cast<std::size_t>(std::max(1LL, left));
 }
 

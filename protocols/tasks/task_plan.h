@@ -2,8 +2,9 @@
 // The trials of a session of version 2, one after the other: a pure function of protocol, session,
 // participant number and the answers so far, the same on every machine and compiler.
 //
-// Blocks without adaptive procedures have their trials in an order by chance under the limits of
-// the block; those of adaptive ones are mixed in rounds, one trial of each track. Catch trials of
+// Identification without levels has the order and orientations that version 1 gives the same design
+// (schedule.h): one renderer a block, or several without limits on the order. Other blocks without
+// adaptive procedures have their trials in an order by chance under the limits of the block; those of adaptive ones are mixed in rounds, one trial of each track. Catch trials of
 // an adaptive block are spread by chance over every 20 trials.
 
 #include <cstdint>
@@ -50,6 +51,7 @@ class TaskPlan {
   int first_block_ = 1;               ///< number of the first
   std::size_t at_ = 0;                ///< into order_
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the block
+  std::size_t unanswered_ = 0;        ///< in an adaptive block
   std::vector<Trial> fixed_;          ///< of the block; empty: adaptive
   std::optional<InterleavedTracks> tracks_;
   std::optional<Trial> next_;
@@ -59,8 +61,11 @@ class TaskPlan {
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session);
 /// Whether answers choose its levels.
 bool is_adaptive(const TaskBlock& block);
-/// No participant has more trials in it.
+/// No participant has more trials in it, but for those that are not answered.
 long long most_trials_of(const TaskBlock& block);
+/// So many trials of an adaptive block without an answer, whose levels come again, end it: nobody is
+/// there. A quarter of most_trials_of, at least 10.
+std::size_t most_unanswered(const TaskBlock& block);
 /// \throws ScheduleError: the limits on the order of its trials cannot be met
 void check_order(const Protocol& protocol, int block);
 

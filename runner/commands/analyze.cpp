@@ -5,6 +5,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/figures/figure_svg.h"
@@ -60,15 +61,21 @@ constexpr int kRefits = 199;  // of each goodness of fit
 constexpr std::uint64_t kRefitSeed = 2026;
 
 /// A study of version 2, or its export.
-void analyze_tasks_of(const std::string& database, const std::string& csv, Outputs& outputs) {
+void analyze_tasks_of(const std::string& database, const std::string& csv,
+                      const analysis::AnalysisSettings& settings, Outputs& outputs) {
   const analysis::TaskAnalysis found =
       analysis::analyze_tasks(csv.empty() ? analysis::read_task_trials_store(database)
                                           : analysis::read_task_trials_csv(csv),
-                              kRefits, kRefitSeed);
+                              kRefits, kRefitSeed, settings, PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : analysis::task_figures(found))
+    std::vector<analysis::Figure> figures = analysis::task_figures(found);
+    if (found.identification) {
+      for (analysis::Figure& figure : analysis::figures_of(*found.identification, {}))
+        figures.push_back(std::move(figure));
+    }
+    for (const analysis::Figure& figure : figures)
       outputs.put_into_folder(figure.id + ".svg",
                               analysis::figure_svg(figure, analysis::light_palette()));
   }
@@ -139,7 +146,7 @@ int analyze_command(const std::vector<std::string>& args) {
     return 0;
   }
   if (is_of_tasks(database, csv)) {
-    analyze_tasks_of(database, csv, outputs);
+    analyze_tasks_of(database, csv, settings, outputs);
     return 0;
   }
 

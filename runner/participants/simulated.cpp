@@ -92,6 +92,7 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
 }
 
 std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
+  percept_.reset();
   if (sample.phase != Phase::feeling) {
     wait_for_time_zero(sample);
     return std::nullopt;  // rests in the home zone
@@ -109,7 +110,8 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
   }
   if (time >= next_percept_) {
     next_percept_ += 1 / settings_.observer.percept_rate;
-    observer_.update(perceive(sample, touch));
+    percept_ = perceive(sample, touch);
+    observer_.update(*percept_);
     if (observer_.decided()) answer_at_ = time + settings_.non_decision;
   }
   if (explorer_.wants_heading()) choose_heading(sample, touch);

@@ -34,6 +34,10 @@ class SimulatedParticipant final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   /// \throws StuckParticipant
   std::optional<Answer> step(const Sample& sample) override;
+  /// What it has perceived in the last step; none: nothing new.
+  const std::optional<Percept>& percept() const { return percept_; }
+  /// Posterior of the shape that it takes for the most probable now.
+  double certainty() const { return observer_.probability(observer_.best()); }
 
  private:
   void wait_for_time_zero(const Sample& sample);
@@ -68,6 +72,7 @@ class SimulatedParticipant final : public Respondent {
   std::optional<double> answer_at_;    ///< s from time zero
   bool touched_ = false;               ///< a percept with contact has been
   Vec3 touched_tip_, touched_normal_;  ///< at the last one: m, and unit
+  std::optional<Percept> percept_;     ///< of the last step
 };
 
 }  // namespace palpate::runner

@@ -39,7 +39,9 @@ int TaskJudgement::index_of(const char* name) const {
   return static_cast<int>(at - answers.begin());
 }
 
-void TaskJudgement::feel(const protocols::Interval& interval, std::optional<double> measured) {
+void TaskJudgement::feel(const protocols::Interval& interval, std::optional<double> measured,
+                         bool noisy) {
+  measured_ = measured.has_value();
   last_level_ = measured.value_or(level_of(interval));
   double reference = last_level_;
   if (block().standard) {
@@ -47,7 +49,7 @@ void TaskJudgement::feel(const protocols::Interval& interval, std::optional<doub
     standard.stimulus = *block().standard;
     reference = level_of(standard);
   }
-  const double sd = settings_.weber * std::abs(reference) / std::sqrt(2.0);
+  const double sd = noisy ? 0 : settings_.weber * std::abs(reference) / std::sqrt(2.0);
   const double estimate = last_level_ + sd * random_.normal();
   estimates_.push_back(estimate);
   feels_standard_ = interval.standard;
@@ -98,6 +100,22 @@ int TaskJudgement::adjusted() {
   return index_of(apart > 0 ? "up" : "down");
 }
 
+int TaskJudgement::identified() {
+  int found = trial_.stimulus;
+  evidence_ = 2;
+  if (measured_ && !block().level) {
+    const auto apart = [&](int stimulus) {
+      const double own =
+          protocol_.stimuli[static_cast<std::size_t>(stimulus)].object.material.stiffness;
+      return std::abs(std::log(std::max(own, 1e-3) / std::max(estimates_.back(), 1e-3)));
+    };
+    found = *std::min_element(block().stimuli.begin(), block().stimuli.end(),
+                              [&](int a, int b) { return apart(a) < apart(b); });
+    evidence_ = std::max(0.0, 2 - apart(found) / settings_.weber);
+  }
+  return index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
+}
+
 int TaskJudgement::answer() {
   const auto count = static_cast<std::uint64_t>(std::max<std::size_t>(1, block().answers.size()));
   if (block().task == TaskKind::adjust) return adjusted();
@@ -115,8 +133,7 @@ int TaskJudgement::answer() {
       return static_cast<int>(std::lround(step));
     }
     default:
-      evidence_ = 2;
-      return index_of(protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str());
+      return identified();
   }
 }
 

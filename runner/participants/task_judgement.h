@@ -9,7 +9,8 @@
 //   detect    "yes" by a psychometric function (protocols/procedures/psychometric.h)
 //   rate      number = level^exponent, times exp(noise)
 //   adjust    turns towards the standard until the estimates are less than half a turn apart
-//   identify  right, but for lapses
+//   identify  what differs in stiffness alone: the stimulus whose stiffness is nearest, as a ratio, to
+//             the estimate; shapes: SimulatedParticipant; else right, but for lapses
 // With the share `lapse` any answer is given.
 
 #include <optional>
@@ -39,8 +40,9 @@ class TaskJudgement {
 
   /// Before the first interval of a trial.
   void begin(const protocols::Trial& trial, const stimuli::Random& random);
-  /// What an interval is felt as. \param measured  the level as the hand met it; none: the true one
-  void feel(const protocols::Interval& interval, std::optional<double> measured);
+  /// What an interval is felt as. \param measured  the level as the hand met it (level_percept.h);
+  /// none: the true one. \param noisy  the noise is in it already
+  void feel(const protocols::Interval& interval, std::optional<double> measured, bool noisy);
   /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.
   int answer();
   double number();  ///< rate: a number typed
@@ -53,6 +55,7 @@ class TaskJudgement {
   std::optional<int> compared();
   int detected();
   int adjusted();
+  int identified();
 
   const protocols::Protocol& protocol_;
   JudgementSettings settings_;
@@ -62,6 +65,7 @@ class TaskJudgement {
   std::optional<double> own_, standard_;  ///< adjust: as felt last
   bool feels_standard_ = false;
   double last_level_ = 0;
+  bool measured_ = false;  ///< the last one was
   double evidence_ = 0;  ///< how clear the answer was, in sd
 };
 

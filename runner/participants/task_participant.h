@@ -1,23 +1,34 @@
 #pragma once
-// A simulated participant for the tasks of version 2: explores as SimulatedParticipant does, feels
-// for a while, and judges levels (task_judgement.h). Stiffness is judged from force and depth as
-// the hand met them; other levels are known to the model.
+// A simulated participant for the tasks of version 2. Shapes it identifies as SimulatedParticipant
+// does, percept by percept. In all other tasks it explores as that one does, feels for a while, and
+// judges levels (task_judgement.h) from what the hand met (level_percept.h), where that tells them;
+// other levels are known to the model.
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "runner/participants/level_percept.h"
 #include "runner/participants/respondent.h"
 #include "runner/participants/simulated.h"
 #include "runner/participants/task_judgement.h"
 
 namespace palpate::runner {
 
+/// What is identified in each block of a protocol; none: nothing, or what no shape tells apart.
+using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;
+/// \throws MeshError
+BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
+
 class TaskParticipant final : public Respondent {
  public:
-  /// As SimulatedParticipant.
+  /// As SimulatedParticipant. \param hypotheses  to explore with. \param of_blocks  to identify;
+  /// must outlive it, too
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                  SimulatedStylus& stylus, const protocols::Protocol& protocol, std::uint64_t seed,
+                  const BlockHypotheses& of_blocks, SimulatedStylus& stylus, const protocols::Protocol& protocol, std::uint64_t seed,
                   int number);
 
   void read(const std::string&) override {}
@@ -30,19 +41,27 @@ class TaskParticipant final : public Respondent {
 
  private:
   Answer answer(std::int64_t time_ns);
+  const protocols::TaskBlock& block() const;
+  std::optional<Answer> identify(const Sample& sample);
 
   const protocols::Protocol& protocol_;
   SimulatedParticipant hand_;
+  /// By what is identified.
+  std::map<const ShapeHypotheses*, SimulatedParticipant> identifiers_;
+  const BlockHypotheses& of_blocks_;
+  SimulatedParticipant* identifier_ = nullptr;  ///< in this trial
   TaskJudgement judgement_;
+  LevelPercept percept_;
   std::uint64_t seed_;
   int number_;
   protocols::Trial trial_;
   IntervalView view_;
   int felt_ = 0;  ///< intervals of the trial so far
   double period_;
-  double stiffness_sum_ = 0;  ///< N/m, over ticks with contact
-  int contact_ticks_ = 0;
   std::int64_t answered_ns_ = 0;
+  bool judged_ = false;   ///< in this interval
+  double look_ = 0;       ///< s of feeling in it
+  bool limited_ = false;  ///< it ends by itself
 };
 
 }  // namespace palpate::runner

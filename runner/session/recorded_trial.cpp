@@ -91,13 +91,6 @@ RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& nam
                                   const std::string& protocol, const std::string& mesh_folder) {
   RecordedTrial trial;
   trial.stored = find_trial(store, name, protocol);
-  if (trial.stored.record.task) {
-    throw data::StoreRefused(
-        store.path() + ": trial " + to_string(name) + " is of the task '" +
-        trial.stored.record.task->task +
-        "', whose intervals cannot be replayed; expected a trial of a protocol "
-        "of version 1");
-  }
   trial.protocol = stored_protocol(store, trial.stored, mesh_folder);
   const std::string& shape = trial.stored.record.shape;
   const auto& stimuli = trial.protocol.stimuli;

@@ -1,32 +1,76 @@
 #include "runner/session/replay.h"
 
+#include <algorithm>
 #include <limits>
-#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "runner/devices/replay.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo.h"
+#include "runner/session/level_scenes.h"
 
 namespace palpate::runner {
 namespace {
 
-protocols::Trial trial_of(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
-                          protocols::RendererKind renderer) {
+using protocols::RendererKind;
+
+/// A renderer, and its scene for the recorded trial.
+struct ShownInterval {
+  RendererKind renderer;
+  rendering::Scene scene;
+};
+
+RendererKind kind_of(const std::string& name, bool other) {
+  const bool ray = (name == protocols::to_string(RendererKind::ray)) != other;
+  return ray ? RendererKind::ray : RendererKind::point;
+}
+
+int stimulus_named(const protocols::Protocol& protocol, const std::string& name) {
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    if (protocol.stimuli[i].name == name) return static_cast<int>(i);
+  }
+  throw std::invalid_argument("the protocol has no stimulus named " + name);
+}
+
+protocols::Trial trial_of(const protocols::Protocol& protocol, const data::TrialRecord& recorded) {
   protocols::Trial trial;
   trial.session = recorded.session;
   trial.block = recorded.block;
   trial.trial = recorded.trial;
-  trial.renderer = renderer;
   trial.practice = recorded.practice;
   const auto& q = recorded.orientation_wxyz;
   trial.orientation = Quat(q[0], q[1], q[2], q[3]);
-  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    if (protocol.stimuli[i].name != recorded.shape) continue;
-    trial.stimulus = static_cast<int>(i);
-    return trial;
+  trial.stimulus = stimulus_named(protocol, recorded.shape);
+  if (!recorded.task) return trial;
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    if (protocol.blocks[i].name == recorded.task->block_name)
+      trial.task_block = static_cast<int>(i);
   }
-  throw std::invalid_argument("the protocol has no stimulus named " + recorded.shape);
+  if (trial.task_block < 0)
+    throw std::invalid_argument("the protocol has no block named " + recorded.task->block_name);
+  return trial;
+}
+
+std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
+                                     const data::TrialRecord& recorded, bool other) {
+  protocols::Trial trial = trial_of(protocol, recorded);
+  std::vector<ShownInterval> shown;
+  if (!recorded.task) {
+    trial.renderer = kind_of(recorded.renderer, other);
+    shown.push_back({trial.renderer, StimulusLibrary(protocol).scene(trial)});
+    return shown;
+  }
+  LevelScenes scenes(protocol);
+  for (const data::IntervalRecord& interval : recorded.task->intervals) {
+    protocols::Interval one;
+    one.stimulus = interval.stimulus.empty() ? -1 : stimulus_named(protocol, interval.stimulus);
+    one.renderer = kind_of(interval.renderer, other);
+    one.level = interval.level;
+    one.standard = interval.standard;
+    shown.push_back({one.renderer, scenes.scene(trial, one)});
+  }
+  return shown;
 }
 
 bool equal(const std::array<double, 3>& recorded, const Vec3& again) {
@@ -35,26 +79,47 @@ bool equal(const std::array<double, 3>& recorded, const Vec3& again) {
 
 }  // namespace
 
-void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
-            protocols::RendererKind renderer,
-            const std::function<void(const data::SampleRecord&, const Sample&)>& visit) {
-  const StimulusLibrary library(protocol);
-  ReplayDevice device(recorded.samples, protocol.servo_rate);
+std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
+    const data::TrialRecord& recorded) {
+  std::vector<std::span<const data::SampleRecord>> intervals;
+  const std::span<const data::SampleRecord> all(recorded.samples);
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= all.size(); ++i) {
+    if (i < all.size() && all[i].tick > all[i - 1].tick) continue;
+    intervals.push_back(all.subspan(begin, i - begin));
+    begin = i;
+  }
+  return intervals;
+}
+
+void replay(
+    const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+    const std::function<void(std::size_t, const data::SampleRecord&, const Sample&)>& visit) {
+  const auto intervals = samples_of_intervals(recorded);
+  std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other);
+  // One whose time was over before it began has none.
+  const std::size_t least = shown.size() - (recorded.task && recorded.timed_out ? 1 : 0);
+  if (intervals.size() > shown.size() || intervals.size() < least)
+    throw std::invalid_argument("samples of " + std::to_string(shown.size()) +
+                                " intervals are expected, found " +
+                                std::to_string(intervals.size()));
   ForceLimits limits;
   limits.max_force = limits.max_change = std::numeric_limits<double>::max();
-  Servo servo(device, device, protocol.servo_rate, limits);
   // The record begins where the stylus had rested in the home zone.
   constexpr HomeZone kAnywhere{0, 0};
-  servo.prepare(library.scene(trial_of(protocol, recorded, renderer)), renderer_for(renderer),
-                kAnywhere);
   // Of an extended probe, the record has the virtual stylus; what the hand got of it follows.
   const std::optional<rendering::Reach> reach = workspace_of(protocol).reach;
-  for (const data::SampleRecord& sample : recorded.samples) {
-    Sample again = servo.tick();
-    if (reach) again.rendering = rendering::felt(*reach, again.rendering);
-    visit(sample, again);
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    ReplayDevice device(intervals[i], protocol.servo_rate);
+    Servo servo(device, device, protocol.servo_rate, limits);
+    servo.prepare(std::move(shown[i].scene), renderer_for(shown[i].renderer), kAnywhere);
+    for (const data::SampleRecord& sample : intervals[i]) {
+      Sample again = servo.tick();
+      if (reach) again.rendering = rendering::felt(*reach, again.rendering);
+      visit(i, sample, again);
+    }
+    servo.stop();
   }
-  servo.stop();
 }
 
 bool equals_record(const data::SampleRecord& recorded, const Sample& again) {

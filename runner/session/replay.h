@@ -1,7 +1,11 @@
 #pragma once
 // Renders a recorded trial again, tick by tick.
 
+#include <cstddef>
 #include <functional>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "data/record.h"
 #include "protocols/protocol.h"
@@ -9,15 +13,19 @@
 
 namespace palpate::runner {
 
-/// Puts a recorded trial through the servo and a renderer again.
+/// The samples of each interval of a trial, in order: what was recorded begins with tick 0 in each.
+/// A trial of version 1 has one.
+std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
+    const data::TrialRecord& recorded);
+
+/// Puts a recorded trial through the servo and a renderer again, interval by interval.
 /// \param recorded  with samples
-/// \param renderer  the recorded one gives the recorded forces, to the bit; the other what it would
-///                  have shown along the same path
-/// \param visit     each recorded tick and what comes of it now, in order
-/// \throws std::invalid_argument where the protocol has no such stimulus
-void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
-            protocols::RendererKind renderer,
-            const std::function<void(const data::SampleRecord&, const Sample&)>& visit);
+/// \param other     false: the recorded renderer, which gives the recorded forces, to the bit; true:
+///                  the other one, as it would have shown the same path
+/// \param visit     number of the interval from 0, each recorded tick and what comes of it now
+/// \throws std::invalid_argument where protocol and record do not agree
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+            const std::function<void(std::size_t, const data::SampleRecord&, const Sample&)>& visit);
 
 /// Whether a tick's rendering is what is on record, bit by bit (a zero's sign aside, which the
 /// store does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault

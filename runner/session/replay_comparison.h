@@ -27,25 +27,36 @@ struct RenderedForce {
 };
 
 struct ReplayedTick {
-  double time = 0;  ///< s from time zero
+  double time = 0;            ///< s from the interval's time zero
+  std::size_t interval = 1;   ///< from 1
   const data::SampleRecord* recorded;
   RenderedForce again;  ///< by the recorded renderer
   RenderedForce other;  ///< by the other one, where it was asked for
 };
 
+/// A trial of version 1 has one.
+struct ReplayedInterval {
+  std::string stimulus, renderer;  ///< as recorded; no stimulus: nothing was there
+  std::optional<double> level = std::nullopt;
+  bool standard = false;
+  std::size_t ticks = 0, equal_ticks = 0;
+};
+
 struct ReplayComparison {
   std::size_t equal_ticks = 0;                    ///< to the bit
   std::optional<std::uint32_t> first_difference;  ///< tick
+  std::size_t differing_interval = 1;             ///< its interval
   bool periods_known = true;  ///< the record holds the ticks' periods, on which damping depends
   ForceSummary recorded;
   std::optional<ForceSummary> other;
   double rms_difference = 0, max_difference = 0;  ///< N, of the two renderers' forces
   std::vector<ReplayedTick> ticks;                ///< all, in order
+  std::vector<ReplayedInterval> intervals;        ///< all, in order
 };
 
 /// \param record         with samples; must outlive the result
 /// \param compare_other  whether the other renderer goes along the same path
-/// \throws std::invalid_argument where the protocol has no such stimulus
+/// \throws std::invalid_argument where protocol and record do not agree
 ReplayComparison compare_with_record(const protocols::Protocol& protocol,
                                      const data::TrialRecord& record, bool compare_other);
 

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "runner/build_info.h"
-#include "runner/participants/task_participant.h"
 #include "runner/session/session.h"
 #include "runner/session/simulated_study.h"
 
@@ -47,6 +46,7 @@ SimulatedStudy::SimulatedStudy(const protocols::Protocol& p, const SimulatedSett
       settings(s),
       library(p),
       hypotheses(shapes_of(checked(p, library, s))),
+      of_blocks(block_hypotheses(p)),
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
@@ -60,8 +60,8 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   if (protocol.passivity_controller) servo.control_passivity();
   std::unique_ptr<Respondent> participant;
   if (protocol.version == 2) {
-    participant = std::make_unique<TaskParticipant>(own, study.hypotheses, stylus, protocol,
-                                                    study.seed, session.participant);
+    participant = std::make_unique<TaskParticipant>(
+        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
   } else {
     participant = std::make_unique<SimulatedParticipant>(own, study.hypotheses, stylus, protocol,
                                                          study.seed, session.participant);

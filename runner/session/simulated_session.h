@@ -9,6 +9,7 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 #include "runner/participants/simulated.h"
+#include "runner/participants/task_participant.h"
 #include "runner/scene_builder.h"
 #include "runner/session/session_plan.h"
 #include "runner/session/trial_log.h"
@@ -26,6 +27,7 @@ struct SimulatedStudy {
   const SimulatedSettings& settings;
   StimulusLibrary library;
   ShapeHypotheses hypotheses;
+  BlockHypotheses of_blocks;  ///< version 2
   std::uint64_t seed;  ///< of the participants; the schedule has the protocol's own
 };
 

@@ -192,8 +192,9 @@ SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
   std::vector<stimuli::ObjectSpec> shapes;
-  // Tasks of version 2 are not answered by the shape: any will do to explore with.
-  if (protocol.version == 2) return {stimuli::ObjectSpec{}};
+  // Tasks of version 2 but identification are not answered by the shape: any will do to explore
+  // with, and of two that are alike none is ever found, so that it goes on to perceive.
+  if (protocol.version == 2) return {stimuli::ObjectSpec{}, stimuli::ObjectSpec{}};
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     shapes.push_back(stimulus.object);
   return shapes;

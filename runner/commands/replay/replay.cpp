@@ -44,8 +44,8 @@ int replay_command(const std::vector<std::string>& args) {
   line.usage = "palpate replay --db FILE --trial CODE/SESSION/TRIAL [--compare] [--out FILE.csv]";
   line.summary =
       "Puts a stored trial through the servo and its renderer again: the forces must be the\n"
-      "recorded ones, bit by bit. Needs servo samples (\"samples\": true in the protocol).\n"
-      "Status 1 when a tick differs.";
+      "recorded ones, bit by bit; of a trial of several intervals, in each of them. Needs servo\n"
+      "samples (\"samples\": true in the protocol). Status 1 when a tick differs.";
   line.example =
       "  palpate replay --db study.db --trial P03/1/12\n"
       "  palpate replay --db study.db --trial P03/1/12 --compare --out both.csv   (and what the\n"
@@ -74,7 +74,7 @@ int replay_command(const std::vector<std::string>& args) {
     outputs.protect(stimulus.object);
   const ReplayComparison found =
       compare_with_record(recorded.protocol, recorded.stored.record, values->count("compare") > 0);
-  if (outputs.wanted("out")) outputs.put("out", to_csv(found));
+  if (outputs.wanted("out")) outputs.put("out", to_csv(recorded, found));
   if (outputs.wanted("json")) outputs.put("json", to_json_text(trial, recorded, found));
   outputs.write();
   std::cout << to_text(trial, recorded, found);

@@ -37,6 +37,9 @@ std::string verdict(const RecordedTrial& trial, const ReplayComparison& found) {
   std::string text = "Rendered again: " + std::to_string(ticks - found.equal_ticks) + " of " +
                      std::to_string(ticks) + " ticks differ from the record, the first is tick " +
                      std::to_string(found.first_difference.value_or(0)) +
+                     (found.intervals.size() > 1
+                          ? " of interval " + std::to_string(found.differing_interval)
+                          : "") +
                      ". Recorded with palpate " + printable(trial.stored.run.program_version) +
                      ", replayed with " PALPATE_VERSION ".\n";
   if (!found.periods_known)
@@ -68,8 +71,34 @@ void put(std::string& row, const RenderedForce& shown) {
   put(row, shown.depth);
 }
 
-std::string csv_header(bool with_other) {
-  std::string header = "tick,t";
+/// A line for each interval of a trial of version 2.
+std::string intervals_text(const ReplayComparison& found) {
+  std::string text;
+  for (std::size_t i = 0; i < found.intervals.size(); ++i) {
+    const ReplayedInterval& one = found.intervals[i];
+    text += "  interval " + std::to_string(i + 1) + ": " +
+            (one.stimulus.empty() ? "nothing" : printable(one.stimulus)) + ", " +
+            printable(one.renderer) + (one.level ? formatted(", level %.12g", *one.level) : "") +
+            (one.standard ? ", standard" : "") + formatted(": %zu of %zu ticks equal\n",
+                                                           one.equal_ticks, one.ticks);
+  }
+  return text;
+}
+
+Json intervals_json(const ReplayComparison& found) {
+  Json all = Json::array();
+  for (const ReplayedInterval& one : found.intervals)
+    all.push_back({{"stimulus", one.stimulus.empty() ? Json() : Json(one.stimulus)},
+                   {"renderer", one.renderer},
+                   {"level", one.level ? Json(*one.level) : Json()},
+                   {"standard", one.standard},
+                   {"ticks", one.ticks},
+                   {"equal_ticks", one.equal_ticks}});
+  return all;
+}
+
+std::string csv_header(bool with_other, bool with_intervals) {
+  std::string header = with_intervals ? "interval,tick,t" : "tick,t";
   const auto add = [&header](const std::string& vector) {
     for (const char* axis : {"_x", "_y", "_z"}) header += "," + vector + axis;
   };
@@ -96,7 +125,9 @@ std::string to_text(const std::string& name, const RecordedTrial& trial,
           formatted(" after %.3f s", record.response_time) + "\n";
   if (trial.limited)
     text += "With the materials as they were limited to what the device can show.\n";
-  text += verdict(trial, found) + in_words(found.recorded, "recorded");
+  text += verdict(trial, found);
+  if (record.task) text += intervals_text(found);
+  text += in_words(found.recorded, "recorded");
   if (found.other) {
     text += in_words(*found.other, "same way") +
             formatted("  their forces differ by %.3f N rms, at most %.3f N\n", found.rms_difference,
@@ -118,6 +149,10 @@ std::string to_json_text(const std::string& name, const RecordedTrial& trial,
                  {"periods_on_record", found.periods_known},
                  {"material_limited", trial.limited},
                  {"recorded", to_json(found.recorded)}};
+  if (trial.stored.record.task) {
+    result["task"] = trial.stored.record.task->task;
+    result["intervals"] = intervals_json(found);
+  }
   if (found.other) {
     result["other"] = to_json(*found.other);
     result["rms_difference_n"] = found.rms_difference;
@@ -126,10 +161,12 @@ std::string to_json_text(const std::string& name, const RecordedTrial& trial,
   return result.dump(1) + "\n";
 }
 
-std::string to_csv(const ReplayComparison& found) {
-  std::string text = csv_header(found.other.has_value());
+std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
+  const bool with_intervals = trial.stored.record.task.has_value();
+  std::string text = csv_header(found.other.has_value(), with_intervals);
   for (const ReplayedTick& tick : found.ticks) {
     const data::SampleRecord& was = *tick.recorded;
+    if (with_intervals) text += std::to_string(tick.interval) + ",";
     text += std::to_string(was.tick);
     put(text, tick.time);
     for (const auto& v : {was.tip, was.tail, was.force, was.torque}) put_vector(text, v);

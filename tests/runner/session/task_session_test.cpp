@@ -19,6 +19,7 @@
 #include "protocols/parse.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/protocol_info.h"
+#include "runner/session/replay_comparison.h"
 #include "runner/session/simulated_session.h"
 #include "runner/session/simulated_study.h"
 
@@ -221,6 +222,127 @@ TEST_F(TaskSession, RatesAndAdjusts) {
     EXPECT_EQ(level, *task.number);
   }
   EXPECT_GT(hard, 1.5 * soft);
+}
+
+TEST_F(TaskSession, IdentifiesAsInVersion1) {
+  const json keys = {{"1", "ball"}, {"2", "die"}};
+  json one = base();
+  one["version"] = 1;
+  one["orientation"] = "uniform";
+  one["stimuli"].push_back(
+      {{"name", "die"}, {"shape", "cube"}, {"edge_m", 0.05}, {"stiffness_n_per_m", 300}});
+  one["samples"] = true;
+  json two = one;
+  one["repetitions"] = 3;
+  one["response"] = {{"keys", keys}};
+  two["version"] = 2;
+  two["blocks"] = {{{"name", "shapes"},
+                    {"task", "identify"},
+                    {"stimuli", {"ball", "die"}},
+                    {"repetitions", 3},
+                    {"keys", keys}}};
+  simulate(parsed_study(one), path("one.db"));
+  simulate(parsed_study(two), path("two.db"));
+  const auto expected = trials_of(path("one.db")), found = trials_of(path("two.db"));
+  ASSERT_EQ(found.size(), 6U);
+  ASSERT_EQ(expected.size(), 6U);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].shape, expected[i].shape);
+    EXPECT_EQ(found[i].orientation_wxyz, expected[i].orientation_wxyz);
+    EXPECT_EQ(found[i].response, expected[i].response);
+    EXPECT_EQ(found[i].correct, expected[i].correct);
+    EXPECT_EQ(found[i].response_time, expected[i].response_time);
+    EXPECT_EQ(found[i].onset_ns, expected[i].onset_ns);
+    EXPECT_EQ(found[i].ticks, expected[i].ticks);
+    EXPECT_EQ(found[i].max_force, expected[i].max_force);
+    EXPECT_EQ(found[i].first_contact_time, expected[i].first_contact_time);
+    EXPECT_EQ(found[i].contact_share, expected[i].contact_share);
+    ASSERT_TRUE(found[i].task.has_value());
+    EXPECT_EQ(found[i].task->success, found[i].correct);
+  }
+}
+
+TEST_F(TaskSession, TellsThingsThatDifferInStiffnessAlone) {
+  json document = base();
+  document["stimuli"].push_back(document["stimuli"][0]);
+  document["stimuli"][1]["name"] = "hard-ball";
+  document["stimuli"][1]["stiffness_n_per_m"] = 900;
+  document["blocks"] = {{{"name", "which"},
+                         {"task", "identify"},
+                         {"stimuli", {"ball", "hard-ball"}},
+                         {"repetitions", 10},
+                         {"keys", {{"1", "ball"}, {"2", "hard-ball"}}}}};
+  simulate(parsed_study(document), path("a.db"));
+  int right = 0;
+  for (const data::TrialRecord& trial : trials_of(path("a.db"))) right += trial.correct ? 1 : 0;
+  EXPECT_GE(right, 17);  // of 20: a factor of 3, but for lapses
+  EXPECT_LE(right, 20);
+}
+
+TEST_F(TaskSession, JudgesSizesByWhereTheHandMetTheSurface) {
+  const auto share_right = [&](double level, const std::string& name) {
+    json document = base();
+    document["blocks"] = {{{"name", "size"},
+                           {"task", "compare"},
+                           {"stimuli", {"ball"}},
+                           {"standard", "ball"},
+                           {"level", {{"path", "/radius_m"}}},
+                           {"procedure",
+                            {{"kind", "constant"}, {"levels", {level}}, {"repetitions", 30}}}}};
+    simulate(parsed_study(document), path(name));
+    int right = 0;
+    for (const data::TrialRecord& trial : trials_of(path(name))) right += trial.correct ? 1 : 0;
+    return right / 30.0;
+  };
+  const double alike = share_right(0.0305, "alike.db"), apart = share_right(0.042, "apart.db");
+  EXPECT_GE(apart, 0.9);  // 12 mm, some four standard deviations of the percept
+  EXPECT_LT(alike, apart);
+  EXPECT_LT(alike, 0.85);  // half a millimetre
+}
+
+TEST_F(TaskSession, RepeatsItsTrialsToTheBit) {
+  json document = base();
+  document["renderers"] = {"point", "ray"};
+  document["orientation"] = "uniform";
+  document["samples"] = true;
+  document["blocks"] = json::parse(R"([
+    {"name": "two", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+     "renderers": ["ray"], "standard_renderer": "point", "level": {"path": "/radius_m"},
+     "procedure": {"kind": "staircase", "start": 0.036, "min": 0.03, "max": 0.04,
+                   "steps": [0.002], "down": 2, "stop": {"trials": 3}}},
+    {"name": "any", "task": "detect", "stimuli": ["ball"], "renderers": ["point"],
+     "catch_trials": 0.5, "level": {"path": "/stiffness_n_per_m"},
+     "procedure": {"kind": "constant", "levels": [200], "repetitions": 1}},
+    {"name": "equal", "task": "adjust", "stimuli": ["ball"], "standard": "ball",
+     "renderers": ["ray"], "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 600,
+     "turn": 60, "starts": [150, 550]}])");
+  const protocols::Protocol protocol = parsed_study(document);
+  simulate(protocol, path("a.db"));
+  data::Store store = data::Store::open(path("a.db"), data::Store::Mode::read_only);
+  int intervals = 0, trials = 0;
+  double differences = 0;
+  store.for_each_trial(
+      [&](const data::StoredTrial& stored) {
+        ++trials;
+        const ReplayComparison again = compare_with_record(protocol, stored.record, true);
+        EXPECT_EQ(again.equal_ticks, stored.record.samples.size());
+        EXPECT_EQ(again.ticks.size(), stored.record.samples.size());
+        ASSERT_EQ(again.intervals.size(), stored.record.task->intervals.size());
+        std::uint64_t ticks = 0;
+        for (const ReplayedInterval& one : again.intervals) {
+          EXPECT_GT(one.ticks, 100U);
+          ticks += one.ticks;
+        }
+        EXPECT_EQ(ticks, stored.record.ticks);
+        intervals += static_cast<int>(again.intervals.size());
+        const bool empty = stored.record.task->catch_trial;
+        EXPECT_EQ(again.recorded.max_force > 0, !empty);
+        differences += again.rms_difference;
+      },
+      true);
+  EXPECT_EQ(trials, 6);
+  EXPECT_GT(intervals, 10);
+  EXPECT_GT(differences, 0);  // somewhere the side of the stylus touches
 }
 
 TEST_F(TaskSession, ExportsTheColumnsOfTasksForVersion2Only) {

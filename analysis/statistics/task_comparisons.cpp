@@ -1,0 +1,151 @@
+#include "analysis/statistics/task_comparisons.h"
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <utility>
+
+#include "analysis/statistics/task_analysis.h"
+
+namespace palpate::analysis {
+namespace {
+
+/// A figure of each participant of a cell.
+using Figures = std::vector<std::pair<std::string, double>>;
+
+struct Measure {
+  const char* name;
+  std::function<Figures(const TaskCell&)> of;
+};
+
+Figures thresholds(const TaskCell& cell, bool two_sided) {
+  Figures figures;
+  const bool has_pse = cell.task == "compare" && !cell.forced_choice;
+  if (has_pse != two_sided) return figures;
+  for (const ParticipantFunction& one : cell.functions) {
+    if (one.fit.undefined.empty())
+      figures.emplace_back(one.participant, one.fit.parameters.threshold);
+  }
+  return figures;
+}
+
+Figures jnds(const TaskCell& cell) {
+  Figures figures;
+  if (cell.task != "compare") return figures;
+  for (const ParticipantFunction& one : cell.functions) {
+    if (!one.fit.undefined.empty()) continue;
+    std::optional<double> jnd = one.discrimination.jnd;
+    if (cell.forced_choice) {
+      jnd.reset();
+      if (cell.standard_level) jnd = std::abs(one.fit.parameters.threshold - *cell.standard_level);
+    }
+    // A function that is as steep as can be has none.
+    if (jnd && *jnd > 0 && !one.fit.slope_at_bound) figures.emplace_back(one.participant, *jnd);
+  }
+  return figures;
+}
+
+Figures exponents(const TaskCell& cell) {
+  Figures figures;
+  if (!cell.magnitude) return figures;
+  for (const StevensLine& line : cell.magnitude->lines) {
+    if (line.exponent) figures.emplace_back(cell.participants[line.participant], *line.exponent);
+  }
+  return figures;
+}
+
+Figures settings(const TaskCell& cell) {
+  Figures figures;
+  for (const Adjustment& one : cell.adjustments)
+    figures.emplace_back(cell.participants[one.participant], one.pse);
+  return figures;
+}
+
+std::vector<Measure> measures() {
+  return {{"threshold", [](const TaskCell& cell) { return thresholds(cell, false); }},
+          {"pse", [](const TaskCell& cell) { return thresholds(cell, true); }},
+          {"jnd", jnds},
+          {"exponent", exponents},
+          {"pse", settings}};
+}
+
+/// Fewer than two cells that have figures: none.
+std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells,
+                                       const Measure& measure,
+                                       const std::function<std::string(const TaskCell&)>& name) {
+  TaskComparison result;
+  result.measure = measure.name;
+  result.logarithms = true;
+  std::vector<ParticipantFigure> all;
+  std::map<std::string, std::size_t> numbers;
+  for (const TaskCell* cell : cells) {
+    const Figures figures = measure.of(*cell);
+    if (figures.empty()) continue;
+    result.task = cell->task;
+    for (const auto& [participant, value] : figures) {
+      const auto number = numbers.emplace(participant, numbers.size()).first->second;
+      all.push_back({number, result.conditions.size(), value});
+      result.logarithms &= value > 0;
+    }
+    result.conditions.push_back(name(*cell));
+  }
+  if (result.conditions.size() < 2) return std::nullopt;
+  if (result.logarithms) {
+    for (ParticipantFigure& figure : all) figure.value = std::log(figure.value);
+  }
+  result.comparison = compare_thresholds(all, result.conditions.size());
+  return result;
+}
+
+/// Groups in order of their first cell.
+template <class Key>
+std::vector<std::vector<const TaskCell*>> groups_of(const std::vector<TaskCell>& cells,
+                                                    const std::function<Key(const TaskCell&)>& key_of) {
+  std::vector<std::vector<const TaskCell*>> groups;
+  std::map<Key, std::size_t> places;
+  for (const TaskCell& cell : cells) {
+    const auto [place, is_new] = places.emplace(key_of(cell), groups.size());
+    if (is_new) groups.emplace_back();
+    groups[place->second].push_back(&cell);
+  }
+  return groups;
+}
+
+}  // namespace
+
+std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells) {
+  using Key = std::tuple<std::string, std::string, std::string>;
+  std::vector<TaskComparison> results;
+  for (const auto& group : groups_of<Key>(
+           cells, [](const TaskCell& c) { return Key{c.task, c.block_name, c.shape}; })) {
+    for (const Measure& measure : measures()) {
+      auto one = compared(group, measure, [](const TaskCell& cell) { return cell.renderer; });
+      if (!one) continue;
+      one->block_name = group.front()->block_name;
+      one->shape = group.front()->shape;
+      results.push_back(std::move(*one));
+    }
+  }
+  return results;
+}
+
+std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cells) {
+  using Key = std::tuple<std::string, std::string, std::optional<double>>;
+  std::vector<TaskComparison> results;
+  for (const auto& group : groups_of<Key>(
+           cells, [](const TaskCell& c) { return Key{c.task, c.renderer, c.standard_level}; })) {
+    for (const Measure& measure : measures()) {
+      auto one = compared(group, measure, [](const TaskCell& cell) {
+        return cell.block_name + (cell.shape.empty() ? "" : ", " + cell.shape);
+      });
+      if (!one) continue;
+      one->renderer = group.front()->renderer;
+      results.push_back(std::move(*one));
+    }
+  }
+  return results;
+}
+
+}  // namespace palpate::analysis

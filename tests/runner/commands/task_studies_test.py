@@ -1,0 +1,163 @@
+"""Studies of version 2 from end to end: simulate, analyze, export, replay, merge; identification as in version 1.
+Usage: task_studies_test.py PALPATE PROTOCOLS"""
+
+import csv
+import io
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE, PROTOCOLS = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
+SHIPPED = ("stiffness-2afc", "size-questplus", "roughness-magnitude")
+SHAPES = [{"name": "sphere", "shape": "sphere", "radius_m": 0.03}, {"name": "cube", "shape": "cube", "edge_m": 0.05}]
+KEYS = {"1": "sphere", "2": "cube"}
+
+
+class TaskStudies(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=600)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def simulated(self, protocol, name, *more, participants=2, seed=1):
+        db = self.dir / f"{name}.db"
+        self.palpate("simulate", protocol, "--db", db, "--participants", participants, "--seed", seed, *more)
+        return db
+
+    def rows(self, db):
+        out = self.dir / f"{db.stem}.csv"
+        self.palpate("export", "--db", db, "--format", "csv", "--out", out, "--force")
+        text = out.read_text()
+        return text, list(csv.DictReader(io.StringIO(text)))
+
+    def numbers(self, *source):
+        out = self.dir / "numbers.json"
+        self.palpate("analyze", *source, "--json", out, "--force")
+        return json.loads(out.read_text())
+
+    def test_shipped_protocols_go_from_simulation_to_report_and_exports(self):
+        for name in SHIPPED:
+            with self.subTest(name):
+                protocol = PROTOCOLS / f"{name}.json"
+                db = self.simulated(protocol, name)
+                page = self.dir / f"{name}.html"
+                out = self.dir / f"{name}.numbers.json"
+                said = self.palpate("analyze", "--db", db, "--report", page, "--json", out,
+                                    "--figures", self.dir / f"{name}-figures").stdout
+                self.assertTrue(said.startswith("SIMULATED PARTICIPANTS"))
+                self.assertIn("SIMULATED PARTICIPANTS", page.read_text())
+                found = json.loads(out.read_text())
+                text, rows = self.rows(db)
+                self.assertEqual(found["n_trials"] + found["n_practice"], len(rows))
+                # The export is analysed to the same cells as the database.
+                self.assertEqual(self.numbers("--csv", self.dir / f"{name}.csv")["cells"], found["cells"])
+                for kind in ("bids", "psych-ds"):
+                    folder = self.dir / f"{name}-{kind}"
+                    self.palpate("export", "--db", db, "--format", kind, "--out", folder)
+                    self.assertTrue(any(folder.rglob("*.tsv")) or any(folder.rglob("*.csv")))
+                    self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--force")
+                # A second time nothing changes; resumed in parts it is the same; another seed is not.
+                self.palpate("simulate", protocol, "--db", db, "--participants", 2)
+                self.assertEqual(self.rows(db)[0], text)
+                parts = self.simulated(protocol, f"{name}-parts", participants=1)
+                self.palpate("simulate", protocol, "--db", parts, "--participants", 2)
+                self.assertEqual(self.rows(parts)[0], text)
+                self.assertNotEqual(self.rows(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
+
+    def test_what_the_simulated_participants_can_do_is_found_again(self):
+        db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "a", participants=4)
+        found = self.numbers("--db", db)
+        constant = next(cell for cell in found["cells"] if cell["block_name"] == "constant")
+        self.assertFalse(constant["forced_choice"])
+        for one in constant["psychometric_functions"]:
+            # Weber fraction 0.15 of 300 N/m is the sd of the difference: 30 N/m between 50 and 75 %.
+            self.assertAlmostEqual(one["fit"]["pse"], 300, delta=40)
+            self.assertAlmostEqual(one["bayes"]["threshold"], one["fit"]["threshold"], delta=15)
+        self.assertEqual({one["measure"] for one in found["condition_comparisons"]} & {"jnd"}, {"jnd"})
+        stairs = next(cell for cell in found["cells"] if cell["block_name"] == "staircases")
+        for one in stairs["psychometric_functions"]:
+            self.assertEqual(sorted(track["track"] for track in one["tracks"]), ["1", "2"])
+            for track in one["tracks"]:
+                # Eight reversals end a track; the last trial has no next level to turn to.
+                self.assertGreaterEqual(len(track["reversal_trials"]), 5)
+                levels = track["levels"]
+                for trial in track["reversal_trials"]:
+                    before = [x for x in levels[:trial] if x != levels[trial - 1]][-1]
+                    after = levels[trial]
+                    self.assertGreater((levels[trial - 1] - before) * (levels[trial - 1] - after), 0)
+
+    def identification(self):
+        """The same study in version 1 and in version 2."""
+        base = {"renderers": ["point", "ray"], "stimuli": SHAPES, "seed": 3}
+        one = {**base, "version": 1, "name": "one", "repetitions": 5, "response": {"keys": KEYS, "time_out_s": 20}}
+        block = {"task": "identify", "stimuli": ["sphere", "cube"], "repetitions": 5, "keys": KEYS, "time_out_s": 20}
+        two = {**base, "version": 2, "name": "two", "block_order": "counterbalanced",
+               "blocks": [{**block, "name": kind, "renderers": [kind]} for kind in ("point", "ray")]}
+        for protocol in (one, two):
+            (self.dir / f"{protocol['name']}.json").write_text(json.dumps(protocol))
+        return self.dir / "one.json", self.dir / "two.json"
+
+    def test_identification_gives_the_trials_and_figures_of_version_1(self):
+        one, two = self.identification()
+        for seed in (1, 4):
+            with self.subTest(seed=seed):
+                databases = [self.simulated(path, f"{path.stem}{seed}", participants=4, seed=seed) for path in (one, two)]
+                (_, expected), (_, found) = (self.rows(db) for db in databases)
+                own = {"protocol_name", "protocol_sha256"}
+                self.assertEqual(len(found), 4 * 20)
+                for a, b in zip(expected, found):
+                    self.assertEqual({key: b[key] for key in a if key not in own}, {key: a[key] for key in a if key not in own})
+                    self.assertEqual((b["task"], b["success"]), ("identify", b["correct"]))
+                plain = self.numbers("--db", databases[0])
+                tasks = self.numbers("--db", databases[1])
+                again = tasks["identification"]
+                for key in ("counts", "accuracy", "confusion", "times", "paired_by_shape", "rm_anova", "mixed_model",
+                            "speed_accuracy", "practice", "exclusions"):
+                    self.assertEqual(again[key], plain[key], key)
+                from_csv = self.numbers("--csv", self.dir / f"two{seed}.csv")
+                self.assertEqual(from_csv["identification"]["times"], plain["times"])
+                self.assertEqual(from_csv["accuracy_model"], tasks["accuracy_model"])
+
+    def test_shards_merge_to_the_whole_study(self):
+        _, two = self.identification()
+        whole = self.rows(self.simulated(two, "whole", participants=3))[0]
+        parts = [self.simulated(two, f"part{i}", "--shard", f"{i}/3", participants=3) for i in (1, 2, 3)]
+        merged = self.dir / "merged.db"
+        self.palpate("merge", "--out", merged, *parts)
+        self.assertEqual(self.rows(merged)[0], whole)
+
+    def test_every_interval_is_replayed_to_the_bit(self):
+        protocol = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())
+        protocol["samples"] = True
+        protocol["blocks"] = [protocol["blocks"][0]]
+        protocol["blocks"][0]["practice"] = False
+        path = self.dir / "kept.json"
+        path.write_text(json.dumps(protocol))
+        db = self.simulated(path, "kept", participants=1)
+        out = self.dir / "replay.json"
+        for trial in (1, 4):
+            table = self.dir / f"ticks{trial}.csv"
+            done = self.palpate("replay", "--db", db, "--trial", f"S001/1/{trial}", "--compare", "--json", out, "--force",
+                                "--out", table)
+            self.assertIn("equal the record, bit by bit", done.stdout)
+            self.assertIn("interval 2:", done.stdout)
+            found = json.loads(out.read_text())
+            self.assertEqual(found["task"], "compare")
+            self.assertEqual([one["ticks"] for one in found["intervals"]], [one["equal_ticks"] for one in found["intervals"]])
+            self.assertEqual(sum(one["ticks"] for one in found["intervals"]), found["ticks"])
+            self.assertEqual(sorted(one["standard"] for one in found["intervals"]), [False, True])
+            rows = list(csv.DictReader(io.StringIO(table.read_text())))
+            self.assertEqual({row["interval"] for row in rows}, {"1", "2"})
+            self.assertEqual([row["t"] for row in rows if row["tick"] == "0"], ["0", "0"])
+
+
+if __name__ == "__main__":
+    unittest.main()
