@@ -181,9 +181,8 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
   for (std::size_t g = 0; g < groups.size(); ++g) {
     for (int b = 0; b < protocol.blocks_per_renderer; ++b) {
       const int repetitions = part_size(protocol.repetitions, protocol.blocks_per_renderer, b);
-      blocks.push_back(
-          {1, static_cast<int>(g),
-           block_of_trials(protocol, participant_number, groups[g], b, repetitions)});
+      blocks.push_back({1, static_cast<int>(g),
+                        block_of_trials(protocol, participant_number, groups[g], b, repetitions)});
     }
   }
   std::vector<Trial*> all;

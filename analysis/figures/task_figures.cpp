@@ -61,7 +61,8 @@ Panel function_panel(const ParticipantFunction& one) {
   return panel;
 }
 
-/// Levels in the order of a track: a circle where the answer was a success, a diamond where it turned.
+/// Levels in the order of a track: a circle where the answer was a success, a diamond where it
+/// turned.
 Panel track_panel(const ParticipantFunction& one, const Track& track) {
   Panel panel;
   panel.title = stimuli::printable(one.participant);
@@ -86,11 +87,10 @@ Panel track_panel(const ParticipantFunction& one, const Track& track) {
     if (turned)
       panel.marks.push_back(symbol(Role::amber, MarkerShape::diamond, trial, track.levels[i], 6,
                                    "reversal at trial " + std::to_string(i + 1)));
-    panel.marks.push_back(symbol(success ? Role::ray : Role::point,
-                                 success ? MarkerShape::circle : MarkerShape::saltire, trial,
-                                 track.levels[i], 3,
-                                 "trial " + std::to_string(i + 1) +
-                                     (success ? ": success" : ": no success")));
+    panel.marks.push_back(
+        symbol(success ? Role::ray : Role::point,
+               success ? MarkerShape::circle : MarkerShape::saltire, trial, track.levels[i], 3,
+               "trial " + std::to_string(i + 1) + (success ? ": success" : ": no success")));
   }
   return panel;
 }

@@ -118,7 +118,8 @@ std::string measure_name(const TaskComparison& one) {
 }
 
 std::string comparison_text(const TaskComparison& one, bool of_renderers) {
-  std::string text = measure_name(one) + " by " + (of_renderers ? "renderer" : "block and stimulus");
+  std::string text =
+      measure_name(one) + " by " + (of_renderers ? "renderer" : "block and stimulus");
   const auto add = [&](const std::string& name) {
     if (!name.empty()) text += ", " + stimuli::printable(name);
   };
@@ -157,11 +158,10 @@ std::string accuracy_text(const MixedLogistic& model) {
   if (!model.undefined.empty()) return text + "  undefined: " + model.undefined + "\n\n";
   for (const LogisticCoefficient& one : model.coefficients) {
     const bool intercept = one.name == "(Intercept)";
-    text += "  " + pad_right(stimuli::printable(one.name), 18) +
-            (intercept ? "odds " : "odds ratio ") +
-            with_interval(std::exp(one.estimate),
-                          {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
-            ", p " + p_text(one.p) + "\n";
+    text +=
+        "  " + pad_right(stimuli::printable(one.name), 18) + (intercept ? "odds " : "odds ratio ") +
+        with_interval(std::exp(one.estimate), {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
+        ", p " + p_text(one.p) + "\n";
   }
   if (!model.random_sds.empty())
     text += "  standard deviation of the participants' log odds " +

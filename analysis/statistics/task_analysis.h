@@ -37,7 +37,7 @@ struct ParticipantFunction {
   Discrimination discrimination;
   PsychometricPosterior posterior;  ///< of the same counts and model
   std::vector<Track> tracks;        ///< of more than one trial
-  Detectability detectability;  ///< detect with catch trials; else undefined
+  Detectability detectability;      ///< detect with catch trials; else undefined
 };
 
 /// All trials of one task with a stimulus and a renderer in a block.
@@ -65,8 +65,8 @@ struct TaskAnalysis {
   std::optional<MixedLogistic> accuracy;  ///< likewise
 };
 
-/// \param simulations  of each goodness of fit. \param settings, program_version  of the analysis of
-/// identification
+/// \param simulations  of each goodness of fit. \param settings, program_version  of the analysis
+/// of identification
 TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
                            const AnalysisSettings& settings = {},
                            const std::string& program_version = {});

@@ -101,8 +101,8 @@ std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells
 
 /// Groups in order of their first cell.
 template <class Key>
-std::vector<std::vector<const TaskCell*>> groups_of(const std::vector<TaskCell>& cells,
-                                                    const std::function<Key(const TaskCell&)>& key_of) {
+std::vector<std::vector<const TaskCell*>> groups_of(
+    const std::vector<TaskCell>& cells, const std::function<Key(const TaskCell&)>& key_of) {
   std::vector<std::vector<const TaskCell*>> groups;
   std::map<Key, std::size_t> places;
   for (const TaskCell& cell : cells) {
@@ -118,8 +118,9 @@ std::vector<std::vector<const TaskCell*>> groups_of(const std::vector<TaskCell>&
 std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells) {
   using Key = std::tuple<std::string, std::string, std::string>;
   std::vector<TaskComparison> results;
-  for (const auto& group : groups_of<Key>(
-           cells, [](const TaskCell& c) { return Key{c.task, c.block_name, c.shape}; })) {
+  for (const auto& group : groups_of<Key>(cells, [](const TaskCell& c) {
+         return Key{c.task, c.block_name, c.shape};
+       })) {
     for (const Measure& measure : measures()) {
       auto one = compared(group, measure, [](const TaskCell& cell) { return cell.renderer; });
       if (!one) continue;
@@ -134,8 +135,9 @@ std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells
 std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cells) {
   using Key = std::tuple<std::string, std::string, std::optional<double>>;
   std::vector<TaskComparison> results;
-  for (const auto& group : groups_of<Key>(
-           cells, [](const TaskCell& c) { return Key{c.task, c.renderer, c.standard_level}; })) {
+  for (const auto& group : groups_of<Key>(cells, [](const TaskCell& c) {
+         return Key{c.task, c.renderer, c.standard_level};
+       })) {
     for (const Measure& measure : measures()) {
       auto one = compared(group, measure, [](const TaskCell& cell) {
         return cell.block_name + (cell.shape.empty() ? "" : ", " + cell.shape);

@@ -1,6 +1,7 @@
 #pragma once
 // What the same participants have under several renderers, or in several blocks and with several
-// stimuli of a task: thresholds, JNDs, exponents, settings. Paired and mixed (threshold_comparison.h).
+// stimuli of a task: thresholds, JNDs, exponents, settings. Paired and mixed
+// (threshold_comparison.h).
 
 #include <string>
 #include <vector>

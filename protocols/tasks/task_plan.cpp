@@ -25,7 +25,7 @@ enum TaskUse : std::uint64_t {
   kTaskTracks = 5
 };
 
-constexpr std::size_t kCatchWindow = 20;   // trials
+constexpr std::size_t kCatchWindow = 20;    // trials
 constexpr long long kLeastUnanswered = 10;  // trials
 
 stimuli::Random task_stream(const Protocol& protocol, int participant, std::uint64_t block,
@@ -223,7 +223,9 @@ Protocol version_1_view(const Protocol& protocol, const TaskBlock* block) {
   view.renderers = protocol.renderers;
   view.orientation = protocol.orientation;
   view.orientations = protocol.orientations;
-  const auto add = [&](const StimulusSpec& stimulus) { view.stimuli.push_back({stimulus.name, {}}); };
+  const auto add = [&](const StimulusSpec& stimulus) {
+    view.stimuli.push_back({stimulus.name, {}});
+  };
   if (block == nullptr) {
     for (const StimulusSpec& stimulus : protocol.stimuli) add(stimulus);
     return view;
@@ -405,8 +407,9 @@ Trial TaskPlan::adaptive_trial() const {
 void TaskPlan::find_next() {
   next_.reset();
   while (at_ < order_.size()) {
-    const bool more = tracks_ ? tracks_->next().has_value() && unanswered_ < most_unanswered(block())
-                              : shown_ < fixed_.size();
+    const bool more = tracks_
+                          ? tracks_->next().has_value() && unanswered_ < most_unanswered(block())
+                          : shown_ < fixed_.size();
     if (more) break;
     if (++at_ < order_.size()) begin_block();
   }

@@ -4,8 +4,9 @@
 //
 // Identification without levels has the order and orientations that version 1 gives the same design
 // (schedule.h): one renderer a block, or several without limits on the order. Other blocks without
-// adaptive procedures have their trials in an order by chance under the limits of the block; those of adaptive ones are mixed in rounds, one trial of each track. Catch trials of
-// an adaptive block are spread by chance over every 20 trials.
+// adaptive procedures have their trials in an order by chance under the limits of the block; those
+// of adaptive ones are mixed in rounds, one trial of each track. Catch trials of an adaptive block
+// are spread by chance over every 20 trials.
 
 #include <cstdint>
 #include <optional>
@@ -63,8 +64,8 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
 bool is_adaptive(const TaskBlock& block);
 /// No participant has more trials in it, but for those that are not answered.
 long long most_trials_of(const TaskBlock& block);
-/// So many trials of an adaptive block without an answer, whose levels come again, end it: nobody is
-/// there. A quarter of most_trials_of, at least 10.
+/// So many trials of an adaptive block without an answer, whose levels come again, end it: nobody
+/// is there. A quarter of most_trials_of, at least 10.
 std::size_t most_unanswered(const TaskBlock& block);
 /// \throws ScheduleError: the limits on the order of its trials cannot be met
 void check_order(const Protocol& protocol, int block);

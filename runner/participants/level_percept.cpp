@@ -15,8 +15,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kLeastDepth = 2e-4;     // m; below it force over depth is noise
-constexpr double kLevelStep = 1e-3;      // of the level, for the derivative
+constexpr double kLeastDepth = 2e-4;        // m; below it force over depth is noise
+constexpr double kLevelStep = 1e-3;         // of the level, for the derivative
 constexpr double kLeastSensitivity = 1e-3;  // m of surface for a m of the level
 
 double box_distance(const Vec3& size, const Vec3& point) {
@@ -46,7 +46,9 @@ double distance_to(const stimuli::ObjectSpec& object, const Vec3& point) {
   }
 }
 
-bool is_length(const std::string& pointer) { return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos; }
+bool is_length(const std::string& pointer) {
+  return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos;
+}
 
 }  // namespace
 
@@ -94,8 +96,7 @@ void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interva
 void LevelPercept::know_object(const protocols::TaskBlock& block,
                                const protocols::Interval& interval) {
   const std::optional<double> level =
-      interval.level ? interval.level
-                     : protocols::own_level(protocol_, block, interval.stimulus);
+      interval.level ? interval.level : protocols::own_level(protocol_, block, interval.stimulus);
   if (!level) return;
   for (const double step : {kLevelStep * std::abs(*level), -kLevelStep * std::abs(*level)}) {
     try {

@@ -9,7 +9,8 @@
 //   detect    "yes" by a psychometric function (protocols/procedures/psychometric.h)
 //   rate      number = level^exponent, times exp(noise)
 //   adjust    turns towards the standard until the estimates are less than half a turn apart
-//   identify  what differs in stiffness alone: the stimulus whose stiffness is nearest, as a ratio, to
+//   identify  what differs in stiffness alone: the stimulus whose stiffness is nearest, as a ratio,
+//   to
 //             the estimate; shapes: SimulatedParticipant; else right, but for lapses
 // With the share `lapse` any answer is given.
 
@@ -66,7 +67,7 @@ class TaskJudgement {
   bool feels_standard_ = false;
   double last_level_ = 0;
   bool measured_ = false;  ///< the last one was
-  double evidence_ = 0;  ///< how clear the answer was, in sd
+  double evidence_ = 0;    ///< how clear the answer was, in sd
 };
 
 }  // namespace palpate::runner

@@ -28,8 +28,8 @@ class TaskParticipant final : public Respondent {
   /// As SimulatedParticipant. \param hypotheses  to explore with. \param of_blocks  to identify;
   /// must outlive it, too
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                  const BlockHypotheses& of_blocks, SimulatedStylus& stylus, const protocols::Protocol& protocol, std::uint64_t seed,
-                  int number);
+                  const BlockHypotheses& of_blocks, SimulatedStylus& stylus,
+                  const protocols::Protocol& protocol, std::uint64_t seed, int number);
 
   void read(const std::string&) override {}
   void feedback(bool) override {}

@@ -100,18 +100,15 @@ ForceSummary render_other(const protocols::Protocol& protocol, const data::Trial
   Summarizer shown(renderers_of(record, true));
   double square_sum = 0;  // N^2
   auto tick = out.ticks.begin();
-  replay(protocol, record, true,
-         [&](std::size_t, const data::SampleRecord& was, const Sample& is) {
-           const rendering::Rendering& r = is.rendering;
-           shown.add(tick->time, glm::length(r.force), r.deepest.depth,
-                     static_cast<int>(r.contacts));
-           const double apart =
-               glm::length(r.force - Vec3(was.force[0], was.force[1], was.force[2]));
-           square_sum += apart * apart;
-           out.max_difference = std::max(out.max_difference, apart);
-           tick->other = rendered(is);
-           ++tick;
-         });
+  replay(protocol, record, true, [&](std::size_t, const data::SampleRecord& was, const Sample& is) {
+    const rendering::Rendering& r = is.rendering;
+    shown.add(tick->time, glm::length(r.force), r.deepest.depth, static_cast<int>(r.contacts));
+    const double apart = glm::length(r.force - Vec3(was.force[0], was.force[1], was.force[2]));
+    square_sum += apart * apart;
+    out.max_difference = std::max(out.max_difference, apart);
+    tick->other = rendered(is);
+    ++tick;
+  });
   out.rms_difference = std::sqrt(square_sum / static_cast<double>(out.ticks.size()));
   return shown.over(out.ticks.size());
 }

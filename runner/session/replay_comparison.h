@@ -27,8 +27,8 @@ struct RenderedForce {
 };
 
 struct ReplayedTick {
-  double time = 0;            ///< s from the interval's time zero
-  std::size_t interval = 1;   ///< from 1
+  double time = 0;           ///< s from the interval's time zero
+  std::size_t interval = 1;  ///< from 1
   const data::SampleRecord* recorded;
   RenderedForce again;  ///< by the recorded renderer
   RenderedForce other;  ///< by the other one, where it was asked for

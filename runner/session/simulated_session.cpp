@@ -60,8 +60,8 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   if (protocol.passivity_controller) servo.control_passivity();
   std::unique_ptr<Respondent> participant;
   if (protocol.version == 2) {
-    participant = std::make_unique<TaskParticipant>(
-        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
+    participant = std::make_unique<TaskParticipant>(own, study.hypotheses, study.of_blocks, stylus,
+                                                    protocol, study.seed, session.participant);
   } else {
     participant = std::make_unique<SimulatedParticipant>(own, study.hypotheses, stylus, protocol,
                                                          study.seed, session.participant);

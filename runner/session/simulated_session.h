@@ -28,7 +28,7 @@ struct SimulatedStudy {
   StimulusLibrary library;
   ShapeHypotheses hypotheses;
   BlockHypotheses of_blocks;  ///< version 2
-  std::uint64_t seed;  ///< of the participants; the schedule has the protocol's own
+  std::uint64_t seed;         ///< of the participants; the schedule has the protocol's own
 };
 
 struct SimulatedSession {

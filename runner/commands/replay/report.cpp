@@ -34,14 +34,14 @@ std::string verdict(const RecordedTrial& trial, const ReplayComparison& found) {
   if (found.equal_ticks == ticks)
     return "Rendered again: all " + std::to_string(ticks) +
            " ticks equal the record, bit by bit.\n";
-  std::string text = "Rendered again: " + std::to_string(ticks - found.equal_ticks) + " of " +
-                     std::to_string(ticks) + " ticks differ from the record, the first is tick " +
-                     std::to_string(found.first_difference.value_or(0)) +
-                     (found.intervals.size() > 1
-                          ? " of interval " + std::to_string(found.differing_interval)
-                          : "") +
-                     ". Recorded with palpate " + printable(trial.stored.run.program_version) +
-                     ", replayed with " PALPATE_VERSION ".\n";
+  std::string text =
+      "Rendered again: " + std::to_string(ticks - found.equal_ticks) + " of " +
+      std::to_string(ticks) + " ticks differ from the record, the first is tick " +
+      std::to_string(found.first_difference.value_or(0)) +
+      (found.intervals.size() > 1 ? " of interval " + std::to_string(found.differing_interval)
+                                  : "") +
+      ". Recorded with palpate " + printable(trial.stored.run.program_version) +
+      ", replayed with " PALPATE_VERSION ".\n";
   if (!found.periods_known)
     text += "The record does not hold the ticks' periods, on which damping depends.\n";
   return text;
@@ -79,8 +79,8 @@ std::string intervals_text(const ReplayComparison& found) {
     text += "  interval " + std::to_string(i + 1) + ": " +
             (one.stimulus.empty() ? "nothing" : printable(one.stimulus)) + ", " +
             printable(one.renderer) + (one.level ? formatted(", level %.12g", *one.level) : "") +
-            (one.standard ? ", standard" : "") + formatted(": %zu of %zu ticks equal\n",
-                                                           one.equal_ticks, one.ticks);
+            (one.standard ? ", standard" : "") +
+            formatted(": %zu of %zu ticks equal\n", one.equal_ticks, one.ticks);
   }
   return text;
 }

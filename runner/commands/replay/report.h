@@ -13,8 +13,8 @@ std::string to_text(const std::string& name, const RecordedTrial& trial,
                     const ReplayComparison& found);
 std::string to_json_text(const std::string& name, const RecordedTrial& trial,
                          const ReplayComparison& found);
-/// A row for each tick: s, m, N, N m; the other renderer's columns where it was asked for. Of a trial
-/// of version 2 `interval` comes first, and t counts within it.
+/// A row for each tick: s, m, N, N m; the other renderer's columns where it was asked for. Of a
+/// trial of version 2 `interval` comes first, and t counts within it.
 std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found);
 
 }  // namespace palpate::runner

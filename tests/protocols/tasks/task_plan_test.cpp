@@ -242,16 +242,22 @@ SameStudy identification(const char* orientation) {
           {"name": "cube", "shape": "cube", "edge_m": 0.06}])");
   const json keys = {{"1", "sphere"}, {"2", "cone"}, {"3", "cube"}};
   SameStudy study;
-  study.one = {{"version", 1},       {"name", "s"},     {"renderers", {"point", "ray"}},
-               {"stimuli", stimuli}, {"seed", 8},       {"orientation", json::parse(orientation)},
-               {"repetitions", 5},   {"response", {{"keys", keys}}}};
+  study.one = {{"version", 1},
+               {"name", "s"},
+               {"renderers", {"point", "ray"}},
+               {"stimuli", stimuli},
+               {"seed", 8},
+               {"orientation", json::parse(orientation)},
+               {"repetitions", 5},
+               {"response", {{"keys", keys}}}};
   study.two = study.one;
   study.two.erase("repetitions");
   study.two.erase("response");
   study.two["version"] = 2;
   const auto block = [&](const char* name, const json& renderers) {
-    return json{{"name", name},           {"task", "identify"}, {"renderers", renderers},
-                {"stimuli", {"sphere", "cone", "cube"}}, {"repetitions", 5}, {"keys", keys}};
+    return json{{"name", name},           {"task", "identify"},
+                {"renderers", renderers}, {"stimuli", {"sphere", "cone", "cube"}},
+                {"repetitions", 5},       {"keys", keys}};
   };
   study.two["blocks"] = {block("with-point", {"point"}), block("with-ray", {"ray"})};
   study.two["block_order"] = "counterbalanced";

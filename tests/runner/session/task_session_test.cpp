@@ -282,13 +282,13 @@ TEST_F(TaskSession, TellsThingsThatDifferInStiffnessAlone) {
 TEST_F(TaskSession, JudgesSizesByWhereTheHandMetTheSurface) {
   const auto share_right = [&](double level, const std::string& name) {
     json document = base();
-    document["blocks"] = {{{"name", "size"},
-                           {"task", "compare"},
-                           {"stimuli", {"ball"}},
-                           {"standard", "ball"},
-                           {"level", {{"path", "/radius_m"}}},
-                           {"procedure",
-                            {{"kind", "constant"}, {"levels", {level}}, {"repetitions", 30}}}}};
+    document["blocks"] = {
+        {{"name", "size"},
+         {"task", "compare"},
+         {"stimuli", {"ball"}},
+         {"standard", "ball"},
+         {"level", {{"path", "/radius_m"}}},
+         {"procedure", {{"kind", "constant"}, {"levels", {level}}, {"repetitions", 30}}}}};
     simulate(parsed_study(document), path(name));
     int right = 0;
     for (const data::TrialRecord& trial : trials_of(path(name))) right += trial.correct ? 1 : 0;
