@@ -18,6 +18,14 @@ std::optional<RunEnd> parse_run_end(std::string_view text) {
   return std::nullopt;
 }
 
+std::int64_t first_onset_ns(const TrialRecord& record) {
+  if (!record.task) return record.onset_ns;
+  for (const IntervalRecord& interval : record.task->intervals) {
+    if (interval.onset_ns != 0) return interval.onset_ns;
+  }
+  return record.onset_ns;
+}
+
 bool is_participant_code(std::string_view code) {
   if (code.empty() || code.size() > 32) return false;
   for (const char c : code) {

@@ -92,6 +92,10 @@ struct TrialRecord {
   std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
 };
 
+/// First tick with forces on in the first interval that was felt, session clock; version 1: the
+/// trial's onset.
+std::int64_t first_onset_ns(const TrialRecord& record);
+
 /// A file that a protocol names, such as a mesh.
 struct ProtocolFile {
   std::string name;   ///< as the protocol names it

@@ -8,6 +8,7 @@
 #include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
 #include "data/export/dataset_writer.h"
+#include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"
 #include "data/files/utc.h"
 
@@ -23,7 +24,10 @@ std::span<const Column> beh_columns(const ExportClock& clock) {
   return trial_columns(clock.times(), clock.tasks()).subspan(1);
 }
 
-const Column kOnset{"onset", "First tick with forces on, from that of the first row", "s"};
+const Column kOnset{"onset",
+                    "First tick with forces on (of several intervals: in the first one), from that "
+                    "of the first row",
+                    "s"};
 const Column kDuration{"duration", "From onset to the response, or the limit for a time-out", "s"};
 
 /// Levels of the columns whose values come from the runs: device, version, protocol, observer.
@@ -154,9 +158,9 @@ void BidsWriter::add(const StoredTrial& trial) {
 }
 
 void BidsWriter::add_row(const StoredTrial& trial) {
-  row_ << trial.record.response_time;
+  row_ << duration_of(trial.record);
   put_trial_without_participant(row_, trial, clock_);
-  table_.rows.push_back({to_unix_ns(trial.run.clock, trial.record.onset_ns), row_.end()});
+  table_.rows.push_back({to_unix_ns(trial.run.clock, first_onset_ns(trial.record)), row_.end()});
   const ClockStamp& clock = trial.run.clock;
   if (table_.runs.empty() || table_.runs.back().clock.utc_ns != clock.utc_ns ||
       table_.runs.back().clock.monotonic_ns != clock.monotonic_ns) {

@@ -14,14 +14,32 @@ constexpr double kLongestGap = 60;  // s
 
 const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the tick is of", "1"};
 
-const std::string& empty_row() {
-  static const std::string row = [] {
-    DelimitedRow all(DelimitedFormat::tsv);
-    all << "";
-    for (std::size_t k = 0; k < sample_columns().size(); ++k) all << "";
-    return all.end();
-  }();
-  return row;
+std::vector<Column> columns_of(const StudyLabel& study) {
+  std::vector<Column> all{kTrialOfSample};
+  if (!study.facts.blocks.empty()) all.push_back(interval_column());
+  all.insert(all.end(), sample_columns().begin(), sample_columns().end());
+  return all;
+}
+
+/// What was felt in each interval.
+nlohmann::ordered_json intervals_of(const TaskRecord& task) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const IntervalRecord& interval : task.intervals) {
+    auto& one =
+        all.emplace_back(nlohmann::ordered_json{{"renderer", guarded_text(interval.renderer)}});
+    one["shape"] = interval.stimulus.empty()
+                       ? nlohmann::ordered_json()
+                       : nlohmann::ordered_json(guarded_text(interval.stimulus));
+    one["level"] =
+        interval.level ? nlohmann::ordered_json(*interval.level) : nlohmann::ordered_json();
+  }
+  return all;
+}
+
+std::string empty_row(std::size_t columns) {
+  DelimitedRow all(DelimitedFormat::tsv);
+  for (std::size_t k = 0; k < columns; ++k) all << "";
+  return all.end();
 }
 
 /// Replaces file names of the protocol by their BIDS URIs in the dataset.
@@ -55,7 +73,8 @@ BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study)
     : study_(study),
       run_(first.run),
       simulated_(first.participant.simulated),
-      begin_ns_(to_unix_ns(first.run.clock, first.record.onset_ns)) {}
+      columns_(columns_of(study)),
+      begin_ns_(to_unix_ns(first.run.clock, first_onset_ns(first.record))) {}
 
 std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
   if (unix_ns < begin_ns_) return std::nullopt;
@@ -69,18 +88,20 @@ std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
 bool BidsRecording::continues_with(const StoredTrial& trial) const {
   const ClockStamp &a = run_.clock, &b = trial.run.clock;
   if (a.utc_ns != b.utc_ns || a.monotonic_ns != b.monotonic_ns) return false;
-  const auto slot = slot_of(to_unix_ns(b, trial.record.onset_ns));
+  const auto slot = slot_of(to_unix_ns(b, first_onset_ns(trial.record)));
   if (!slot || *slot < free_) return false;
   return static_cast<double>(*slot - free_) <= kLongestGap * study_.facts.servo_rate;
 }
 
 void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   const TrialRecord& record = trial.record;
-  const std::int64_t onset = slot_of(to_unix_ns(trial.run.clock, record.onset_ns)).value_or(free_);
-  const double length = std::ceil(record.response_time * study_.facts.servo_rate);
+  const std::int64_t onset =
+      slot_of(to_unix_ns(trial.run.clock, first_onset_ns(record))).value_or(free_);
+  const double length = std::ceil(duration_of(record) * study_.facts.servo_rate);
   free_ = onset + static_cast<std::int64_t>(std::clamp(length, 0.0, 1e9));
   if (record.samples.empty()) return;
   SampleSlots slots(trial, study_.facts.servo_rate);
+  const std::string nothing = empty_row(columns_.size());
   DelimitedRow row(DelimitedFormat::tsv);
   std::int64_t first = 0;
   for (const SampleRecord& sample : record.samples) {
@@ -90,20 +111,23 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
       first_row_ = next_row_ = slot;
     }
     if (&sample == &record.samples.front()) first = slot;
-    for (; next_row_ < slot; ++next_row_) file_->gzip.write(empty_row());
+    for (; next_row_ < slot; ++next_row_) file_->gzip.write(nothing);
     row << record.trial;
+    if (!study_.facts.blocks.empty()) row << slots.interval();
     put_sample(row, sample);
     file_->gzip.write(row.end());
     ++next_row_;
   }
   free_ = std::max(free_, next_row_);
-  trials_.push_back({{"trial", record.trial},
-                     {"onset", static_cast<double>(onset) / study_.facts.servo_rate},
-                     {"first_row", first - first_row_},
-                     {"rows", next_row_ - first},
-                     {"renderer", guarded_text(record.renderer)},
-                     {"shape", guarded_text(record.shape)},
-                     {"orientation_wxyz", record.orientation_wxyz}});
+  auto& about = trials_.emplace_back(
+      nlohmann::ordered_json{{"trial", record.trial},
+                             {"onset", static_cast<double>(onset) / study_.facts.servo_rate},
+                             {"first_row", first - first_row_},
+                             {"rows", next_row_ - first},
+                             {"renderer", guarded_text(record.renderer)},
+                             {"shape", guarded_text(record.shape)},
+                             {"orientation_wxyz", record.orientation_wxyz}});
+  if (record.task) about["intervals"] = intervals_of(*record.task);
 }
 
 std::optional<nlohmann::ordered_json> BidsRecording::finish(
@@ -118,15 +142,13 @@ std::optional<nlohmann::ordered_json> BidsRecording::finish(
        "onset 0 in the beh.tsv of the same run: the first tick with forces on of its first trial"},
       {"Simulated", simulated_},
       {"Device", run_.device}};
-  json["Columns"].push_back(kTrialOfSample.name);
-  for (const Column& column : sample_columns()) json["Columns"].push_back(column.name);
-  json[kTrialOfSample.name] = describe_column(kTrialOfSample, {}, fault_bits);
-  for (const Column& column : sample_columns()) {
-    json[column.name] = describe_column(column, {}, fault_bits);
-  }
+  for (const Column& column : columns_) json["Columns"].push_back(column.name);
+  for (const Column& column : columns_) json[column.name] = describe_column(column, {}, fault_bits);
   json["TrialsDescription"] =
       "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "
-      "of that name in Objects, turned by the quaternion about the origin of the world frame";
+      "of that name in Objects, turned by the quaternion about the origin of the world frame; "
+      "intervals, where a trial has "
+      "them: what was felt in each, null for nothing, or a level of its own";
   json["Trials"] = trials_;
   json["ObjectsDescription"] =
       "The protocol's stimuli: position_m, where it is there, and orientation_wxyz place the "

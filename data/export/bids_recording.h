@@ -40,6 +40,7 @@ class BidsRecording {
   const StudyLabel& study_;
   const RunInfo run_;
   const bool simulated_;
+  const std::vector<Column> columns_;
   const std::int64_t begin_ns_;                // since 1970
   std::int64_t free_ = 0;                      // the first slot after all trials so far
   std::int64_t first_row_ = 0, next_row_ = 0;  // slots

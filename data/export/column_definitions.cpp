@@ -13,7 +13,7 @@ const Column kRenderer{"renderer",
                        "How the stylus was felt",
                        "",
                        {{"point", "only its tip"}, {"ray", "tip and side, as force and torque"}}};
-const Column kShape{"shape", "Name of the stimulus that was shown"};
+const Column kShape{"shape", "Name of the stimulus that was shown", "", {}, Column::Names::stimuli};
 const Column kPractice{
     "practice",
     "Practice or warm-up",
@@ -43,7 +43,11 @@ std::vector<Column> make_trials() {
       kTrial,
       kRenderer,
       kShape,
-      {"response", "Name of the stimulus that was answered; missing where there was no answer"},
+      {"response",
+       "Name of the stimulus that was answered; missing where there was no answer",
+       "",
+       {},
+       Column::Names::stimuli},
       {"correct",
        "Whether response is shape",
        "",
@@ -116,6 +120,7 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
       column.description =
           "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "
           "or no; rate: a number; adjust: the level left; missing where there was none";
+      column.names = Column::Names::answers;
     } else if (name == "correct") {
       column.description =
           "Whether the answer was right; rate and adjust: missing, no answer is right or wrong";
@@ -130,11 +135,12 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
         {"detect", "whether there was anything"},
         {"rate", "a number for it"},
         {"adjust", "a level that equals the standard"}}},
-      {"block_name", "Name of the block in the protocol"},
+      {"block_name", "Name of the block in the protocol", "", {}, Column::Names::blocks},
       {"track", "Stimulus, renderer and procedure within the block, from 1", "1"},
       {"level",
-       "The varied number of the stimulus, in the unit that the protocol's path says; adjust: "
-       "where it started; missing in catch trials and where nothing is varied"},
+       "The varied number of the stimulus, in the unit at the end of its name in the protocol (see "
+       "block_name; orientation: degrees); adjust: where it started; missing in catch trials and "
+       "where nothing is varied"},
       {"standard_level", "The same number of the standard"},
       {"catch_trial",
        "Whether there was nothing to find",
@@ -249,6 +255,12 @@ std::span<const Column> trial_columns(Times times, bool tasks) {
 std::span<const Column> attempt_columns(Times times) {
   static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute);
   return times == Times::absolute ? absolute : relative;
+}
+
+const Column& interval_column() {
+  static const Column interval{"interval", "Interval of the trial that the tick is of, from 1",
+                               "1"};
+  return interval;
 }
 
 std::span<const Column> sample_columns() {

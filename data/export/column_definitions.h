@@ -17,6 +17,8 @@ struct Column {
   const char* unit = "";  ///< "1": a pure number; "": a text or a code
   /// Code -> meaning; empty where the values are no codes.
   std::vector<std::pair<const char*, const char*>> levels = {};
+  /// What else the values are: names that the protocol gives, or answers to its tasks.
+  enum class Names { none, stimuli, blocks, answers } names = Names::none;
 };
 
 /// Of trials.csv, in order. \param tasks  a protocol of version 2 is among the studies: with the
@@ -24,5 +26,7 @@ struct Column {
 std::span<const Column> trial_columns(Times times, bool tasks = false);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
+/// Before them where a protocol of version 2 is among the studies.
+const Column& interval_column();
 
 }  // namespace palpate::data

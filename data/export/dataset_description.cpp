@@ -105,9 +105,11 @@ std::string dataset_name(const std::map<std::string, StudyLabel>& labels, bool s
 }
 
 std::string dataset_description(const std::map<std::string, StudyLabel>& labels, bool simulated) {
-  std::string text =
-      "Identification of shapes by touch through a force-feedback stylus, one row a trial, "
-      "recorded by palpate.";
+  const bool tasks = std::any_of(labels.begin(), labels.end(), [](const auto& entry) {
+    return !entry.second.facts.blocks.empty();
+  });
+  std::string text = tasks ? "Judgements of objects" : "Identification of shapes";
+  text += " by touch through a force-feedback stylus, one row a trial, recorded by palpate.";
   for (const auto& [sha256, study] : labels) {
     if (!study.facts.title.empty())
       text += " " + study.protocol.name + ": " + study.facts.title + ".";
@@ -115,13 +117,43 @@ std::string dataset_description(const std::map<std::string, StudyLabel>& labels,
   return text + (simulated ? std::string(" ") + kSimulatedSentence : "");
 }
 
+namespace {
+
+void add_stimuli(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
+  for (const StimulusFacts& stimulus : facts.stimuli)
+    levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
+}
+
+/// None where numbers are answered, too.
+void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
+  std::set<std::string> tasks;
+  for (const BlockFacts& block : facts.blocks) tasks.insert(block.task);
+  if (tasks.contains("rate") || tasks.contains("adjust")) return;
+  if (tasks.contains("compare")) {
+    for (const char* interval : {"1", "2", "3"}) levels[interval] = "that interval";
+    levels["same"] = "the intervals were the same";
+    levels["different"] = "they were not";
+  }
+  if (tasks.contains("detect")) {
+    levels["yes"] = "there was something";
+    levels["no"] = "there was nothing";
+  }
+  if (tasks.empty() || tasks.contains("identify")) add_stimuli(levels, facts);
+}
+
+}  // namespace
+
 nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& facts) {
   nlohmann::ordered_json levels;
   for (const auto& [value, meaning] : column.levels) levels[value] = meaning;
-  const std::string_view name = column.name;
-  if (name == "shape" || name == "response") {
-    for (const auto& stimulus : facts.stimuli) {
-      levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
+  if (column.names == Column::Names::stimuli) {
+    add_stimuli(levels, facts);
+  } else if (column.names == Column::Names::answers) {
+    add_answers(levels, facts);
+  } else if (column.names == Column::Names::blocks) {
+    for (const BlockFacts& block : facts.blocks) {
+      levels[guarded_text(block.name)] =
+          block.task + (block.level_path.empty() ? "" : "; levels of " + block.level_path);
     }
   }
   return levels;
@@ -149,6 +181,7 @@ ProtocolFacts all_facts(const std::map<std::string, StudyLabel>& labels) {
   for (const auto& [sha256, study] : labels) {
     facts.stimuli.insert(facts.stimuli.end(), study.facts.stimuli.begin(),
                          study.facts.stimuli.end());
+    facts.blocks.insert(facts.blocks.end(), study.facts.blocks.begin(), study.facts.blocks.end());
   }
   return facts;
 }

@@ -46,9 +46,11 @@ std::string dataset_readme(const std::string& name, const std::string& about, bo
          "one row a trial.\n"
          "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
          "samples of session S,\none row a tick; `time` counts from the first tick with forces on "
-         "of its trial, which is the `onset_utc` of\nthat trial. What was felt, how it was turned "
-         "and with which renderer stands in the trial's row.\nPlaces are rounded to 1 nm, forces "
-         "to "
+         "of its trial, which is the `onset_utc` of\nthat trial, or of several intervals from that "
+         "of the "
+         "first one. What was felt, how it was turned and with\nwhich renderer stands in the "
+         "trial's "
+         "row. Places are rounded to 1 nm, forces to "
          "1 uN and torques to 1 uN m.\n"
          "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
          "were cut off; their\ntrials were shown again.\n"
@@ -125,15 +127,20 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
                                     "_description-haptic_data.csv"));
     row_ << "participant_id"
          << "session"
-         << "trial" << kTimeOfTick.name << sample_columns();
+         << "trial";
+    if (clock_.tasks()) row_ << interval_column().name;
+    row_ << kTimeOfTick.name << sample_columns();
     haptic_->write(row_.end());
+    if (clock_.tasks()) use({&interval_column(), 1});
     use({&kTimeOfTick, 1});
     use(sample_columns());
   }
   SampleSlots slots(trial, servo_rate);
   for (const SampleRecord& sample : record.samples) {
-    row_ << trial.participant.code << record.session << record.trial
-         << static_cast<double>(slots.next()) / servo_rate;
+    const std::int64_t slot = slots.next();
+    row_ << trial.participant.code << record.session << record.trial;
+    if (clock_.tasks()) row_ << slots.interval();
+    row_ << static_cast<double>(slot) / servo_rate;
     put_sample(row_, sample);
     haptic_->write(row_.end());
   }
@@ -152,6 +159,7 @@ Json PsychDsWriter::variables() const {
   };
   add(trial_columns(settings_.times, clock_.tasks()));
   add(attempt_columns(settings_.times));
+  add({&interval_column(), 1});
   add({&kTimeOfTick, 1});
   add(sample_columns());
   return all;

@@ -1,5 +1,6 @@
 #include "data/export/sample_slots.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -7,14 +8,42 @@ namespace palpate::data {
 namespace {
 
 constexpr std::int64_t kLongestLoss = 600'000;  // slots: ten minutes at 1 kHz
+constexpr double kLongestTrial = 1e6;           // s
+
+/// Damaged times may differ by more than 63 bits.
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  return (static_cast<double>(to_ns) - static_cast<double>(from_ns)) / 1e9;
+}
 
 }  // namespace
+
+double duration_of(const TrialRecord& record) {
+  if (!record.task) return record.response_time;
+  return record.response_time + seconds_between(first_onset_ns(record), record.onset_ns);
+}
+
+/// -1: there is no interval left
+std::int64_t SampleSlots::begin_of_next_interval() {
+  if (!trial_.record.task) return -1;
+  const std::vector<IntervalRecord>& all = trial_.record.task->intervals;
+  for (std::size_t i = static_cast<std::size_t>(interval_) + 1; i < all.size(); ++i) {
+    if (all[i].onset_ns == 0) continue;  // it was not reached
+    interval_ = static_cast<int>(i);
+    const double since = seconds_between(first_onset_ns(trial_.record), all[i].onset_ns);
+    return static_cast<std::int64_t>(std::round(std::clamp(since, 0.0, kLongestTrial) * rate_));
+  }
+  return -1;
+}
 
 std::int64_t SampleSlots::next() {
   const auto& samples = trial_.record.samples;
   const SampleRecord& sample = samples[index_];
   if (index_++ == 0) return slot_ = sample.tick;
   const SampleRecord& before = samples[index_ - 2];
+  if (sample.tick <= before.tick) {
+    if (const std::int64_t begin = begin_of_next_interval(); begin > slot_)
+      return slot_ = begin + sample.tick;
+  }
   double step = static_cast<double>(sample.tick) - static_cast<double>(before.tick);
   if (step == 1 && sample.period_ns > 0) {
     // After a late tick, the slots until the next scheduled one are empty.

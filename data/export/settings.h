@@ -15,11 +15,18 @@ struct StimulusFacts {
   std::string object;  ///< JSON of the protocol, without the name
 };
 
+/// A block of a protocol of version 2.
+struct BlockFacts {
+  std::string name, task;
+  std::string level_path;  ///< JSON pointer of the varied number, which names its unit; "" for none
+};
+
 /// What an export needs of a protocol beyond its text; the caller parses it, data/ cannot.
 struct ProtocolFacts {
   std::string title = {};    ///< "" for none
   double servo_rate = 1000;  ///< Hz
   std::vector<StimulusFacts> stimuli = {};
+  std::vector<BlockFacts> blocks = {};  ///< empty: version 1
 };
 
 /// Meaning of a bit of the columns `faults`.

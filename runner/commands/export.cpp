@@ -44,6 +44,24 @@ class Progress {
   double all_ = 0;
 };
 
+std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) {
+  std::vector<data::BlockFacts> blocks;
+  const auto text = [](const nlohmann::ordered_json& object, const char* key) {
+    const auto found = object.find(key);
+    return found != object.end() && found->is_string() ? found->get<std::string>() : "";
+  };
+  if (!protocol.contains("blocks") || !protocol["blocks"].is_array()) return blocks;
+  for (const auto& block : protocol["blocks"]) {
+    if (!block.is_object()) continue;
+    data::BlockFacts& facts = blocks.emplace_back();
+    facts.name = text(block, "name");
+    facts.task = text(block, "task");
+    if (const auto level = block.find("level"); level != block.end() && level->is_object())
+      facts.level_path = text(*level, "path");
+  }
+  return blocks;
+}
+
 /// Reads only what an export needs from the stored text, so that old databases can be exported
 /// after the rules for protocols have changed.
 data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
@@ -66,6 +84,7 @@ data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
     object.erase("name");
     facts.stimuli.push_back({stimulus["name"], object.dump()});
   }
+  facts.blocks = blocks_of(json);
   return facts;
 }
 
