@@ -48,7 +48,7 @@ void expect_upright(const SolidMesh& mesh) {
   }
 }
 
-ObjectSpec spec_of(ShapeKind shape) {
+ObjectSpec solid_spec(ShapeKind shape) {
   ObjectSpec spec;
   spec.shape = shape;
   spec.radius = 0.02;
@@ -83,7 +83,7 @@ TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
     double missing = 1;
     for (const int resolution : {kLeastResolution, 5, 10, kMostResolution}) {
       SCOPED_TRACE(static_cast<int>(c.shape) * 100 + resolution);
-      const SolidMesh mesh = mesh_of_primitive(spec_of(c.shape), resolution);
+      const SolidMesh mesh = mesh_of_primitive(solid_spec(c.shape), resolution);
       const std::vector<SurfaceTriangle> surface = surface_of(mesh);
       expect_closed(surface);
       expect_upright(mesh);
@@ -106,15 +106,15 @@ TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
 }
 
 TEST(SolidMesh, HasAsManyElementsAlongASideAsItsLengthAsksForAndAtLeastTwo) {
-  EXPECT_EQ(mesh_of_primitive(spec_of(ShapeKind::box), 8).hexahedra.size(), 8U * 4U * 2U);
-  EXPECT_EQ(mesh_of_primitive(spec_of(ShapeKind::box), 4).hexahedra.size(), 4U * 2U * 2U);
-  EXPECT_EQ(mesh_of_primitive(spec_of(ShapeKind::cube), 3).hexahedra.size(), 27U);
-  EXPECT_EQ(mesh_of_primitive(spec_of(ShapeKind::cube), 3).nodes.size(), 64U) << "shared";
-  EXPECT_EQ(surface_of(mesh_of_primitive(spec_of(ShapeKind::cube), 3)).size(), 6U * 9U * 2U);
+  EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 8).hexahedra.size(), 8U * 4U * 2U);
+  EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 4).hexahedra.size(), 4U * 2U * 2U);
+  EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::cube), 3).hexahedra.size(), 27U);
+  EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::cube), 3).nodes.size(), 64U) << "shared";
+  EXPECT_EQ(surface_of(mesh_of_primitive(solid_spec(ShapeKind::cube), 3)).size(), 6U * 9U * 2U);
 }
 
 TEST(SolidMesh, NodesAreSharedByNeighboursSoEveryInnerFaceHasTwoElements) {
-  const SolidMesh mesh = mesh_of_primitive(spec_of(ShapeKind::sphere), 6);
+  const SolidMesh mesh = mesh_of_primitive(solid_spec(ShapeKind::sphere), 6);
   std::set<std::array<double, 3>> places;
   for (const Vec3& p : mesh.nodes) {
     const auto rounded = [](double x) { return std::round(x * 1e8) / 1e8 + 0.0; };
@@ -139,7 +139,7 @@ TEST(SolidMesh, TheSurfaceOfATetrahedronIsClosedWithFourTrianglesAFace) {
 }
 
 TEST(SolidMesh, OtherShapesHaveNoElements) {
-  EXPECT_THROW(mesh_of_primitive(spec_of(ShapeKind::cone), 6), std::invalid_argument);
+  EXPECT_THROW(mesh_of_primitive(solid_spec(ShapeKind::cone), 6), std::invalid_argument);
 }
 
 }  // namespace
