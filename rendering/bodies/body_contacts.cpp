@@ -9,6 +9,7 @@ namespace {
 
 // m; parts that are so near touch. Above rounding, below what is seen or felt.
 constexpr double kTouching = 1e-8;
+constexpr double kMet = 0.5 * kTouching;
 constexpr double kUnbounded = 1e300;
 
 /// m/s; the least speed of separation that a contact asks for: it may close its gap, and what
@@ -38,6 +39,7 @@ void BodyContacts::find(double within, double extra) {
   state_.contacts.clear();
   for (std::size_t i = 0; i < world_.bodies.size(); ++i)
     state_.spin[i] = spin_of(world_.bodies[i].inertia, state_.motion[i]);
+  std::fill(state_.placed.begin(), state_.placed.end(), 0);
   const double fall = glm::length(world_.gravity) * within * within;
   for (std::uint32_t index = 0; index < world_.pairs.size(); ++index) {
     const BodyPair& pair = world_.pairs[index];
@@ -57,10 +59,24 @@ void BodyContacts::find(double within, double extra) {
   }
 }
 
+void BodyContacts::place_parts(std::uint32_t body) {
+  if (state_.placed[body]) return;
+  state_.placed[body] = 1;
+  const Mat3 axes = glm::mat3_cast(state_.motion[body].orientation);
+  Vec3* centre = &state_.part_centres[world_.first_part[body]];
+  for (const CollidingPart& part : world_.bodies[body].parts)
+    *centre++ = axes * part.centre + state_.motion[body].centre;
+}
+
 void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra) {
   const BodyPair& pair = world_.pairs[index];
   const MovingBody& body_a = world_.bodies[pair.a];
   const Pose pose_a = pose_of(pair.a), pose_b = pose_of_other(pair);
+  place_parts(pair.a);
+  if (!pair.obstacle) place_parts(pair.b);
+  const Vec3* const centres_a = &state_.part_centres[world_.first_part[pair.a]];
+  const Vec3* const centres_b =
+      pair.obstacle ? nullptr : &state_.part_centres[world_.first_part[pair.b]];
   const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
   const double turning =
       glm::length(state_.spin[pair.a]) * body_a.radius +
@@ -70,8 +86,8 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
   for (std::uint32_t k = 0; k < pair.count; ++k) {
     const PartPair& parts = world_.part_pairs[pair.first + k];
     const CollidingPart &a = body_a.parts[parts.part_a], &b = part_b(pair, parts.part_b);
-    const Vec3 apart = pose_b.orientation * b.centre + pose_b.position -
-                       (pose_a.orientation * a.centre + pose_a.position);
+    const Vec3 apart =
+        (pair.obstacle ? b.centre : centres_b[parts.part_b]) - centres_a[parts.part_a];
     const double near = a.mesh->radius() + b.mesh->radius() + reach;
     if (glm::dot(apart, apart) > near * near) continue;
     const ConvexPlace at_a = place_of(a, pose_a), at_b = place_of(b, pose_b);
@@ -83,15 +99,25 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
     for (const ManifoldPoint& point : state_.manifold.points()) {
       if (state_.contacts.size() == BodyWorldState::kMostContacts) return;
       state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
-                                 point.place, state_.manifold.normal, point.gap});
+                                 point.place, state_.manifold.normal, point.gap,
+                                 static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
     }
   }
 }
 
 double BodyContacts::time_to_next(double most) {
+  const double resting = resting_speed(most);
   double next = most;
-  for (const auto& parts : state_.near_parts) {
-    if (parts.gap > kTouching) next = std::min(next, meeting_time(parts, next));
+  for (auto& parts : state_.near_parts) parts.apart = parts.gap > kTouching;
+  // What touches and parts again, as after a bounce, may meet elsewhere.
+  for (const BodyContact& contact : state_.contacts) {
+    auto& parts = state_.near_parts[contact.parts];
+    if (contact.gap <= kTouching && separation_speed(contact) > resting) parts.apart = true;
+  }
+  for (auto& parts : state_.near_parts) {
+    if (!parts.apart) continue;
+    next = std::min(next, parts.gap > kTouching ? meeting_time(parts, next)
+                                                : meeting_again(parts, next));
   }
   return next;
 }
@@ -118,8 +144,7 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
 /// that is slow, as for bodies that turn, the time is found between there and the end by false
 /// position (Illinois).
 double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double most) {
-  constexpr int kMostAdvances = 6, kMostRounds = 24;
-  constexpr double kMet = 0.5 * kTouching;
+  constexpr int kMostAdvances = 6;
   const BodyPair& pair = world_.pairs[near.pair];
   const double turning =
       glm::length(state_.spin[pair.a]) * world_.bodies[pair.a].radius +
@@ -137,26 +162,49 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
     if (!(speed * (most - time) > distance - kMet)) return most;
     time += (distance - kMet) / speed;
   }
-  double low = time, high = most;
-  double at_low = gap_after(near, low, memory, closing).distance - kMet;
-  double at_high = gap_after(near, high, memory, closing).distance - kMet;
-  if (at_low <= kMet) return low;
-  if (at_high > 0) return most;
+  const TimeAndGap low{time, gap_after(near, time, memory, closing).distance};
+  const TimeAndGap high{most, gap_after(near, most, memory, closing).distance};
+  if (low.gap <= kTouching) return time;
+  if (high.gap > kMet) return most;
+  return meeting_between(near, low, high, memory);
+}
+
+/// Of parts that touch and come apart. The time before which they are apart is looked for from the
+/// end on: what is in contact for longer than a thousandth of `most` is held apart instead.
+double BodyContacts::meeting_again(BodyWorldState::NearParts& near, double most) {
+  GapMemory memory = state_.gaps[near.parts];
+  Vec3 closing(0);
+  TimeAndGap high{most, gap_after(near, most, memory, closing).distance};
+  if (high.gap >= 0) return most;
+  for (double time = 0.5 * most; time > 1e-3 * most; time *= 0.5) {
+    const TimeAndGap low{time, gap_after(near, time, memory, closing).distance};
+    if (low.gap > kTouching) return meeting_between(near, low, high, memory);
+    high = low;
+  }
+  near.apart = false;
+  return most;
+}
+
+/// False position (Illinois). \param low  where the parts are apart \param high  where they overlap
+double BodyContacts::meeting_between(const BodyWorldState::NearParts& near, TimeAndGap low,
+                                     TimeAndGap high, GapMemory& memory) const {
+  constexpr int kMostRounds = 24;
+  Vec3 closing(0);
+  low.gap -= kMet;
+  high.gap -= kMet;
   for (int round = 0; round < kMostRounds; ++round) {
-    const double middle = (low * at_high - high * at_low) / (at_high - at_low);
+    const double middle = (low.time * high.gap - high.time * low.gap) / (high.gap - low.gap);
     const double value = gap_after(near, middle, memory, closing).distance - kMet;
     if (std::abs(value) <= kMet) return middle;
     if (value > 0) {
-      low = middle;
-      at_low = value;
-      at_high *= 0.5;
+      low = {middle, value};
+      high.gap *= 0.5;
     } else {
-      high = middle;
-      at_high = value;
-      at_low *= 0.5;
+      high = {middle, value};
+      low.gap *= 0.5;
     }
   }
-  return low;
+  return low.time;
 }
 
 double BodyContacts::separation_speed(const BodyContact& contact) const {
@@ -226,6 +274,7 @@ void BodyContacts::add_row(std::uint32_t a, std::uint32_t b, const Vec3& place,
     row.turn_b = state_.per_inertia[b] * row.moment_b;
     speed += glm::dot(direction, state_.velocity[b]) + glm::dot(row.moment_b, state_.spin[b]);
   }
+  row.speed = speed;
   state_.problem.add_row(least_speed - speed, bound, leader);
   state_.rows.push_back(row);
 }
@@ -284,6 +333,47 @@ void BodyContacts::solve_rows(std::span<PressingSpring> springs, double step) {
     }
   }
   if (!problem.solve()) ++state_.not_converged;
+}
+
+/// Whether the impulses of a bounce give the bodies energy, above rounding: half the sum of impulses
+/// times the speeds before and after.
+bool BodyContacts::makes_energy() const {
+  const ComplementarityProblem& problem = state_.problem;
+  double sum = 0, scale = 0;
+  for (std::size_t i = 0; i < problem.size(); ++i) {
+    const double x = problem.x()[i];
+    if (x == 0) continue;
+    double change = 0;
+    for (std::size_t k = 0; k < problem.size(); ++k) change += problem.a(i, k) * problem.x()[k];
+    sum += x * (state_.rows[i].speed + 0.5 * change);
+    scale += std::abs(x * state_.rows[i].speed);
+  }
+  return sum > 1e-12 * scale;
+}
+
+/// Newton's restitution with Coulomb's friction can make energy where friction turns the sliding
+/// round (Kane & Levinson 1985). Then less friction acts; without any none is made.
+void BodyContacts::solve_bounce() {
+  constexpr int kMostShares = 4, kMostRefinements = 24;
+  ComplementarityProblem& problem = state_.problem;
+  const auto refine = [&] {
+    double least = 1e-12 * (problem.size() > 0 ? problem.x()[0] : 0);
+    for (const double x : problem.x()) least = std::max(least, 1e-12 * x);
+    for (int round = 0; round < kMostRefinements && problem.refine() > least; ++round) {
+    }
+  };
+  solve_rows({}, 0);
+  refine();
+  for (int round = 0; round <= kMostShares && makes_energy(); ++round) {
+    problem.scale_friction(round < kMostShares ? 0.5 : 0);
+    if (!problem.solve()) ++state_.not_converged;
+    refine();
+  }
+  apply_rows({});
+}
+
+void BodyContacts::apply_rows(std::span<PressingSpring> springs) {
+  const ComplementarityProblem& problem = state_.problem;
   for (std::size_t i = 0; i < problem.size(); ++i) {
     const double x = problem.x()[i];
     if (x == 0) continue;
@@ -307,12 +397,17 @@ void BodyContacts::add_impulses(std::size_t body) {
   state_.motion[body].spin_momentum += state_.twist[body];
 }
 
+/// m/s; what approaches more slowly is not thrown back.
+double BodyContacts::resting_speed(double step) const {
+  return 2 * glm::length(world_.gravity) * step + 1e-9;
+}
+
 /// Impacts go through a group of touching bodies one after another, as through a row of balls:
 /// those that approach part, then those that approach then (Smith, Kaufman, Vouga, Tamstorf &
 /// Grinspun 2012, Reflections on simultaneous impact).
 bool BodyContacts::bounce(double step) {
   constexpr int kMostRounds = 24;
-  const double resting = 2 * glm::length(world_.gravity) * step + 1e-9;
+  const double resting = resting_speed(step);
   bool bounced = false;
   for (int round = 0; round < kMostRounds; ++round) {
     set_velocities(0);
@@ -335,7 +430,7 @@ bool BodyContacts::bounce(double step) {
         add_friction(contact, leader, pair.friction);
       }
       any |= state_.problem.size() > 0;
-      solve_rows({}, 0);
+      solve_bounce();
     }
     if (!any) break;
     bounced = true;
@@ -358,7 +453,7 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
     if (state_.island[island] != island || (!chosen.empty() && !chosen[island])) continue;
     bool closing = false;
     for (const BodyContact& contact : state_.contacts) {
-      if (state_.island[contact.a] == island)
+      if (state_.island[contact.a] == island && !state_.near_parts[contact.parts].apart)
         closing |= separation_speed(contact) < least_speed_of(contact.gap, step);
     }
     begin_rows();
@@ -390,6 +485,7 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
       }
     }
     solve_rows(springs, step);
+    apply_rows(springs);
   }
 }
 

@@ -20,11 +20,13 @@ class BodyContacts {
   /// \return whether some did
   bool bounce(double step);
 
-  /// s, until the next pair meets, at most `most`.
+  /// s, until the next pair meets, at most `most`. Says of state.near_parts which do not meet until
+  /// then; those that rest on each other do.
   double time_to_next(double most);
 
-  /// Impulses that keep all contacts from closing by more than their gap within a step. Sets
-  /// state.push, twist and pushed. \param springs  that press \param chosen  bodies; empty: all
+  /// Impulses that keep all contacts from closing by more than their gap within a step. Groups of
+  /// bodies of which none meets another by time_to_next move freely. Sets state.push, twist and
+  /// pushed. \param springs  that press \param chosen  bodies; empty: all
   void hold_apart(double step, std::span<PressingSpring> springs, std::span<const char> chosen);
 
   /// Those impulses, on one body.
@@ -36,18 +38,29 @@ class BodyContacts {
   Pose pose_of(std::uint32_t body) const;
   Pose pose_of_other(const BodyPair& pair) const;
   const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
+  void place_parts(std::uint32_t body);
   void find_in_pair(std::uint32_t index, double within, double extra);
   Gap gap_after(const BodyWorldState::NearParts& near, double time, GapMemory& memory,
                 Vec3& closing) const;
   double meeting_time(const BodyWorldState::NearParts& parts, double most);
+  double meeting_again(BodyWorldState::NearParts& parts, double most);
+  struct TimeAndGap {
+    double time = 0, gap = 0;
+  };
+  double meeting_between(const BodyWorldState::NearParts& parts, TimeAndGap low, TimeAndGap high,
+                         GapMemory& memory) const;
   void set_velocities(double step);
   void find_islands(std::span<const PressingSpring> springs);
+  double resting_speed(double step) const;
   double separation_speed(const BodyContact& contact) const;
   void add_row(std::uint32_t a, std::uint32_t b, const Vec3& place, const Vec3& direction,
                double least_speed, double bound, int leader, int spring);
   void add_friction(const BodyContact& contact, int leader, double friction);
   void begin_rows();
   void solve_rows(std::span<PressingSpring> springs, double step);
+  bool makes_energy() const;
+  void solve_bounce();
+  void apply_rows(std::span<PressingSpring> springs);
 
   const BodyWorld& world_;
   BodyWorldState& state_;

@@ -9,6 +9,9 @@ namespace palpate::rendering {
 void BodyWorld::pair_up() {
   pairs.clear();
   part_pairs.clear();
+  first_part.assign(1, 0);
+  for (const MovingBody& body : bodies)
+    first_part.push_back(first_part.back() + static_cast<std::uint32_t>(body.parts.size()));
   const auto add = [this](std::uint32_t a, std::uint32_t b, bool obstacle, std::size_t parts_of_b) {
     BodyPair pair;
     pair.a = a;
@@ -53,6 +56,8 @@ BodyWorldState initial_state(const BodyWorld& world) {
   state.twist.resize(count);
   state.per_inertia.resize(count);
   state.pushed.resize(count);
+  state.placed.resize(count);
+  state.part_centres.resize(world.first_part.empty() ? 0 : world.first_part.back());
   std::size_t most_sides = 0;
   const auto look = [&most_sides](const std::vector<CollidingPart>& parts) {
     for (const CollidingPart& part : parts) {

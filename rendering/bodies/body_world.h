@@ -60,9 +60,10 @@ struct BodyWorld {
   std::vector<Obstacle> obstacles;
   std::vector<BodyPair> pairs;
   std::vector<PartPair> part_pairs;
+  std::vector<std::uint32_t> first_part;  ///< of each body, and one more: counts of parts before it
   Vec3 gravity{0, 0, 0};
 
-  /// Sets the pairs from bodies and obstacles.
+  /// Sets the pairs and first_part from bodies and obstacles.
   void pair_up();
 };
 
@@ -73,6 +74,7 @@ struct BodyContact {
   std::uint32_t pair = 0;
   Vec3 place, normal;  ///< normal: unit, from a to b
   double gap = 0;      ///< m
+  std::uint32_t parts = 0;  ///< index in BodyWorldState::near_parts
 };
 
 /// A spring that presses on a body within a step: the probe. It acts along -normal.
@@ -99,9 +101,12 @@ struct BodyWorldState {
   std::size_t most_pairs = 0, most_parts = 0, most_corners = 0;
   void make_room();
   std::vector<std::uint32_t> near;  ///< pairs
+  std::vector<Vec3> part_centres;   ///< of each part of each body, where `placed` says so, world
+  std::vector<char> placed;         ///< of each body
   struct NearParts {
     std::uint32_t pair = 0, parts = 0;
     double gap = 0;
+    bool apart = false;  ///< moving freely, they do not meet before the next event
   };
   std::vector<NearParts> near_parts;
   std::vector<BodyContact> contacts;
@@ -119,6 +124,7 @@ struct BodyWorldState {
     Vec3 moment_a, moment_b;  ///< m, of a unit impulse
     Vec3 turn_a, turn_b;      ///< rad/s, by it
     int spring = -1;          ///< index of the spring that presses here
+    double speed = 0;         ///< m/s, without impulses, by which a and b separate along it
   };
   std::vector<Row> rows;
 };

@@ -34,6 +34,7 @@ ComplementarityProblem::ComplementarityProblem()
       upper_(kMostRows),
       change_(kMostRows),
       rate_(kMostRows),
+      before_(kMostRows),
       leader_(kMostRows) {
   make_room();
 }
@@ -47,6 +48,12 @@ void ComplementarityProblem::add_row(double b, double bound, int leader) {
   b_[count_] = b;
   bound_[count_] = bound;
   leader_[count_++] = leader;
+}
+
+void ComplementarityProblem::scale_friction(double factor) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (leader_[i] >= 0) bound_[i] *= factor;
+  }
 }
 
 double ComplementarityProblem::slack(std::size_t row) const {
@@ -219,14 +226,14 @@ void ComplementarityProblem::sweep() {
   }
 }
 
-bool ComplementarityProblem::solve() {
+bool ComplementarityProblem::drive_all(bool bounds_known) {
   free_.clear();
   done_.clear();
   std::fill_n(x_.begin(), count_, 0.0);
   int pivots_left = static_cast<int>(20 * count_) + 50;
   for (const bool friction : {false, true}) {
     for (std::size_t i = 0; i < count_; ++i) {
-      if ((leader_[i] >= 0) == friction) set_bounds(i);
+      if ((leader_[i] >= 0) == friction && !(friction && bounds_known)) set_bounds(i);
     }
     for (std::size_t i = 0; i < count_; ++i) {
       if ((leader_[i] >= 0) != friction || drive(i, pivots_left)) continue;
@@ -235,6 +242,23 @@ bool ComplementarityProblem::solve() {
     }
   }
   return true;
+}
+
+bool ComplementarityProblem::solve() { return drive_all(false); }
+
+double ComplementarityProblem::refine() {
+  std::copy_n(x_.begin(), count_, before_.begin());
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (leader_[i] >= 0) set_bounds(i);
+  }
+  drive_all(true);
+  double change = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (leader_[i] < 0) continue;
+    const auto leader = static_cast<std::size_t>(leader_[i]);
+    change = std::max(change, std::abs(x_[leader] - before_[leader]));
+  }
+  return change;
 }
 
 double ComplementarityProblem::residual() const {

@@ -35,8 +35,14 @@ class ComplementarityProblem {
   double& a(std::size_t row, std::size_t column) { return matrix_[row * count_ + column]; }
   double a(std::size_t row, std::size_t column) const { return matrix_[row * count_ + column]; }
 
+  /// Makes the coefficients of all rows with a leader smaller. The matrix stays.
+  void scale_friction(double factor);
+
   /// False: the limit of pivots was met; x is within its bounds and as good as sweeps make it.
   bool solve();
+  /// Solves again with the bounds of rows with a leader by what solve() or the last refine() made of
+  /// their leaders. \return the largest change of x of a leader
+  double refine();
   std::span<const double> x() const { return {x_.data(), count_}; }
   /// Largest violation of the conditions above, in units of w.
   double residual() const;
@@ -51,11 +57,12 @@ class ComplementarityProblem {
   void find_rates(std::size_t row);
   double slack(std::size_t row) const;
   void sweep();
+  bool drive_all(bool bounds_known);
 
   std::size_t count_ = 0;
   std::vector<double> matrix_, factor_;  ///< factor_ by position in free_
   std::vector<std::size_t> first_;       ///< of each row of factor_: where it is not zero any more
-  std::vector<double> b_, bound_, x_, w_, lower_, upper_, change_, rate_;
+  std::vector<double> b_, bound_, x_, w_, lower_, upper_, change_, rate_, before_;
   std::vector<int> leader_;
   std::vector<std::size_t> free_;
   std::vector<std::size_t> done_;  ///< rows at a bound that are already in

@@ -23,6 +23,8 @@ struct ProbeContact {
   double felt_depth = 0;   ///< m; what the force is the stiffness times of
   double depth_after = 0;  ///< m, at the end of the step; of a spring in closed form
   int segment = 0;
+  Vec3 moved;     ///< m, of the place on the virtual probe within the step
+  Vec3 pressing;  ///< unit; the mean normal of the step, of a spring in closed form
 };
 
 class BodiesState final : public MotionState {
@@ -46,6 +48,9 @@ class BodiesState final : public MotionState {
     ProbeContact contact;
     Vec3 on_tool;  ///< m, of the place on the probe, in the frame of the tool
     ContactType type = ContactType::none;
+    bool balanced = false;  ///< the next two are known
+    double energy = 0;   ///< J, that the body has to have when it leaves the probe
+    double impulse = 0;  ///< N s, of the contact so far
   };
   std::vector<Held> held;
   std::size_t most_contacts = 0;
@@ -76,11 +81,12 @@ class MovingBodies final : public SceneMotion {
   void feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
   void find_probe_contacts(BodiesState& state, const Stroke& stroke) const;
   void go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const;
-  void hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact,
-            bool alone) const;
+  void hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact) const;
   void place_contact(BodiesState& state, const Stroke& stroke, const Pose& frame, const Vec3& shift,
                      ProbeContact contact) const;
   void push_freely(BodiesState& state, ProbeContact& contact, double duration) const;
+  void balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
+               double duration) const;
   void push_held(BodiesState& state, const Stroke& stroke) const;
   void push_sideways(BodiesState& state, ProbeContact& contact, double duration) const;
   void settle(BodiesState& state, const Stroke& stroke) const;

@@ -9,22 +9,73 @@
 namespace palpate::rendering {
 namespace {
 
-/// Of an orientation whose spin is that of the momentum.
+/// Of an orientation whose spin is that of the momentum, times its length: stages of Runge-Kutta
+/// are not of unit length.
 Quat rate_of_turn(const BodyInertia& inertia, const Vec3& spin_momentum, const Quat& q) {
-  const Vec3 spin = inertia.per_inertia * (glm::conjugate(q) * spin_momentum);
-  return 0.5 * (q * Quat(0, spin.x, spin.y, spin.z));
+  const double per_length2 = 1 / glm::dot(q, q);
+  const Vec3 v(q.x, q.y, q.z);
+  const Vec3 across = glm::cross(spin_momentum, v);  // q* L q / |q|^2, by hand
+  const Vec3 local =
+      spin_momentum + 2 * per_length2 * (q.w * across + glm::cross(across, v));
+  const Vec3 half = 0.5 * (inertia.per_inertia * local);
+  return {-glm::dot(v, half), q.w * half + glm::cross(v, half)};
 }
 
 Quat runge_kutta(const BodyInertia& inertia, const Vec3& momentum, const Quat& q, double step) {
-  // Stages are not of unit length: the rotation of the momentum is scaled back by its square.
-  const auto rate = [&](const Quat& at) {
-    return rate_of_turn(inertia, momentum, glm::normalize(at)) * glm::length(at);
-  };
-  const Quat a = rate(q);
-  const Quat b = rate(q + 0.5 * step * a);
-  const Quat c = rate(q + 0.5 * step * b);
-  const Quat d = rate(q + step * c);
+  const Quat a = rate_of_turn(inertia, momentum, q);
+  const Quat b = rate_of_turn(inertia, momentum, q + 0.5 * step * a);
+  const Quat c = rate_of_turn(inertia, momentum, q + 0.5 * step * b);
+  const Quat d = rate_of_turn(inertia, momentum, q + step * c);
   return glm::normalize(q + step / 6 * (a + 2.0 * b + 2.0 * c + d));
+}
+
+/// By a rotation vector, rad.
+Quat rotation_by(const Vec3& turn) {
+  const double half = 0.5 * glm::length(turn);
+  const double share = half > 0 ? 0.5 * std::sin(half) / half : 0.5;
+  return {std::cos(half), share * turn};
+}
+
+/// A symmetric top precesses about its momentum and spins about its axis, both evenly.
+Quat turned_symmetric(const BodyInertia& inertia, const Vec3& momentum, const Quat& q,
+                      double duration) {
+  const Quat precession = rotation_by(duration * inertia.per_across * momentum);
+  const double along = glm::dot(q * inertia.axis, momentum);
+  const double spin = (inertia.per_along - inertia.per_across) * along;
+  return glm::normalize(precession * q * rotation_by(duration * spin * inertia.axis));
+}
+
+double largest_of(const Mat3& m) {
+  double largest = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::abs(m[i][k]));
+  }
+  return largest;
+}
+
+/// Whether inertia = across + (along - across) u u^T: then its deviator d = b (u u^T - 1/3) has a
+/// determinant of 2 b^3 / 27.
+void find_symmetry(BodyInertia& out) {
+  constexpr double kSymmetric = 1e-10;
+  const double mean = (out.inertia[0][0] + out.inertia[1][1] + out.inertia[2][2]) / 3;
+  const Mat3 deviator = out.inertia - mean * Mat3(1);
+  const double b = std::cbrt(13.5 * glm::determinant(deviator));
+  Mat3 square(0);
+  if (largest_of(deviator) > kSymmetric * mean) {
+    if (!(std::abs(b) > kSymmetric * mean)) return;
+    square = deviator / b + Mat3(1.0 / 3);
+    if (!(largest_of(square * square - square) * std::abs(b) <= kSymmetric * mean)) return;
+    int most = 0;
+    for (int i = 1; i < 3; ++i) {
+      if (square[i][i] > square[most][most]) most = i;
+    }
+    out.axis = glm::normalize(square[most]);
+    out.per_across = 1 / (mean - b / 3);
+    out.per_along = 1 / (mean + 2 * b / 3);
+  } else {
+    out.per_across = out.per_along = 1 / mean;
+  }
+  out.symmetric = true;
 }
 
 }  // namespace
@@ -41,6 +92,7 @@ BodyInertia inertia_of(const MassProperties& properties) {
   out.per_mass = 1 / properties.mass;
   out.inertia = properties.inertia;
   out.per_inertia = glm::inverse(properties.inertia);
+  find_symmetry(out);
   return out;
 }
 
@@ -79,6 +131,7 @@ Quat turned_freely(const BodyInertia& inertia, const Vec3& spin_momentum, Quat o
   constexpr double kLargestStep = 0.02;  // rad
   constexpr double kMostSteps = 64;
   if (glm::dot(spin_momentum, spin_momentum) == 0 || duration == 0) return orientation;
+  if (inertia.symmetric) return turned_symmetric(inertia, spin_momentum, orientation, duration);
   const Vec3 spin = inertia.per_inertia * (glm::conjugate(orientation) * spin_momentum);
   const double steps =
       std::clamp(std::ceil(glm::length(spin) * duration / kLargestStep), 1.0, kMostSteps);

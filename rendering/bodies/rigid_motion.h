@@ -13,6 +13,11 @@ struct BodyInertia {
   double per_mass = 1;  ///< 1/kg
   Mat3 inertia;         ///< kg m^2, about the centre of mass, in the body's axes
   Mat3 per_inertia;     ///< its inverse
+  /// Two principal moments are equal to 1e-10, or all three: it turns freely in closed form.
+  bool symmetric = false;
+  Vec3 axis{0, 0, 1};     ///< of the third, where it is symmetric
+  double per_across = 1;  ///< 1/(kg m^2); by the two that are equal
+  double per_along = 1;   ///< by the third
 };
 
 /// \throws std::invalid_argument: mass or inertia is not positive
@@ -40,8 +45,9 @@ Vec3 velocity_at(const Vec3& spin, const BodyMotion& motion, const Vec3& point);
 Quat turned(const Quat& orientation, const Vec3& turn);
 
 /// Moves a body for a time in which nothing but gravity and damping acts. Gravity and linear
-/// damping in closed form; orientation by classical Runge-Kutta 4 with the angular momentum held,
-/// in steps of at most 0.02 rad: its error is of fourth order, that of momentum nothing.
+/// damping in closed form; orientation, too, where two moments of inertia are equal, else by
+/// classical Runge-Kutta 4 with the angular momentum held, in steps of at most 0.02 rad: its error
+/// is of fourth order, that of momentum nothing.
 /// \param damping  1/s, of velocity and spin. \param duration  s
 void move_freely(const BodyInertia& inertia, const Vec3& gravity, double damping, double duration,
                  BodyMotion& motion);

@@ -42,7 +42,7 @@ SpringPass pass_spring(const SpringStart& start, double duration) {
     bool leaves = false;
     if (amplitude > rest) {
       double exit = std::numbers::pi + std::asin(std::min(1.0, std::max(-1.0, rest / amplitude)));
-      if (exit < phase) exit += 2 * std::numbers::pi;
+      if (exit - 2 * std::numbers::pi >= phase) exit -= 2 * std::numbers::pi;
       leaves = (exit - phase) / rate < left;
       if (leaves) inside = (exit - phase) / rate;
     }

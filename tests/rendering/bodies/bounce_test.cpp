@@ -1,0 +1,259 @@
+// Bounces off the middle, against Newton's law of restitution with Coulomb's friction in closed
+// form.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "rendering/bodies/spring_pass.h"
+#include "stimuli/random.h"
+#include "tests/rendering/bodies/body_fixtures.h"
+
+namespace palpate::rendering::test {
+namespace {
+
+constexpr Quat kAsItIs{1, 0, 0, 0};
+
+double drawn(stimuli::Random& random, double low, double high) {
+  return low + (high - low) * random.unit();
+}
+
+Quat turned_anyhow(stimuli::Random& random) {
+  return glm::normalize(Quat(drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1),
+                             drawn(random, -1, 1)));
+}
+
+double energy_of(const Scene& scene, const RenderState& state) {
+  return kinetic_energy(body_world_of(scene), body_state_of(state));
+}
+
+/// A body that a place of it strikes a plane with; all in the plane of z = 0, normal and tangent as
+/// axes.
+struct PlanarImpact {
+  double mass = 1, moment = 1;     ///< kg, kg m^2
+  double normal = 0, tangent = 0;  ///< m, of the place from the centre
+  double restitution = 1, friction = 0;
+};
+
+struct PlanarMotion {
+  double normal = 0, tangent = 0, spin = 0;  ///< m/s, rad/s
+};
+
+/// Newton's law: the speed of approach comes back times the restitution; friction holds the place
+/// where its cone allows, else slides.
+PlanarMotion after_impact(const PlanarImpact& of, const PlanarMotion& before) {
+  // Of the place: u_n = v_n - w r_t, u_t = v_t + w r_n.
+  const double rn = of.normal, rt = of.tangent;
+  const double nn = 1 / of.mass + rt * rt / of.moment, tt = 1 / of.mass + rn * rn / of.moment;
+  const double nt = -rt * rn / of.moment;
+  const double un = before.normal - before.spin * rt, ut = before.tangent + before.spin * rn;
+  const double wanted = -(1 + of.restitution) * un;
+  const double determinant = nn * tt - nt * nt;
+  double jn = (wanted * tt + ut * nt) / determinant;
+  double jt = (-ut * nn - wanted * nt) / determinant;
+  if (std::abs(jt) > of.friction * jn) {
+    const double sign = jt > 0 ? 1 : -1;
+    jn = wanted / (nn + sign * of.friction * nt);
+    jt = sign * of.friction * jn;
+  }
+  return {before.normal + jn / of.mass, before.tangent + jt / of.mass,
+          before.spin + (rn * jt - rt * jn) / of.moment};
+}
+
+/// A plank falls askew on an edge, with the edge's whole length on the floor.
+TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
+  const double length = 0.2, height = 0.04, depth = 0.06, mass = 0.3;
+  const double moment = mass / 12 * (length * length + height * height);
+  for (const double friction : {0.0, 0.1, 0.4, 2.0}) {
+    for (const double restitution : {1.0, 0.6, 0.2}) {
+      for (const double angle : {-0.9, -0.3, 0.4, 0.8}) {
+        for (const double sliding : {-0.7, 0.0, 0.2}) {
+          BodyScene s;
+          s.stands(box_mesh({3, 0.1, 3}), {{0, -0.05, 0}, kAsItIs});
+          const Quat turn = glm::angleAxis(angle, Vec3(0, 0, 1));
+          // The lowest edge.
+          const Vec3 corner = turn * Vec3(angle > 0 ? -0.5 * length : 0.5 * length, -0.5 * height, 0);
+          stimuli::Body& body =
+              s.moves(box_mesh({length, height, depth}), {{0, 0.0499 - corner.y, 0}, turn}, mass);
+          body.velocity = {sliding, -1, 0};
+          body.restitution = restitution;
+          body.friction = friction;
+          const Scene scene = s.scene();
+          RenderState state = scene.initial_state();
+          const PlanarMotion expected = after_impact(
+              {mass, moment, corner.y, -corner.x, restitution, friction}, {-1, -sliding, 0});
+          run(scene, state, 0.05);
+          const BodyPose& now = state.motion.bodies()[0];
+          const double after = 0.5 * mass * (expected.normal * expected.normal +
+                                             expected.tangent * expected.tangent) +
+                               0.5 * moment * expected.spin * expected.spin;
+          // Where the law itself would make energy, less friction acts.
+          if (after > 0.5 * mass * (1 + sliding * sliding) * (1 + 1e-9)) continue;
+          EXPECT_NEAR(now.velocity.y, expected.normal, 1e-6) << friction << " " << restitution << " " << angle << " " << sliding;
+          EXPECT_NEAR(now.velocity.x, -expected.tangent, 1e-6);
+          EXPECT_NEAR(now.spin.z, expected.spin, 1e-5);
+          EXPECT_NEAR(std::abs(now.spin.x) + std::abs(now.velocity.z), 0, 1e-6);
+        }
+      }
+    }
+  }
+}
+
+/// Boxes that turn meet a wall with one corner after another; each time the energy stays.
+TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
+  stimuli::Random random(5);
+  for (int trial = 0; trial < 40; ++trial) {
+    BodyScene s;
+    s.stands(box_mesh({0.1, 2, 2}), {{0.2, 0, 0}, kAsItIs});
+    // Almost flat ones meet it with the far edge some tenths of a millisecond after the near one.
+    const Quat turn = trial % 2 == 0 ? turned_anyhow(random)
+                                     : glm::angleAxis(drawn(random, -2e-3, 2e-3), Vec3(0, 0, 1));
+    stimuli::Body& body = s.moves(box_mesh({0.05, 0.2, 0.08}), {{0, 0, 0}, turn}, 0.3);
+    body.restitution = 1;
+    body.friction = 0;
+    body.velocity = {1, 0.2, 0};
+    if (trial % 4 > 1) body.spin = {drawn(random, -5, 5), drawn(random, -5, 5), 2};
+    if (trial % 3 == 0) {
+      stimuli::Body& other = s.moves(box_mesh({0.1, 0.05, 0.08}),
+                                     {{0.05, 0.3, 0.01}, turned_anyhow(random)}, trial % 2 ? 0.3 : 5);
+      other.restitution = 1;
+      other.friction = 0;
+      other.velocity = {0.1, -2, 0.3};
+    }
+    const Scene scene = s.scene();
+    RenderState state = scene.initial_state();
+    const double before = energy_of(scene, state);
+    const Vec3 came = state.motion.bodies()[0].velocity;
+    run(scene, state, 0.5);
+    EXPECT_NEAR(energy_of(scene, state) / before, 1, 1e-8) << trial;
+    EXPECT_GT(glm::distance(state.motion.bodies()[0].velocity, came), 0.1) << trial;
+  }
+}
+
+/// Friction turns sliding round where a body strikes with its mass behind the place: Newton's law
+/// would make energy there.
+TEST(Bounce, FrictionMakesNoEnergy) {
+  stimuli::Random random(9);
+  int struck = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    BodyScene s;
+    s.stands(box_mesh({0.1, 3, 3}), {{0.2, 0, 0}, kAsItIs});
+    stimuli::Body& body =
+        s.moves(box_mesh({0.3, 0.02, 0.02}), {{-0.05, 0, 0}, turned_anyhow(random)}, 0.3);
+    body.restitution = trial % 2 == 0 ? 1 : 0.7;
+    body.friction = drawn(random, 0.1, 3);
+    body.velocity = {1, drawn(random, -3, 3), drawn(random, -3, 3)};
+    body.spin = {drawn(random, -20, 20), drawn(random, -20, 20), drawn(random, -20, 20)};
+    const Scene scene = s.scene();
+    RenderState state = scene.initial_state();
+    const double before = energy_of(scene, state);
+    run(scene, state, 0.3);
+    EXPECT_LE(energy_of(scene, state), before * (1 + 1e-8)) << trial;
+    struck += state.motion.bodies()[0].velocity.x < 0.9 ? 1 : 0;
+  }
+  EXPECT_GT(struck, 150);
+}
+
+struct TipBounce {
+  double mass, stiffness, off;
+  Vec3 spin{0, 0, 0};
+  Vec3 hand{0, 0, 0};  ///< m/s
+};
+
+struct TipResult {
+  double energy_before = 0, energy_after = 0, work = 0;  ///< J; work of the hand on the body
+  Vec3 velocity{0, 0, 0}, spin{0, 0, 0};
+  int ticks_in_contact = 0;
+};
+
+/// A box flies against the tip, off its middle, until it is away again.
+TipResult bounce_on_tip(const TipBounce& of, double dt) {
+  BodyScene s;
+  s.stiffness = of.stiffness;
+  stimuli::Body& body = s.moves(box_mesh({0.05, 0.1, 0.06}), {{-0.05, 0, 0}, kAsItIs}, of.mass);
+  body.velocity = {0.3, 0, 0};
+  body.spin = of.spin;
+  const Scene scene = s.scene();
+  RenderState state = scene.initial_state();
+  TipResult result;
+  result.energy_before = energy_of(scene, state);
+  const auto probe = [&](int tick) {
+    const Vec3 tip = Vec3(0, of.off, 0.005) + tick * dt * of.hand;
+    return LineProbe{tip, tip + Vec3(0.12, 0, 0)};
+  };
+  ray_renderer().tick(scene, state, probe(0), 0);
+  int away = 0;
+  for (int i = 1; i < 3.0 / dt && away * dt < 0.01; ++i) {
+    const Rendering r = ray_renderer().tick(scene, state, probe(i), dt);
+    // The hand feels a force held for the tick, and moves evenly within it.
+    result.work -= dt * glm::dot(r.force, of.hand);
+    result.ticks_in_contact += r.contacts > 0 ? 1 : 0;
+    away = r.contacts > 0 || result.ticks_in_contact == 0 ? 0 : away + 1;
+    EXPECT_GE(r.force.x, -1e-12);
+  }
+  const BodyPose& now = state.motion.bodies()[0];
+  result.energy_after = energy_of(scene, state);
+  result.velocity = now.velocity;
+  result.spin = now.spin;
+  return result;
+}
+
+TEST(Bounce, OffTheMiddleOnTheTipEnergyStays) {
+  for (const double mass : {1e-3, 0.1, 10.0}) {
+    for (const double stiffness : {200.0, 3000.0, 5e4}) {
+      if (mass > 1 && stiffness < 1000) continue;  // it would go through the box
+      for (const double off : {0.0, 0.02, 0.04}) {
+        for (const Vec3& spin : {Vec3(0), Vec3(0.3, 1, 0.2)}) {
+          const TipResult r = bounce_on_tip({mass, stiffness, off, spin}, 1e-3);
+          EXPECT_GT(r.ticks_in_contact, 0);
+          EXPECT_NEAR(r.energy_after / r.energy_before, 1, 1e-9)
+              << mass << " " << stiffness << " " << off << " " << spin.y;
+        }
+      }
+    }
+  }
+}
+
+/// What a hand that goes to meet it gives it, it has afterwards.
+TEST(Bounce, OnATipThatMovesItGetsTheWorkOfTheHand) {
+  for (const double mass : {1e-3, 0.1}) {
+    for (const double stiffness : {1000.0, 5e4}) {
+      const TipResult r = bounce_on_tip({mass, stiffness, 0.03, Vec3(0), {-0.2, 0, 0}}, 1e-3);
+      EXPECT_GT(r.work, 0.2 * r.energy_before);
+      EXPECT_NEAR((r.energy_after - r.work) / r.energy_before, 1, 1e-8) << mass << " " << stiffness;
+    }
+  }
+}
+
+/// Where it goes, not its energy alone: steps of a millisecond against steps of ten microseconds.
+TEST(Bounce, OffTheMiddleOnTheTipItGoesWhereFineStepsSendIt) {
+  for (const double off : {0.01, 0.04}) {
+    const TipBounce of{0.1, 3000, off, Vec3(0.3, 1, 0.2)};
+    const TipResult coarse = bounce_on_tip(of, 1e-3), fine = bounce_on_tip(of, 1e-5);
+    EXPECT_NEAR(glm::distance(coarse.velocity, fine.velocity) / 0.3, 0, 2e-3) << off;
+    EXPECT_NEAR(glm::distance(coarse.spin, fine.spin) / glm::length(fine.spin), 0, 2e-3) << off;
+  }
+}
+
+/// A body that is nearly out of a spring while something pushes it in: the spring's rest is deeper.
+TEST(Bounce, ASpringIsLeftFromAboveItsRest) {
+  const SpringStart start{5e-5, -0.29, 0.77, 10, 5e4};
+  double depth = start.depth, speed = start.speed, impulse = 0;
+  const int steps = 1000000;
+  const double duration = 1e-3, h = duration / steps;
+  for (int i = 0; i < steps; ++i) {
+    const double force = depth > 0 ? start.stiffness * depth : 0;
+    speed += h * (start.growth - force / start.mass);
+    depth += h * speed;
+    impulse += h * force;
+  }
+  const SpringPass pass = pass_spring(start, duration);
+  EXPECT_GT(pass.impulse, 0);
+  EXPECT_NEAR(pass.impulse, impulse, 1e-3 * impulse);
+  EXPECT_NEAR(pass.depth, depth, 1e-8);
+}
+
+}  // namespace
+}  // namespace palpate::rendering::test
