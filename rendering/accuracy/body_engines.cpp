@@ -44,7 +44,8 @@ class OwnBodies final : public BodyEngine {
       object.body.friction = box.friction;
       moving.push_back(object);
     }
-    return moving_scene(std::move(parts), moving, of.gravity, false);
+    // A body that sleeps would be right for nothing.
+    return moving_scene(std::move(parts), moving, of.gravity, false, {}, false);
   }
 
   static constexpr LineProbe kFar{Vec3(100), Vec3(100)};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "rendering/bodies/body_sleep.h"
+
 namespace palpate::rendering {
 namespace {
 
@@ -33,16 +35,44 @@ const CollidingPart& BodyContacts::part_b(const BodyPair& pair, std::uint32_t pa
   return pair.obstacle ? world_.obstacles[pair.b].parts[part] : world_.bodies[pair.b].parts[part];
 }
 
-void BodyContacts::find(double within, double extra) {
+void BodyContacts::find(double within, double extra, std::span<const char> chosen) {
+  do look_for(within, extra, chosen, true);
+  while (wake_near());
+}
+
+void BodyContacts::find_near(double within, double extra) {
+  do look_for(within, extra, {}, false);
+  while (wake_near());
+}
+
+/// What is awake wakes what it may touch, and all that sleeps with it.
+bool BodyContacts::wake_near() {
+  if (state_.sleeping == 0) return false;
+  const std::size_t before = state_.sleeping;
+  for (const auto& parts : state_.near_parts) {
+    const BodyPair& pair = world_.pairs[parts.pair];
+    if (pair.obstacle) continue;
+    for (const std::uint32_t body : {pair.a, pair.b}) {
+      if (state_.sleep[body].asleep) wake(state_, body);
+    }
+  }
+  return state_.sleeping < before;
+}
+
+void BodyContacts::look_for(double within, double extra, std::span<const char> chosen,
+                            bool places) {
   state_.near.clear();
   state_.near_parts.clear();
   state_.contacts.clear();
   for (std::size_t i = 0; i < world_.bodies.size(); ++i)
-    state_.spin[i] = spin_of(world_.bodies[i].inertia, state_.motion[i]);
+    state_.spin[i] =
+        state_.sleep[i].asleep ? Vec3(0) : spin_of(world_.bodies[i].inertia, state_.motion[i]);
   std::fill(state_.placed.begin(), state_.placed.end(), 0);
   const double fall = glm::length(world_.gravity) * within * within;
   for (std::uint32_t index = 0; index < world_.pairs.size(); ++index) {
     const BodyPair& pair = world_.pairs[index];
+    if (state_.sleep[pair.a].asleep && (pair.obstacle || state_.sleep[pair.b].asleep)) continue;
+    if (!chosen.empty() && !chosen[pair.a] && (pair.obstacle || !chosen[pair.b])) continue;
     const BodyMotion& a = state_.motion[pair.a];
     const Vec3 centre =
         pair.obstacle ? world_.obstacles[pair.b].centre : state_.motion[pair.b].centre;
@@ -55,7 +85,7 @@ void BodyContacts::find(double within, double extra) {
     const Vec3 apart = centre - a.centre;
     if (glm::dot(apart, apart) > reach * reach) continue;
     state_.near.push_back(index);
-    find_in_pair(index, within, extra + (pair.obstacle ? fall : 0));
+    find_in_pair(index, within, extra + (pair.obstacle ? fall : 0), places);
   }
 }
 
@@ -68,7 +98,7 @@ void BodyContacts::place_parts(std::uint32_t body) {
     *centre++ = axes * part.centre + state_.motion[body].centre;
 }
 
-void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra) {
+void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra, bool places) {
   const BodyPair& pair = world_.pairs[index];
   const MovingBody& body_a = world_.bodies[pair.a];
   const Pose pose_a = pose_of(pair.a), pose_b = pose_of_other(pair);
@@ -95,6 +125,7 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
     const Gap gap = gap_between(at_a, at_b, reach, memory);
     if (gap.distance > reach) continue;
     state_.near_parts.push_back({index, pair.first + k, gap.distance});
+    if (!places) return;
     find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
     for (const ManifoldPoint& point : state_.manifold.points()) {
       if (state_.contacts.size() == BodyWorldState::kMostContacts) return;
@@ -116,8 +147,8 @@ double BodyContacts::time_to_next(double most) {
   }
   for (auto& parts : state_.near_parts) {
     if (!parts.apart) continue;
-    next = std::min(next, parts.gap > kTouching ? meeting_time(parts, next)
-                                                : meeting_again(parts, next));
+    next = std::min(next,
+                    parts.gap > kTouching ? meeting_time(parts, next) : meeting_again(parts, next));
   }
   return next;
 }
@@ -220,6 +251,7 @@ double BodyContacts::separation_speed(const BodyContact& contact) const {
 /// The velocities after a step without impulses; the present ones for a step of 0.
 void BodyContacts::set_velocities(double step) {
   for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    if (state_.sleep[i].asleep) continue;  // nothing touches it
     const MovingBody& body = world_.bodies[i];
     BodyMotion motion = state_.motion[i];
     state_.per_inertia[i] = world_per_inertia(body.inertia, motion.orientation);
@@ -335,8 +367,8 @@ void BodyContacts::solve_rows(std::span<PressingSpring> springs, double step) {
   if (!problem.solve()) ++state_.not_converged;
 }
 
-/// Whether the impulses of a bounce give the bodies energy, above rounding: half the sum of impulses
-/// times the speeds before and after.
+/// Whether the impulses of a bounce give the bodies energy, above rounding: half the sum of
+/// impulses times the speeds before and after.
 bool BodyContacts::makes_energy() const {
   const ComplementarityProblem& problem = state_.problem;
   double sum = 0, scale = 0;
@@ -354,13 +386,14 @@ bool BodyContacts::makes_energy() const {
 /// Newton's restitution with Coulomb's friction can make energy where friction turns the sliding
 /// round (Kane & Levinson 1985). Then less friction acts; without any none is made.
 void BodyContacts::solve_bounce() {
-  constexpr int kMostShares = 4, kMostRefinements = 24;
+  constexpr int kMostShares = 4;
+  constexpr std::size_t kMostRefinedRows = 240;  // in all rounds: of many contacts less is known
   ComplementarityProblem& problem = state_.problem;
   const auto refine = [&] {
-    double least = 1e-12 * (problem.size() > 0 ? problem.x()[0] : 0);
-    for (const double x : problem.x()) least = std::max(least, 1e-12 * x);
-    for (int round = 0; round < kMostRefinements && problem.refine() > least; ++round) {
-    }
+    double least = 0;
+    for (const double x : problem.x()) least = std::max(least, 1e-10 * x);
+    for (std::size_t rows = problem.size(); rows <= kMostRefinedRows && problem.refine() > least;)
+      rows += problem.size();
   };
   solve_rows({}, 0);
   refine();

@@ -12,9 +12,11 @@ class BodyContacts {
  public:
   BodyContacts(const BodyWorld& world, BodyWorldState& state) : world_(world), state_(state) {}
 
-  /// Sets state.near and state.contacts: what touches or may meet within a time, s.
-  /// \param extra  m; farther away by this as well
-  void find(double within, double extra = 0);
+  /// Sets state.near, near_parts and contacts: what touches or may meet within a time, s.
+  /// \param extra  m; farther away by this as well \param chosen  bodies; empty: all
+  void find(double within, double extra = 0, std::span<const char> chosen = {});
+  /// The same without contacts.
+  void find_near(double within, double extra);
 
   /// Bodies that touch and approach each other part again, with the restitution of the pair.
   /// \return whether some did
@@ -39,7 +41,9 @@ class BodyContacts {
   Pose pose_of_other(const BodyPair& pair) const;
   const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
   void place_parts(std::uint32_t body);
-  void find_in_pair(std::uint32_t index, double within, double extra);
+  void find_in_pair(std::uint32_t index, double within, double extra, bool places);
+  void look_for(double within, double extra, std::span<const char> chosen, bool places);
+  bool wake_near();
   Gap gap_after(const BodyWorldState::NearParts& near, double time, GapMemory& memory,
                 Vec3& closing) const;
   double meeting_time(const BodyWorldState::NearParts& parts, double most);

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/bodies/body_contacts.h"
+#include "rendering/bodies/body_sleep.h"
 
 namespace palpate::rendering {
 namespace {
@@ -33,17 +34,17 @@ void accelerate(const BodyWorld& world, const MovingBody& body, double duration,
   if (body.of.damping > 0) motion.spin_momentum *= std::exp(-body.of.damping * duration);
 }
 
-}  // namespace
-
-void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration) {
+void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
   BodyContacts contacts(world, state);
   double left = duration;
   for (int event = 0; left > 0; ++event) {
     contacts.find(left);
     if (state.near.empty()) {
-      for (std::size_t i = 0; i < world.bodies.size(); ++i)
+      for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+        if (state.sleep[i].asleep) continue;
         move_freely(world.bodies[i].inertia, world.gravity, world.bodies[i].of.damping, left,
                     state.motion[i]);
+      }
       return;
     }
     if (contacts.bounce(left)) contacts.find(left);
@@ -51,6 +52,7 @@ void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration)
     // Impulses act on the velocities as they will be; what they do not push moves freely.
     contacts.hold_apart(next, {}, {});
     for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+      if (state.sleep[i].asleep) continue;
       const MovingBody& body = world.bodies[i];
       if (state.pushed[i]) {
         accelerate(world, body, next, state.motion[i]);
@@ -65,12 +67,20 @@ void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration)
   }
 }
 
+}  // namespace
+
+void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration) {
+  if (state.sleeping == world.bodies.size()) return;
+  move_all(world, state, duration);
+  fall_asleep(world, state, duration);
+}
+
 void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const char> chosen,
                   std::span<PressingSpring> springs, double duration) {
   BodyContacts contacts(world, state);
   double deepest = 0;  // no spring pushes farther than that
   for (const PressingSpring& spring : springs) deepest = std::max(deepest, spring.depth);
-  contacts.find(duration, deepest);
+  contacts.find(duration, deepest, chosen);
   contacts.hold_apart(duration, springs, chosen);
   for (std::size_t i = 0; i < world.bodies.size(); ++i) {
     if (!chosen[i]) continue;
@@ -83,16 +93,16 @@ void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const
 bool mark_connected(const BodyWorld& world, BodyWorldState& state, double duration, double distance,
                     std::span<char> marked) {
   BodyContacts contacts(world, state);
-  contacts.find(duration, distance);
+  contacts.find_near(duration, distance);
   bool touches = false;
   for (bool more = true; more;) {
     more = false;
-    for (const BodyContact& contact : state.contacts) {
-      const bool stands = contact.b == BodyContact::kStands;
-      const bool a = marked[contact.a] != 0, b = !stands && marked[contact.b] != 0;
+    for (const BodyWorldState::NearParts& parts : state.near_parts) {
+      const BodyPair& pair = world.pairs[parts.pair];
+      const bool a = marked[pair.a] != 0, b = !pair.obstacle && marked[pair.b] != 0;
       touches |= a || b;
-      if (stands || a == b) continue;
-      marked[contact.a] = marked[contact.b] = 1;
+      if (pair.obstacle || a == b) continue;
+      marked[pair.a] = marked[pair.b] = 1;
       more = true;
     }
   }

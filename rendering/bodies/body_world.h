@@ -62,6 +62,7 @@ struct BodyWorld {
   std::vector<PartPair> part_pairs;
   std::vector<std::uint32_t> first_part;  ///< of each body, and one more: counts of parts before it
   Vec3 gravity{0, 0, 0};
+  bool sleeps = true;  ///< what has come to rest is left alone (body_sleep.h)
 
   /// Sets the pairs and first_part from bodies and obstacles.
   void pair_up();
@@ -72,8 +73,8 @@ struct BodyContact {
   static constexpr std::uint32_t kStands = ~std::uint32_t{0};
   std::uint32_t a = 0, b = kStands;  ///< bodies
   std::uint32_t pair = 0;
-  Vec3 place, normal;  ///< normal: unit, from a to b
-  double gap = 0;      ///< m
+  Vec3 place, normal;       ///< normal: unit, from a to b
+  double gap = 0;           ///< m
   std::uint32_t parts = 0;  ///< index in BodyWorldState::near_parts
 };
 
@@ -90,10 +91,21 @@ struct PressingSpring {
   double impulse = 0;     ///< N s; the result
 };
 
+/// Whether a body sleeps (body_sleep.h), and since when it has gone nowhere.
+struct SleepState {
+  bool asleep = false;
+  double rested = 0;        ///< s
+  std::uint32_t group = 0;  ///< of those that fell asleep together
+  Vec3 centre;              ///< m; where it was when it came to rest
+  Quat orientation{1, 0, 0, 0};
+};
+
 /// What the step changes and the room it needs.
 struct BodyWorldState {
   std::vector<BodyMotion> motion;
-  std::vector<GapMemory> gaps;      ///< of each part pair
+  std::vector<GapMemory> gaps;  ///< of each part pair
+  std::vector<SleepState> sleep;
+  std::size_t sleeping = 0;         ///< bodies
   std::uint64_t not_converged = 0;  ///< problems that met the limit of pivots
 
   // Room. Copies of a state have none until they make it.

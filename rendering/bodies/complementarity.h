@@ -40,8 +40,8 @@ class ComplementarityProblem {
 
   /// False: the limit of pivots was met; x is within its bounds and as good as sweeps make it.
   bool solve();
-  /// Solves again with the bounds of rows with a leader by what solve() or the last refine() made of
-  /// their leaders. \return the largest change of x of a leader
+  /// Solves again with the bounds of rows with a leader by what solve() or the last refine() made
+  /// of their leaders. \return the largest change of x of a leader
   double refine();
   std::span<const double> x() const { return {x_.data(), count_}; }
   /// Largest violation of the conditions above, in units of w.

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "rendering/bodies/body_sleep.h"
 #include "rendering/bodies/spring_pass.h"
 #include "rendering/tool_pose.h"
 
@@ -127,6 +128,7 @@ void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stro
   if (stroke.touches) {
     feel(renderer, state, stroke);
     find_probe_contacts(state, stroke);
+    for (const ProbeContact& contact : state.contacts) wake(state.world, contact.spring.body);
     if (stroke.duration > 0 && !state.contacts.empty()) {
       state.ahead = state.world.motion;
       push_held(state, stroke);
@@ -272,20 +274,24 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   const Rendering& felt = state.felt[spring.body];
   constexpr double kSame = 1 - 2e-4;  // cosine; beyond it another feature is touched
   const bool known =
-      held.holds && (felt.contacts == 0 ||
-                     (felt.deepest.type == held.type &&
-                      glm::dot(motion.orientation * held.contact.spring.normal, spring.normal) > kSame));
+      held.holds &&
+      (felt.contacts == 0 ||
+       (felt.deepest.type == held.type &&
+        glm::dot(motion.orientation * held.contact.spring.normal, spring.normal) > kSame));
   const Vec3 first_normal =
-      before.orientation * (known ? held.contact.spring.normal
-                                  : glm::conjugate(motion.orientation) * spring.normal);
-  const Vec3 first_place = known ? out_of({before.centre, before.orientation}, held.contact.spring.place)
-                                 : contact.on_probe - contact.moved;
+      before.orientation *
+      (known ? held.contact.spring.normal : glm::conjugate(motion.orientation) * spring.normal);
+  const Vec3 first_place =
+      known ? out_of({before.centre, before.orientation}, held.contact.spring.place)
+            : contact.on_probe - contact.moved;
   const Vec3 normal = glm::normalize(first_normal + spring.normal);
-  const Vec3 moment = 0.5 * glm::cross(first_place - before.centre + spring.place - motion.centre, normal);
+  const Vec3 moment =
+      0.5 * glm::cross(first_place - before.centre + spring.place - motion.centre, normal);
   const Quat middle = glm::normalize(before.orientation + motion.orientation);
   const Vec3 turn = world_per_inertia(body.inertia, middle) * moment;
-  const double first_closing = glm::dot(
-      first_normal, velocity_at(spin_of(body.inertia, before), before, first_place) - contact.moved / duration);
+  const double first_closing =
+      glm::dot(first_normal, velocity_at(spin_of(body.inertia, before), before, first_place) -
+                                 contact.moved / duration);
   SpringStart start;
   start.stiffness = spring.stiffness;
   start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
@@ -306,8 +312,8 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   spring.impulse = pass.impulse;
   contact.pressing = normal;
   contact.depth_after = pass.depth;
-  const Vec3 mean_momentum = 0.5 * (before.spin_momentum + motion.spin_momentum) -
-                             pass.double_impulse / duration * moment;
+  const Vec3 mean_momentum =
+      0.5 * (before.spin_momentum + motion.spin_momentum) - pass.double_impulse / duration * moment;
   motion.velocity -= pass.impulse * body.inertia.per_mass * normal;
   motion.spin_momentum -= pass.impulse * moment;
   motion.centre -= pass.double_impulse * body.inertia.per_mass * normal;
@@ -315,9 +321,9 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   balance(state, contact, moment, duration);
 }
 
-/// On its way off the probe a body's energy, with the spring's, has to be what it came with and what
-/// hand and weight have given it since. What steps of finite length have lost or won of it (some
-/// 1e-4, where the body turns on the probe) the impulse makes good.
+/// On its way off the probe a body's energy, with the spring's, has to be what it came with and
+/// what hand and weight have given it since. What steps of finite length have lost or won of it
+/// (some 1e-4, where the body turns on the probe) the impulse makes good.
 void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
                            double duration) const {
   constexpr double kMostShare = 1e-2;  // of the whole impulse: more is no rounding of steps
@@ -327,15 +333,13 @@ void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3
   if (!held.balanced) return;
   const BodyInertia& inertia = world_.bodies[spring.body].inertia;
   BodyMotion& motion = state.world.motion[spring.body];
-  const double leaving =
-      glm::dot(contact.pressing, motion.velocity - contact.moved / duration) +
-      glm::dot(moment, spin_of(inertia, motion));
+  const double leaving = glm::dot(contact.pressing, motion.velocity - contact.moved / duration) +
+                         glm::dot(moment, spin_of(inertia, motion));
   const double per_mass =
-      inertia.per_mass +
-      glm::dot(moment, world_per_inertia(inertia, motion.orientation) * moment);
+      inertia.per_mass + glm::dot(moment, world_per_inertia(inertia, motion.orientation) * moment);
   const double depth = std::max(0.0, contact.depth_after);
-  const double surplus = kinetic_energy(inertia, motion) +
-                         0.5 * spring.stiffness * depth * depth - held.energy;
+  const double surplus =
+      kinetic_energy(inertia, motion) + 0.5 * spring.stiffness * depth * depth - held.energy;
   const double under = leaving * leaving - 2 * surplus * per_mass;
   if (!(leaving < 0) || !(under >= 0.25 * leaving * leaving)) return;
   const double impulse = std::max((leaving + std::sqrt(under)) / per_mass, -spring.impulse);

@@ -49,8 +49,8 @@ class BodiesState final : public MotionState {
     Vec3 on_tool;  ///< m, of the place on the probe, in the frame of the tool
     ContactType type = ContactType::none;
     bool balanced = false;  ///< the next two are known
-    double energy = 0;   ///< J, that the body has to have when it leaves the probe
-    double impulse = 0;  ///< N s, of the contact so far
+    double energy = 0;      ///< J, that the body has to have when it leaves the probe
+    double impulse = 0;     ///< N s, of the contact so far
   };
   std::vector<Held> held;
   std::size_t most_contacts = 0;

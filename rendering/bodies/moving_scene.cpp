@@ -125,7 +125,7 @@ void check_masses(const BodyWorld& world) {
 }  // namespace
 
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
-                   const Vec3& gravity, bool side_contact, const Tool& tool) {
+                   const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps) {
   if (moving.empty()) return Scene(std::move(parts), side_contact, tool);
   if (moving.size() > kMostBodies)
     refuse(moving[kMostBodies].object,
@@ -136,6 +136,7 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
   }
   BodyWorld world;
   world.gravity = gravity;
+  world.sleeps = sleeps;
   std::vector<Scene> shapes;
   std::vector<SceneObject> fixed;
   const auto is_of = [](int object) {

@@ -22,8 +22,10 @@ inline constexpr std::size_t kMostBodies = 64;
 
 /// \param parts    of all objects, where they are at first
 /// \param gravity  m/s^2
+/// \param sleeps   what has come to rest is not moved until something comes near
 /// \throws std::invalid_argument naming the object and the limit that is passed
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
-                   const Vec3& gravity, bool side_contact = true, const Tool& tool = {});
+                   const Vec3& gravity, bool side_contact = true, const Tool& tool = {},
+                   bool sleeps = true);
 
 }  // namespace palpate::rendering

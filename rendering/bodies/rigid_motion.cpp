@@ -15,8 +15,7 @@ Quat rate_of_turn(const BodyInertia& inertia, const Vec3& spin_momentum, const Q
   const double per_length2 = 1 / glm::dot(q, q);
   const Vec3 v(q.x, q.y, q.z);
   const Vec3 across = glm::cross(spin_momentum, v);  // q* L q / |q|^2, by hand
-  const Vec3 local =
-      spin_momentum + 2 * per_length2 * (q.w * across + glm::cross(across, v));
+  const Vec3 local = spin_momentum + 2 * per_length2 * (q.w * across + glm::cross(across, v));
   const Vec3 half = 0.5 * (inertia.per_inertia * local);
   return {-glm::dot(v, half), q.w * half + glm::cross(v, half)};
 }

@@ -140,6 +140,7 @@ TEST(BodyContact, CradleOfBalls) {
 
 TEST(BodyContact, HeavyOnLightAtMostAHundredthOfAMillimetre) {
   BodyScene s;
+  s.sleeps = false;
   s.gravity = {0, 0, -9.81};
   s.stands(box_mesh({1, 1, 0.1}), {{0, 0, -0.05}, {1, 0, 0, 0}});
   s.moves(box_mesh(Vec3(0.02)), {{0, 0, 0.01}, {1, 0, 0, 0}}, 0.001);
@@ -157,6 +158,7 @@ TEST(BodyContact, HeavyOnLightAtMostAHundredthOfAMillimetre) {
 
 TEST(BodyContact, AStackOfTenRests) {
   BodyScene s;
+  s.sleeps = false;
   s.gravity = {0, 0, -9.81};
   s.stands(box_mesh({1, 1, 0.1}), {{0, 0, -0.05}, {1, 0, 0, 0}});
   for (int i = 0; i < 10; ++i)

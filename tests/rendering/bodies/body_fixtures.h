@@ -29,6 +29,7 @@ class BodyScene {
  public:
   Vec3 gravity{0, 0, 0};
   double stiffness = 1000;
+  bool sleeps = true;
 
   void stands(const Mesh& mesh, const Pose& pose) { add(mesh, pose, next_++); }
   stimuli::Body& moves(const Mesh& mesh, const Pose& pose, double mass) {
@@ -46,7 +47,7 @@ class BodyScene {
     return moving_.back().body;
   }
   Scene scene(bool sides = true, const Tool& tool = {}) const {
-    return moving_scene(parts_, moving_, gravity, sides, tool);
+    return moving_scene(parts_, moving_, gravity, sides, tool, sleeps);
   }
 
  private:

@@ -21,8 +21,8 @@ double drawn(stimuli::Random& random, double low, double high) {
 }
 
 Quat turned_anyhow(stimuli::Random& random) {
-  return glm::normalize(Quat(drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1),
-                             drawn(random, -1, 1)));
+  return glm::normalize(
+      Quat(drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1)));
 }
 
 double energy_of(const Scene& scene, const RenderState& state) {
@@ -74,7 +74,8 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
           s.stands(box_mesh({3, 0.1, 3}), {{0, -0.05, 0}, kAsItIs});
           const Quat turn = glm::angleAxis(angle, Vec3(0, 0, 1));
           // The lowest edge.
-          const Vec3 corner = turn * Vec3(angle > 0 ? -0.5 * length : 0.5 * length, -0.5 * height, 0);
+          const Vec3 corner =
+              turn * Vec3(angle > 0 ? -0.5 * length : 0.5 * length, -0.5 * height, 0);
           stimuli::Body& body =
               s.moves(box_mesh({length, height, depth}), {{0, 0.0499 - corner.y, 0}, turn}, mass);
           body.velocity = {sliding, -1, 0};
@@ -86,12 +87,14 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
               {mass, moment, corner.y, -corner.x, restitution, friction}, {-1, -sliding, 0});
           run(scene, state, 0.05);
           const BodyPose& now = state.motion.bodies()[0];
-          const double after = 0.5 * mass * (expected.normal * expected.normal +
-                                             expected.tangent * expected.tangent) +
-                               0.5 * moment * expected.spin * expected.spin;
+          const double after =
+              0.5 * mass *
+                  (expected.normal * expected.normal + expected.tangent * expected.tangent) +
+              0.5 * moment * expected.spin * expected.spin;
           // Where the law itself would make energy, less friction acts.
           if (after > 0.5 * mass * (1 + sliding * sliding) * (1 + 1e-9)) continue;
-          EXPECT_NEAR(now.velocity.y, expected.normal, 1e-6) << friction << " " << restitution << " " << angle << " " << sliding;
+          EXPECT_NEAR(now.velocity.y, expected.normal, 1e-6)
+              << friction << " " << restitution << " " << angle << " " << sliding;
           EXPECT_NEAR(now.velocity.x, -expected.tangent, 1e-6);
           EXPECT_NEAR(now.spin.z, expected.spin, 1e-5);
           EXPECT_NEAR(std::abs(now.spin.x) + std::abs(now.velocity.z), 0, 1e-6);
@@ -116,8 +119,9 @@ TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
     body.velocity = {1, 0.2, 0};
     if (trial % 4 > 1) body.spin = {drawn(random, -5, 5), drawn(random, -5, 5), 2};
     if (trial % 3 == 0) {
-      stimuli::Body& other = s.moves(box_mesh({0.1, 0.05, 0.08}),
-                                     {{0.05, 0.3, 0.01}, turned_anyhow(random)}, trial % 2 ? 0.3 : 5);
+      stimuli::Body& other =
+          s.moves(box_mesh({0.1, 0.05, 0.08}), {{0.05, 0.3, 0.01}, turned_anyhow(random)},
+                  trial % 2 ? 0.3 : 5);
       other.restitution = 1;
       other.friction = 0;
       other.velocity = {0.1, -2, 0.3};
