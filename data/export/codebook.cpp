@@ -12,14 +12,14 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
                     const ExportSettings& settings, TextSink& out) {
   DelimitedRow row(DelimitedFormat::csv);
   for (const Column& column : columns) {
-    row << table << column.name << column.unit << "" << column.description;
+    const std::string unit = unit_of(column, facts);
+    row << table << column.name << unit << "" << column.description;
     out.write(row.end());
     for (const auto& values :
          {column_levels(column, facts), column_bits(column, settings.fault_bits)}) {
       for (const auto& [value, meaning] : values.items()) {
         // Names of stimuli are guarded already: DelimitedRow would guard them twice.
-        row << table << column.name << column.unit << unguarded(value)
-            << meaning.get<std::string>();
+        row << table << column.name << unit << unguarded(value) << meaning.get<std::string>();
         out.write(row.end());
       }
     }

@@ -138,10 +138,10 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
       {"block_name", "Name of the block in the protocol", "", {}, Column::Names::blocks},
       {"track", "Stimulus, renderer and procedure within the block, from 1", "1"},
       {"level",
-       "The varied number of the stimulus, in the unit at the end of its name in the protocol (see "
-       "block_name; orientation: degrees); adjust: where it started; missing in catch trials and "
-       "where nothing is varied"},
-      {"standard_level", "The same number of the standard"},
+       "The varied number of the stimulus; adjust: where it started; missing in catch trials and "
+       "where nothing is varied",
+       Column::kLevelUnit},
+      {"standard_level", "The same number of the standard", Column::kLevelUnit},
       {"catch_trial",
        "Whether there was nothing to find",
        "",

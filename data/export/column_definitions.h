@@ -12,6 +12,8 @@
 namespace palpate::data {
 
 struct Column {
+  /// Unit of the block's varied number, which its protocol names.
+  static constexpr const char* kLevelUnit = "see block_name";
   const char* name;
   const char* description;
   const char* unit = "";  ///< "1": a pure number; "": a text or a code

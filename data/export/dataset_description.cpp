@@ -153,10 +153,21 @@ nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& 
   } else if (column.names == Column::Names::blocks) {
     for (const BlockFacts& block : facts.blocks) {
       levels[guarded_text(block.name)] =
-          block.task + (block.level_path.empty() ? "" : "; levels of " + block.level_path);
+          block.task + (block.level_path.empty()
+                            ? ""
+                            : "; levels of " + block.level_path + " in " + block.level_unit);
     }
   }
   return levels;
+}
+
+std::string unit_of(const Column& column, const ProtocolFacts& facts) {
+  if (std::string_view(column.unit) != Column::kLevelUnit) return column.unit;
+  std::set<std::string> units;
+  for (const BlockFacts& block : facts.blocks) {
+    if (!block.level_unit.empty()) units.insert(block.level_unit);
+  }
+  return units.size() == 1 ? *units.begin() : column.unit;
 }
 
 nlohmann::ordered_json column_bits(const Column& column,
@@ -170,7 +181,7 @@ nlohmann::ordered_json column_bits(const Column& column,
 nlohmann::ordered_json describe_column(const Column& column, const ProtocolFacts& facts,
                                        const std::vector<FaultMeaning>& fault_bits) {
   nlohmann::ordered_json json{{"Description", column.description}};
-  if (*column.unit != '\0') json["Units"] = column.unit;
+  if (*column.unit != '\0') json["Units"] = unit_of(column, facts);
   if (const auto levels = column_levels(column, facts); !levels.is_null()) json["Levels"] = levels;
   if (const auto bits = column_bits(column, fault_bits); !bits.is_null()) json["Bits"] = bits;
   return json;

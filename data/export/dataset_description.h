@@ -48,6 +48,8 @@ inline constexpr const char* kSimulatedSentence =
 /// Value -> meaning, including the names of stimuli as they are in the table; null: the values are
 /// no codes.
 nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& facts);
+/// As the protocols say where theirs is the only one.
+std::string unit_of(const Column& column, const ProtocolFacts& facts);
 /// Fault bit -> meaning for the columns of fault bits; null for others.
 nlohmann::ordered_json column_bits(const Column& column,
                                    const std::vector<FaultMeaning>& fault_bits);

@@ -35,7 +35,7 @@ Json describe_variable(const Column& column, const ProtocolFacts& facts,
   const std::string text = column.description + listed("Values", column_levels(column, facts)) +
                            listed("Bits", column_bits(column, fault_bits));
   Json variable{{"@type", "PropertyValue"}, {"name", column.name}, {"description", text}};
-  if (*column.unit != '\0') variable["unitText"] = column.unit;
+  if (*column.unit != '\0') variable["unitText"] = unit_of(column, facts);
   return variable;
 }
 

@@ -18,7 +18,8 @@ struct StimulusFacts {
 /// A block of a protocol of version 2.
 struct BlockFacts {
   std::string name, task;
-  std::string level_path;  ///< JSON pointer of the varied number, which names its unit; "" for none
+  std::string level_path;  ///< JSON pointer of the varied number; "" for none
+  std::string level_unit;
 };
 
 /// What an export needs of a protocol beyond its text; the caller parses it, data/ cannot.

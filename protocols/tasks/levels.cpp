@@ -109,6 +109,23 @@ std::vector<double> levels_of(const TaskBlock& block) {
   return levels;
 }
 
+std::string unit_of_level(const std::string& of) {
+  std::string path = of;  // without the places in a list: /size_m/0
+  while (!path.empty() && path.back() >= '0' && path.back() <= '9') path.pop_back();
+  if (path.ends_with('/')) path.pop_back();
+  if (path.ends_with("/orientation")) return "deg";
+  for (const auto& [ending, unit] : {std::pair{"_n_per_m", "N/m"},
+                                     {"_ns_per_m", "N s/m"},
+                                     {"_n", "N"},
+                                     {"_kg_per_m3", "kg/m^3"},
+                                     {"_kg", "kg"},
+                                     {"_pa", "Pa"},
+                                     {"_m", "m"}}) {
+    if (path.ends_with(ending)) return unit;
+  }
+  return "1";
+}
+
 Protocol with_all_levels(const Protocol& protocol) {
   Protocol all = protocol;
   for (const TaskBlock& block : protocol.blocks) {

@@ -22,6 +22,10 @@ std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block
 /// The protocol with a stimulus more for every level of every block; version 1: as it is.
 Protocol with_all_levels(const Protocol& protocol);
 
+/// "m", "N/m", "deg", ...: the unit of a varied number, of the end of its name; "1" without one.
+/// \param path  JSON pointer
+std::string unit_of_level(const std::string& path);
+
 /// A level as it is printed: the shortest text that reads back as it.
 std::string level_text(double level);
 

@@ -12,6 +12,7 @@
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "protocols/protocol.h"
+#include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
@@ -58,6 +59,7 @@ std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) 
     facts.task = text(block, "task");
     if (const auto level = block.find("level"); level != block.end() && level->is_object())
       facts.level_path = text(*level, "path");
+    if (!facts.level_path.empty()) facts.level_unit = protocols::unit_of_level(facts.level_path);
   }
   return blocks;
 }

@@ -17,7 +17,12 @@ NUMBERS = (
     "practice timed_out first_contact_time simulated missed_ticks attempt participant_number started_inside ticks "
     "longest_period faults max_force before_contact contact_share edge_dwell elapsed"
 ).split()
-MAY_BE_MISSING = {"response", "first_contact_time", "observer_sha256", "response_device", "contact_share", "edge_dwell"}
+MAY_BE_MISSING = set(
+    "response first_contact_time observer_sha256 response_device contact_share edge_dwell "  # and of tasks:
+    "correct level standard_level number confidence confidence_delay comparison_interval interval_levels".split()
+)
+LISTS = {"interval_onsets", "interval_ends", "interval_levels"}  # separated by semicolons
+MIXED = {"response", "number", "confidence"}  # what they are depends on the task, and is described
 
 
 def read_tsv(path):
@@ -37,7 +42,8 @@ def is_number(text):
 
 def described(sidecar, column):
     about = sidecar.get(column)
-    return isinstance(about, dict) and "Description" in about and ("Units" in about or "Levels" in about)
+    told = isinstance(about, dict) and "Description" in about
+    return told and ("Units" in about or "Levels" in about or column in LISTS | MIXED)
 
 
 def table_faults(path):
@@ -98,12 +104,14 @@ def recording_faults(path):
     if any(0 < row.count("n/a") < len(row) for row in samples):
         faults.append(f"{path.name}: a row is n/a in part")
     rate, start = sidecar.get("SamplingFrequency", 0), sidecar.get("StartTime", 0)
+    tick = columns.index("tick")
     places = {}  # trial -> the rows of its ticks
     for i, row in enumerate(samples):
         if row[0] == "n/a":
             continue
         place = places.setdefault(row[0], [])
-        if place and int(row[1]) <= int(samples[place[-1]][1]):
+        # Each interval of a trial counts its ticks from 0.
+        if place and [int(x) for x in row[1 : tick + 1]] <= [int(x) for x in samples[place[-1]][1 : tick + 1]]:
             faults.append(f"{path.name}: row {i}: the ticks are out of order")
         place.append(i)
     listed = {str(trial["trial"]): trial for trial in sidecar.get("Trials", [])}
@@ -113,7 +121,7 @@ def recording_faults(path):
         if trial not in told:
             faults.append(f"{path.name}: trial {trial} is not in the table")
             continue
-        onset = start + (place[0] - int(samples[place[0]][1])) / rate if rate > 0 else 0
+        onset = start + (place[0] - int(samples[place[0]][tick])) / rate if rate > 0 else 0
         if abs(onset - float(told[trial]["onset"])) * rate > 1:
             faults.append(f"{path.name}: trial {trial} does not stand at its onset")
         about = listed.get(trial, {})

@@ -12,6 +12,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 from contents import Contents  # noqa: E402, F401
 from folders import Folders, WithdrawalAndMerge  # noqa: E402, F401
 from rules import Rules  # noqa: E402, F401
+from tasks import Tasks  # noqa: E402, F401
 
 if __name__ == "__main__":
     unittest.main(argv=sys.argv[:1])
