@@ -186,6 +186,9 @@ TEST_F(Sweeps, OtherFilesAreNoSweeps) {
   make_sweep(folder_ / "b.sweep", {1, 2});
   SQLite::Database(folder_ / "b.sweep", SQLite::OPEN_READWRITE).exec("CREATE TABLE more (x)");
   expect_refused([&] { SweepFile::open(folder_ / "b.sweep"); }, "other tables");
+  make_sweep(folder_ / "d.sweep", {1, 2});
+  SQLite::Database(folder_ / "d.sweep", SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 99");
+  expect_refused([&] { SweepFile::open(folder_ / "d.sweep"); }, "a sweep's file of version 99");
   make_sweep(folder_ / "c.sweep", {1, 2});
   fs::resize_file(folder_ / "c.sweep", 5000);
   expect_refused([&] { SweepFile::open(folder_ / "c.sweep"); }, "damaged");
