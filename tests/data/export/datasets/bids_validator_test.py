@@ -48,8 +48,8 @@ def validator():
     return command
 
 
-def simulate(folder, name, participants, /, **changes):
-    protocol = json.loads((PROTOCOLS / "quick.json").read_text())
+def simulate(folder, name, participants, /, start="quick", **changes):
+    protocol = json.loads((PROTOCOLS / f"{start}.json").read_text())
     protocol.pop("$schema")
     protocol.update(changes)
     (folder / f"{name}.json").write_text(json.dumps(protocol))
@@ -84,7 +84,9 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
         plain = simulate(folder, "plain", 2, practice={"repetitions": 1}, sessions={"count": 2, "warm_up_trials": 2})
-        for dataset in (plain, simulate(folder, "sampled", 2, name="with-samples", repetitions=1, samples=True)):
+        sampled = simulate(folder, "sampled", 2, name="with-samples", repetitions=1, samples=True)
+        tasks = simulate(folder, "tasks", 1, start="stiffness-2afc", samples=True)
+        for dataset in (plain, sampled, tasks):
             errors, warnings = issues(command, dataset)
             good &= expect(errors == [], f"{dataset.name}: no errors {errors}")
             good &= expect(set(warnings) <= {"NO_AUTHORS"}, f"{dataset.name}: no warning but that authors are to be added {warnings}")

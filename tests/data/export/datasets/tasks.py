@@ -11,11 +11,13 @@ SHORT = {"kind": "constant", "levels": [200, 400], "repetitions": 2}
 
 
 def simulate_tasks(folder, name, blocks):
-    """`blocks`: changes to the first block of protocols/stiffness-2afc.json, with samples."""
+    """`blocks`: changes to the block of constant levels of protocols/stiffness-2afc.json, with samples."""
     protocol = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())
     protocol.pop("$schema")
     block = {key: value for key, value in protocol["blocks"][1].items() if key not in ("keys", "confidence", "order")}
-    protocol |= {"name": name, "samples": True, "blocks": [block | {"procedure": SHORT} | change for change in blocks]}
+    whole = [block | {"procedure": SHORT} | change for change in blocks]
+    protocol |= {"name": name, "samples": True,
+                 "blocks": [{key: value for key, value in one.items() if value is not None} for one in whole]}
     (folder / f"{name}.json").write_text(json.dumps(protocol))
     run_palpate("simulate", folder / f"{name}.json", "--db", folder / f"{name}.db", "--participants", 1)
     for form in ("bids", "psych-ds"):
@@ -28,7 +30,7 @@ class Tasks(Study):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        rate = {"name": "hardness", "task": "rate", "question": "How hard?", "range": {"min": 0, "max": 1000}}
+        rate = {"name": "hardness", "task": "rate", "question": "How hard?", "min": 0, "max": 1000}
         cls.pairs = simulate_tasks(cls.dir, "pairs", [{}, {"name": "three", "intervals": 3}])
         cls.mixed = simulate_tasks(cls.dir, "mixed", [{}, rate | {"standard": None}])
 
