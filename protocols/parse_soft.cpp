@@ -85,6 +85,7 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
     section.number("density_kg_per_m3", soft.density, kSoftDensity);
     section.number("damping_s", soft.damping, kStrainDamping);
     read_fixed(section, soft);
+    soft.resolution = 0;  // the highest that can be stepped
     section.integer("resolution", soft.resolution, kResolution);
     refuse_with(section, is_gmsh && section.has("resolution"), "resolution",
                 "expected none: a .msh file brings its elements");

@@ -25,9 +25,11 @@ inline constexpr std::uint32_t kContactsDropped = 8;
 // 16 to 2048 are the servo's (runner/servo/servo_fault.h).
 inline constexpr std::uint32_t kContactCapped = 4096;
 inline constexpr std::uint32_t kReleased = 8192;
+inline constexpr std::uint32_t kSoftLate = 16384;
+inline constexpr std::uint32_t kSoftStalled = 32768;
 }  // namespace render_fault
 
-inline constexpr std::array<FaultBit, 6> kRenderFaults = {{
+inline constexpr std::array<FaultBit, 8> kRenderFaults = {{
     {render_fault::kNonFinite, "non-finite", "not a finite number",
      "the pose or the force was not a finite number: zero force until cleared",
      "a force or pose was not finite"},
@@ -45,6 +47,12 @@ inline constexpr std::array<FaultBit, 6> kRenderFaults = {{
      "the tool hooked behind an object and turned too far from it: its force faded, and there is "
      "none "
      "from that object until it has been left"},
+    {render_fault::kSoftLate, "soft-late", "soft body late",
+     "the next step of a soft object was not there in time: its surface gave way by its local "
+     "compliance alone"},
+    {render_fault::kSoftStalled, "soft-stalled", "soft body stalled",
+     "the steps of a soft object had not come for a tenth of a second: zero force until cleared",
+     "a soft object was not stepped any more"},
 }};
 
 /// Every bit of the table.

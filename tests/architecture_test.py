@@ -13,7 +13,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # the folder itself ("runner": scene_builder.h) is the base of the rooms within.
 RENDERING = {"stimuli", "rendering"}
 BODIES = RENDERING | {"rendering/bodies"}
-SERVO = RENDERING | {"runner", "runner/servo"}
+SERVO = RENDERING | {"runner", "runner/servo", "rendering/bodies/soft"}
 MAY_INCLUDE = {
     "stimuli": set(),
     "rendering": {"stimuli"},
@@ -36,7 +36,7 @@ MAY_INCLUDE = {
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols"},
     "runner": BODIES | {"protocols", "rendering/bodies/soft"},
-    "runner/servo": RENDERING | {"runner"},
+    "runner/servo": RENDERING | {"runner", "rendering/bodies/soft"},
     "runner/safety": SERVO,
     "runner/sound": {"stimuli", "protocols"},
     "runner/devices": SERVO | {"protocols", "data", "runner/devices/falcon"},
@@ -100,7 +100,7 @@ PUBLIC = {
     "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
-                    "tick_clock tick_source triple_buffer",
+                    "tick_clock tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals fault_table guarded_device",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
@@ -111,7 +111,7 @@ PUBLIC = {
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay_comparison session_plan simulated_session simulated_study station",
     "runner/sweep": "design swept_study",
-    "runner/stability": "boundary integrators",
+    "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",
     "runner/commands": "render/forces render/trajectory_csv shared/command shared/schedule_rows shared/simulation",
 }

@@ -119,8 +119,8 @@ void Servo::keep_time() noexcept {
 }
 
 void Servo::warm_up() noexcept {
-  if (!warm_ || sample_.phase != Phase::feeling) return;
-  shown_->renderer->tick(shown_->scene, shown_->shadow, sample_.probe, period_);
+  if (!warm_ || sample_.phase != Phase::feeling || !shown_->shadow) return;
+  shown_->renderer->tick(shown_->scene, *shown_->shadow, sample_.probe, period_);
   sample_.warm_up_ns = clock_.now_ns() - sample_.time_ns;
 }
 
@@ -193,7 +193,9 @@ const Sample& Servo::tick() noexcept {
                                              static_cast<double>(sample_.period_ns) * 1e-9);
   if (workspace_.reach) sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
   sample_.faults |= sample_.rendering.faults;
-  if (sample_.rendering.faults & rendering::render_fault::kNonFinite) limiter_.trip();
+  constexpr std::uint32_t kEnds =
+      rendering::render_fault::kNonFinite | rendering::render_fault::kSoftStalled;
+  if (sample_.rendering.faults & kEnds) limiter_.trip();
   command(sample_.rendering.device1, sample_.rendering.device2);
   ++quality_.ticks;
   quality_.faults |= sample_.faults;

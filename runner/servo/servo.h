@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/servo/device.h"
 #include "runner/servo/force_limiter.h"
@@ -23,13 +24,16 @@ struct TrialScene {
       : scene(what),
         renderer(&how),
         state(scene.initial_state()),
-        shadow(scene.initial_state()),
-        home(where) {}
+        home(where) {
+    rendering::pace_by_tick(state);
+    // A soft body's shadow would be a body of its own, with steps of its own.
+    if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
+  }
 
   const rendering::Scene scene;
   const rendering::Renderer* renderer;
-  rendering::RenderState state;   ///< the servo's alone while the scene is shown
-  rendering::RenderState shadow;  ///< likewise; a tick behind: for keep_warm()
+  rendering::RenderState state;  ///< the servo's alone while the scene is shown
+  std::optional<rendering::RenderState> shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
 };
 
@@ -49,6 +53,10 @@ class Servo final : public TickSource {
   /// As prepare, but without allocating and without a new start of the ticks' times. `shown` must
   /// live until the next begin(), prepare() or stop().
   void begin(TrialScene& shown) noexcept;
+  /// Steps of soft objects that are due in the next tick wait, as they did where it was recorded.
+  void hold_steps(bool held) noexcept {
+    if (shown_ != nullptr) rendering::hold_steps(shown_->state, held);
+  }
   /// Zero force from the current tick on, until clear_fault(). From any thread or signal handler.
   void emergency_zero() noexcept { emergency_.store(true); }
   /// The experimenter allows forces again. From any thread.
@@ -74,6 +82,8 @@ class Servo final : public TickSource {
   /// time.
   void start() noexcept;
 
+  /// Null before the first and after stop().
+  const TrialScene* shown() const noexcept { return shown_; }
   double period() const { return period_; }  ///< s
   std::int64_t period_ns() const { return period_ns_; }
 

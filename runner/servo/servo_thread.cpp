@@ -13,6 +13,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
+constexpr std::size_t kPlaces = 4096;             // ticks
 constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as stalled
 
 }  // namespace
@@ -21,7 +22,9 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
     : realtime_(settings.realtime),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
       awake_(settings.realtime.awake),
-      ring_(settings.ring) {
+      ring_(settings.ring),
+      places_(settings.touched_places ? kPlaces : 1),
+      tells_places_(settings.touched_places) {
   servo_.keep_warm();
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
@@ -45,7 +48,9 @@ void ServoThread::run() noexcept {
   servo_.start();
   while (!quit_.load(std::memory_order_relaxed)) {
     take_requests();
-    publish(servo_.tick());
+    const Sample& sample = servo_.tick();
+    if (tells_places_) publish_places(sample);  // first: who has the sample finds them
+    publish(sample);
   }
   servo_.stop();
 }
@@ -80,9 +85,19 @@ void ServoThread::publish(const Sample& sample) noexcept {
   health_.add_lost_sample();
 }
 
+void ServoThread::publish_places(const Sample& sample) noexcept {
+  const TrialScene* const shown = servo_.shown();
+  if (shown == nullptr || sample.rendering.contacts == 0) return;
+  TouchedPlaces touched;
+  touched.time_ns = sample.time_ns;
+  touched.count =
+      find_contact_places(shown->scene, shown->state, sample.rendering, touched.places);
+  places_.push(touched);
+}
+
 void ServoThread::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                           const HomeZone& home) {
-  auto shown = std::make_unique<TrialScene>(scene, renderer, home);
+  auto shown = std::make_unique<ShownScene>(scene, renderer, home, realtime_);
   if (scene_set_) stop();
   if (!scene_set_) scenes_.clear();
   while (ring_.pop(popped_)) {
@@ -90,7 +105,7 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
   popped_ = {};
   scenes_.push_back(std::move(shown));
   scene_set_ = true;
-  incoming_.store(scenes_.back().get(), std::memory_order_release);
+  incoming_.store(&scenes_.back()->trial, std::memory_order_release);
 }
 
 const Sample& ServoThread::next() noexcept {

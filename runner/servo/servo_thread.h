@@ -12,6 +12,8 @@
 #include "runner/servo/ring.h"
 #include "runner/servo/servo.h"
 #include "runner/servo/servo_health.h"
+#include "runner/servo/soft_threads.h"
+#include "runner/servo/touched_places.h"
 #include "runner/servo/triple_buffer.h"
 
 namespace palpate::runner {
@@ -23,6 +25,7 @@ struct ServoSettings {
   bool passivity_controller = false;
   RealtimeSettings realtime;
   std::size_t ring = 16384;  ///< samples that wait for the session before some are lost
+  bool touched_places = false;  ///< where every tick touches is told, too
 };
 
 /// prepare, next and stop belong to one thread, the session's; latest to one, which may be another.
@@ -44,6 +47,10 @@ class ServoThread final : public TickSource {
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
 
+  /// Where the tool touched, with ServoSettings::touched_places: of the ticks with contact alone, in
+  /// order; some are lost where the session does not keep up. By the session's thread.
+  bool touched(TouchedPlaces& places) noexcept { return places_.pop(places); }
+
   /// The newest sample, also between trials; false where there is none that is newer than the last.
   bool latest(Sample& sample) noexcept { return latest_.read(sample); }
   /// Zero force within the tick and until clear_fault(). From any thread or signal handler.
@@ -57,6 +64,9 @@ class ServoThread final : public TickSource {
   bool in_this_thread() const noexcept { return thread_id_.load() == current_thread(); }
 
   const RealtimeRights& rights() const { return rights_; }
+  /// The threads that step what is soft in the scene of prepare(), valid until the next one. By the
+  /// session's thread.
+  SoftThreads* soft_threads() noexcept { return scenes_.empty() ? nullptr : &scenes_.back()->soft; }
   /// Every tick since the thread began, trials or not. From any thread.
   const ServoHealth& health() const { return health_; }
 
@@ -65,6 +75,7 @@ class ServoThread final : public TickSource {
   void run() noexcept;
   void take_requests() noexcept;
   void publish(const Sample& sample) noexcept;
+  void publish_places(const Sample& sample) noexcept;
 
   const RealtimeSettings realtime_;
   Servo servo_;
@@ -72,7 +83,17 @@ class ServoThread final : public TickSource {
   RealtimeRights rights_;
   ServoHealth health_;
 
-  std::vector<std::unique_ptr<TrialScene>>
+  /// A scene with the threads that step what is soft in it, which the servo's state refers to.
+  struct ShownScene {
+    ShownScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
+               const RealtimeSettings& realtime)
+        : trial(what, how, where), soft(trial.scene, realtime) {
+      if (!soft.empty()) soft.attach(trial.state);
+    }
+    TrialScene trial;
+    SoftThreads soft;
+  };
+  std::vector<std::unique_ptr<ShownScene>>
       scenes_;  ///< the session thread's; freed once the servo has left them
   std::atomic<TrialScene*> incoming_{nullptr};
   std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
@@ -81,6 +102,8 @@ class ServoThread final : public TickSource {
 
   Ring<Sample> ring_;
   TripleBuffer<Sample> latest_;
+  Ring<TouchedPlaces> places_;
+  bool tells_places_;
   // The servo's own:
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial

@@ -11,6 +11,10 @@ namespace palpate::runner {
 template <class T>
 class TripleBuffer {
  public:
+  /// Before there are two threads: what has room of its own gets it here.
+  void fill(const T& value) {
+    for (T& slot : slots_) slot = value;
+  }
   /// By the writer.
   void write(const T& value) noexcept {
     slots_[back_] = value;

@@ -114,6 +114,7 @@ void replay(
     Servo servo(device, device, protocol.servo_rate, limits);
     servo.prepare(std::move(shown[i].scene), renderer_for(shown[i].renderer), kAnywhere);
     for (const data::SampleRecord& sample : intervals[i]) {
+      servo.hold_steps((sample.faults & rendering::render_fault::kSoftLate) != 0);
       Sample again = servo.tick();
       if (reach) again.rendering = rendering::felt(*reach, again.rendering);
       visit(i, sample, again);

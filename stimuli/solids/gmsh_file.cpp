@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <unordered_map>
 #include <utility>
@@ -138,6 +139,9 @@ class GmshReader {
       }
       for (const std::uint64_t own : tags) read_place(own);
     }
+    if (!stopped_ && nodes_.size() != head[1])
+      return fault(std::to_string(head[1]) + " nodes, as the section begins with",
+                   std::to_string(nodes_.size()));
     end_section("$EndNodes");
   }
 
@@ -202,6 +206,24 @@ class GmshReader {
     return found->second;
   }
 
+  /// Each element once, and at most two on a face: else the surface has holes.
+  void check_once(const QuadraticTetrahedron& t, std::size_t line) {
+    std::array<std::uint32_t, 4> corners{t[0], t[1], t[2], t[3]};
+    std::sort(corners.begin(), corners.end());
+    if (!known_elements_.insert(corners).second) {
+      faults_.add_line(line, "each tetrahedron once", "one with the corners of another");
+      return;
+    }
+    for (std::size_t left_out = 0; left_out < 4; ++left_out) {
+      std::array<std::uint32_t, 3> face{};
+      for (std::size_t i = 0, k = 0; i < 4; ++i) {
+        if (i != left_out) face[k++] = corners[i];
+      }
+      if (++faces_[face] == 3)
+        faults_.add_line(line, "at most two tetrahedra on a face", "a third one");
+    }
+  }
+
   SolidMesh solid() {
     for (const Read& read : tetrahedra_) {
       QuadraticTetrahedron t{};
@@ -227,6 +249,7 @@ class GmshReader {
         constexpr int kEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
         for (std::size_t e = 0; e < 6; ++e) t[4 + e] = middle_of(t[kEdges[e][0]], t[kEdges[e][1]]);
       }
+      check_once(t, read.line);
       mesh_.tetrahedra.push_back(t);
     }
     faults_.throw_if_any();
@@ -245,6 +268,8 @@ class GmshReader {
   SolidMesh mesh_;
   std::unordered_map<std::uint32_t, std::uint32_t> used_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles_;
+  std::set<std::array<std::uint32_t, 4>> known_elements_;  ///< corners
+  std::map<std::array<std::uint32_t, 3>, int> faces_;      ///< how many elements have them
 };
 
 }  // namespace

@@ -110,11 +110,13 @@ SoftState SoftBody::rest() const {
   const std::size_t n = mesh_.nodes.size();
   state.x = mesh_.nodes;
   for (auto* const field : {&state.v, &state.gradient, &state.load, &state.ahead, &state.by_load,
-                            &state.trial, &state.step, &state.trial_gradient})
+                            &state.trial, &state.step, &state.trial_gradient,
+                            &state.next_gradient})
     field->assign(n, Vec3(0));
   state.pack.resize(factor_.size());
   state.work.resize(2 * factor_.size());
   state.energy = solid_.energy(state.x, state.gradient.data(), state.strains);
+  state.next_strains = state.strains;
   look_ahead(state);
   return state;
 }
@@ -164,12 +166,12 @@ void SoftBody::add_forces(SoftState& state, std::span<const NodeForce> forces) c
   }
 }
 
-/// Incremental potential at x less that at the step's start. \param gradient  null: not wanted
-double SoftBody::potential_change(const SoftState& state, std::span<const Vec3> x,
-                                  Vec3* gradient) const {
+/// J, of inertia, gravity and load from the step's start to x. \param gradient  it is added to; null:
+/// not wanted
+double SoftBody::work_against(const SoftState& state, std::span<const Vec3> x,
+                              Vec3* gradient) const {
   const double h = settings_.step;
-  double change =
-      solid_.energy(x, state.strains, settings_.material.damping / h, gradient) - state.energy;
+  double change = 0;
   for (const std::uint32_t i : free_nodes_) {
     const double mass = solid_.masses()[i];
     const Vec3 moved = x[i] - state.x[i];
@@ -178,6 +180,24 @@ double SoftBody::potential_change(const SoftState& state, std::span<const Vec3> 
     if (gradient != nullptr) gradient[i] += mass / (h * h) * moved - pull;
   }
   return change;
+}
+
+/// Incremental potential at the trial less that at the step's start. What the next step begins with,
+/// if this one ends there, comes with it.
+double SoftBody::change_at_trial(SoftState& state) const noexcept {
+  const Solid::Potential there = solid_.potential(
+      state.trial, state.strains, settings_.material.damping / settings_.step,
+      state.next_gradient.data(), state.next_strains);
+  state.next_energy = there.elastic;
+  state.next_is_trial = true;
+  return there.damped - state.energy + work_against(state, state.trial, nullptr);
+}
+
+/// Of the incremental potential.
+void SoftBody::find_trial_gradient(SoftState& state) const noexcept {
+  solid_.energy(state.trial, state.strains, settings_.material.damping / settings_.step,
+                state.trial_gradient.data());
+  work_against(state, state.trial, state.trial_gradient.data());
 }
 
 }  // namespace palpate::rendering

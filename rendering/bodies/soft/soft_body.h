@@ -45,6 +45,11 @@ struct SoftState {
   std::vector<double> pack, work;  ///< of solving
   std::vector<Vec3> trial, step, trial_gradient;
   std::uint64_t steps = 0, shortened = 0;  ///< so far; iterations that the guard cut short
+  // Elastic, of the last trial, which become the state's own where it is accepted:
+  std::vector<Vec3> next_gradient;
+  Strains next_strains;
+  double next_energy = 0;
+  bool next_is_trial = false;
 };
 
 /// Immutable.
@@ -65,6 +70,7 @@ class SoftBody {
   static constexpr std::uint32_t kInside = 0xffffffff;
   /// Surface node of a node; kInside: it is none.
   std::uint32_t surface_index(std::uint32_t node) const { return surface_index_[node]; }
+  bool is_fixed(std::uint32_t node) const { return is_fixed_[node]; }
   std::size_t free_nodes() const { return free_nodes_.size(); }
   std::size_t factor_entries() const { return factor_.entries(); }
 
@@ -83,7 +89,9 @@ class SoftBody {
   void solve(SoftState& state, std::vector<Vec3>& b) const noexcept;
   void look_ahead(SoftState& state) const noexcept;
   void add_forces(SoftState& state, std::span<const NodeForce> forces) const noexcept;
-  double potential_change(const SoftState& state, std::span<const Vec3> x, Vec3* gradient) const;
+  double work_against(const SoftState& state, std::span<const Vec3> x, Vec3* gradient) const;
+  double change_at_trial(SoftState& state) const noexcept;
+  void find_trial_gradient(SoftState& state) const noexcept;
   enum class LineSearch { stays, moves, as_expected };  ///< by the quadratic model
   LineSearch search_line(SoftState& state, double& change) const noexcept;
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <set>
@@ -24,16 +27,45 @@ constexpr double kLowRate = 100;                 // Hz
 constexpr double kLowRateYoung = 1e5;            // Pa
 constexpr std::size_t kMostSoftNodes = 6000;     // beyond it building takes minutes
 constexpr double kBase = 0.01, kBallBase = 0.1;  // of the height
+constexpr double kShortest = 0.001, kLongest = 2;  // m, of an object
+constexpr int kPlainResolution = 10;               // where a description gives none
 
-stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec) {
-  if (spec.shape != stimuli::ShapeKind::mesh)
-    return stimuli::mesh_of_primitive(spec, spec.soft->resolution);
+stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec, int resolution) {
+  if (spec.shape != stimuli::ShapeKind::mesh) return stimuli::mesh_of_primitive(spec, resolution);
   return stimuli::read_gmsh(
       spec.file, spec.file_bytes ? *spec.file_bytes : stimuli::read_whole(spec.file, 1U << 31));
 }
 
+[[noreturn]] void refuse(const std::string& fault) { throw stimuli::MeshError({fault}); }
+
+/// Of m in mm, of s in ms.
+std::string in_thousandths(double value) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), 1000 * value,
+                                 std::chars_format::general, 4);
+  return {text.data(), end.ptr};
+}
+
+/// Longest side of the box about the nodes, m.
+double extent(const std::vector<Vec3>& nodes) {
+  Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Vec3& p : nodes) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+}
+
+void check_extent(const stimuli::SolidMesh& mesh) {
+  const double longest = extent(mesh.nodes);
+  if (longest >= kShortest && longest <= kLongest) return;
+  refuse("/soft: the object is " + in_thousandths(longest) + " mm long; expected " + in_thousandths(kShortest) +
+         " to " + in_thousandths(kLongest) + " mm (files are in m)");
+}
+
 std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
-                                       const std::vector<Vec3>& nodes) {
+                                       const stimuli::SolidMesh& mesh) {
+  const std::vector<Vec3>& nodes = mesh.nodes;
   std::set<std::uint32_t> fixed;
   if (spec.soft->fixed == stimuli::Soft::Fixed::base) {
     double low = std::numeric_limits<double>::infinity(), high = -low;
@@ -47,69 +79,113 @@ std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
     }
   }
   if (spec.soft->fixed == stimuli::Soft::Fixed::points) {
-    for (const Vec3& point : spec.soft->points) {
+    // An element's side, of one that is as long as high.
+    const double reach =
+        extent(nodes) /
+        std::cbrt(static_cast<double>(mesh.hexahedra.size() + mesh.tetrahedra.size()));
+    for (std::size_t i = 0; i < spec.soft->points.size(); ++i) {
+      const Vec3& point = spec.soft->points[i];
       const auto nearest =
           std::min_element(nodes.begin(), nodes.end(), [&](const Vec3& a, const Vec3& b) {
             return glm::distance(a, point) < glm::distance(b, point);
           });
+      if (!(glm::distance(*nearest, point) <= reach)) {
+        refuse("/soft/fixed/" + std::to_string(i) + ": the nearest node is " +
+               in_thousandths(glm::distance(*nearest, point)) +
+               " mm away; expected a point of the object, in m and its own frame");
+      }
       fixed.insert(static_cast<std::uint32_t>(nearest - nodes.begin()));
     }
   }
   return {fixed.begin(), fixed.end()};
 }
 
-[[noreturn]] void refuse(const std::string& fault) { throw stimuli::MeshError({fault}); }
+/// Of a mesh with what is fixed: the rate of its steps, or why it has none.
+struct Rate {
+  double rate = 0;    ///< Hz; 0: none
+  std::string fault;  ///< without the place
+};
 
-SoftBody body_of(const stimuli::SolidMesh& mesh, const std::vector<std::uint32_t>& fixed,
-                 SoftSettings settings) {
+Rate rate_of(const stimuli::SolidMesh& mesh, const std::vector<std::uint32_t>& fixed,
+             SoftSettings settings) {
   const std::size_t hexahedra = mesh.hexahedra.size(), tetrahedra = mesh.tetrahedra.size();
+  const std::string elements = std::to_string(hexahedra + tetrahedra) + " elements ";
+  if (mesh.nodes.size() > kMostSoftNodes) {
+    return {0, std::to_string(mesh.nodes.size()) + " nodes; expected at most " +
+                   std::to_string(kMostSoftNodes)};
+  }
   settings.compliance = false;
   const SoftBody trial(mesh, fixed, settings);  // to count the entries of its factor
   const double cost = step_cost(hexahedra, tetrahedra, trial.factor_entries());
   const auto rate =
       std::find_if(kRates.begin(), kRates.end(), [&](double r) { return cost <= kShare / r; });
   if (rate == kRates.end()) {
-    refuse("/soft: " + std::to_string(hexahedra + tetrahedra) + " elements take " +
-           std::to_string(1000 * cost) + " ms a step; expected at most " +
-           std::to_string(1000 * kShare / kRates.back()) +
-           " ms, a quarter of the time at 62.5 Hz: a lower resolution");
+    return {0, elements + "take " + in_thousandths(cost) + " ms a step; expected at most " +
+                   in_thousandths(kShare / kRates.back()) + " ms, a quarter of the time at 62.5 Hz"};
   }
-  if (*rate < kLowRate && settings.material.young < kLowRateYoung) {
-    refuse(
-        "/soft: " + std::to_string(hexahedra + tetrahedra) + " elements leave time for " +
-        std::to_string(static_cast<int>(*rate)) +
-        " steps a second, at which less than 100000 Pa may swing; expected a lower resolution or "
-        "a stiffer material");
+  if (!coupling_is_stable(settings.material.young, *rate)) {
+    return {0, elements + "leave time for " + std::to_string(static_cast<int>(*rate)) +
+                   " steps a second, at which less than 100000 Pa may swing"};
   }
-  settings.step = 1 / *rate;
-  settings.compliance = true;
-  return {mesh, fixed, settings};
+  return {*rate, {}};
+}
+
+struct Meshed {
+  stimuli::SolidMesh mesh;  ///< local frame
+  std::vector<std::uint32_t> fixed;
+  Rate rate;
+};
+
+Meshed mesh_at(const stimuli::ObjectSpec& spec, int resolution, const SoftSettings& settings) {
+  Meshed out{mesh_of(spec, resolution), {}, {}};
+  check_extent(out.mesh);
+  out.fixed = fixed_nodes(spec, out.mesh);
+  if (out.fixed.size() == out.mesh.nodes.size())
+    refuse("/soft/fixed: expected something left to move");
+  out.rate = rate_of(out.mesh, out.fixed, settings);
+  return out;
+}
+
+/// At the resolution that was asked for; where none was, the highest up to kPlainResolution of
+/// which the steps have a rate.
+Meshed meshed(const stimuli::ObjectSpec& spec, const SoftSettings& settings) {
+  const bool is_file = spec.shape == stimuli::ShapeKind::mesh;
+  const int asked = spec.soft->resolution;
+  int resolution = asked > 0 ? asked : kPlainResolution;
+  Meshed out = mesh_at(spec, resolution, settings);
+  const std::string fault = out.rate.fault;
+  while (out.rate.rate == 0 && !is_file && resolution > stimuli::kLeastResolution)
+    out = mesh_at(spec, --resolution, settings);
+  const bool found = out.rate.rate > 0;
+  if (fault.empty() || (found && asked == 0)) return out;
+  refuse((is_file ? "/soft: " : "/soft/resolution: ") + fault + ": " +
+         (!found ? "expected fewer elements or a stiffer material"
+                 : "expected a resolution of at most " + std::to_string(resolution) +
+                       " or a stiffer material"));
 }
 
 }  // namespace
 
+bool coupling_is_stable(double young, double rate) {
+  return rate >= kLowRate || young >= kLowRateYoung;
+}
+
 double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries) {
-  return 2 * (8e-7 * static_cast<double>(hexahedra) + 6e-7 * static_cast<double>(tetrahedra) +
-              2.5e-9 * static_cast<double>(factor_entries));
+  return 2 * (7e-7 * static_cast<double>(hexahedra) + 5e-7 * static_cast<double>(tetrahedra) +
+              1e-9 * static_cast<double>(factor_entries));
 }
 
 std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& spec,
                                                     const Pose& pose, const SoftTouch& touch) {
-  stimuli::SolidMesh mesh = mesh_of(spec);
-  if (mesh.nodes.size() > kMostSoftNodes) {
-    refuse("/soft: " + std::to_string(mesh.nodes.size()) + " nodes; expected at most " +
-           std::to_string(kMostSoftNodes) + ": a lower resolution");
-  }
-  const std::vector<std::uint32_t> fixed = fixed_nodes(spec, mesh.nodes);
-  if (fixed.size() == mesh.nodes.size()) refuse("/soft/fixed: expected something left to move");
-  for (Vec3& node : mesh.nodes) node = pose.orientation * node + pose.position;
   const stimuli::Soft& soft = *spec.soft;
-  const SoftSettings settings{.material = {soft.young, soft.poisson, soft.density, soft.damping},
-                              .gravity = touch.gravity};
+  SoftSettings settings{.material = {soft.young, soft.poisson, soft.density, soft.damping},
+                        .gravity = touch.gravity};
   try {
-    auto body = std::make_shared<const SoftBody>(body_of(mesh, fixed, settings));
+    Meshed found = meshed(spec, settings);
+    for (Vec3& node : found.mesh.nodes) node = pose.orientation * node + pose.position;
+    settings.step = 1 / found.rate.rate;
     return std::make_shared<const SoftObject>(
-        std::move(body),
+        std::make_shared<const SoftBody>(std::move(found.mesh), found.fixed, settings),
         SoftContactSettings{.radius = touch.radius, .stiffness = spec.material.stiffness},
         touch.object);
   } catch (const std::invalid_argument& error) {

@@ -115,10 +115,20 @@ class Search {
     const Vec3 off = on_axis - place;
     const double distance = glm::length(off), radius = settings_.radius;
     if (distance > radius + margin_) return;
-    const bool behind = glm::dot(off, outward) < 0;
+    // A contact goes on by where the tool was, so that no fold of the surface throws it across. A
+    // new one begins from outside: from within, another side is not met, save where it is held, as
+    // by a table.
+    const SoftContact* const known = last(contact.key);
+    bool behind = glm::dot(off, known != nullptr ? known->normal : outward) < 0;
+    if (known == nullptr && behind) {
+      if (!is_held(contact)) return;
+      behind = false;
+    }
     if (behind && distance > kBehind * radius) return;
     if (distance > 1e-6 * radius) {
       contact.normal = off / (behind ? -distance : distance);
+    } else if (known != nullptr) {
+      contact.normal = known->normal;
     } else {
       const double length = glm::length(outward);
       if (!(length > 0)) return;
@@ -129,6 +139,21 @@ class Search {
     contact.along = along;
     contact.axis_point = on_axis - memory_.shift;
     keep(contact);
+  }
+
+  /// Of the last tick; null: it is new.
+  const SoftContact* last(std::uint32_t key) const {
+    for (const SoftContact& contact : memory_.contacts) {
+      if (contact.key == key) return &contact;
+    }
+    return nullptr;
+  }
+
+  bool is_held(const SoftContact& contact) const {
+    for (std::uint32_t a = 0; a < contact.count; ++a) {
+      if (!moment_.body.is_fixed(moment_.body.surface_nodes()[contact.nodes[a]])) return false;
+    }
+    return true;
   }
 
   void keep(const SoftContact& contact) {

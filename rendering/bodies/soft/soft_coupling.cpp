@@ -1,11 +1,15 @@
 #include "rendering/bodies/soft/soft_coupling.h"
 
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 namespace palpate::rendering {
 namespace {
 
-constexpr double kEarly = 1e-9;  // s; sums of ticks fall short of a step by rounding
+constexpr double kEarly = 1e-9;        // s; sums of ticks fall short of a step by rounding
+constexpr double kFarthestAhead = 2;   // steps beyond the view: clusters' boxes reach so far
+constexpr double kFarthestNode = 1e3;  // m
 
 void add_impulse(SoftObjectState& state, double dt) {
   for (const NodeForce& f : state.contact.forces) {
@@ -26,13 +30,23 @@ void ask_for_step(SoftObjectState& state) {
   state.impelled.clear();
   state.since_step = 0;
   state.waiting = true;
+  if (state.stepper != nullptr) state.stepper->ask(state.mean);
 }
 
 void take_step(const SoftObject& object, SoftObjectState& state) {
-  object.body->step(state.body, state.mean);
-  object.surface.look(*object.body, state.body, state.view);
+  const bool good = state.stepper != nullptr
+                        ? state.stepper->take(state.view)
+                        : step_and_look(object, state.body, state.mean, state.view);
+  state.failed = state.failed || !good;
   state.view_age = state.since_step;
   state.waiting = false;
+}
+
+/// Where one may come in this tick.
+void take_due_step(const SoftObject& object, SoftObjectState& state) {
+  if (state.pace == SoftPace::hold || !state.waiting || !step_is_due(object, state, 0)) return;
+  take_step(object, state);
+  if (state.pace == SoftPace::this_tick) state.pace = SoftPace::hold;
 }
 
 }  // namespace
@@ -48,13 +62,39 @@ SoftObjectState initial_state(const SoftObject& object) {
   return state;
 }
 
+bool step_is_due(const SoftObject& object, const SoftObjectState& state, double dt) noexcept {
+  return state.waiting &&
+         state.since_step + dt >= object.delay * object.body->settings().step - kEarly;
+}
+
+bool is_stalled(const SoftObjectState& state) noexcept {
+  return state.waiting && state.since_step > kStalledAfter;
+}
+
+bool step_and_look(const SoftObject& object, SoftState& body, std::span<const NodeForce> forces,
+                   SoftView& view) noexcept {
+  object.body->step(body, forces);
+  object.surface.look(*object.body, body, view);
+  double most = 0;
+  bool numbers = std::isfinite(body.energy);
+  for (std::size_t i = 0; i < view.x.size(); ++i) {
+    const Vec3& x = view.x[i];
+    const Vec3& ahead = view.ahead[i];
+    numbers = numbers && std::isfinite(x.x + x.y + x.z + ahead.x + ahead.y + ahead.z);
+    most = std::max({most, std::abs(x.x), std::abs(x.y), std::abs(x.z)});
+  }
+  return numbers && most <= kFarthestNode;
+}
+
 Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
              const PlacedTool& tool, double step, double dt) noexcept {
   const double h = object.body->settings().step;
   state.since_step += dt;
   state.view_age += dt;
-  if (state.waiting && state.since_step >= object.delay * h - kEarly) take_step(object, state);
-  const SoftMoment moment{*object.body, object.surface, state.view, state.view_age / h};
+  take_due_step(object, state);
+  if (state.failed) return Vec3(0);
+  const double fraction = std::min(state.view_age / h, kFarthestAhead);
+  const SoftMoment moment{*object.body, object.surface, state.view, fraction};
   Vec3 force(0);
   if (!state.started || state.off) {
     const bool inside = is_inside(moment, object.contact.radius, tip, tool);
@@ -63,9 +103,10 @@ Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
   }
   if (!state.off) force = follow_surface(moment, object.contact, tip, tool, step, state.contact);
   add_impulse(state, dt);
-  if (state.since_step >= h - kEarly) {
+  // A step that is late is waited for: the next one gets the mean force of all that time.
+  if (!state.waiting && state.since_step >= h - kEarly) {
     ask_for_step(state);
-    if (object.delay * h <= kEarly) take_step(object, state);
+    if (object.delay * h <= kEarly) take_due_step(object, state);
   }
   return force;
 }

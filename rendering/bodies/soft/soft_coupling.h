@@ -6,7 +6,9 @@
 // With the mean force as the reference, the surface does not jump when a step comes in, as long as
 // the body is linear: where the old view ends with a force held, the new one begins.
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -32,6 +34,30 @@ struct SoftObject {
   double delay = 0.5;
 };
 
+/// Makes the steps of one soft body elsewhere, as in a thread of its own. Functions return at once.
+class SoftStepper {
+ public:
+  virtual ~SoftStepper() = default;
+  /// Asks for a step with these forces. The step before must have been taken.
+  virtual void ask(std::span<const NodeForce> forces) noexcept = 0;
+  /// Whether the step that was asked for has been made.
+  virtual bool ready() const noexcept = 0;
+  /// Once it is ready: swaps `view` for the one after it. False: the body has failed.
+  virtual bool take(SoftView& view) noexcept = 0;
+
+ protected:
+  SoftStepper() = default;
+  SoftStepper(const SoftStepper&) = default;
+  SoftStepper& operator=(const SoftStepper&) = default;
+};
+
+/// When the steps that were asked for come in.
+enum class SoftPace : std::uint8_t {
+  when_due,   ///< each at its time, within long ticks as well
+  this_tick,  ///< the one that is due by the end of this tick, if it was asked for before
+  hold,       ///< none in this tick
+};
+
 struct SoftObjectState {
   SoftState body;
   SoftView view;          ///< that the servo goes by
@@ -44,7 +70,22 @@ struct SoftObjectState {
   std::vector<NodeForce> mean;          ///< N, that the step was asked for with
   bool off = false;                     ///< no force until the tool has left it once
   bool started = false;
+  SoftPace pace = SoftPace::when_due;
+  SoftStepper* stepper = nullptr;  ///< null: steps are made here, within the tick. Copies have none
+  bool failed = false;  ///< a step gave what is no number, or is far away: no force any more
 };
+
+/// Whether the step that was asked for, if one was, is due after dt more.
+bool step_is_due(const SoftObject& object, const SoftObjectState& state, double dt) noexcept;
+
+/// s; a step that is so late counts as stalled.
+inline constexpr double kStalledAfter = 0.1;
+bool is_stalled(const SoftObjectState& state) noexcept;
+
+/// One step, and what the servo knows after it. Not by the servo's thread where it has one of its
+/// own. \return false: what came out is no number, or is far away
+bool step_and_look(const SoftObject& object, SoftState& body, std::span<const NodeForce> forces,
+                   SoftView& view) noexcept;
 
 SoftObjectState initial_state(const SoftObject& object);
 

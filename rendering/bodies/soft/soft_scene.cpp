@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kLongestTick = 0.001;  // s; longer ones are cut, the hand moving evenly
 constexpr double kStride = 0.5;         // of the radius that the tool moves in a piece of a tick
-constexpr int kMostPieces = 256;
+constexpr int kMostPieces = 10'000;      // so that a gap of more than 10 s in a path counts as 10 s
+constexpr int kMostPiecesOfServo = 256;  // which gets a step a tick at most, however long
 constexpr double kFarthestPose = 1e6;  // m; a reading beyond it is a fault, as for other objects
 
 class SoftMotionState final : public MotionState {
@@ -21,10 +22,12 @@ class SoftMotionState final : public MotionState {
   RenderState others;
   std::vector<SoftObjectState> soft;
   ToolPose last;
-  bool has_last = false;
+  bool has_last = false, by_tick = false, hold = false;
 
   std::unique_ptr<MotionState> clone() const override {
-    return std::make_unique<SoftMotionState>(*this);
+    auto copy = std::make_unique<SoftMotionState>(*this);
+    for (SoftObjectState& state : copy->soft) state.stepper = nullptr;
+    return copy;
   }
   std::span<const BodyPose> bodies() const override { return others.motion.bodies(); }
 };
@@ -114,15 +117,19 @@ class SoftMotion final : public SceneMotion {
     if (tool != nullptr)
       pose.frame =
           tool_frame(pose.d, state.has_last ? &state.last.frame : nullptr, outer.measured_side);
+    if (state.by_tick) result.faults |= pace(state, std::max(0.0, dt));
     follow(state, pose, tool, sides, std::max(0.0, dt));
     if (tool != nullptr) result.ideal_side = pose.frame[0];
     for (std::size_t i = 0; i < soft_.size(); ++i)
       add_contacts(*soft_[i], state.soft[i], pose, sides, tool != nullptr, result);
     const Vec3 all = result.force + result.torque;
-    if (!std::isfinite(all.x + all.y + all.z)) {
+    const bool failed = std::ranges::any_of(state.soft, &SoftObjectState::failed);
+    const bool stalled = std::ranges::any_of(state.soft, is_stalled);
+    if (failed || stalled || !std::isfinite(all.x + all.y + all.z)) {
       Rendering none;
       none.ideal = probe;
-      none.faults = result.faults | render_fault::kNonFinite;
+      none.faults =
+          result.faults | (stalled ? render_fault::kSoftStalled : render_fault::kNonFinite);
       result = none;
     }
     state.last = pose;
@@ -133,6 +140,21 @@ class SoftMotion final : public SceneMotion {
   }
 
  private:
+  /// Which steps come in in a tick of dt. \return kSoftLate: some are due, and none will
+  std::uint32_t pace(SoftMotionState& state, double dt) const noexcept {
+    bool due = false, late = state.hold;
+    for (std::size_t i = 0; i < soft_.size(); ++i) {
+      SoftObjectState& own = state.soft[i];
+      const bool own_due = step_is_due(*soft_[i], own, dt);
+      own.pace = own_due ? SoftPace::this_tick : SoftPace::hold;
+      due = due || own_due;
+      late = late || (own_due && own.stepper != nullptr && !own.stepper->ready());
+    }
+    if (!due || !late) return 0;
+    for (SoftObjectState& own : state.soft) own.pace = SoftPace::hold;
+    return render_fault::kSoftLate;
+  }
+
   /// The hand moves evenly from the last pose to this one.
   void follow(SoftMotionState& state, const ToolPose& to, const Tool* tool, bool sides,
               double dt) const noexcept {
@@ -142,11 +164,13 @@ class SoftMotion final : public SceneMotion {
       const double stride = std::min(soft_[i]->contact.radius * kStride, kLongestStride);
       const double wanted =
           std::max({1.0, std::ceil(moved / stride - 1e-9), std::ceil(dt / kLongestTick - 1e-6)});
-      const int pieces = static_cast<int>(std::min<double>(wanted, kMostPieces));
+      const int most = state.by_tick ? kMostPiecesOfServo : kMostPieces;
+      const int pieces = static_cast<int>(std::min<double>(wanted, most));
+      const double piece = state.by_tick ? dt / pieces : std::min(dt / pieces, kLongestTick);
       for (int k = 1; k <= pieces; ++k) {
         const ToolPose at = k < pieces ? between(from, to, static_cast<double>(k) / pieces) : to;
         advance(*soft_[i], state.soft[i], at.tip, place(tool, sides, at), moved / pieces,
-                dt / pieces);
+                piece);
       }
     }
   }
@@ -168,6 +192,33 @@ Scene soft_scene(Scene others, std::vector<SceneObject> shown,
                  const Tool& tool) {
   return Scene(std::move(shown), side_contact, tool,
                std::make_shared<const SoftMotion>(std::move(others), std::move(soft)));
+}
+
+void visit_soft_contacts(const RenderState& state, SoftContactVisit visit, void* whom) noexcept {
+  const auto* const own = dynamic_cast<const SoftMotionState*>(state.motion.get());
+  if (own == nullptr) return;
+  for (const SoftObjectState& soft : own->soft) {
+    for (const SoftContact& contact : soft.contact.contacts) {
+      if (contact.force > 0)
+        visit(whom, contact.axis_point + soft.contact.shift, contact.force * contact.normal);
+    }
+  }
+}
+
+void pace_by_tick(RenderState& state) {
+  if (auto* const own = dynamic_cast<SoftMotionState*>(state.motion.get())) own->by_tick = true;
+}
+
+void hold_steps(RenderState& state, bool held) noexcept {
+  if (auto* const own = dynamic_cast<SoftMotionState*>(state.motion.get())) own->hold = held;
+}
+
+void step_elsewhere(RenderState& state, std::span<SoftStepper* const> steppers) {
+  pace_by_tick(state);
+  auto* const own = dynamic_cast<SoftMotionState*>(state.motion.get());
+  if (own == nullptr) return;
+  for (std::size_t i = 0; i < own->soft.size() && i < steppers.size(); ++i)
+    own->soft[i].stepper = steppers[i];
 }
 
 std::vector<SoftShape> soft_shapes(const Scene& scene, const RenderState& state) {

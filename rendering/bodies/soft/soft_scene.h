@@ -28,6 +28,32 @@ Scene soft_scene(Scene others, std::vector<SceneObject> shown,
 /// Empty where nothing is soft. Valid until the state's next tick, which changes them in place.
 std::vector<SoftShape> soft_shapes(const Scene& scene, const RenderState& state);
 
+/// Every contact with force of the last tick with what gives: place on the ideal tool's axis, m, and
+/// force on the tool, N. No allocation.
+using SoftContactVisit = void (*)(void* whom, const Vec3& place, const Vec3& force);
+void visit_soft_contacts(const RenderState& state, SoftContactVisit visit, void* whom) noexcept;
+template <class Visit>
+void for_each_soft_contact(const RenderState& state, Visit visit) noexcept {
+  visit_soft_contacts(
+      state,
+      [](void* whom, const Vec3& place, const Vec3& force) {
+        (*static_cast<Visit*>(whom))(place, force);
+      },
+      &visit);
+}
+
+/// Steps come in as they do at a servo, tick by tick: one that was asked for in a tick in a later
+/// one, all that are due, or none of them where one is not ready (fault kSoftLate).
+void pace_by_tick(RenderState& state);
+
+/// Before a tick, of a state that is paced: steps that are due in it wait. Held in the ticks that
+/// have the fault kSoftLate, a recorded path comes out the same. No allocation.
+void hold_steps(RenderState& state, bool held) noexcept;
+
+/// The same, with the steps made elsewhere. Right after initial_state().
+/// \param steppers  of soft_objects(scene), in order; they must outlive the state's use
+void step_elsewhere(RenderState& state, std::span<SoftStepper* const> steppers);
+
 /// The soft objects of a scene; empty where there are none.
 std::span<const std::shared_ptr<const SoftObject>> soft_objects(const Scene& scene);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "rendering/bodies/soft/soft_body.h"
 
@@ -33,7 +34,7 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
   double part = 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
-    const double there = potential_change(state, state.trial, nullptr);
+    const double there = change_at_trial(state);
     if (there <= change + kArmijo * part * slope + rounding) {
       const double share = (change - there) / (-0.5 * slope);
       change = there;
@@ -42,6 +43,7 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
                                                                       : LineSearch::moves;
     }
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] -= part * state.step[i];
+    state.next_is_trial = false;
   }
   return LineSearch::stays;
 }
@@ -58,11 +60,12 @@ void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const n
                                         solid_.masses()[i] * (state.v[i] / h + settings_.gravity);
   }
   state.step = state.ahead;
+  state.next_is_trial = false;
   double change = 0;
   LineSearch found = search_line(state, change);
   for (int iteration = 1; found == LineSearch::moves && iteration < settings_.iterations;
        ++iteration) {
-    potential_change(state, state.trial, state.trial_gradient.data());
+    find_trial_gradient(state);
     for (std::size_t i = 0; i < state.x.size(); ++i) {
       if (is_fixed_[i]) state.trial_gradient[i] = Vec3(0);
       state.step[i] = -state.trial_gradient[i];
@@ -74,7 +77,13 @@ void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const n
     state.v[i] = (state.trial[i] - state.x[i]) / h;
     state.x[i] = state.trial[i];
   }
-  state.energy = solid_.energy(state.x, state.gradient.data(), state.strains);
+  if (state.next_is_trial) {
+    state.energy = state.next_energy;
+    std::swap(state.gradient, state.next_gradient);
+    std::swap(state.strains, state.next_strains);
+  } else {
+    state.energy = solid_.energy(state.x, state.gradient.data(), state.strains);
+  }
   look_ahead(state);
 }
 

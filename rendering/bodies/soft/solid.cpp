@@ -135,10 +135,12 @@ void Solid::prepare(const std::vector<Vec3>& nodes, Elements<kNodes, kPoints>& e
   }
 }
 
-template <int kNodes, int kPoints, bool kDamped>
-double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<const Vec3> x,
-                        const Strains* before, double rate, Vec3* gradient, Strains* now) const {
-  double energy = 0;
+template <int kNodes, int kPoints, Solid::Terms kTerms>
+Solid::Potential Solid::energy_of(const Elements<kNodes, kPoints>& elements,
+                                  std::span<const Vec3> x, const Strains* before, double rate,
+                                  Vec3* gradient, Strains* now) const {
+  constexpr bool kDamps = kTerms != Terms::elastic, kDampedGradient = kTerms == Terms::damped;
+  double energy = 0, damping = 0;
   for (std::size_t e = 0; e < elements.nodes.size(); ++e) {
     const auto& shape = elements.shapes[elements.shape_of[e]];
     const auto& nodes = elements.nodes[e];
@@ -159,26 +161,25 @@ double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<con
       local += shape.weight[q] * (square[q] - 3 - 2 * j + j * j);
     }
     energy += 0.5 * mu_ * local + 0.5 * shape.volume * lambda_ * (mean - 1) * (mean - 1);
+    double green[6][kPoints];
     [[maybe_unused]] double change[6][kPoints];
     double pressure = lambda_ * (mean - 1);
-    if constexpr (kDamped) {
-      green_strain<kPoints>(f, change);
+    if (kDamps || now != nullptr) green_strain<kPoints>(f, green);
+    if constexpr (kDamps) {
       double spent = 0;
       for (int c = 0; c < 6; ++c) {
         const double* const old =
             before->green.data() + 6 * (elements.first_point + e * kPoints) + c * kPoints;
         for (int q = 0; q < kPoints; ++q) {
-          change[c][q] -= old[q];
+          change[c][q] = green[c][q] - old[q];
           spent += (c < 3 ? 1 : 2) * shape.weight[q] * change[c][q] * change[c][q];
         }
       }
       const double swelling = mean - before->dilation[elements.first_element + e];
-      energy += rate * (mu_ * spent + 0.5 * shape.volume * lambda_ * swelling * swelling);
-      pressure += rate * lambda_ * swelling;
+      damping += rate * (mu_ * spent + 0.5 * shape.volume * lambda_ * swelling * swelling);
+      if (kDampedGradient) pressure += rate * lambda_ * swelling;
     }
     if (now != nullptr) {
-      double green[6][kPoints];
-      green_strain<kPoints>(f, green);
       std::copy(&green[0][0], &green[0][0] + 6 * kPoints,
                 now->green.begin() +
                     static_cast<std::ptrdiff_t>(6 * (elements.first_point + e * kPoints)));
@@ -192,7 +193,7 @@ double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<con
           stress[i][j][q] = mu_ * f[i][j][q] + (mu_ * (det[q] - 2) + pressure) * cof[i][j][q];
       }
     }
-    if constexpr (kDamped) {
+    if constexpr (kDampedGradient) {
       constexpr int kIndex[3][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}};
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) {
@@ -223,28 +224,42 @@ double Solid::energy_of(const Elements<kNodes, kPoints>& elements, std::span<con
       }
     }
   }
-  return energy;
+  return {energy, energy + damping};
 }
 
 double Solid::energy(std::span<const Vec3> x, Vec3* gradient) const {
   if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
-  return energy_of<8, 8, false>(hexahedra_, x, nullptr, 0, gradient, nullptr) +
-         energy_of<10, 4, false>(tetrahedra_, x, nullptr, 0, gradient, nullptr);
+  return energy_of<8, 8, Terms::elastic>(hexahedra_, x, nullptr, 0, gradient, nullptr).elastic +
+         energy_of<10, 4, Terms::elastic>(tetrahedra_, x, nullptr, 0, gradient, nullptr).elastic;
 }
 
 double Solid::energy(std::span<const Vec3> x, Vec3* gradient, Strains& strains) const {
   if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
-  strains.green.resize(6 * (8 * hexahedra_.nodes.size() + 4 * tetrahedra_.nodes.size()));
-  strains.dilation.resize(hexahedra_.nodes.size() + tetrahedra_.nodes.size());
-  return energy_of<8, 8, false>(hexahedra_, x, nullptr, 0, gradient, &strains) +
-         energy_of<10, 4, false>(tetrahedra_, x, nullptr, 0, gradient, &strains);
+  fit(strains);
+  return energy_of<8, 8, Terms::elastic>(hexahedra_, x, nullptr, 0, gradient, &strains).elastic +
+         energy_of<10, 4, Terms::elastic>(tetrahedra_, x, nullptr, 0, gradient, &strains).elastic;
 }
 
 double Solid::energy(std::span<const Vec3> x, const Strains& before, double rate,
                      Vec3* gradient) const {
   if (gradient != nullptr) std::fill(gradient, gradient + nodes(), Vec3(0));
-  return energy_of<8, 8, true>(hexahedra_, x, &before, rate, gradient, nullptr) +
-         energy_of<10, 4, true>(tetrahedra_, x, &before, rate, gradient, nullptr);
+  return energy_of<8, 8, Terms::damped>(hexahedra_, x, &before, rate, gradient, nullptr).damped +
+         energy_of<10, 4, Terms::damped>(tetrahedra_, x, &before, rate, gradient, nullptr).damped;
+}
+
+Solid::Potential Solid::potential(std::span<const Vec3> x, const Strains& before, double rate,
+                                  Vec3* gradient, Strains& strains) const {
+  std::fill(gradient, gradient + nodes(), Vec3(0));
+  fit(strains);
+  constexpr Terms kTerms = Terms::elastic_gradient;
+  const Potential a = energy_of<8, 8, kTerms>(hexahedra_, x, &before, rate, gradient, &strains);
+  const Potential b = energy_of<10, 4, kTerms>(tetrahedra_, x, &before, rate, gradient, &strains);
+  return {a.elastic + b.elastic, a.damped + b.damped};
+}
+
+void Solid::fit(Strains& strains) const {
+  strains.green.resize(6 * (8 * hexahedra_.nodes.size() + 4 * tetrahedra_.nodes.size()));
+  strains.dilation.resize(hexahedra_.nodes.size() + tetrahedra_.nodes.size());
 }
 
 double Solid::volume(std::span<const Vec3> x) const {

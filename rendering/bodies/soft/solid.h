@@ -50,6 +50,14 @@ class Solid {
   /// J, with the incremental potential of damping over a step.
   /// \param before  strains at its start. \param rate  damping / duration of the step
   double energy(std::span<const Vec3> x, const Strains& before, double rate, Vec3* gradient) const;
+  /// What a step needs of where it may end, in one go: J, elastic, with its gradient (N, one of
+  /// each node) and the strains there (resized where they are not of this solid).
+  struct Potential {
+    double elastic = 0;  ///< J
+    double damped = 0;   ///< J, with the incremental potential of damping
+  };
+  Potential potential(std::span<const Vec3> x, const Strains& before, double rate, Vec3* gradient,
+                      Strains& strains) const;
   /// m^3, of the deformed solid.
   double volume(std::span<const Vec3> x) const;
 
@@ -80,9 +88,11 @@ class Solid {
 
   template <int kNodes, int kPoints>
   void prepare(const std::vector<Vec3>& nodes, Elements<kNodes, kPoints>& elements);
-  template <int kNodes, int kPoints, bool kDamped>
-  double energy_of(const Elements<kNodes, kPoints>& elements, std::span<const Vec3> x,
-                   const Strains* before, double rate, Vec3* gradient, Strains* now) const;
+  enum class Terms { elastic, damped, elastic_gradient };  ///< the last: damping in the sum alone
+  template <int kNodes, int kPoints, Terms kTerms>
+  Potential energy_of(const Elements<kNodes, kPoints>& elements, std::span<const Vec3> x,
+                      const Strains* before, double rate, Vec3* gradient, Strains* now) const;
+  void fit(Strains& strains) const;
   template <int kNodes, int kPoints>
   void add_stiffness(const Elements<kNodes, kPoints>& elements, std::vector<Block>& blocks) const;
 

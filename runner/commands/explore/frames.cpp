@@ -155,7 +155,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   const rendering::Scene scene = build_scene(scene_path, spec, renderer);
   const TouchedScene touched = touch(scene, spec, renderer, poses, rows);
   SceneDrawing drawing(spec.objects, tool_of(spec.tool));
-  drawing.add_layers(scene);
+  drawing.add_compiled(scene);
   const SceneDrawingSettings looks = drawing_settings(drawing, touched, renderer, settings.labels);
   const Camera camera = camera_for(drawing, touched, looks, settings);
   const std::unique_ptr<ScenePainter> painter =

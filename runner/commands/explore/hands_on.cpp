@@ -59,7 +59,7 @@ ExploreSettings window_settings(const protocols::SceneSpec& spec,
                                 const rendering::Renderer& renderer,
                                 const HandsOnSettings& settings) {
   SceneDrawing drawing(spec.objects, tool_of(spec.tool));
-  drawing.add_layers(build_scene(settings.scene_path, spec, renderer));
+  drawing.add_compiled(build_scene(settings.scene_path, spec, renderer));
   ExploreSettings out{.title = fs::path(settings.scene_path).filename().string(),
                       .objects = spec.objects,
                       .drawing = std::move(drawing),

@@ -2,17 +2,26 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <iterator>
+#include <memory>
 #include <utility>
 
 #include "runner/commands/render/forces.h"
 #include "runner/display/timeline.h"
+#include "runner/servo/servo_fault.h"
 
 namespace palpate::runner {
 namespace {
 
 constexpr auto kIdle = std::chrono::milliseconds(5);
+constexpr std::int64_t kSoftEvery = 15'000'000;  // ns, between two surfaces that are kept
+
+ServoSettings with_places(ServoSettings settings) {
+  settings.touched_places = true;
+  return settings;
+}
 // Forces begin wherever the stylus is: an object that it is inside of gives none until it was left.
 constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
 
@@ -21,7 +30,7 @@ constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
 LiveTouch::LiveTouch(Device& device, Clock& clock, Settings settings)
     : settings_(std::move(settings)),
       shown_(settings_.spec.objects),
-      servo_(device, clock, settings_.servo) {
+      servo_(device, clock, with_places(settings_.servo)) {
   prepare(shown_);  // faults of the scene are told before there is a window
   recorder_ = std::jthread([this](const std::stop_token& stop) { record(stop); });
 }
@@ -43,9 +52,11 @@ void LiveTouch::keep(const Sample& sample) {
   if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
   last_ns_ = sample.time_ns;
   SceneMoment moment{.sample = sample, .contacts = {}};
-  // The servo tells the deepest place; the force there is the one that was commanded.
-  if (sample.rendering.contacts > 0)
-    moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});
+  if (sample.rendering.contacts > 0) add_contacts(moment);
+  update_soft(sample.time_ns);
+  for (const auto& surface : soft_) {
+    if (surface != nullptr) moment.soft.push_back(surface);
+  }
   const WorkspaceMap& map = settings_.servo.workspace;
   if (map.reach) moment.held = unstretched(*map.reach, sample.probe);
   const std::lock_guard lock(mutex_);
@@ -53,6 +64,38 @@ void LiveTouch::keep(const Sample& sample) {
     fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
   fresh_.push_back(std::move(moment));
   recorded_.fetch_add(1);
+}
+
+/// Where forces are off or limited, what was rendered is not what the hand got: one place then, with
+/// that.
+void LiveTouch::add_contacts(SceneMoment& moment) {
+  const Sample& sample = moment.sample;
+  constexpr std::uint32_t kNotAsRendered = servo_fault::kForceLimited | servo_fault::kTripped;
+  while (touched_.time_ns < sample.time_ns && servo_.touched(touched_)) {
+  }
+  if (touched_.time_ns == sample.time_ns && (sample.faults & kNotAsRendered) == 0) {
+    moment.contacts.assign(touched_.places.begin(),
+                           touched_.places.begin() + static_cast<std::ptrdiff_t>(touched_.count));
+  } else {
+    moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});
+  }
+}
+
+void LiveTouch::update_soft(std::int64_t now_ns) {
+  SoftThreads* const threads = servo_.soft_threads();
+  if (threads == nullptr || threads->empty()) {
+    soft_.clear();
+    return;
+  }
+  if (now_ns < soft_ns_ + kSoftEvery && soft_.size() == threads->size()) return;
+  soft_ns_ = now_ns;
+  soft_.resize(threads->size());
+  SoftSnapshot snapshot;
+  for (std::size_t i = 0; i < threads->size(); ++i) {
+    if (!(*threads)[i].latest(snapshot)) continue;
+    soft_[i] = std::make_shared<const SoftSurfaceNow>(SoftSurfaceNow{
+        (*threads)[i].object(), {snapshot.now.begin(), snapshot.now.end()}});
+  }
 }
 
 void LiveTouch::record(const std::stop_token& stop) {

@@ -56,6 +56,8 @@ class LiveTouch final : public TouchSource {
   void record(const std::stop_token& stop);
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
   void keep(const Sample& sample);
+  void add_contacts(SceneMoment& moment);
+  void update_soft(std::int64_t now_ns);
 
   const Settings settings_;
   mutable std::mutex mutex_;  ///< of the next three; held for a swap or an append
@@ -66,6 +68,9 @@ class LiveTouch final : public TouchSource {
   std::atomic<std::uint64_t> recorded_{0};
   std::vector<stimuli::ObjectSpec> shown_;  ///< the recorder's; so the next
   std::int64_t last_ns_ = 0;
+  TouchedPlaces touched_;  ///< the next that no sample has had yet
+  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_;  ///< the newest, by soft object
+  std::int64_t soft_ns_ = 0;                                 ///< when they were asked for
   ServoThread servo_;
   std::jthread recorder_;  ///< last: ends first
 };

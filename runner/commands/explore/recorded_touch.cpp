@@ -4,12 +4,18 @@
 #include <cstddef>
 #include <exception>
 #include <iterator>
+#include <memory>
 #include <utility>
 
 #include "runner/commands/render/forces.h"
 #include "runner/display/timeline.h"
 
 namespace palpate::runner {
+namespace {
+
+constexpr double kSoftEvery = 0.015;  // s; a minute of every tick's surfaces would fill the memory
+
+}  // namespace
 
 SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
                       const rendering::Scene& scene, const rendering::Rendering& rendering,
@@ -22,6 +28,7 @@ SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
   out.sample.device2 = rendering.device2;
   if (spec.reach) out.held = pose.probe;
   out.poses = object_poses(spec.objects, state);
+  out.soft = soft_surfaces(scene, state);
   return out;
 }
 
@@ -38,12 +45,20 @@ void RecordedTouch::touch() {
   const rendering::Scene scene = build_scene(scene_path_, spec_, renderer_);
   const std::size_t stride = (poses_.size() + Timeline::kMost - 2) / (Timeline::kMost - 1);
   std::size_t row = 0;
+  double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
+  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft;
   moments_.clear();
   render_along(scene, spec_, renderer_, poses_,
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
                    const rendering::RenderState& state) {
-                 if (row++ % stride == 0)
-                   moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+                 if (row++ % stride != 0) return;
+                 moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+                 if (pose.t >= soft_time && pose.t < soft_time + kSoftEvery && soft_time >= 0) {
+                   moments_.back().soft = soft;
+                 } else {
+                   soft = moments_.back().soft;
+                   soft_time = pose.t;
+                 }
                });
 }
 

@@ -166,21 +166,11 @@ std::string ask_new_code() {
   return *code;
 }
 
-/// A step of a soft body takes longer than a tick, and the servo has no other thread for it.
-void refuse_soft(const protocols::Protocol& protocol, const std::string& file) {
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    if (!stimulus.object.soft) continue;
-    throw UsageError(file + ": stimulus '" + stimulus.name +
-                     "' is soft: soft stimuli are simulated and rendered, not yet run live");
-  }
-}
-
 }  // namespace
 
 Admission admit(const RunSettings& settings) {
   Admission admission;
   admission.protocol = protocols::parse_protocol(settings.protocol);
-  refuse_soft(admission.protocol, settings.protocol);
   admission.participant = settings.participant;
   admission.number = settings.number;
   Known known = look_into(settings, admission.protocol, admission.participant);

@@ -12,6 +12,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/stability/report.h"
+#include "runner/stability/soft_map.h"
 
 namespace palpate::runner {
 namespace {
@@ -187,24 +188,43 @@ StabilityReport study(bool full, int jobs) {
   return report;
 }
 
+/// The map of soft bodies. \return the exit code
+int study_soft(int jobs) {
+  const std::vector<SoftCase> cases = soft_cases();
+  std::vector<SoftSwing> map(cases.size());
+  std::vector<std::function<void()>> tasks;
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    tasks.emplace_back([&, i] { map[i] = press_and_hold(cases[i]); });
+  run_all(tasks, jobs);
+  std::cout << soft_map_text(map);
+  return std::ranges::all_of(
+             map, [](const SoftSwing& one) { return !one.accepted || one.settles(); })
+             ? 0
+             : 1;
+}
+
 }  // namespace
 
 int stability_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate stability [--full] [--report FILE.html] [--json FILE]";
+  line.usage = "palpate stability [--full] [--report FILE.html] [--json FILE]\n"
+      "       palpate stability --soft";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
       "hand, two devices and renderer against a wall, an edge, a sphere and two objects, and\n"
       "compares the stability boundary with the passivity condition of theory. Status 1 where\n"
-      "theory is violated.";
+      "theory is violated. With --soft: does a tool come to rest on a soft body that is stepped at\n"
+      "its own rate? Status 1 where it does not and scenes may have it.";
   line.example =
       "  palpate stability\n"
+      "  palpate stability --soft\n"
       "  palpate stability --full --report stability.html --json stability.json";
   std::string json, page, figure;
   int jobs = 0;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("full", "four stiffnesses a decade instead of one");
+  add("soft", "the map of soft bodies alone: moduli, springs, rates of the body (a minute)");
   add("report", po::value(&page)->value_name("FILE"),
       "write a report with figures as an HTML page");
   add("figure", po::value(&figure)->value_name("FILE"), "write the map as SVG");
@@ -218,6 +238,13 @@ int stability_command(const std::vector<std::string>& args) {
   }
   Outputs outputs(*values, {"json", "report", "figure"}, {});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  if (values->count("soft") > 0) {
+    for (const char* const other : {"full", "report", "figure", "json"}) {
+      if (values->count(other) > 0)
+        throw UsageError(std::string("--soft: expected without --") + other);
+    }
+    return study_soft(jobs);
+  }
   const StabilityReport report = study(values->count("full") > 0, jobs);
   if (outputs.wanted("json")) outputs.put("json", stability_json(report).dump(1) + "\n");
   if (outputs.wanted("figure"))

@@ -9,12 +9,16 @@
 #include <utility>
 
 #include "stimuli/compose.h"
+#include "stimuli/input_file.h"
 #include "stimuli/parts/triangulate.h"
 #include "stimuli/primitives.h"
+#include "stimuli/solids/gmsh_file.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner {
 namespace {
 
+constexpr std::size_t kMostFileBytes = std::size_t{1} << 31;
 constexpr int kSides = 24;
 constexpr float kFlattest = 0.866F;  // cosine between normals that are smoothed
 
@@ -50,8 +54,33 @@ glm::vec3 on_rim(int corner) {
 
 }  // namespace
 
+DrawnMesh surface_mesh(std::span<const Vec3> places,
+                       std::span<const std::array<std::uint32_t, 3>> triangles,
+                       std::span<const float> tints) {
+  DrawnMesh out;
+  out.reserve(3 * triangles.size());
+  for (const auto& corners : triangles) {
+    const Vec3 &a = places[corners[0]], &b = places[corners[1]], &c = places[corners[2]];
+    const Vec3 across = glm::cross(b - a, c - a);
+    const double area = glm::length(across);
+    if (!(area > 0)) continue;
+    const glm::vec3 normal(across / area);
+    for (const std::uint32_t corner : corners) {
+      out.push_back({glm::vec3(places[corner]), normal, tints.empty() ? 0.0F : tints[corner]});
+    }
+  }
+  smooth(out);
+  return out;
+}
+
 DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
   DrawnMesh out;
+  if (object.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(object.file)) {
+    const stimuli::SolidMesh solid = stimuli::read_gmsh(
+        object.file, object.file_bytes ? *object.file_bytes
+                                       : stimuli::read_whole(object.file, kMostFileBytes));
+    return surface_mesh(solid.nodes, stimuli::surface_of(solid), {});
+  }
   add_object(object, Pose(), out);
   smooth(out);
   return out;

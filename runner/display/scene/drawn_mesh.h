@@ -1,9 +1,12 @@
 #pragma once
 // Meshes for pictures: triangles with normals, m.
 
+#include <array>
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
@@ -14,6 +17,7 @@ namespace palpate::runner {
 struct DrawnVertex {
   glm::vec3 position;  ///< m
   glm::vec3 normal;    ///< unit, outward
+  float tint = 0;      ///< 0: the object's colour; 1: that of what has given way
 };
 using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
 
@@ -21,6 +25,11 @@ using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
 /// Edges that are flatter than 30 degrees are smoothed. \throws MeshError, std::runtime_error where
 /// a file is no mesh
 DrawnMesh triangles_of(const stimuli::ObjectSpec& object);
+
+/// A surface of triangles. \param tints  of the places; empty: none
+DrawnMesh surface_mesh(std::span<const Vec3> places,
+                       std::span<const std::array<std::uint32_t, 3>> triangles,
+                       std::span<const float> tints);
 
 /// Adds the facets of a convex mesh, in the frame in which its own has this pose.
 void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& out);

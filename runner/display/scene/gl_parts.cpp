@@ -77,8 +77,10 @@ GlMesh::GlMesh(const DrawnMesh& mesh) : corners_(static_cast<int>(mesh.size())) 
   // NOLINTNEXTLINE(performance-no-int-to-ptr): an offset, as OpenGL asks for it
   const void* const normals = reinterpret_cast<const void*>(offsetof(DrawnVertex, normal));
   glVertexAttribPointer(1, 3, GL_FLOAT, GL_FALSE, sizeof(DrawnVertex), normals);
-  glEnableVertexAttribArray(0);
-  glEnableVertexAttribArray(1);
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): likewise
+  const void* const tints = reinterpret_cast<const void*>(offsetof(DrawnVertex, tint));
+  glVertexAttribPointer(2, 1, GL_FLOAT, GL_FALSE, sizeof(DrawnVertex), tints);
+  for (const GLuint attribute : {0U, 1U, 2U}) glEnableVertexAttribArray(attribute);
   glBindVertexArray(0);
 }
 

@@ -33,6 +33,7 @@ constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.0
 constexpr double kLengthOfOneNewton = 0.35;  // of the size
 constexpr double kTurnOfOneNewtonMetre = 3;  // radius, of the size
 constexpr double kLeastForce = 0.005;        // N; less is not drawn
+constexpr double kRedOfSize = 0.2;           // of the radius: so far has given way what is red
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
 bool finite(const Vec3& v) {
@@ -90,21 +91,18 @@ std::string caption_of(const SceneMoment& moment, double grid) {
 std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
                                          const rendering::RenderState& state,
                                          const rendering::Rendering& rendering) {
-  if (rendering.contacts == 0) return {};
-  const auto force_of = [](const rendering::LoadedContact& c) {
-    return c.force * c.contact.normal + c.stiffness * c.tangential_offset;
-  };
-  std::vector<ContactPlace> out;
-  if (scene.motion() != nullptr) {
-    out.push_back({rendering.deepest.point, rendering.force});
-  } else if (scene.features().unions) {
-    for (const rendering::PlacedContact& c : state.unions.contacts)
-      out.push_back({c.place + c.loaded.tangential_offset, force_of(c.loaded)});
-  } else if (scene.features().several_parts) {
-    for (const rendering::LoadedContact& c : state.contacts)
-      out.push_back({c.contact.point, force_of(c)});
-  } else {
-    out.push_back({rendering.deepest.point, rendering.force});
+  constexpr std::size_t kMostPlaces = 1024;
+  std::vector<ContactPlace> out(kMostPlaces);
+  out.resize(find_contact_places(scene, state, rendering, out));
+  return out;
+}
+
+std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_surfaces(
+    const rendering::Scene& scene, const rendering::RenderState& state) {
+  std::vector<std::shared_ptr<const SoftSurfaceNow>> out;
+  for (const rendering::SoftShape& shape : rendering::soft_shapes(scene, state)) {
+    out.push_back(std::make_shared<const SoftSurfaceNow>(
+        SoftSurfaceNow{shape.object, {shape.now.begin(), shape.now.end()}}));
   }
   return out;
 }
@@ -152,6 +150,25 @@ SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rend
   for (const glm::vec3& point : points) radius = std::max(radius, glm::distance(point, middle_));
   size_ = std::max<double>(radius, 1e-4);
   ground_ = low.y;
+}
+
+void SceneDrawing::add_compiled(const rendering::Scene& scene) {
+  add_layers(scene);
+  for (const auto& soft : rendering::soft_objects(scene))
+    objects_[static_cast<std::size_t>(soft->object)].soft = soft;
+}
+
+std::shared_ptr<const DrawnMesh> SceneDrawing::drawn_soft(const Object& object,
+                                                          const SoftSurfaceNow& now) {
+  const std::vector<Vec3>& rest = object.soft->rest;
+  const std::vector<Vec3> places(now.places.begin(), now.places.end());
+  std::vector<float> tints;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double moved = glm::distance(places[i], rest[i]) / (kRedOfSize * object.top);
+    tints.push_back(static_cast<float>(std::clamp(moved, 0.0, 1.0)));
+  }
+  return std::make_shared<const DrawnMesh>(
+      surface_mesh(places, object.soft->surface.triangles(), tints));
 }
 
 void SceneDrawing::add_layers(const rendering::Scene& scene) {
@@ -229,11 +246,25 @@ std::optional<SceneDrawing::Hit> SceneDrawing::hit(const glm::vec3& from, const 
 
 void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSettings& settings,
                                ScenePicture& out) const {
+  const auto add_label = [&](std::size_t i, const glm::mat4& place) {
+    if (!settings.labels) return;
+    const glm::vec3 above(0, objects_[i].top + 0.06F * static_cast<float>(size_), 0);
+    out.labels.push_back({glm::vec3(place[3]) + above, objects_[i].label});
+  };
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Object& object = objects_[i];
     const glm::mat4 place = place_of(i < moment.poses.size() ? moment.poses[i] : object.pose);
     const auto index = static_cast<int>(i);
     const bool skin = !object.layers.empty() || !object.felt;
+    const auto now = std::ranges::find_if(
+        moment.soft, [&](const auto& surface) { return surface->object == index; });
+    if (now != moment.soft.end() && object.soft != nullptr &&
+        (*now)->places.size() == object.soft->rest.size()) {
+      out.objects.push_back(
+          {drawn_soft(object, **now), glm::mat4(1), object.colour, 1.0F, index, 0});
+      add_label(i, place);
+      continue;
+    }
     out.objects.push_back(
         {object.mesh, place, object.colour, skin ? kSkinOpacity : 1.0F, index, 0});
     for (std::size_t k = 0; k < object.layers.size(); ++k) {
@@ -241,10 +272,7 @@ void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSett
       out.objects.push_back({object.layers[k], place, kLayerColours[k % kLayerColours.size()],
                              kLayerOpacity, index, static_cast<int>(k) + 1});
     }
-    if (!settings.labels) continue;
-    const glm::vec3 middle(place[3]);
-    out.labels.push_back(
-        {middle + glm::vec3(0, object.top + 0.06F * static_cast<float>(size_), 0), object.label});
+    add_label(i, place);
   }
 }
 

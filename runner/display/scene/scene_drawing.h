@@ -8,22 +8,18 @@
 #include <string>
 #include <vector>
 
+#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
 #include "runner/display/scene/picture.h"
 #include "runner/servo/sample.h"
+#include "runner/servo/touched_places.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::runner {
 
-/// A place where the tool touches with force.
-struct ContactPlace {
-  Vec3 place;  ///< m, on the ideal tool
-  Vec3 force;  ///< N, on the tool
-};
-
-/// All places of a tick; of a scene in which something moves the deepest alone, with all of the
-/// force. \param state  after it
+/// All places of a tick; of a scene in which something rigid moves the deepest alone, with all of
+/// the force. \param state  after it
 std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
                                          const rendering::RenderState& state,
                                          const rendering::Rendering& rendering);
@@ -31,6 +27,16 @@ std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
 /// Of the objects after a tick. Empty where nothing moves.
 std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
                                const rendering::RenderState& state);
+
+/// Where the surface of a soft object is.
+struct SoftSurfaceNow {
+  int object = 0;
+  std::vector<glm::vec3> places;  ///< m, of the surface's nodes
+};
+
+/// Of the soft objects after a tick.
+std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_surfaces(
+    const rendering::Scene& scene, const rendering::RenderState& state);
 
 /// What a picture shows of one tick.
 struct SceneMoment {
@@ -40,6 +46,8 @@ struct SceneMoment {
   std::optional<rendering::LineProbe> held = std::nullopt;
   std::vector<Pose> poses =
       {};  ///< of the objects, where they have moved; empty: as the scene has it
+  /// Of soft objects; those that are not there are drawn at rest.
+  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft = {};
 };
 
 struct SceneDrawingSettings {
@@ -56,8 +64,10 @@ class SceneDrawing {
   /// \throws MeshError, std::runtime_error where a file is no mesh
   SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rendering::Tool tool);
 
-  /// Layers as they were compiled; the surfaces about them become translucent.
-  void add_layers(const rendering::Scene& scene);
+  /// What only the compiled scene knows: layers (the surfaces about them become translucent), and
+  /// the surfaces of soft objects, which are coloured by how far they have given way, red from a
+  /// tenth of the object's size on.
+  void add_compiled(const rendering::Scene& scene);
 
   ScenePicture picture(const SceneMoment& moment, const Theme& theme,
                        const SceneDrawingSettings& settings) const;
@@ -89,7 +99,11 @@ class SceneDrawing {
     std::vector<std::shared_ptr<const DrawnMesh>> layers;
     float top = 0;  ///< m, of its bounding sphere above its origin
     bool felt = true;
+    std::shared_ptr<const rendering::SoftObject> soft = nullptr;
   };
+  void add_layers(const rendering::Scene& scene);
+  static std::shared_ptr<const DrawnMesh> drawn_soft(const Object& object,
+                                                     const SoftSurfaceNow& now);
   void add_objects(const SceneMoment& moment, const SceneDrawingSettings& settings,
                    ScenePicture& out) const;
   void add_tool(const SceneMoment& moment, const Theme& theme, const SceneDrawingSettings& settings,

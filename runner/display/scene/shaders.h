@@ -6,10 +6,13 @@ namespace palpate::runner::shaders {
 inline constexpr const char* kSolidVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
+layout(location = 2) in float tint;
 uniform mat4 matrix, place;
 uniform vec4 cut;
 out vec3 at, outward;
+out float tinted;
 void main() {
+  tinted = tint;
   vec4 world = place * vec4(position, 1.0);
   at = world.xyz;
   outward = inverse(transpose(mat3(place))) * normal;
@@ -20,6 +23,7 @@ void main() {
 // A lamp with soft shadows, a hemisphere of sky and ground that is darker under things, and a rim.
 inline constexpr const char* kSolidFragment = R"(#version 330 core
 in vec3 at, outward;
+in float tinted;
 uniform vec3 colour, eye, lamp, ground_colour;
 uniform float opacity, softness, sky_softness, grain;
 uniform float grid, ground_from, ground_to;  // of the ground alone; grid < 0: none of its lines
@@ -67,7 +71,9 @@ void main() {
     result = vec4(seen, 1.0 - smoothstep(ground_from, ground_to, far));
     return;
   }
-  vec3 base = linear(colour);
+  // From the object's colour over yellow to red: how far it has given way.
+  vec3 base = mix(mix(linear(colour), linear(vec3(0.95, 0.80, 0.35)), min(2.0 * tinted, 1.0)),
+                  linear(vec3(0.80, 0.22, 0.20)), clamp(2.0 * tinted - 1.0, 0.0, 1.0));
   vec3 above = vec3(0.50, 0.53, 0.58), below = vec3(0.24, 0.22, 0.21);
   vec3 hemisphere = mix(below, above, 0.5 + 0.5 * n.y) * mix(0.72, 1.0, sky);
   float lit = max(facing, 0.0) * sun;

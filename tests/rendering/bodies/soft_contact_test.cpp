@@ -159,6 +159,43 @@ TEST(SoftContact, SettlesWhateverTheStiffnessAndTheRates) {
   }
 }
 
+/// Presses straight down to far below the base, at `speed`, and checks every tick.
+void press_through(double thickness, double radius, double stiffness, double speed) {
+  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, thickness}, {6, 6, 3});
+  std::vector<std::uint32_t> held;
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (mesh.nodes[i].z < -0.499 * thickness) held.push_back(i);
+  }
+  const SoftObject object(
+      std::make_shared<const SoftBody>(
+          mesh, held, SoftSettings{.material = {.young = 20000}, .step = 0.004}),
+      {.radius = radius, .stiffness = stiffness}, 0);
+  SoftObjectState state = initial_state(object);
+  Vec3 at(0.0003, 0.0002, thickness / 2 + radius + 0.001), last(0);
+  const double goal = radius - thickness / 2 - 0.02;
+  const double fall = speed * 0.001;
+  for (int i = 0; i < static_cast<int>((at.z - goal) / fall) + 200; ++i) {
+    const double step = std::max(-fall, goal - at.z);
+    at.z += step;
+    const Vec3 force = advance(object, state, at, one_segment(Vec3(0, 0, 0.1)), -step, 0.001);
+    ASSERT_GE(force.z, -1e-9) << "pulled in at " << at.z;
+    ASSERT_LE(std::hypot(force.x, force.y), 0.25 * force.z + 0.05) << "at " << at.z;
+    // A spring pushed by a step, and what the body gives back within a tick.
+    ASSERT_LE(glm::length(force - last), stiffness * fall + 0.05 * glm::length(force) + 0.05);
+    ASSERT_GE(at.z + state.contact.shift.z, 0.98 * radius - thickness / 2) << "through the base";
+    last = force;
+  }
+  EXPECT_GT(last.z, 0.5 * stiffness * 0.02);  // rests on the base
+}
+
+TEST(SoftContact, PressedToItsBaseItPushesBackAndLetsNothingThrough) {
+  for (const double speed : {0.01, 0.08, 0.5}) {
+    SCOPED_TRACE(speed);
+    press_through(0.03, 0.004, 2000, speed);
+    press_through(0.003, 0.002, 800, speed);
+  }
+}
+
 TEST(SoftContact, SeveralSegmentsOfOneToolPressAtOnce) {
   const SoftObject object = slab(20000, 250, {});
   PlacedTool fork;

@@ -106,6 +106,48 @@ TEST(SoftScene, LongTicksAreCutInPieces) {
   EXPECT_NEAR(at_100_hz.force.z / at_1_khz.force.z, 1, 1e-6);
 }
 
+TEST(SoftScene, AFreeBlockFallsAsFarInLongTicksAsInShortOnes) {
+  stimuli::ObjectSpec spec = soft_cube(20000);
+  spec.soft->resolution = 2;
+  spec.soft->fixed = stimuli::Soft::Fixed::none;
+  const Scene scene =
+      soft_scene(Scene({}, true), {}, {build_soft_object(spec, Pose{}, {0.002, {0, 0, -1}, 0})},
+                 true, {});
+  const auto fallen = [&](double dt) {
+    RenderState state = scene.initial_state();
+    const int ticks = static_cast<int>(std::lround(2 / dt));
+    for (int i = 0; i <= ticks; ++i)
+      ray_renderer().tick(scene, state, standing(1, 1), i > 0 ? dt : 0);
+    return -soft_shapes(scene, state)[0].now[0].z;
+  };
+  const double fine = fallen(0.001);
+  EXPECT_NEAR(fine, 2, 0.04);
+  EXPECT_NEAR(fallen(0.2), fine, 0.02);
+  EXPECT_NEAR(fallen(1), fine, 0.02);
+}
+
+TEST(SoftScene, WithoutAResolutionItHasTheHighestThatCanBeStepped) {
+  stimuli::ObjectSpec plain = soft_cube(20000);
+  plain.soft->resolution = 0;
+  const auto found = build_soft_object(plain, Pose{}, {});
+  EXPECT_GE(found->body->mesh().hexahedra.size(), 216U);
+  EXPECT_LE(found->body->mesh().hexahedra.size(), 1000U);
+  EXPECT_TRUE(coupling_is_stable(20000, 1 / found->body->settings().step));
+}
+
+TEST(SoftScene, FixedPointsAreOnTheObject) {
+  stimuli::ObjectSpec spec = soft_cube(20000);
+  spec.soft->fixed = stimuli::Soft::Fixed::points;
+  spec.soft->points = {{0.025, 0.025, -0.025}, {25, 25, 25}};  // the second in mm
+  try {
+    build_soft_object(spec, Pose{}, {});
+    FAIL() << "was taken";
+  } catch (const stimuli::MeshError& error) {
+    ASSERT_EQ(error.faults().size(), 1U);
+    EXPECT_EQ(error.faults()[0].rfind("/soft/fixed/1: ", 0), 0U) << error.faults()[0];
+  }
+}
+
 TEST(SoftScene, ACopyOfTheStateGoesOnTheSameAndNoNumberIsNoForce) {
   const Scene scene = two_cubes(true);
   RenderState state = scene.initial_state();

@@ -154,7 +154,7 @@ TEST(SceneDrawingTest, LayersLieInsideOfATranslucentSkin) {
   const ScenePicture before = drawing.picture({}, light_theme(), {});
   ASSERT_EQ(before.objects.size(), 1U);
   EXPECT_EQ(before.objects[0].opacity, 1);
-  drawing.add_layers(rendering::Scene({surface, layer}));
+  drawing.add_compiled(rendering::Scene({surface, layer}));
   const ScenePicture after = drawing.picture({}, light_theme(), {});
   ASSERT_EQ(after.objects.size(), 2U);
   EXPECT_LT(after.objects[0].opacity, 1);

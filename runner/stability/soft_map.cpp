@@ -1,0 +1,131 @@
+#include "runner/stability/soft_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <memory>
+
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_coupling.h"
+#include "stimuli/solids/solid_mesh.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};        // Pa
+constexpr double kRates[] = {62.5, 125, 250, 500, 1000};       // Hz
+constexpr double kSprings[] = {200, 800, 3000};                // N/m
+constexpr double kHalf = 0.015, kDepth = 0.003, kTick = 0.001;  // m, m, s
+constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
+
+rendering::SoftObject slab(const SoftCase& what) {
+  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kHalf}, {4, 4, 2});
+  std::vector<std::uint32_t> held;
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (mesh.nodes[i].z < -0.999 * kHalf) held.push_back(i);
+  }
+  const rendering::SoftSettings settings{
+      .material = {.young = what.young, .poisson = what.poisson, .damping = what.damping},
+      .step = 1 / what.rate};
+  return {std::make_shared<const rendering::SoftBody>(std::move(mesh), held, settings),
+          {.radius = what.radius, .stiffness = what.stiffness},
+          0};
+}
+
+struct WorstSwing {
+  double share = 0;
+  bool accepted = true, finite = true;
+};
+
+WorstSwing worst_of(const std::vector<SoftSwing>& map, double young, double rate) {
+  WorstSwing out;
+  for (const SoftSwing& one : map) {
+    if (one.what.young != young || one.what.rate != rate) continue;
+    out.share = std::max(out.share, one.swing);
+    out.accepted = out.accepted && one.accepted;
+    out.finite = out.finite && one.finite;
+  }
+  return out;
+}
+
+}  // namespace
+
+SoftSwing press_and_hold(const SoftCase& what) {
+  const rendering::SoftObject object = slab(what);
+  rendering::SoftObjectState state = rendering::initial_state(object);
+  rendering::PlacedTool tool;
+  tool.count = 1;
+  tool.segments[0] = {Vec3(0), Vec3(0, 0, 0.1)};
+  SoftSwing out{.what = what};
+  out.accepted = rendering::coupling_is_stable(what.young, what.rate);
+  Vec3 at(0.0003, 0.0002, kHalf + what.radius + 0.0005);
+  const double goal = kHalf + what.radius - kDepth;
+  double low = std::numeric_limits<double>::infinity(), high = -low, sum = 0;
+  constexpr double kFall = 2e-5;  // m, in a tick
+  const int falling = static_cast<int>((at.z - goal) / kFall) + 1;
+  for (int i = 0; i < falling + kHeldTicks; ++i) {
+    const double step = std::max(-kFall, goal - at.z);
+    at.z += step;
+    const double force = rendering::advance(object, state, at, tool, std::abs(step), kTick).z;
+    out.finite = out.finite && std::isfinite(force);
+    if (i < falling + kHeldTicks - kWatchedTicks) continue;
+    low = std::min(low, force);
+    high = std::max(high, force);
+    sum += force;
+  }
+  out.force = sum / kWatchedTicks;
+  out.swing = out.force > 0 ? (high - low) / out.force : std::numeric_limits<double>::infinity();
+  return out;
+}
+
+std::vector<SoftCase> soft_cases() {
+  std::vector<SoftCase> out;
+  struct Tool {
+    double radius, poisson, damping;
+  };
+  for (const Tool& tool : {Tool{0.002, 0.45, 0.01}, Tool{0.002, 0.45, 0}, Tool{0.01, 0.49, 0.01}}) {
+    for (const double young : kModuli) {
+      for (const double rate : kRates) {
+        for (const double spring : kSprings)
+          out.push_back({young, spring, rate, tool.radius, tool.poisson, tool.damping});
+      }
+    }
+  }
+  return out;
+}
+
+std::string soft_map_text(const std::vector<SoftSwing>& map) {
+  std::string out =
+      "Soft bodies: worst swing of the force, in % of it, while the tool is held still,\n"
+      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm. -: refused in scenes\n\n"
+      "       Pa ";
+  char cell[48];
+  for (const double rate : kRates) {
+    std::snprintf(cell, sizeof cell, "%9g Hz", rate);
+    out += cell;
+  }
+  out += '\n';
+  int accepted = 0, settled = 0;
+  for (const SoftSwing& one : map) {
+    accepted += one.accepted;
+    settled += one.accepted && one.settles();
+  }
+  for (const double young : kModuli) {
+    std::snprintf(cell, sizeof cell, "%9.0f ", young);
+    out += cell;
+    for (const double rate : kRates) {
+      const WorstSwing worst = worst_of(map, young, rate);
+      std::snprintf(cell, sizeof cell, "%10.2f %s", 100 * worst.share,
+                    worst.accepted ? " " : "-");
+      out += worst.finite ? cell : "  no number ";
+    }
+    out += '\n';
+  }
+  std::snprintf(cell, sizeof cell, "\n%d of %d cases", settled, accepted);
+  out += cell;
+  return out + " that scenes may have come to rest (1 % at most).\n";
+}
+
+}  // namespace palpate::runner
