@@ -150,21 +150,17 @@ def engine():
 
 
 def surgery():
-    """Fig. 17b: an instrument of three segments."""
+    """Fig. 17b: an instrument of three segments on a flexible object."""
     write_scene("fig17b-instrument", {
         "objects": [
-            {"shape": "compound", "stiffness_n_per_m": 300, "parts": [
-                {"shape": "sphere", "radius_m": 0.034, "subdivisions": 3, "position_m": [-0.03, 0.012, 0]},
-                {"shape": "sphere", "radius_m": 0.030, "subdivisions": 3, "position_m": [0.004, 0.012, 0.010]},
-                {"shape": "sphere", "radius_m": 0.024, "subdivisions": 3, "position_m": [0.036, 0.010, -0.002]}]},
-            {"shape": "cylinder", "radius_m": 0.006, "height_m": 0.11, "segments": 32, "position_m": [0.0, 0.046, 0.004],
-             "orientation_wxyz": LYING, "stiffness_n_per_m": 300}],
+            {"shape": "sphere", "radius_m": 0.045, "subdivisions": 3, "orientation_wxyz": UPRIGHT, "stiffness_n_per_m": 800,
+             "soft": {"young_pa": 15000, "resolution": 8}}],
         "tool": {"segments": [{"from_m": [0, 0, 0.022], "to_m": [0, 0, 0.15]}, {"from_m": [0, 0, 0.022], "to_m": [0.009, 0, 0]},
-                              {"from_m": [0, 0, 0.022], "to_m": [-0.009, 0, 0]}]}})
+                              {"from_m": [0, 0, 0.022], "to_m": [-0.009, 0, 0]}], "radius_m": 0.0025}})
 
     def pose(t):
-        x, y, z, lean = along(t, (0, (0.02, 0.085, 0.02, 0.2)), (0.7, (0.005, 0.050, 0.006, 0.25)), (1.3, (0.002, 0.0395, 0.005, 0.3)),
-                              (2.0, (-0.02, 0.039, 0.003, 0.1)), (2.6, (0.012, 0.0395, 0.006, 0.4)), (3.2, (0.02, 0.08, 0.02, 0.2)))
+        x, y, z, lean = along(t, (0, (0.02, 0.085, 0.02, 0.2)), (0.7, (0.005, 0.056, 0.006, 0.25)), (1.3, (0.002, 0.036, 0.005, 0.3)),
+                              (2.0, (-0.012, 0.034, 0.003, 0.1)), (2.6, (0.010, 0.036, 0.006, 0.4)), (3.2, (0.02, 0.08, 0.02, 0.2)))
         tip = (x, y, z)
         axis = unit((lean, 1, 0.45))
         return tip, add(tip, axis, 0.13), (0, -0.45, 1)

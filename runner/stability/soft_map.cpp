@@ -36,16 +36,17 @@ rendering::SoftObject slab(const SoftCase& what) {
 
 struct WorstSwing {
   double share = 0;
-  bool accepted = true, finite = true;
+  bool accepted = false, finite = true;
 };
 
 WorstSwing worst_of(const std::vector<SoftSwing>& map, double young, double rate) {
   WorstSwing out;
   for (const SoftSwing& one : map) {
     if (one.what.young != young || one.what.rate != rate) continue;
-    out.share = std::max(out.share, one.swing);
-    out.accepted = out.accepted && one.accepted;
     out.finite = out.finite && one.finite;
+    if (!one.accepted) continue;
+    out.accepted = true;
+    out.share = std::max(out.share, one.swing);
   }
   return out;
 }
@@ -59,7 +60,8 @@ SoftSwing press_and_hold(const SoftCase& what) {
   tool.count = 1;
   tool.segments[0] = {Vec3(0), Vec3(0, 0, 0.1)};
   SoftSwing out{.what = what};
-  out.accepted = rendering::coupling_is_stable(what.young, what.rate);
+  out.accepted = rendering::coupling_is_stable(
+      {.young = what.young, .poisson = what.poisson, .damping = what.damping}, what.rate);
   Vec3 at(0.0003, 0.0002, kHalf + what.radius + 0.0005);
   const double goal = kHalf + what.radius - kDepth;
   double low = std::numeric_limits<double>::infinity(), high = -low, sum = 0;
@@ -99,7 +101,8 @@ std::vector<SoftCase> soft_cases() {
 std::string soft_map_text(const std::vector<SoftSwing>& map) {
   std::string out =
       "Soft bodies: worst swing of the force, in % of it, while the tool is held still,\n"
-      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm. -: refused in scenes\n\n"
+      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm, of all that scenes may have.\n"
+      "-: none may\n\n"
       "       Pa ";
   char cell[48];
   for (const double rate : kRates) {
@@ -117,9 +120,12 @@ std::string soft_map_text(const std::vector<SoftSwing>& map) {
     out += cell;
     for (const double rate : kRates) {
       const WorstSwing worst = worst_of(map, young, rate);
-      std::snprintf(cell, sizeof cell, "%10.2f %s", 100 * worst.share,
-                    worst.accepted ? " " : "-");
-      out += worst.finite ? cell : "  no number ";
+      if (worst.accepted) {
+        std::snprintf(cell, sizeof cell, "%12.2f", 100 * worst.share);
+      } else {
+        std::snprintf(cell, sizeof cell, "%12s", "-");
+      }
+      out += worst.finite ? cell : "   no number";
     }
     out += '\n';
   }

@@ -25,7 +25,9 @@ constexpr std::array kRates{1000.0, 500.0, 250.0, 125.0, 62.5};  // Hz
 // force at 62.5 Hz and 10 kPa): rendering/README.md has the map.
 constexpr double kLowRate = 100;                 // Hz
 constexpr double kLowRateYoung = 1e5;            // Pa
-constexpr std::size_t kMostSoftNodes = 6000;     // beyond it building takes minutes
+// One that is very soft and hardly damped swings under stiff springs below this rate.
+constexpr double kSwingingYoung = 1e4, kSwingingDamping = 0.01, kSwingingRate = 400;  // Pa, s, Hz
+constexpr double kLeastFill = 20;                // by nodes^(4/3), of solids as long as high
 constexpr double kBase = 0.01, kBallBase = 0.1;  // of the height
 constexpr double kShortest = 0.001, kLongest = 2;  // m, of an object
 constexpr int kPlainResolution = 10;               // where a description gives none
@@ -106,28 +108,37 @@ struct Rate {
   std::string fault;  ///< without the place
 };
 
+/// Hz, of those at which the coupling is stable.
+double least_rate(const SoftMaterial& material) {
+  double least = kRates.front();
+  for (const double rate : kRates) {
+    if (coupling_is_stable(material, rate)) least = rate;
+  }
+  return least;
+}
+
 Rate rate_of(const stimuli::SolidMesh& mesh, const std::vector<std::uint32_t>& fixed,
              SoftSettings settings) {
   const std::size_t hexahedra = mesh.hexahedra.size(), tetrahedra = mesh.tetrahedra.size();
-  const std::string elements = std::to_string(hexahedra + tetrahedra) + " elements ";
-  if (mesh.nodes.size() > kMostSoftNodes) {
-    return {0, std::to_string(mesh.nodes.size()) + " nodes; expected at most " +
-                   std::to_string(kMostSoftNodes)};
-  }
+  const double least = least_rate(settings.material);
+  const auto too_slow = [&](double cost) -> Rate {
+    return {0, std::to_string(hexahedra + tetrahedra) + " elements take " +
+                   in_thousandths(cost) + " ms a step; expected at most " +
+                   in_thousandths(kShare / least) + " ms, a quarter of the time at " +
+                   in_thousandths(least / 1000) +
+                   " Hz, the lowest rate at which such a material comes to rest under a tool"};
+  };
+  // No factor of so many nodes has fewer entries: the largest meshes are not worth one.
+  const double few = kLeastFill * std::pow(static_cast<double>(mesh.nodes.size()), 4.0 / 3);
+  const double at_least = step_cost(hexahedra, tetrahedra, static_cast<std::size_t>(few));
+  if (at_least > kShare / least) return too_slow(at_least);
   settings.compliance = false;
   const SoftBody trial(mesh, fixed, settings);  // to count the entries of its factor
   const double cost = step_cost(hexahedra, tetrahedra, trial.factor_entries());
-  const auto rate =
-      std::find_if(kRates.begin(), kRates.end(), [&](double r) { return cost <= kShare / r; });
-  if (rate == kRates.end()) {
-    return {0, elements + "take " + in_thousandths(cost) + " ms a step; expected at most " +
-                   in_thousandths(kShare / kRates.back()) + " ms, a quarter of the time at 62.5 Hz"};
+  for (const double rate : kRates) {
+    if (cost <= kShare / rate && coupling_is_stable(settings.material, rate)) return {rate, {}};
   }
-  if (!coupling_is_stable(settings.material.young, *rate)) {
-    return {0, elements + "leave time for " + std::to_string(static_cast<int>(*rate)) +
-                   " steps a second, at which less than 100000 Pa may swing"};
-  }
-  return {*rate, {}};
+  return too_slow(cost);
 }
 
 struct Meshed {
@@ -166,8 +177,10 @@ Meshed meshed(const stimuli::ObjectSpec& spec, const SoftSettings& settings) {
 
 }  // namespace
 
-bool coupling_is_stable(double young, double rate) {
-  return rate >= kLowRate || young >= kLowRateYoung;
+bool coupling_is_stable(const SoftMaterial& material, double rate) {
+  if (rate < kLowRate && material.young < kLowRateYoung) return false;
+  const bool swings = material.young < kSwingingYoung && material.damping < kSwingingDamping;
+  return !swings || rate >= kSwingingRate;
 }
 
 double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries) {

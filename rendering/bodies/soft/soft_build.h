@@ -20,9 +20,9 @@ struct SoftTouch {
 /// that depends on it is the same on every computer. Twice what it took where it was measured.
 double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries);
 
-/// Whether tools of any size and springs up to 3 kN/m come to rest on a body of that modulus (Pa)
-/// which is stepped at that rate (Hz): found by simulation, `palpate stability --soft`.
-bool coupling_is_stable(double young, double rate);
+/// Whether tools of any size and springs up to 3 kN/m come to rest on a body of that material which
+/// is stepped at that rate (Hz): found by simulation, `palpate stability --soft`.
+bool coupling_is_stable(const SoftMaterial& material, double rate);
 
 /// With a resolution of 0, the highest up to 10 that can be stepped. Steps at the highest of 1000, 500, 250, 125 and 62.5 Hz of which they take a quarter at most.
 /// \param spec  with `soft`. \param pose  of its local frame in the world

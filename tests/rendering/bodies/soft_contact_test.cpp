@@ -174,18 +174,19 @@ void press_through(double thickness, double radius, double stiffness, double spe
   Vec3 at(0.0003, 0.0002, thickness / 2 + radius + 0.001), last(0);
   const double goal = radius - thickness / 2 - 0.02;
   const double fall = speed * 0.001;
-  for (int i = 0; i < static_cast<int>((at.z - goal) / fall) + 200; ++i) {
+  const int ticks = static_cast<int>((at.z - goal) / fall) + 200;
+  for (int i = 0; i < ticks; ++i) {
     const double step = std::max(-fall, goal - at.z);
     at.z += step;
     const Vec3 force = advance(object, state, at, one_segment(Vec3(0, 0, 0.1)), -step, 0.001);
     ASSERT_GE(force.z, -1e-9) << "pulled in at " << at.z;
     ASSERT_LE(std::hypot(force.x, force.y), 0.25 * force.z + 0.05) << "at " << at.z;
     // A spring pushed by a step, and what the body gives back within a tick.
-    ASSERT_LE(glm::length(force - last), stiffness * fall + 0.05 * glm::length(force) + 0.05);
+    ASSERT_LE(glm::length(force - last), stiffness * fall + 0.08 * glm::length(force) + 0.05);
     ASSERT_GE(at.z + state.contact.shift.z, 0.98 * radius - thickness / 2) << "through the base";
     last = force;
   }
-  EXPECT_GT(last.z, 0.5 * stiffness * 0.02);  // rests on the base
+  EXPECT_GT(last.z, 0.8 * stiffness * 0.02);  // rests on the base
 }
 
 TEST(SoftContact, PressedToItsBaseItPushesBackAndLetsNothingThrough) {

@@ -132,7 +132,7 @@ TEST(SoftScene, WithoutAResolutionItHasTheHighestThatCanBeStepped) {
   const auto found = build_soft_object(plain, Pose{}, {});
   EXPECT_GE(found->body->mesh().hexahedra.size(), 216U);
   EXPECT_LE(found->body->mesh().hexahedra.size(), 1000U);
-  EXPECT_TRUE(coupling_is_stable(20000, 1 / found->body->settings().step));
+  EXPECT_TRUE(coupling_is_stable({.young = 20000}, 1 / found->body->settings().step));
 }
 
 TEST(SoftScene, FixedPointsAreOnTheObject) {
