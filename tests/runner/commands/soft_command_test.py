@@ -1,0 +1,86 @@
+"""Soft objects from outside: simulated people on soft blocks, replay, refusals. Usage: soft_command_test.py PALPATE"""
+
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+PALPATE = sys.argv[1]
+
+
+def block(young, **soft):
+    return {"shape": "box", "size_m": [0.06, 0.06, 0.04], "soft": {"young_pa": young, **soft}}
+
+
+class Soft(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=600)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def file(self, name, content):
+        path = self.dir / name
+        path.write_text(content if isinstance(content, str) else json.dumps(content))
+        return path
+
+    def test_which_of_four_soft_blocks_is_stiffer(self):
+        levels = [5000, 9000, 45000, 80000]
+        protocol = self.file("blocks.json", {
+            "version": 2, "name": "blocks", "renderers": ["ray"], "orientation": "fixed", "samples": True, "seed": 5,
+            "stimuli": [{"name": "standard", **block(20000, resolution=3)},
+                        {"name": "comparison", **block(20000, resolution=3)}],
+            "blocks": [{"name": "four", "task": "compare", "question": "Which one was stiffer?",
+                        "stimuli": ["comparison"], "standard": "standard", "level": {"path": "/soft/young_pa"},
+                        "procedure": {"kind": "constant", "levels": levels, "repetitions": 1}}]})
+        self.palpate("simulate", protocol, "--participants", 1, "--seed", 3, "--db", self.dir / "study.db")
+        self.palpate("analyze", "--db", self.dir / "study.db", "--json", self.dir / "found.json")
+        found = json.loads((self.dir / "found.json").read_text())
+        self.assertEqual(found["n_trials"], 4)
+        curve = found["cells"][0]["psychometric_functions"][0]["levels"]
+        self.assertEqual([point["level"] for point in curve], levels)
+        # More than twice as soft or as stiff as the standard: nobody takes one for the other.
+        self.assertEqual([point["successes"] for point in curve], [0, 0, 1, 1])
+
+    def test_what_was_felt_on_a_soft_block_is_replayed_to_the_bit(self):
+        protocol = self.file("felt.json", {
+            "version": 1, "name": "felt", "renderers": ["ray"], "orientation": "fixed", "samples": True, "seed": 7,
+            "stimuli": [{"name": "soft", **block(15000, resolution=3)}, {"name": "hard", "shape": "cube", "edge_m": 0.05}],
+            "repetitions": 1, "response": {"keys": {"1": "soft", "2": "hard"}, "time_out_s": 4}})
+        self.palpate("simulate", protocol, "--participants", 1, "--seed", 2, "--db", self.dir / "felt.db")
+        for trial in (1, 2):
+            self.palpate("replay", "--db", self.dir / "felt.db", "--trial", f"S001/1/{trial}")
+
+    def render(self, scene, status=0):
+        rows = "".join(f"{0.001 * i},0.001,0.002,{0.023 - 1e-5 * i},0.001,0.002,{0.143 - 1e-5 * i}\n" for i in range(400))
+        path = self.file("path.csv", "t_s,tip_x_m,tip_y_m,tip_z_m,tail_x_m,tail_y_m,tail_z_m\n" + rows)
+        out = self.dir / "forces.csv"
+        done = self.palpate("render", "--scene", self.file("scene.json", scene), "--trajectory", path, "--renderer", "ray",
+                            "--out", out, "--force", status=status)
+        return done.stderr if status else list(csv.DictReader(out.open()))
+
+    def test_a_block_without_a_resolution_is_felt(self):
+        forces = [float(row["force_z_n"]) for row in self.render({"objects": [block(20000)]})]
+        self.assertGreater(forces[-1], 0.05)
+        self.assertGreaterEqual(min(forces), 0)
+
+    def test_too_fine_a_block_is_refused_with_what_would_do(self):
+        message = self.render({"objects": [block(20000, resolution=20)]}, status=2)
+        self.assertIn("/objects/0/soft/resolution: ", message)
+        self.assertRegex(message, "expected a resolution of at most [0-9]+")
+
+    def test_points_in_millimetres_are_refused(self):
+        message = self.render({"objects": [block(20000, resolution=3, fixed=[[30, 30, -20]])]}, status=2)
+        self.assertIn("/objects/0/soft/fixed/0: ", message)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
