@@ -21,10 +21,7 @@ namespace palpate::runner {
 /// The scene of one trial with its renderer and the renderer's state.
 struct TrialScene {
   TrialScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where)
-      : scene(what),
-        renderer(&how),
-        state(scene.initial_state()),
-        home(where) {
+      : scene(what), renderer(&how), state(scene.initial_state()), home(where) {
     rendering::pace_by_tick(state);
     // A soft body's shadow would be a body of its own, with steps of its own.
     if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
@@ -32,7 +29,7 @@ struct TrialScene {
 
   const rendering::Scene scene;
   const rendering::Renderer* renderer;
-  rendering::RenderState state;  ///< the servo's alone while the scene is shown
+  rendering::RenderState state;                  ///< the servo's alone while the scene is shown
   std::optional<rendering::RenderState> shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
 };

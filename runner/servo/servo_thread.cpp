@@ -13,7 +13,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
-constexpr std::size_t kPlaces = 4096;             // ticks
+constexpr std::size_t kPlaces = 4096;                // ticks
 constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as stalled
 
 }  // namespace
@@ -90,8 +90,7 @@ void ServoThread::publish_places(const Sample& sample) noexcept {
   if (shown == nullptr || sample.rendering.contacts == 0) return;
   TouchedPlaces touched;
   touched.time_ns = sample.time_ns;
-  touched.count =
-      find_contact_places(shown->scene, shown->state, sample.rendering, touched.places);
+  touched.count = find_contact_places(shown->scene, shown->state, sample.rendering, touched.places);
   places_.push(touched);
 }
 

@@ -24,7 +24,7 @@ struct ServoSettings {
   WorkspaceMap workspace;
   bool passivity_controller = false;
   RealtimeSettings realtime;
-  std::size_t ring = 16384;  ///< samples that wait for the session before some are lost
+  std::size_t ring = 16384;     ///< samples that wait for the session before some are lost
   bool touched_places = false;  ///< where every tick touches is told, too
 };
 
@@ -47,8 +47,8 @@ class ServoThread final : public TickSource {
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
 
-  /// Where the tool touched, with ServoSettings::touched_places: of the ticks with contact alone, in
-  /// order; some are lost where the session does not keep up. By the session's thread.
+  /// Where the tool touched, with ServoSettings::touched_places: of the ticks with contact alone,
+  /// in order; some are lost where the session does not keep up. By the session's thread.
   bool touched(TouchedPlaces& places) noexcept { return places_.pop(places); }
 
   /// The newest sample, also between trials; false where there is none that is newer than the last.

@@ -16,8 +16,8 @@ class Places {
     if (count_ < out_.size()) out_[count_++] = {place, force};
   }
   void add(const Vec3& place, const rendering::LoadedContact& contact) noexcept {
-    add(place, contact.force * contact.contact.normal +
-                   contact.stiffness * contact.tangential_offset);
+    add(place,
+        contact.force * contact.contact.normal + contact.stiffness * contact.tangential_offset);
   }
   std::size_t count() const noexcept { return count_; }
 

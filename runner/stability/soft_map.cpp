@@ -14,9 +14,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};        // Pa
-constexpr double kRates[] = {62.5, 125, 250, 500, 1000};       // Hz
-constexpr double kSprings[] = {200, 800, 3000};                // N/m
+constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};         // Pa
+constexpr double kRates[] = {62.5, 125, 250, 500, 1000};        // Hz
+constexpr double kSprings[] = {200, 800, 3000};                 // N/m
 constexpr double kHalf = 0.015, kDepth = 0.003, kTick = 0.001;  // m, m, s
 constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
 

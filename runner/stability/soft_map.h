@@ -1,6 +1,6 @@
 #pragma once
-// Whether a tool that is pressed into a soft body comes to rest, where the body is stepped more slowly
-// than the servo ticks: over moduli, contact stiffnesses, rates of the body, and tools.
+// Whether a tool that is pressed into a soft body comes to rest, where the body is stepped more
+// slowly than the servo ticks: over moduli, contact stiffnesses, rates of the body, and tools.
 
 #include <functional>
 #include <string>
@@ -14,7 +14,7 @@ struct SoftCase {
   double rate = 250;       ///< Hz, of the body's steps
   double radius = 0.002;   ///< m, of the tool, which stands on the body
   double poisson = 0.45;
-  double damping = 0.01;   ///< s, of the body
+  double damping = 0.01;  ///< s, of the body
 };
 
 struct SoftSwing {
@@ -30,8 +30,8 @@ struct SoftSwing {
 /// A slab, 60 x 60 x 30 mm, pressed 3 mm deep at 20 mm/s by a tool held still, then held for 1.5 s.
 SoftSwing press_and_hold(const SoftCase& what);
 
-/// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with nearly
-/// incompressible material.
+/// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with
+/// nearly incompressible material.
 std::vector<SoftCase> soft_cases();
 
 /// Worst swing of each modulus and rate, as a table, and what it says in a sentence.

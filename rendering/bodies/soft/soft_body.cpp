@@ -110,8 +110,7 @@ SoftState SoftBody::rest() const {
   const std::size_t n = mesh_.nodes.size();
   state.x = mesh_.nodes;
   for (auto* const field : {&state.v, &state.gradient, &state.load, &state.ahead, &state.by_load,
-                            &state.trial, &state.step, &state.trial_gradient,
-                            &state.next_gradient})
+                            &state.trial, &state.step, &state.trial_gradient, &state.next_gradient})
     field->assign(n, Vec3(0));
   state.pack.resize(factor_.size());
   state.work.resize(2 * factor_.size());
@@ -166,8 +165,8 @@ void SoftBody::add_forces(SoftState& state, std::span<const NodeForce> forces) c
   }
 }
 
-/// J, of inertia, gravity and load from the step's start to x. \param gradient  it is added to; null:
-/// not wanted
+/// J, of inertia, gravity and load from the step's start to x. \param gradient  it is added to;
+/// null: not wanted
 double SoftBody::work_against(const SoftState& state, std::span<const Vec3> x,
                               Vec3* gradient) const {
   const double h = settings_.step;
@@ -182,12 +181,12 @@ double SoftBody::work_against(const SoftState& state, std::span<const Vec3> x,
   return change;
 }
 
-/// Incremental potential at the trial less that at the step's start. What the next step begins with,
-/// if this one ends there, comes with it.
+/// Incremental potential at the trial less that at the step's start. What the next step begins
+/// with, if this one ends there, comes with it.
 double SoftBody::change_at_trial(SoftState& state) const noexcept {
-  const Solid::Potential there = solid_.potential(
-      state.trial, state.strains, settings_.material.damping / settings_.step,
-      state.next_gradient.data(), state.next_strains);
+  const Solid::Potential there =
+      solid_.potential(state.trial, state.strains, settings_.material.damping / settings_.step,
+                       state.next_gradient.data(), state.next_strains);
   state.next_energy = there.elastic;
   state.next_is_trial = true;
   return there.damped - state.energy + work_against(state, state.trial, nullptr);

@@ -23,12 +23,12 @@ constexpr double kShare = 0.25;                                  // of the time 
 constexpr std::array kRates{1000.0, 500.0, 250.0, 125.0, 62.5};  // Hz
 // A soft body at the lowest rate swings under a thick tool with a stiff spring (a tenth of the
 // force at 62.5 Hz and 10 kPa): rendering/README.md has the map.
-constexpr double kLowRate = 100;                 // Hz
-constexpr double kLowRateYoung = 1e5;            // Pa
+constexpr double kLowRate = 100;       // Hz
+constexpr double kLowRateYoung = 1e5;  // Pa
 // One that is very soft and hardly damped swings under stiff springs below this rate.
 constexpr double kSwingingYoung = 1e4, kSwingingDamping = 0.01, kSwingingRate = 400;  // Pa, s, Hz
-constexpr double kLeastFill = 20;                // by nodes^(4/3), of solids as long as high
-constexpr double kBase = 0.01, kBallBase = 0.1;  // of the height
+constexpr double kLeastFill = 20;                  // by nodes^(4/3), of solids as long as high
+constexpr double kBase = 0.01, kBallBase = 0.1;    // of the height
 constexpr double kShortest = 0.001, kLongest = 2;  // m, of an object
 constexpr int kPlainResolution = 10;               // where a description gives none
 
@@ -61,8 +61,8 @@ double extent(const std::vector<Vec3>& nodes) {
 void check_extent(const stimuli::SolidMesh& mesh) {
   const double longest = extent(mesh.nodes);
   if (longest >= kShortest && longest <= kLongest) return;
-  refuse("/soft: the object is " + in_thousandths(longest) + " mm long; expected " + in_thousandths(kShortest) +
-         " to " + in_thousandths(kLongest) + " mm (files are in m)");
+  refuse("/soft: the object is " + in_thousandths(longest) + " mm long; expected " +
+         in_thousandths(kShortest) + " to " + in_thousandths(kLongest) + " mm (files are in m)");
 }
 
 std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
@@ -122,10 +122,9 @@ Rate rate_of(const stimuli::SolidMesh& mesh, const std::vector<std::uint32_t>& f
   const std::size_t hexahedra = mesh.hexahedra.size(), tetrahedra = mesh.tetrahedra.size();
   const double least = least_rate(settings.material);
   const auto too_slow = [&](double cost) -> Rate {
-    return {0, std::to_string(hexahedra + tetrahedra) + " elements take " +
-                   in_thousandths(cost) + " ms a step; expected at most " +
-                   in_thousandths(kShare / least) + " ms, a quarter of the time at " +
-                   in_thousandths(least / 1000) +
+    return {0, std::to_string(hexahedra + tetrahedra) + " elements take " + in_thousandths(cost) +
+                   " ms a step; expected at most " + in_thousandths(kShare / least) +
+                   " ms, a quarter of the time at " + in_thousandths(least / 1000) +
                    " Hz, the lowest rate at which such a material comes to rest under a tool"};
   };
   // No factor of so many nodes has fewer entries: the largest meshes are not worth one.

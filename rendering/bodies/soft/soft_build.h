@@ -24,10 +24,11 @@ double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t fact
 /// is stepped at that rate (Hz): found by simulation, `palpate stability --soft`.
 bool coupling_is_stable(const SoftMaterial& material, double rate);
 
-/// With a resolution of 0, the highest up to 10 that can be stepped. Steps at the highest of 1000, 500, 250, 125 and 62.5 Hz of which they take a quarter at most.
-/// \param spec  with `soft`. \param pose  of its local frame in the world
-/// \throws stimuli::MeshError: a file's faults, an element that is flat, more elements than can be
-/// stepped at 62.5 Hz, nothing near a fixed point, a size of more than 2 m or less than 1 mm
+/// With a resolution of 0, the highest up to 10 that can be stepped. Steps at the highest of 1000,
+/// 500, 250, 125 and 62.5 Hz of which they take a quarter at most. \param spec  with `soft`. \param
+/// pose  of its local frame in the world \throws stimuli::MeshError: a file's faults, an element
+/// that is flat, more elements than can be stepped at 62.5 Hz, nothing near a fixed point, a size
+/// of more than 2 m or less than 1 mm
 std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& spec,
                                                     const Pose& pose, const SoftTouch& touch);
 

@@ -11,11 +11,11 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kLongestTick = 0.001;  // s; longer ones are cut, the hand moving evenly
-constexpr double kStride = 0.5;         // of the radius that the tool moves in a piece of a tick
+constexpr double kLongestTick = 0.001;   // s; longer ones are cut, the hand moving evenly
+constexpr double kStride = 0.5;          // of the radius that the tool moves in a piece of a tick
 constexpr int kMostPieces = 10'000;      // so that a gap of more than 10 s in a path counts as 10 s
 constexpr int kMostPiecesOfServo = 256;  // which gets a step a tick at most, however long
-constexpr double kFarthestPose = 1e6;  // m; a reading beyond it is a fault, as for other objects
+constexpr double kFarthestPose = 1e6;    // m; a reading beyond it is a fault, as for other objects
 
 class SoftMotionState final : public MotionState {
  public:
@@ -169,8 +169,7 @@ class SoftMotion final : public SceneMotion {
       const double piece = state.by_tick ? dt / pieces : std::min(dt / pieces, kLongestTick);
       for (int k = 1; k <= pieces; ++k) {
         const ToolPose at = k < pieces ? between(from, to, static_cast<double>(k) / pieces) : to;
-        advance(*soft_[i], state.soft[i], at.tip, place(tool, sides, at), moved / pieces,
-                piece);
+        advance(*soft_[i], state.soft[i], at.tip, place(tool, sides, at), moved / pieces, piece);
       }
     }
   }

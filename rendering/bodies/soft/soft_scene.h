@@ -28,8 +28,8 @@ Scene soft_scene(Scene others, std::vector<SceneObject> shown,
 /// Empty where nothing is soft. Valid until the state's next tick, which changes them in place.
 std::vector<SoftShape> soft_shapes(const Scene& scene, const RenderState& state);
 
-/// Every contact with force of the last tick with what gives: place on the ideal tool's axis, m, and
-/// force on the tool, N. No allocation.
+/// Every contact with force of the last tick with what gives: place on the ideal tool's axis, m,
+/// and force on the tool, N. No allocation.
 using SoftContactVisit = void (*)(void* whom, const Vec3& place, const Vec3& force);
 void visit_soft_contacts(const RenderState& state, SoftContactVisit visit, void* whom) noexcept;
 template <class Visit>

@@ -66,8 +66,8 @@ void LiveTouch::keep(const Sample& sample) {
   recorded_.fetch_add(1);
 }
 
-/// Where forces are off or limited, what was rendered is not what the hand got: one place then, with
-/// that.
+/// Where forces are off or limited, what was rendered is not what the hand got: one place then,
+/// with that.
 void LiveTouch::add_contacts(SceneMoment& moment) {
   const Sample& sample = moment.sample;
   constexpr std::uint32_t kNotAsRendered = servo_fault::kForceLimited | servo_fault::kTripped;
@@ -93,8 +93,8 @@ void LiveTouch::update_soft(std::int64_t now_ns) {
   SoftSnapshot snapshot;
   for (std::size_t i = 0; i < threads->size(); ++i) {
     if (!(*threads)[i].latest(snapshot)) continue;
-    soft_[i] = std::make_shared<const SoftSurfaceNow>(SoftSurfaceNow{
-        (*threads)[i].object(), {snapshot.now.begin(), snapshot.now.end()}});
+    soft_[i] = std::make_shared<const SoftSurfaceNow>(
+        SoftSurfaceNow{(*threads)[i].object(), {snapshot.now.begin(), snapshot.now.end()}});
   }
 }
 

@@ -197,8 +197,8 @@ int study_soft(int jobs) {
     tasks.emplace_back([&, i] { map[i] = press_and_hold(cases[i]); });
   run_all(tasks, jobs);
   std::cout << soft_map_text(map);
-  return std::ranges::all_of(
-             map, [](const SoftSwing& one) { return !one.accepted || one.settles(); })
+  return std::ranges::all_of(map,
+                             [](const SoftSwing& one) { return !one.accepted || one.settles(); })
              ? 0
              : 1;
 }
@@ -207,13 +207,15 @@ int study_soft(int jobs) {
 
 int stability_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate stability [--full] [--report FILE.html] [--json FILE]\n"
+  line.usage =
+      "palpate stability [--full] [--report FILE.html] [--json FILE]\n"
       "       palpate stability --soft";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
       "hand, two devices and renderer against a wall, an edge, a sphere and two objects, and\n"
       "compares the stability boundary with the passivity condition of theory. Status 1 where\n"
-      "theory is violated. With --soft: does a tool come to rest on a soft body that is stepped at\n"
+      "theory is violated. With --soft: does a tool come to rest on a soft body that is stepped "
+      "at\n"
       "its own rate? Status 1 where it does not and scenes may have it.";
   line.example =
       "  palpate stability\n"

@@ -77,8 +77,8 @@ DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
   DrawnMesh out;
   if (object.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(object.file)) {
     const stimuli::SolidMesh solid = stimuli::read_gmsh(
-        object.file, object.file_bytes ? *object.file_bytes
-                                       : stimuli::read_whole(object.file, kMostFileBytes));
+        object.file,
+        object.file_bytes ? *object.file_bytes : stimuli::read_whole(object.file, kMostFileBytes));
     return surface_mesh(solid.nodes, stimuli::surface_of(solid), {});
   }
   add_object(object, Pose(), out);

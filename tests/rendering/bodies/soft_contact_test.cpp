@@ -167,8 +167,8 @@ void press_through(double thickness, double radius, double stiffness, double spe
     if (mesh.nodes[i].z < -0.499 * thickness) held.push_back(i);
   }
   const SoftObject object(
-      std::make_shared<const SoftBody>(
-          mesh, held, SoftSettings{.material = {.young = 20000}, .step = 0.004}),
+      std::make_shared<const SoftBody>(mesh, held,
+                                       SoftSettings{.material = {.young = 20000}, .step = 0.004}),
       {.radius = radius, .stiffness = stiffness}, 0);
   SoftObjectState state = initial_state(object);
   Vec3 at(0.0003, 0.0002, thickness / 2 + radius + 0.001), last(0);

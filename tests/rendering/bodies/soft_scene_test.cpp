@@ -110,9 +110,8 @@ TEST(SoftScene, AFreeBlockFallsAsFarInLongTicksAsInShortOnes) {
   stimuli::ObjectSpec spec = soft_cube(20000);
   spec.soft->resolution = 2;
   spec.soft->fixed = stimuli::Soft::Fixed::none;
-  const Scene scene =
-      soft_scene(Scene({}, true), {}, {build_soft_object(spec, Pose{}, {0.002, {0, 0, -1}, 0})},
-                 true, {});
+  const Scene scene = soft_scene(
+      Scene({}, true), {}, {build_soft_object(spec, Pose{}, {0.002, {0, 0, -1}, 0})}, true, {});
   const auto fallen = [&](double dt) {
     RenderState state = scene.initial_state();
     const int ticks = static_cast<int>(std::lround(2 / dt));

@@ -1,5 +1,5 @@
-// Soft bodies that are stepped beside the servo: what a hand feels does not depend on how fast their
-// threads are, but for ticks that say so; and where they do not answer, forces end.
+// Soft bodies that are stepped beside the servo: what a hand feels does not depend on how fast
+// their threads are, but for ticks that say so; and where they do not answer, forces end.
 
 #include "runner/servo/soft_threads.h"
 
@@ -81,12 +81,10 @@ TEST(SoftThreads, APathComesOutTheSameWithoutThreadsIfItKnowsWhichTicksWereLate)
     threads[0].stall(i % 300 > 280);
     // Without a rest a tick takes microseconds, and every step is late.
     if (i % 500 > 50) std::this_thread::sleep_for(std::chrono::microseconds(300));
-    const Rendering r =
-        rendering::ray_renderer().tick(scene, live, path[i].probe, path[i].dt);
+    const Rendering r = rendering::ray_renderer().tick(scene, live, path[i].probe, path[i].dt);
     const bool was_late = (r.faults & render_fault::kSoftLate) != 0;
     hold_steps(again, was_late);
-    const Rendering s =
-        rendering::ray_renderer().tick(scene, again, path[i].probe, path[i].dt);
+    const Rendering s = rendering::ray_renderer().tick(scene, again, path[i].probe, path[i].dt);
     ASSERT_TRUE(equal(r, s)) << i;
     late += was_late;
     felt += r.contacts > 0;
@@ -117,7 +115,7 @@ TEST(SoftThreads, AThreadThatStallsIsHeldForAWhileAndThenForcesEnd) {
     if ((r.faults & render_fault::kSoftStalled) != 0) break;
     EXPECT_NEAR(r.force.z, before.force.z, 0.2 * before.force.z);
   }
-  EXPECT_GT(held, 90);   // a tenth of a second
+  EXPECT_GT(held, 90);  // a tenth of a second
   EXPECT_LT(held, 120);
   EXPECT_EQ(r.force, Vec3(0));
   EXPECT_EQ(r.device1 + r.device2, Vec3(0));
@@ -219,8 +217,7 @@ TEST(SoftThreads, AServoTripsWhereTheyStallAndSnapshotsShowTheSurface) {
   EXPECT_GT(sample.device1.z + sample.device2.z, 0.1);
   SoftSnapshot snapshot;
   ASSERT_TRUE((*threads)[0].latest(snapshot));
-  const std::vector<Vec3> rest =
-      rendering::soft_objects(soft_cubes(1))[0]->rest;
+  const std::vector<Vec3> rest = rendering::soft_objects(soft_cubes(1))[0]->rest;
   double moved = 0;
   for (std::size_t i = 0; i < rest.size(); ++i)
     moved = std::max(moved, glm::distance(rest[i], snapshot.now[i]));
