@@ -42,6 +42,7 @@ class Faces {
   Face beyond(const Face& face, bool towards_end) const {
     const FacedPart& at = parts_[face.part];
     const stimuli::Facet& facet = facet_of(face);
+    if (facet.side_count == 3) return crossed_triangle(face, towards_end).next;
     Face out = face;
     double nearest = HUGE_VAL;
     for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
@@ -60,28 +61,32 @@ class Faces {
   /// By how much `face` and those that follow, towards the end or the beginning, move the point
   /// from `from`. Counts those within the blend angle.
   /// \param on  the point at `from`, on the surface, world frame
-  double way(Face face, double from, Vec3 on, bool towards_end, int& along) const {
+  double way(Face face, double from, const Vec3& on, bool towards_end, int& along) const {
+    Face last = face;
     double moved = 0;
     for (int i = 0; i < kMostFaces; ++i) {
       // A convex surface falls away: once a face is past the blend angle, so are all beyond. But
       // where it was cut, behind a wall at any angle, another part goes on.
-      const bool past_angle = past(face, towards_end);
-      tick::Portion at = portion(face);
-      const bool beside = !(at.enter <= at.leave);
-      const bool wall = past_angle || beside || (i > 0 && std::abs(turned_to(face)) >= 1);
-      if (wall) {
-        const bool goes_on = continues(face, from, on, towards_end);
+      double angle = turned_to(face);
+      Crossed at = crossed(face, towards_end);
+      const bool past_angle = towards_end ? angle >= 1 : angle <= -1;
+      const bool beside = !(at.portion.enter <= at.portion.leave);
+      if (past_angle || beside || (i > 0 && std::abs(angle) >= 1)) {
+        const bool goes_on = continues(face, from, i > 0 ? foot(last, from) : on, towards_end);
         if (!goes_on && (past_angle || beside)) break;
-        if (goes_on) at = portion(face);
+        if (goes_on) {
+          angle = turned_to(face);
+          at = crossed(face, towards_end);
+        }
       }
-      const double end = towards_end ? std::max(from, at.leave) : std::min(from, at.enter);
-      const double angle = turned_to(face);
+      const double end =
+          towards_end ? std::max(from, at.portion.leave) : std::min(from, at.portion.enter);
       along += std::abs(angle) < 1;
       moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
       from = end;
       if (towards_end ? from >= 1 : from <= 0) break;
-      on = foot(face, from);
-      face = beyond(face, towards_end);
+      last = face;
+      face = at.next;
     }
     return moved;
   }
@@ -101,13 +106,40 @@ class Faces {
     return parts_[face.part].part->mesh->facets()[face.facet];
   }
 
-  double turned_to(const Face& face) const {
-    return turned(glm::dot(facet_of(face).normal, parts_[face.part].d), length_);
+  /// What of the segment is over a face, and the face that follows.
+  struct Crossed {
+    tick::Portion portion;
+    Face next;
+  };
+  Crossed crossed(const Face& face, bool towards_end) const {
+    if (facet_of(face).side_count == 3) return crossed_triangle(face, towards_end);
+    return {portion(face), beyond(face, towards_end)};
   }
 
-  bool past(const Face& face, bool towards_end) const {
-    const double angle = turned_to(face);
-    return towards_end ? angle >= 1 : angle <= -1;
+  /// As tick::touching_portion has it: it reads facets alone.
+  Crossed crossed_triangle(const Face& face, bool towards_end) const {
+    const FacedPart& at = parts_[face.part];
+    const stimuli::Facet& facet = facet_of(face);
+    const Vec3 a = at.ideal - (glm::dot(facet.normal, at.ideal) - facet.offset) * facet.normal;
+    const Vec3 along = at.d - glm::dot(facet.normal, at.d) * facet.normal;
+    Crossed out{{}, face};
+    double nearest = HUGE_VAL;
+    for (const stimuli::Neighbour& side : facet.triangle) {
+      const stimuli::Facet& across = at.part->mesh->facets()[side.across];
+      const double height = across.offset - glm::dot(across.normal, a);
+      const double slope = -glm::dot(across.normal, along);
+      out.portion.clip(height, slope);
+      if (!(towards_end ? slope < 0 : slope > 0)) continue;
+      const double way = towards_end ? -height / slope : height / slope;
+      if (way >= nearest) continue;
+      nearest = way;
+      out.next.facet = side.across;
+    }
+    return out;
+  }
+
+  double turned_to(const Face& face) const {
+    return turned(glm::dot(facet_of(face).normal, parts_[face.part].d), length_);
   }
 
   bool is_on(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& point) const {
@@ -127,6 +159,9 @@ class Faces {
       if (k == own) continue;
       const stimuli::ConvexMesh& mesh = *parts_[k].part->mesh;
       const Vec3 point = parts_[k].part->local_point(on);
+      const Vec3 from_middle = point - mesh.centre();
+      const double farthest = mesh.radius() + tolerance_;
+      if (glm::dot(from_middle, from_middle) > farthest * farthest) continue;
       const auto takes = [&](std::uint32_t facet) {
         const Face other{k, facet};
         // Inner walls, where parts abut, stand across.
@@ -160,6 +195,12 @@ class Faces {
         under.feature.kind != Kind::none ? under.feature.index : under.separating_feature.index;
     if (takes(facet)) return true;
     const stimuli::Facet& centre = mesh.facets()[facet];
+    if (centre.side_count == 3) {
+      for (const stimuli::Neighbour& next : centre.triangle) {
+        if (takes(next.across)) return true;
+      }
+      return false;
+    }
     for (std::uint32_t i = centre.first_side; i < centre.first_side + centre.side_count; ++i) {
       if (takes(mesh.sides()[i].across)) return true;
     }

@@ -242,6 +242,8 @@ double distance_off_facet(const stimuli::ConvexMesh& mesh, const Measured& at, c
   const stimuli::Facet& facet = mesh.facets()[at.index];
   const bool tail = kSegment && at.probe_fraction > 0;
   const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
+  // Inside of a triangle is below the planes beyond its sides, which walks have read already.
+  if (facet.side_count == 3 && beyond_triangle(mesh, facet, end).edge == kNone) return 0;
   const Vec3 along = tail ? -d : d;
   double past = 0, enter = 0, leave = 1;
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {

@@ -54,6 +54,7 @@ void NearPairs::collect(const ToolPose& from, const PlacedTool& placed_from, dou
   const PlacedTool& now = now_;
   visit_near_parts([&](std::uint32_t index) {
     const ScenePart& part = tick_.scene.parts()[index];
+    if (part.breaking != ScenePart::kHolds && all_.breaking[part.breaking].strength == 0) return;
     for (std::uint32_t j = 0; j < now.count; ++j) {
       NearPair near;
       near.part = index;

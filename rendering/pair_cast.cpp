@@ -132,14 +132,33 @@ bool beyond(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip
   return true;
 }
 
+/// Whether the segment is no farther past the facet of M than a few more of its kind are wide:
+/// then stepping there is less than looking elsewhere.
+template <bool kSegment>
+bool is_near(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
+  constexpr double kWidths = 4;
+  if (kSegment && at.edge)
+    return std::abs(at.edge_fraction - 0.5) < kWidths && at.probe_fraction > -1 &&
+           at.probe_fraction < 2;
+  const stimuli::Facet& facet = mesh.facets()[at.index];
+  if (facet.side_count != 3) return true;
+  const stimuli::Edge& edge = mesh.edges()[facet.triangle[0].edge];
+  const Vec3 e = edge.to - edge.from;
+  const Vec3 to = (kSegment && at.probe_fraction > 0 ? tip + d : tip) - edge.from;
+  const double up = glm::dot(to, at.normal);
+  return glm::dot(to, to) - up * up < kWidths * kWidths * glm::dot(e, e);
+}
+
 /// A facet of M near the segment.
 template <bool kSegment>
 Measured facing(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d,
                 const Vec3& out) {
   const stimuli::ConvexMesh& mesh = part.mesh;
-  if (start.kind != Kind::none && part.trees.support_map() == nullptr) {
+  if (start.kind != Kind::none) {
     const Measured known = measured<kSegment>(mesh, start, tip, d);
-    if (glm::dot(known.normal, out) > 0) return known;
+    if (glm::dot(known.normal, out) > 0 &&
+        (part.trees.support_map() == nullptr || is_near<kSegment>(mesh, known, tip, d)))
+      return known;
   }
   if (const FacetMap* const map = part.trees.facet_map(); map != nullptr) {
     const Measured under = measure_facet<kSegment>(mesh, map->facet_under(tip, d), tip, d);
@@ -244,6 +263,12 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
   double time = 0;
   Vec3 at_tip = tip;
   Measured at = measured<kSegment>(mesh, from.separating_feature, tip, d);
+  if (part.trees.facet_map() != nullptr && glm::dot(at.normal, motion) < at.depth &&
+      !is_near<kSegment>(mesh, at, tip, d)) {
+    // A plane that has separated them for long may be far from where they are now.
+    Measured under;
+    if (outward_facet<kSegment>(part, {}, tip, d, under) && under.depth < 0) at = under;
+  }
   const std::size_t most = mesh.facets().size() + mesh.edges().size();
   int stalled = 0;
   for (std::size_t step = 0; step < most + kStalledSteps; ++step) {

@@ -9,19 +9,23 @@
 namespace palpate::rendering {
 namespace {
 
-/// Forgets what the group's ideal tool rested on: from now on it is the virtual one.
-void forget_contacts(UnionTick& tick, std::uint32_t index) {
-  const PartGroup& group = tick.scene.groups()[index];
-  UnionMemory& all = tick.state.unions;
-  all.groups[index].touching = false;
-  all.groups[index].lag = 0;
+/// Forgets what rested on the k-th part of a group.
+void forget_part(UnionTick& tick, const PartGroup& group, std::size_t k) {
   const std::size_t segments = tick.scene.segments();
-  for (std::size_t i = 0; i < group.part_count * segments; ++i) {
-    PairState& pair = all.pairs[group.first_pair + i];
+  for (std::size_t j = 0; j < segments; ++j) {
+    PairState& pair = tick.state.unions.pairs[group.first_pair + k * segments + j];
     pair.carries = false;
     pair.plane.valid = false;
     pair.friction = {};
   }
+}
+
+/// Forgets what the group's ideal tool rested on: from now on it is the virtual one.
+void forget_contacts(UnionTick& tick, std::uint32_t index) {
+  const PartGroup& group = tick.scene.groups()[index];
+  tick.state.unions.groups[index].touching = false;
+  tick.state.unions.groups[index].lag = 0;
+  for (std::size_t k = 0; k < group.part_count; ++k) forget_part(tick, group, k);
 }
 
 /// Whether the virtual tool is outside of the surface and all layers of an object.
@@ -33,9 +37,17 @@ bool left(UnionTick& tick, std::uint32_t object) {
   return true;
 }
 
+void restore(UnionTick& tick, std::size_t breaking) {
+  UnionMemory& all = tick.state.unions;
+  GroupState& group = all.groups[tick.scene.breaking()[breaking].group];
+  all.breaking[breaking] = {};
+  group.strength = 1;
+  group.parts_went = false;
+}
+
 void restore_layers(UnionTick& tick, std::uint32_t object) {
-  for (std::uint32_t i = 0; i < tick.scene.breaking().size(); ++i) {
-    if (tick.scene.breaking()[i].object_state == object) tick.state.unions.breaking[i] = {};
+  for (std::size_t i = 0; i < tick.scene.breaking().size(); ++i) {
+    if (tick.scene.breaking()[i].object_state == object) restore(tick, i);
   }
 }
 
@@ -71,6 +83,42 @@ BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
   return index == ScenePart::kHolds ? nullptr : &tick.state.unions.breaking[index];
 }
 
+/// Parts whose force has gone hold the ideal tool no longer.
+void remove_parts(UnionTick& tick, std::uint32_t breaking) {
+  const std::uint32_t index = tick.scene.breaking()[breaking].group;
+  const PartGroup& group = tick.scene.groups()[index];
+  for (std::uint32_t k = 0; k < group.part_count; ++k) {
+    if (tick.scene.parts()[group.first_part + k].breaking == breaking) forget_part(tick, group, k);
+  }
+  tick.state.unions.groups[index].parts_went = true;
+}
+
+/// N, without friction.
+Vec3 force_of(const UnionMemory& all, std::uint32_t group) {
+  Vec3 force(0);
+  for (const PlacedContact& c : all.contacts) {
+    if (c.group == group) force += c.loaded.force * c.loaded.contact.normal;
+  }
+  return force;
+}
+
+/// What the tool comes upon where parts of its layer went takes over smoothly: it may be deep in
+/// it by then.
+void raise_forces(UnionTick& tick) {
+  UnionMemory& all = tick.state.unions;
+  for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
+    GroupState& group = all.groups[g];
+    if (!group.parts_went && group.strength == 1) continue;
+    if (group.parts_went) {
+      const double now = glm::length(force_of(all, g));
+      group.strength = now > group.last_force ? group.last_force / now : 1;
+      group.parts_went = false;
+    } else {
+      group.strength = std::min(1.0, group.strength + step_of(tick) / kFadeTime);
+    }
+  }
+}
+
 /// Layers whose force exceeds what they bear begin to give way.
 void break_layers(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
@@ -86,8 +134,9 @@ void break_layers(UnionTick& tick) {
       parts.giving_way = true;
       all.exceptions = true;
     }
-    if (parts.giving_way)
-      parts.strength = std::max(0.0, parts.strength - step_of(tick) / kFadeTime);
+    if (!(parts.giving_way && parts.strength > 0)) continue;
+    parts.strength = std::max(0.0, parts.strength - step_of(tick) / kFadeTime);
+    if (parts.strength == 0) remove_parts(tick, static_cast<std::uint32_t>(i));
   }
 }
 
@@ -120,22 +169,36 @@ void update_objects(UnionTick& tick) {
   for (std::size_t i = 0; i < all.breaking.size(); ++i) {
     const std::uint32_t object = tick.scene.breaking()[i].object_state;
     if (!all.breaking[i].giving_way) continue;
-    if (!all.objects[object].off && left(tick, object)) restore_layers(tick, object);
+    // A tick later, so that the ideal tool comes from outside; it may be in them where the virtual
+    // one has gone right through the object.
+    if (all.breaking[i].was_left) {
+      restore(tick, i);
+    } else {
+      const bool held = all.groups[tick.scene.breaking()[i].group].touching;
+      all.breaking[i].was_left = !all.objects[object].off && !held && left(tick, object);
+    }
     all.exceptions |= all.breaking[i].giving_way;
   }
 }
 
 void fade_forces(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
-  if (!all.breaking.empty()) break_layers(tick);
+  if (!all.breaking.empty()) {
+    raise_forces(tick);
+    break_layers(tick);
+  }
   if (!all.exceptions) return;
   release_hooked(tick);
   for (PlacedContact& c : all.contacts) {
     const std::uint32_t object = tick.scene.groups()[c.group].object_state;
     const BreakState* const parts = breaking_of(tick, c);
-    const double strength = all.objects[object].strength * (parts != nullptr ? parts->strength : 1);
+    const double strength = all.objects[object].strength * all.groups[c.group].strength *
+                            (parts != nullptr ? parts->strength : 1);
     c.loaded.force *= strength;
     c.loaded.stiffness *= strength;  // of friction
+  }
+  for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
+    if (all.groups[g].parts_went) all.groups[g].last_force = glm::length(force_of(all, g));
   }
   for (std::uint32_t i = 0; i < all.objects.size(); ++i) {
     ObjectState& object = all.objects[i];

@@ -10,13 +10,6 @@
 namespace palpate::rendering {
 namespace {
 
-double distance_to_segment(const Vec3& p, const LineProbe& probe) {
-  const Vec3 d = probe.tail - probe.tip;
-  const double d2 = glm::dot(d, d);
-  const double t = d2 > 0 ? std::clamp(glm::dot(p - probe.tip, d) / d2, 0.0, 1.0) : 0;
-  return glm::length(p - (probe.tip + t * d));
-}
-
 /// Parts of one surface or layer stand side by side; the order in which they come first stays.
 void bring_together(std::vector<SceneObject>& objects) {
   const auto key = [](const SceneObject& o) { return std::pair(o.object, o.layer); };
@@ -90,6 +83,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
     parts_.push_back(std::move(part));
   }
   group_parts();
+  index_parts();
   features.unions = std::any_of(groups_.begin(), groups_.end(),
                                 [](const PartGroup& group) { return group.by_law; });
   features.several_parts = parts_.size() != 1 || features.unions;
@@ -133,6 +127,38 @@ void Scene::group_parts() {
   }
 }
 
+void Scene::index_parts() {
+  if (parts_.size() <= kFewParts) return;
+  std::vector<Box> boxes;
+  boxes.reserve(parts_.size());
+  for (const ScenePart& part : parts_) {
+    boxes.push_back(
+        {part.sphere_centre - part.sphere_radius, part.sphere_centre + part.sphere_radius});
+    most_radius_ = std::max(most_radius_, part.sphere_radius);
+  }
+  part_tree_ = BoundingTree(boxes);
+  const auto& nodes = part_tree_.nodes();
+  node_spheres_.resize(nodes.size());
+  for (std::uint32_t n = static_cast<std::uint32_t>(nodes.size()); n-- > 0;) {
+    Sphere& sphere = node_spheres_[n];
+    sphere.centre = 0.5 * (nodes[n].box.low + nodes[n].box.high);
+    const auto include = [&](const Vec3& centre, double radius) {
+      sphere.radius = std::max(sphere.radius, glm::length(centre - sphere.centre) + radius);
+    };
+    if (nodes[n].count == 0) {
+      for (const std::uint32_t child : {n + 1, nodes[n].first})
+        include(node_spheres_[child].centre, node_spheres_[child].radius);
+      const double of_box = 0.5 * glm::length(nodes[n].box.high - nodes[n].box.low);
+      sphere.radius = std::min(sphere.radius, of_box);
+      continue;
+    }
+    for (std::uint32_t i = nodes[n].first; i < nodes[n].first + nodes[n].count; ++i) {
+      const ScenePart& part = parts_[part_tree_.order()[i]];
+      include(part.sphere_centre, part.sphere_radius);
+    }
+  }
+}
+
 void Scene::find_breaking_parts() {
   for (const PartGroup& group : groups_) {
     const std::size_t first = breaking_.size();
@@ -141,7 +167,8 @@ void Scene::find_breaking_parts() {
       if (!std::isfinite(part.break_force)) continue;
       std::size_t same = first;
       while (same < breaking_.size() && breaking_[same].force != part.break_force) ++same;
-      if (same == breaking_.size()) breaking_.push_back({group.object_state, part.break_force});
+      if (same == breaking_.size())
+        breaking_.push_back({group.object_state, part.break_force, part.group});
       part.breaking = static_cast<std::uint32_t>(same);
     }
   }
@@ -169,69 +196,6 @@ RenderState Scene::initial_state() const {
     state.unions.rubbed.reserve(contacts);
   }
   return state;
-}
-
-void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe,
-                       const ToolPose& tool, bool sides) {
-  if (state.clearance == std::numeric_limits<double>::infinity()) return;
-  UnionMemory& memory = state.unions;
-  const Tool* const carried = sides ? scene.tool() : nullptr;
-  // The tool moves no farther than its tip and what its size makes of the turn of its frame.
-  const auto moved = [&](const ToolPose& a, const ToolPose& b) {
-    double out = glm::length(a.tip - b.tip);
-    if (carried == nullptr) return std::max(out, glm::length(a.tip + a.d - b.tip - b.d));
-    double turned2 = 0;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 apart = a.frame[k] - b.frame[k];
-      turned2 += glm::dot(apart, apart);
-    }
-    return out + scene.tool_reach() * std::sqrt(turned2);
-  };
-  const double step = state.has_last ? moved(tool, memory.last) : 0;
-  const double slack = memory.reach + step;
-  if (state.clearance > 0 && moved(tool, memory.near_pose) + slack < state.clearance) return;
-  state.near_parts.clear();
-  state.near_parts_pose = probe;
-  memory.near_pose = tool;
-  state.clearance = std::numeric_limits<double>::infinity();
-  const PlacedTool placed = place(carried, sides, tool);
-  for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
-    const ScenePart& part = scene.parts()[i];
-    double gap = HUGE_VAL;
-    for (std::size_t j = 0; j < placed.count; ++j) {
-      const Vec3 from = tool.tip + placed.segments[j].from;
-      gap = std::min(
-          gap, distance_to_segment(part.sphere_centre, {from, from + placed.segments[j].along}));
-    }
-    gap -= part.sphere_radius;
-    const bool in_contact = state.parts[i].feature.kind != ContactFeature::Kind::none;
-    if (in_contact || in_reach(part, gap, step + slack)) {
-      state.near_parts.push_back(i);
-    } else {
-      state.clearance = std::min(state.clearance, gap);
-    }
-  }
-}
-
-void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  // How far the probe moved in this tick: what it may have passed counts as near.
-  const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
-                                                glm::length(probe.tail - state.last.tail))
-                                     : 0;
-  state.near_parts.clear();
-  state.near_parts_pose = probe;
-  state.clearance = std::numeric_limits<double>::infinity();
-  for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
-    const ScenePart& part = scene.parts()[i];
-    const double gap = distance_to_segment(part.sphere_centre, probe) - part.sphere_radius;
-    // A part in contact stays: pressed through a thin plate, the virtual probe may be far from it.
-    const bool in_contact = state.parts[i].feature.kind != ContactFeature::Kind::none;
-    if (in_contact || in_reach(part, gap, step)) {
-      state.near_parts.push_back(i);
-    } else {
-      state.clearance = std::min(state.clearance, gap);
-    }
-  }
 }
 
 }  // namespace palpate::rendering

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "rendering/bounding_tree.h"
 #include "rendering/facet_walk.h"
 #include "rendering/first_contact.h"
 #include "rendering/force.h"
@@ -148,29 +149,45 @@ class Scene {
   const Tool* tool() const { return tool_.segments.empty() ? nullptr : &tool_; }
   /// m, from the tip to the farthest point of the tool.
   double tool_reach() const { return tool_reach_; }
+  static constexpr std::size_t kFewParts = 32;  ///< up to so many have no tree
+  /// Of the parts' bounding spheres.
+  const BoundingTree& part_tree() const { return part_tree_; }
+  struct Sphere {
+    Vec3 centre;        ///< m
+    double radius = 0;  ///< m
+  };
+  /// About all parts of each node of the tree.
+  const std::vector<Sphere>& node_spheres() const { return node_spheres_; }
+  double most_radius() const { return most_radius_; }  ///< m, of those spheres
   std::size_t segments() const { return tool_.segments.empty() ? 1 : tool_.segments.size(); }
   RenderState initial_state() const;
 
  private:
   void group_parts();
+  void index_parts();
   void find_breaking_parts();
 
   std::vector<ScenePart> parts_;
   std::vector<PartGroup> groups_;
   std::vector<BreakingParts> breaking_;
   std::size_t object_states_ = 0;
+  BoundingTree part_tree_;
+  std::vector<Sphere> node_spheres_;
+  double most_radius_ = 0;
   double tool_reach_ = 0;
   Tool tool_;
   std::size_t features_index_ = 0;
   std::shared_ptr<const SceneMotion> motion_;
 };
 
+/// Of the radius: room to move before the list of near parts must be rebuilt.
+inline constexpr double kReachShare = 0.25;
+
 /// Broad phase: whether the probe can touch the part soon, or may have passed it in this tick.
 /// \param gap   m, between the probe and the part's bounding sphere
 /// \param step  m, how far the probe moved in this tick
 inline bool in_reach(const ScenePart& part, double gap, double step) {
-  // The margin, a quarter of the radius, is room to move before the list must be rebuilt.
-  return gap - step <= 0.25 * part.sphere_radius;
+  return gap - step <= kReachShare * part.sphere_radius;
 }
 
 /// The same for a tool, whose ideal one may be up to `reach` away from it.

@@ -32,6 +32,7 @@ struct PartGroup {
 struct BreakingParts {
   std::uint32_t object_state = 0;
   double force = 0;  ///< N; what they bear
+  std::uint32_t group = 0;
 };
 
 /// One part and one segment of the tool.
@@ -49,12 +50,16 @@ struct GroupState {
   bool touching = false;
   Vec3 shift;      ///< m, at the last tick, from the virtual to the ideal tool, without the skin
   double lag = 0;  ///< rad, by which it is behind the virtual tool in turning
+  double strength = 1;      ///< of what is left to hold it since parts that gave way have gone
+  double last_force = 0;    ///< N, of all contacts with the group when they went
+  bool parts_went = false;  ///< at the last tick
 };
 
 /// What is remembered of BreakingParts.
 struct BreakState {
   bool giving_way = false;  ///< they broke: their force falls, until the object is left
-  double strength = 1;      ///< what is left of their force
+  bool was_left = false;    ///< at the last tick: they are whole from now on
+  double strength = 1;      ///< what is left of their force; 0: they are not there
   Vec3 force;               ///< N, of this tick's contacts with them
 };
 

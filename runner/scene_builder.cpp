@@ -112,12 +112,7 @@ struct SceneBuilder::Placing {
   bool side_contact;
   bool has_layers;  ///< anywhere: then its whole surface says where it ends
   std::vector<rendering::SceneObject>& out;
-  /// A shape that has layers.
-  struct Shape {
-    const stimuli::ObjectSpec* spec;
-    Pose pose;
-  };
-  std::vector<Shape> shapes = {};
+  std::vector<PlacedShape> all = {}, layered = {};  ///< its shapes; those that have layers
 
   void add(int layer, const stimuli::Layer& of, const Prepared& prepared, const Pose& pose) {
     rendering::SceneObject part{prepared.mesh, pose, {}, object, prepared.trees};
@@ -129,8 +124,8 @@ struct SceneBuilder::Placing {
   }
 };
 
-std::vector<SceneBuilder::Prepared> SceneBuilder::with_trees(
-    const std::vector<std::shared_ptr<const stimuli::ConvexMesh>>& meshes, bool side_contact) {
+std::vector<SceneBuilder::Prepared> SceneBuilder::with_trees(const Meshes& meshes,
+                                                             bool side_contact) {
   std::vector<Prepared> parts;
   parts.reserve(meshes.size());
   for (const auto& mesh : meshes)
@@ -138,9 +133,8 @@ std::vector<SceneBuilder::Prepared> SceneBuilder::with_trees(
   return parts;
 }
 
-std::vector<std::shared_ptr<const stimuli::ConvexMesh>> SceneBuilder::surface_of(
-    const stimuli::ObjectSpec& spec, bool side_contact) {
-  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
+SceneBuilder::Meshes SceneBuilder::surface_of(const stimuli::ObjectSpec& spec, bool side_contact) {
+  Meshes meshes;
   for (const Prepared& part : prepare(spec, 0, side_contact)) meshes.push_back(part.mesh);
   return meshes;
 }
@@ -149,7 +143,7 @@ const std::vector<SceneBuilder::Prepared>& SceneBuilder::prepare(const stimuli::
                                                                  double depth, bool side_contact) {
   const std::string key = shape_key(spec, side_contact) + ' ' + key_of(depth);
   if (const auto known = prepared_.find(key); known != prepared_.end()) return known->second;
-  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
+  Meshes meshes;
   if (depth > 0) {
     meshes = stimuli::inset_union(surface_of(spec, side_contact), depth);
   } else {
@@ -159,14 +153,55 @@ const std::vector<SceneBuilder::Prepared>& SceneBuilder::prepare(const stimuli::
   return prepared_.emplace(key, with_trees(meshes, side_contact)).first->second;
 }
 
-/// Shapes with equal layers have them in common: what lies between two of them is no surface.
+SceneBuilder::Meshes SceneBuilder::surfaces_of(const std::vector<PlacedShape>& shapes,
+                                               bool side_contact) {
+  Meshes surface;
+  for (const PlacedShape& shape : shapes) {
+    for (const auto& mesh : surface_of(*shape.spec, side_contact))
+      surface.push_back(in_frame(*mesh, shape.pose));
+  }
+  return surface;
+}
+
+/// The object's surface moved inwards, as far as the shapes go that have the layer: what lies
+/// between two shapes is no surface, whatever layers they have.
+std::vector<SceneBuilder::Prepared> SceneBuilder::layer_of(const std::vector<PlacedShape>& shapes,
+                                                           double depth, const Placing& placing,
+                                                           Pose& pose) {
+  std::vector<PlacedShape> others = placing.all;
+  std::erase_if(others, [&](const PlacedShape& shape) {
+    return std::ranges::any_of(shapes, [&](const auto& one) { return one.spec == shape.spec; });
+  });
+  if (others.empty() && shapes.size() == 1) {
+    pose = shapes[0].pose;
+    return prepare(*shapes[0].spec, depth, placing.side_contact);
+  }
+  const Meshes own = surfaces_of(shapes, placing.side_contact);
+  Meshes beside;  // what a ball of that radius about a point of the shapes can reach into
+  for (const auto& other : surfaces_of(others, placing.side_contact)) {
+    const bool near = std::ranges::any_of(own, [&](const auto& mesh) {
+      return glm::distance(mesh->centre(), other->centre()) <=
+             mesh->radius() + other->radius() + depth;
+    });
+    if (near) beside.push_back(other);
+  }
+  if (beside.empty() && shapes.size() == 1) {
+    pose = shapes[0].pose;
+    return prepare(*shapes[0].spec, depth, placing.side_contact);
+  }
+  if (beside.empty()) return with_trees(stimuli::inset_union(own, depth), placing.side_contact);
+  Meshes whole = own;
+  whole.insert(whole.end(), beside.begin(), beside.end());
+  return with_trees(stimuli::inset_union_within(whole, depth, own), placing.side_contact);
+}
+
 void SceneBuilder::place_layers(Placing& placing) {
   std::size_t most = 0;
-  for (const Placing::Shape& shape : placing.shapes)
+  for (const PlacedShape& shape : placing.layered)
     most = std::max(most, shape.spec->material.layers.size());
   std::vector<std::string> faults;
   for (std::size_t i = 0; i < most; ++i) {
-    std::vector<Placing::Shape> left = placing.shapes;
+    std::vector<PlacedShape> left = placing.layered;
     std::erase_if(left, [&](const auto& shape) { return shape.spec->material.layers.size() <= i; });
     double least = left.front().spec->material.layers[i].depth, deepest = 0;
     bool is_left = false;
@@ -175,26 +210,16 @@ void SceneBuilder::place_layers(Placing& placing) {
       const auto others = std::stable_partition(left.begin(), left.end(), [&](const auto& shape) {
         return same_layer(shape.spec->material.layers[i], layer);
       });
-      const std::vector<Placing::Shape> same(left.begin(), others);
+      const std::vector<PlacedShape> same(left.begin(), others);
       left.erase(left.begin(), others);
       least = std::min(least, layer.depth);
-      std::vector<std::shared_ptr<const stimuli::ConvexMesh>> surface;
-      std::vector<Prepared> parts;
       Pose pose;
-      if (same.size() == 1) {
-        pose = same[0].pose;
-        surface = surface_of(*same[0].spec, placing.side_contact);
-        parts = prepare(*same[0].spec, layer.depth, placing.side_contact);
-      } else {
-        for (const Placing::Shape& shape : same) {
-          for (const auto& mesh : surface_of(*shape.spec, placing.side_contact))
-            surface.push_back(in_frame(*mesh, shape.pose));
-        }
-        parts = with_trees(stimuli::inset_union(surface, layer.depth), placing.side_contact);
-      }
+      const std::vector<Prepared> parts = layer_of(same, layer.depth, placing, pose);
       for (const Prepared& part : parts) placing.add(static_cast<int>(i) + 1, layer, part, pose);
       is_left |= !parts.empty();
-      if (!is_left) deepest = std::max(deepest, stimuli::largest_inset(surface));
+      if (!is_left)
+        deepest =
+            std::max(deepest, stimuli::largest_inset(surfaces_of(same, placing.side_contact)));
     }
     if (is_left) continue;
     std::ostringstream text;
@@ -222,7 +247,8 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
     }
     if (surface.stiffness > 0 || placing.has_layers) placing.out.push_back(std::move(placed));
   }
-  if (!spec.material.layers.empty()) placing.shapes.push_back({&spec, pose});
+  placing.all.push_back({&spec, pose});
+  if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose});
 }
 
 std::vector<rendering::SceneObject> SceneBuilder::placed(const stimuli::ObjectSpec& spec,

@@ -46,10 +46,16 @@ class SceneBuilder {
     std::shared_ptr<const stimuli::ConvexMesh> mesh;
     std::shared_ptr<const rendering::ContactTrees> trees;
   };
-  static std::vector<Prepared> with_trees(
-      const std::vector<std::shared_ptr<const stimuli::ConvexMesh>>& meshes, bool side_contact);
-  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> surface_of(
-      const stimuli::ObjectSpec& spec, bool side_contact);
+  /// A shape where it stands in its object.
+  struct PlacedShape {
+    const stimuli::ObjectSpec* spec;
+    Pose pose;
+  };
+  using Meshes = std::vector<std::shared_ptr<const stimuli::ConvexMesh>>;
+  static std::vector<Prepared> with_trees(const Meshes& meshes, bool side_contact);
+  Meshes surface_of(const stimuli::ObjectSpec& spec, bool side_contact);
+  /// In the object's frame.
+  Meshes surfaces_of(const std::vector<PlacedShape>& shapes, bool side_contact);
   /// Its convex parts. \param depth  m, by which its surface is moved inwards: empty where nothing
   /// is left
   const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, double depth,
@@ -59,6 +65,8 @@ class SceneBuilder {
   std::vector<rendering::SceneObject> placed(const stimuli::ObjectSpec& spec, int object,
                                              bool side_contact);
   void place_layers(Placing& placing);
+  std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,
+                                 const Placing& placing, Pose& pose);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
 };

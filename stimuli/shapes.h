@@ -17,23 +17,39 @@ struct ShapeTraits {
   bool size = false;                                  ///< three of them
   bool subdivisions = false, segments = false;        ///< how finely it is tessellated
   /// Its surface is known exactly: it has a signed distance and local penetration depths, and the
-  /// accuracy study and simulated participants use it.
+  /// accuracy study uses it.
   bool analytic = false;
+  /// Simulated participants imagine it by a formula (runner/participants/shape_lines.h); others by
+  /// distances on a grid.
+  bool formula = false;
 };
 
 constexpr ShapeTraits traits_of(ShapeKind shape) {
   switch (shape) {
     case ShapeKind::sphere:
-      return {.name = "sphere", .radius = true, .subdivisions = true, .analytic = true};
+      return {.name = "sphere",
+              .radius = true,
+              .subdivisions = true,
+              .analytic = true,
+              .formula = true};
     case ShapeKind::cone:
-      return {.name = "cone", .radius = true, .height = true, .segments = true, .analytic = true};
+      return {.name = "cone",
+              .radius = true,
+              .height = true,
+              .segments = true,
+              .analytic = true,
+              .formula = true};
     case ShapeKind::cylinder:
-      return {
-          .name = "cylinder", .radius = true, .height = true, .segments = true, .analytic = true};
+      return {.name = "cylinder",
+              .radius = true,
+              .height = true,
+              .segments = true,
+              .analytic = true,
+              .formula = true};
     case ShapeKind::cube:
-      return {.name = "cube", .edge = true, .analytic = true};
+      return {.name = "cube", .edge = true, .analytic = true, .formula = true};
     case ShapeKind::box:
-      return {.name = "box", .size = true};
+      return {.name = "box", .size = true, .analytic = true};
     case ShapeKind::mesh:
       return {.name = "mesh"};
     case ShapeKind::compound:

@@ -17,9 +17,9 @@ SurfaceDistance to_sphere(double radius, const Vec3& point) {
   return {from_centre - radius, from_centre > 0 ? point / from_centre : Vec3(0, 0, 1)};
 }
 
-SurfaceDistance to_cube(double edge, const Vec3& point) {
+SurfaceDistance to_box(const Vec3& size, const Vec3& point) {
   const Vec3 sign(sign_of(point.x), sign_of(point.y), sign_of(point.z));
-  const Vec3 beyond = glm::abs(point) - Vec3(edge / 2);
+  const Vec3 beyond = glm::abs(point) - 0.5 * size;
   const Vec3 outside = glm::max(beyond, Vec3(0));
   const double distance = glm::length(outside);
   if (distance > 0) return {distance, sign * (outside / distance)};
@@ -92,14 +92,15 @@ SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point) 
     case ShapeKind::sphere:
       return to_sphere(primitive.radius, point);
     case ShapeKind::cube:
-      return to_cube(primitive.edge, point);
+      return to_box(Vec3(primitive.edge), point);
+    case ShapeKind::box:
+      return to_box(primitive.size, point);
     case ShapeKind::cylinder:
       return revolved(to_cylinder(primitive.radius, primitive.height, from_axis, point.z), point,
                       from_axis);
     case ShapeKind::cone:
       return revolved(to_cone(primitive.radius, primitive.height, from_axis, point.z), point,
                       from_axis);
-    case ShapeKind::box:
     case ShapeKind::mesh:
     case ShapeKind::compound:
       break;

@@ -12,10 +12,10 @@ struct SurfaceDistance {
   Vec3 normal;          ///< unit; gradient of the distance where it is defined, outward
 };
 
-/// Of the analytic sphere, cone, cylinder or cube in its local frame; pose and tessellation are not
-/// used. Where the gradient is not defined the normal is a choice among its neighbours: at equal
-/// depths inside, the side of a cone or cylinder before its ends and x before y before z of a cube;
-/// on an axis or middle plane the positive direction (+x, +y, +z), at a sphere's centre +z.
+/// Of the analytic sphere, cone, cylinder, cube or box in its local frame; pose and tessellation
+/// are not used. Where the gradient is not defined the normal is a choice among its neighbours: at
+/// equal depths inside, the side of a cone or cylinder before its ends and x before y before z of a
+/// cube; on an axis or middle plane the positive direction (+x, +y, +z), at a sphere's centre +z.
 /// \throws std::invalid_argument for a mesh or compound.
 SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point);
 

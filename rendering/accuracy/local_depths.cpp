@@ -1,9 +1,10 @@
-// Local penetration depths in the analytic shapes; sphere and cube.
+// Local penetration depths in the analytic shapes; sphere, cube and box.
 
 #include "rendering/accuracy/local_depths.h"
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
@@ -36,8 +37,13 @@ void depths_in_sphere(Collector& collector) {
   collector.add_side(normal, radius - from, fraction, kRightAngle);
 }
 
-void depths_in_cube(Collector& collector) {
-  const double h = collector.shape.edge / 2;
+/// Half the edges of a cube or a box, m.
+Vec3 half_of(const stimuli::ObjectSpec& s) {
+  return s.shape == stimuli::ShapeKind::cube ? Vec3(s.edge / 2) : 0.5 * s.size;
+}
+
+void depths_in_box(Collector& collector) {
+  const Vec3 h = half_of(collector.shape);
   for (int axis = 0; axis < 3; ++axis) {
     for (const double sign : {-1.0, 1.0}) {
       Vec3 normal;
@@ -45,8 +51,9 @@ void depths_in_cube(Collector& collector) {
       const double flat = angle_to_plane(collector.u, normal);
       for (const bool tail : {false, true}) {
         const Vec3& p = tail ? collector.probe.tail : collector.probe.tip;
-        if (std::abs(p[(axis + 1) % 3]) <= h && std::abs(p[(axis + 2) % 3]) <= h)
-          collector.add_end(tail, normal, h - sign * p[axis], flat);
+        const int beside = (axis + 1) % 3, before = (axis + 2) % 3;
+        if (std::abs(p[beside]) <= h[beside] && std::abs(p[before]) <= h[before])
+          collector.add_end(tail, normal, h[axis] - sign * p[axis], flat);
       }
       if (collector.is_point()) continue;
       // The edges along this axis: the normal chooses which.
@@ -59,17 +66,18 @@ void depths_in_cube(Collector& collector) {
       const int i = (axis + 1) % 3, k = (axis + 2) % 3;
       if (n[i] == 0 || n[k] == 0) continue;  // flat on a face
       Vec3 start;
-      start[axis] = -h;
-      start[i] = std::copysign(h, n[i]);
-      start[k] = std::copysign(h, n[k]);
+      start[axis] = -h[axis];
+      start[i] = std::copysign(h[i], n[i]);
+      start[k] = std::copysign(h[k], n[k]);
       const double before = collector.u[i], beside = collector.u[k];
       const double depth = glm::dot(n, start - collector.probe.tip);
       const Vec3 w = collector.probe.tip + depth * n - start;
-      const Vec3 across = glm::cross(2 * h * line, collector.d);
+      const Vec3 edge = 2 * h[axis] * line;
+      const Vec3 across = glm::cross(edge, collector.d);
       const double c2 = glm::dot(across, across);
       const double along = glm::dot(glm::cross(w, collector.d), across) / c2;
       if (along < 0 || along > 1) continue;
-      collector.add_side(n, depth, glm::dot(glm::cross(w, 2 * h * line), across) / c2,
+      collector.add_side(n, depth, glm::dot(glm::cross(w, edge), across) / c2,
                          std::asin(std::min({1.0, std::abs(before), std::abs(beside)})));
     }
   }
@@ -82,14 +90,16 @@ double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
     case stimuli::ShapeKind::sphere:
       return glm::length(p) - s.radius;
     case stimuli::ShapeKind::cube:
-      return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) - s.edge / 2;
+    case stimuli::ShapeKind::box: {
+      const Vec3 out_of = glm::abs(p) - half_of(s);
+      return std::max({out_of.x, out_of.y, out_of.z});
+    }
     case stimuli::ShapeKind::cylinder:
       return std::max(out - s.radius, std::abs(p.z) - s.height / 2);
     case stimuli::ShapeKind::cone: {
       const Vec3 side = cone_normal(s, Vec3(1, 0, 0));
       return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
     }
-    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;
@@ -119,12 +129,12 @@ double support(const stimuli::ObjectSpec& primitive, const Vec3& n) {
     case stimuli::ShapeKind::sphere:
       return primitive.radius * glm::length(n);
     case stimuli::ShapeKind::cube:
-      return primitive.edge / 2 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z));
+    case stimuli::ShapeKind::box:
+      return glm::dot(depths::half_of(primitive), glm::abs(n));
     case stimuli::ShapeKind::cylinder:
       return out + std::abs(up);
     case stimuli::ShapeKind::cone:
       return std::max(up, out - up);
-    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;
@@ -145,7 +155,8 @@ std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const
       depths::depths_in_sphere(collector);
       break;
     case stimuli::ShapeKind::cube:
-      depths::depths_in_cube(collector);
+    case stimuli::ShapeKind::box:
+      depths::depths_in_box(collector);
       break;
     case stimuli::ShapeKind::cylinder:
       depths::depths_in_cylinder(collector);
@@ -153,7 +164,6 @@ std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const
     case stimuli::ShapeKind::cone:
       depths::depths_in_cone(collector);
       break;
-    case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;  // refused above

@@ -29,8 +29,8 @@ struct LocalDepth {
   double flat_angle = 0;
 };
 
-/// All local minima in the analytic sphere, cone, cylinder or cube (pose and tessellation are not
-/// used), least first; empty when the probe is not inside. Where by symmetry a whole ring of
+/// All local minima in the analytic sphere, cone, cylinder, cube or box (pose and tessellation are
+/// not used), least first; empty when the probe is not inside. Where by symmetry a whole ring of
 /// directions is equal, one of them. tip == tail is a point.
 /// \throws std::invalid_argument for a mesh or compound.
 std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const LineProbe& probe);

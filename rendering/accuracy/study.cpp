@@ -14,6 +14,7 @@ namespace palpate::rendering {
 namespace {
 
 constexpr double kPi = 3.14159265358979324;
+const Vec3 kBox(0.08, 0.06, 0.04);  // m; no two sides alike, or it would be the cube again
 
 std::vector<stimuli::ShapeKind> analytic_shapes() {
   std::vector<stimuli::ShapeKind> all;
@@ -130,8 +131,8 @@ int triangles_of(const stimuli::ObjectSpec& spec) {
     case stimuli::ShapeKind::cylinder:
       return 4 * spec.segments - 4;
     case stimuli::ShapeKind::cube:
-      return 12;
     case stimuli::ShapeKind::box:
+      return 12;
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
       break;
@@ -144,6 +145,7 @@ std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int mos
   for (int level = 0; level <= 8; ++level) {
     stimuli::ObjectSpec spec;
     spec.shape = shape;
+    spec.size = kBox;
     spec.subdivisions = level;
     // Steps of 2 where labs choose, then of 4.
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));

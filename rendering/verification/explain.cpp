@@ -62,6 +62,11 @@ void add_structures(const Scene& scene, const Renderer& renderer, std::vector<Ti
       tally(
           scene, [](const ContactTrees& t) { return t.support_map() != nullptr; }, vertices),
       "vertices to climb", SupportMap::kSmallMesh));
+  stages.push_back(structure(
+      "facet map",
+      tally(
+          scene, [](const ContactTrees& t) { return t.facet_map() != nullptr; }, vertices),
+      "vertices to walk past", SupportMap::kSmallMesh));
 }
 
 /// Parts that a point anywhere on the first part's bounding sphere cannot reach.
@@ -82,6 +87,11 @@ void add_parts(const Scene& scene, std::vector<TickStage>& stages) {
   stages.push_back({"several parts", StageTime::tick, several,
                     several ? "broad phase by bounding spheres, a list of contacts, sums over it"
                             : "a single part is always near and has one contact at most"});
+  const bool tree = !scene.part_tree().nodes().empty();
+  stages.push_back({"tree of parts", StageTime::once, tree,
+                    "not more than " + std::to_string(Scene::kFewParts) +
+                        " parts are looked at one by one (here " + std::to_string(parts) + ")"});
+  if (tree) stages.back().why = "of their bounding spheres, for the broad phase";
   const std::size_t far = out_of_reach(scene);
   stages.push_back({"objects out of reach", StageTime::tick, false,
                     far == 0 ? "there are none while the first is touched"

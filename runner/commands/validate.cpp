@@ -13,6 +13,7 @@
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/parts/overlaps.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -37,6 +38,14 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   } catch (const std::runtime_error& error) {
     faults.push_back({file, where, error.what()});
   }
+}
+
+/// Groups of a mesh file that overlap: taken, but hardly meant where parts should abut.
+void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
+  for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
+  for (const std::string& overlap : stimuli::group_overlaps(object))
+    out << "  note        stimulus " << name << " (" << stimuli::printable(object.file_name)
+        << "): " << stimuli::printable(overlap) << "\n";
 }
 
 std::string list(const std::vector<std::string>& words) {
@@ -175,6 +184,8 @@ int validate_command(const std::vector<std::string>& args) {
   }
   if (!faults.empty()) throw protocols::InputError(faults);
   print_summary(protocol, std::cout);
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    print_overlaps(stimulus.object, stimulus.name, std::cout);
   print_fitness(protocol, std::cout);
   return 0;
 }

@@ -57,7 +57,7 @@ std::vector<Mat3> cube_rotations() {
   return rotations;
 }
 
-std::vector<Mat3> analytic_rotations(stimuli::ShapeKind kind) {
+std::vector<Mat3> formula_rotations(stimuli::ShapeKind kind) {
   switch (kind) {
     case stimuli::ShapeKind::cone:
       return spiral_axes(kConeAxes, -1);
@@ -72,12 +72,12 @@ std::vector<Mat3> analytic_rotations(stimuli::ShapeKind kind) {
     case stimuli::ShapeKind::compound:
       break;
   }
-  throw std::invalid_argument("no analytic shape");
+  throw std::invalid_argument("no formula for this shape");
 }
 
-/// One of the analytic shapes, centred, felt at its surface.
+/// One of the shapes with a formula, centred, felt at its surface.
 bool has_formula(const stimuli::ObjectSpec& stimulus) {
-  return stimuli::traits_of(stimulus.shape).analytic && stimulus.pose.position == Vec3(0) &&
+  return stimuli::traits_of(stimulus.shape).formula && stimulus.pose.position == Vec3(0) &&
          stimulus.pose.orientation == Quat(1, 0, 0, 0) && stimulus.material.stiffness > 0;
 }
 
@@ -112,7 +112,7 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
   shape.kind = stimulus.shape;
   std::vector<Mat3> rotations;
   if (has_formula(stimulus)) {
-    rotations = analytic_rotations(stimulus.shape);
+    rotations = formula_rotations(stimulus.shape);
     shape.radius = static_cast<float>(stimulus.radius);
     shape.half_size = static_cast<float>(
         (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);

@@ -294,7 +294,36 @@ class UnionInset {
   std::vector<MeshPointer> out_;
 };
 
+/// What of a convex set lies in a part; nullptr: nothing.
+MeshPointer common(const MeshPointer& mesh, const ConvexMesh& part, const SetGrowth& growth) {
+  const auto& vertices = mesh->vertices();
+  ConvexSet set = whole(mesh);
+  for (const Facet& facet : part.facets()) {
+    if (std::all_of(vertices.begin(), vertices.end(), [&](const Vec3& v) {
+          return glm::dot(facet.normal, v) - facet.offset <= 1e-3 * growth.tolerance();
+        }))
+      continue;
+    std::optional<ConvexSet> behind = growth.behind(set, {facet.normal, facet.offset});
+    if (!behind) return nullptr;
+    set = std::move(*behind);
+  }
+  return set.mesh;
+}
+
 }  // namespace
+
+std::vector<MeshPointer> inset_union_within(const std::vector<MeshPointer>& parts, double depth,
+                                            const std::vector<MeshPointer>& within) {
+  const SetGrowth growth(parts, kAbuts);
+  std::vector<MeshPointer> out;
+  for (const MeshPointer& mesh : inset_union(parts, depth)) {
+    for (const MeshPointer& part : within) {
+      if (glm::distance(mesh->centre(), part->centre()) > mesh->radius() + part->radius()) continue;
+      if (MeshPointer piece = common(mesh, *part, growth)) out.push_back(std::move(piece));
+    }
+  }
+  return out;
+}
 
 std::vector<MeshPointer> inset_union(const std::vector<MeshPointer>& parts, double depth) {
   if (parts.size() > 1) return UnionInset(parts, depth).made();

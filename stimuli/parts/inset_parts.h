@@ -20,6 +20,12 @@ inline constexpr double kInsetWithin = 1.1;
 std::vector<std::shared_ptr<const ConvexMesh>> inset_union(
     const std::vector<std::shared_ptr<const ConvexMesh>>& parts, double depth);
 
+/// Of that, what lies in one of `within`, which are some of the parts: the layer of those alone,
+/// under the surface that they have together with the others. It ends where they do.
+std::vector<std::shared_ptr<const ConvexMesh>> inset_union_within(
+    const std::vector<std::shared_ptr<const ConvexMesh>>& parts, double depth,
+    const std::vector<std::shared_ptr<const ConvexMesh>>& within);
+
 /// m; from about this depth on nothing is left: of the largest ball in one of the sets that
 /// inset_union moves inwards.
 double largest_inset(const std::vector<std::shared_ptr<const ConvexMesh>>& parts);

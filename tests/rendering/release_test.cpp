@@ -112,6 +112,64 @@ TEST_P(Layers, ABrokenLayerFadesAndComesBackWhenTheObjectHasBeenLeft) {
   }
 }
 
+TEST_P(Layers, ABrokenLayerHoldsNothing) {
+  const Scene scene(layered_cube(0, {{0.001, 500, 0, 1.0}}, GetParam()));
+  RenderState state = scene.initial_state();
+  for (double depth = -0.002; depth < 0.004; depth += 1e-5)
+    ray_renderer().tick(scene, state, at_depth(depth), kTick);
+  Rendering r;
+  for (int i = 0; i < 25; ++i) r = ray_renderer().tick(scene, state, at_depth(0.004), kTick);
+  EXPECT_EQ(r.contacts, 0);
+  EXPECT_EQ(r.force, Vec3(0));
+  EXPECT_EQ(r.ideal.tip, at_depth(0.004).tip);
+  // Right through the cube, out below, and back in from there: whole.
+  for (double depth = 0.004; depth < 0.0601; depth += 1e-4)
+    EXPECT_EQ(ray_renderer().tick(scene, state, at_depth(depth), kTick).contacts, 0) << depth;
+  for (double depth = -0.11; depth > -0.102; depth -= 1e-4)
+    r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
+  for (double depth = -0.002; depth < 0.0015; depth += 1e-5)
+    r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
+  EXPECT_NEAR(r.force.z, 500 * 0.0005, 6e-3);
+}
+
+/// A slab that bears 1 N on a block that holds, both of one layer.
+TEST(PartsOfALayer, WhatLiesUnderOneThatBrokeTakesOverWithoutAStep) {
+  constexpr double kTop = 0.03, kSeam = 0.026, kSpring = 500;  // m, m, N/m
+  std::vector<SceneObject> parts{
+      testing::placed_object(testing::mesh_of(box_soup(Vec3(-kTop), Vec3(kTop))), {}, 0, 0),
+      testing::placed_object(
+          testing::mesh_of(box_soup(Vec3(-0.02, -0.02, kSeam), Vec3(0.02, 0.02, kTop))), {},
+          kSpring, 0),
+      testing::placed_object(
+          testing::mesh_of(box_soup(Vec3(-0.02, -0.02, -0.02), Vec3(0.02, 0.02, kSeam))), {},
+          kSpring, 0)};
+  parts[0].layer = kNotFelt;
+  parts[1].layer = parts[2].layer = 1;
+  parts[1].break_force = 1;
+  for (const bool turned_round : {false, true}) {
+    if (turned_round) std::swap(parts[1], parts[2]);
+    const Scene scene(parts);
+    RenderState state = scene.initial_state();
+    double depth = -0.001, last = 0;
+    const auto tick = [&] {
+      const Rendering r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
+      EXPECT_LE(std::abs(r.force.z - last), 0.35) << depth;  // of 5 N in 20 ms, and the way
+      last = r.force.z;
+      return r;
+    };
+    // Fast enough to be 10 mm in the block when the slab has gone.
+    for (; depth < 0.014; depth += 6e-4) tick();
+    for (int i = 0; i < 60; ++i) tick();
+    EXPECT_NEAR(last, kSpring * (depth - (kTop - kSeam)), 1e-9);
+    // The block holds it from above although its ideal tool is where the slab was.
+    for (; depth > 0.001; depth -= 1e-4) tick();
+    EXPECT_EQ(tick().contacts, 0);
+    for (; depth > -0.002; depth -= 1e-4) tick();
+    for (; depth < 0.001; depth += 1e-5) tick();
+    EXPECT_NEAR(last, kSpring * (depth - 1e-5), 1e-9) << "whole again";
+  }
+}
+
 TEST_P(Layers, WhoBeginsBetweenSurfaceAndLayerFeelsNeitherUntilTheObjectHasBeenLeft) {
   const Scene scene(layered_cube(100, {{0.005, 500, 0, {}}}, GetParam()));
   RenderState state = scene.initial_state();

@@ -187,6 +187,51 @@ TEST(SceneBuilder, ALayerGoesOnFromPartToPart) {
   }
 }
 
+TEST(SceneBuilder, ALayerOfSomePartsIsUnderTheSurfaceOfTheWholeObject) {
+  // The lower block has the layer, a slab on it has none, or one of another kind.
+  const auto lower = box(Vec3(-kHalf), {kHalf, kHalf, 0.02}, of(0, {{0.002, 1000, 0, {}}}));
+  const auto upper = [](std::vector<stimuli::Layer> layers) {
+    return box({-kHalf, -kHalf, 0.02}, {kHalf, kHalf, kHalf}, of(100, std::move(layers)));
+  };
+  const double slab = kHalf - 0.02;
+  for (const bool turned_round : {false, true}) {
+    const auto scene_of = [&](std::vector<stimuli::Layer> layers) {
+      return turned_round ? compound({lower, upper(std::move(layers))})
+                          : compound({upper(std::move(layers)), lower});
+    };
+    // Between slab and block is no surface: the layer begins at once under the slab.
+    Press press(scene_of({}));
+    press.at(-0.001);
+    for (const double depth : {0.001, 0.0049, 0.0051, 0.007, 0.012}) {
+      EXPECT_NEAR(press.force(depth), 100 * depth + 1000 * std::max(0.0, depth - slab), 1e-6)
+          << depth;
+    }
+    // Down to the seam that of the slab, 1 mm under its top, beyond it both: one ideal tool.
+    Press both(scene_of({{0.001, 400, 0, {}}}));
+    both.at(-0.001);
+    for (const double depth : {0.0005, 0.002, 0.0049, 0.007})
+      EXPECT_NEAR(both.force(depth), 100 * depth + 400 * std::max(0.0, depth - 0.001), 1e-6);
+  }
+}
+
+TEST(SceneBuilder, LayersThatDifferFromPartToPartMeetAtTheSeam) {
+  // Equal but for what they bear, or deeper on the right.
+  for (const double deeper : {0.0, 0.002}) {
+    const auto left = box(Vec3(-kHalf), {0, kHalf, kHalf}, of(0, {{0.003, 1000, 0, {}}}));
+    const auto right = box({0, -kHalf, -kHalf}, Vec3(kHalf),
+                           of(0, {{0.003 + deeper, 1000, 0, deeper > 0 ? 90.0 : 100.0}}));
+    Press press(compound({left, right}));
+    for (double depth = -0.001; depth < 0.006; depth += 1e-4) press.at(depth, -0.01);
+    for (double x = -0.01; x < 0.01; x += 1e-4) {
+      const rendering::Rendering r = press.at(0.006, x);
+      if (std::abs(x) < 5e-5) continue;
+      const double top = x > 0 ? 0.003 + deeper : 0.003;
+      ASSERT_LE(glm::length(r.force - Vec3(0, 0, 1000 * (0.006 - top))), 1e-3)
+          << deeper << " at " << x;
+    }
+  }
+}
+
 TEST(SceneBuilder, SaysHowDeepTheLayersOfACompoundMayBe) {
   const stimuli::Material material = of(0, {{0.026, 1000, 0, {}}});
   try {

@@ -6,42 +6,19 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <string>
 
-#include "stimuli/mesh_file.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
-#include "tests/stimuli/mesh_invariants.h"
+#include "tests/stimuli/part_checks.h"
 
 namespace palpate::stimuli {
 namespace {
 
-// By tetrahedra from a point of the mesh: apart from how the library adds up volumes.
-double volume(const ConvexMesh& mesh) {
-  double six = 0;
-  const Vec3 apex = mesh.vertices()[0];
-  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-    const auto at = [&](std::uint32_t k) { return mesh.vertices()[checks::corner_of(mesh, f, k)]; };
-    for (std::uint32_t k = 2; k < mesh.facets()[f].side_count; ++k)
-      six += glm::dot(at(0) - apex, glm::cross(at(k - 1) - apex, at(k) - apex));
-  }
-  return six / 6;
-}
-
-double volume(const std::vector<ConvexMesh>& parts) {
-  double sum = 0;
-  for (const ConvexMesh& part : parts) sum += volume(part);
-  return sum;
-}
-
-double out_of(const ConvexMesh& mesh, const Vec3& point) {
-  double most = -std::numeric_limits<double>::infinity();
-  for (const Facet& facet : mesh.facets())
-    most = std::max(most, glm::dot(facet.normal, point) - facet.offset);
-  return most;
-}
+using checks::out_of;
+using checks::refusal;
+using checks::volume;
 
 // Points of the bounding box that are in another number of parts than they should be: 1 inside the
 // solid, 0 outside.
@@ -213,14 +190,6 @@ TEST(ConvexParts, SeveralPiecesThatDoNotTouch) {
   EXPECT_NEAR(volume(parts), 0.06 * 0.06 * 0.06 + solids::l_shape().volume, 1e-15);
 }
 
-std::string refusal(const PolygonSoup& soup) {
-  try {
-    return "taken, in " + std::to_string(convex_parts(soup).size()) + " parts";
-  } catch (const MeshError& error) {
-    return error.what();
-  }
-}
-
 TEST(ConvexParts, ABrokenSolidIsRefusedWithTheReason) {
   PolygonSoup open = solids::l_shape().soup;
   open.faces.pop_back();
@@ -262,146 +231,6 @@ TEST(ConvexParts, ARoughSurfaceIsRefusedWithTheLimit) {
   const std::string rough = refusal(blocks.solid().soup);
   EXPECT_NE(rough.find("too many"), std::string::npos) << rough;
   EXPECT_NE(rough.find("expected"), std::string::npos) << rough;
-}
-
-// An .obj of several boxes, each a group; `faces` of the first that are left out.
-std::string boxes_text(const std::vector<Vec3>& at, const char* statement, int left_out = 0) {
-  std::string text;
-  for (std::size_t b = 0; b < at.size(); ++b) {
-    const PolygonSoup box = cube(0.02);
-    text += std::string(statement) + " box " + std::to_string(b) + "\n";
-    for (const Vec3& vertex : box.vertices) {
-      const Vec3 place = vertex + at[b];
-      text += "v " + std::to_string(place.x) + " " + std::to_string(place.y) + " " +
-              std::to_string(place.z) + "\n";
-    }
-    for (std::size_t f = b == 0 ? static_cast<std::size_t>(left_out) : 0; f < 6; ++f) {
-      text += "f";
-      for (const std::uint32_t corner : box.faces[f])
-        text += " " + std::to_string(8 * b + corner + 1);
-      text += "\n";
-    }
-  }
-  return text;
-}
-
-TEST(ConvexParts, ClosedGroupsOfAFileAreParts) {
-  for (const char* statement : {"g", "o"}) {
-    // Side by side, touching; and through each other.
-    for (const double apart : {0.02, 0.013}) {
-      const PolygonSoup soup = read_mesh(
-          "boxes.obj", boxes_text({Vec3(0), Vec3(apart, 0, 0), Vec3(0, apart, 0)}, statement));
-      const std::vector<ConvexMesh> parts = convex_parts(soup);
-      ASSERT_EQ(parts.size(), 3U);
-      for (const ConvexMesh& part : parts) EXPECT_NEAR(volume(part), 8e-6, 1e-12);
-    }
-  }
-}
-
-TEST(ConvexParts, AnOpenGroupBesideClosedOnesIsNamed) {
-  const PolygonSoup soup = read_mesh("boxes.obj", boxes_text({Vec3(0), Vec3(0.03, 0, 0)}, "g", 2));
-  const std::string text = refusal(soup);
-  EXPECT_NE(text.find("not closed by themselves: open: edge"), std::string::npos) << text;
-}
-
-/// A cube as a group of a soup. \param turned  all its faces, as of a void
-void add_cube(PolygonSoup& soup, const std::string& name, double edge, const Vec3& at,
-              bool turned = false) {
-  const PolygonSoup box = cube(edge);
-  const auto first = static_cast<std::uint32_t>(soup.vertices.size());
-  for (const Vec3& vertex : box.vertices) soup.vertices.push_back(vertex + at);
-  for (std::vector<std::uint32_t> face : box.faces) {
-    for (std::uint32_t& corner : face) corner += first;
-    if (turned) std::reverse(face.begin(), face.end());
-    soup.faces.push_back(std::move(face));
-    soup.group_of.push_back(static_cast<std::uint32_t>(soup.group_names.size()));
-  }
-  soup.group_names.push_back(name);
-}
-
-TEST(ConvexParts, AVoidThatIsAGroupGoesWithTheGroupRoundIt) {
-  // In either order; within a shell in a void of a larger shell it goes with the inner one.
-  for (const bool void_first : {false, true}) {
-    PolygonSoup soup;
-    if (void_first) add_cube(soup, "cavity", 0.02, Vec3(0.005, 0, 0), true);
-    add_cube(soup, "shell", 0.06, Vec3(0));
-    if (!void_first) add_cube(soup, "cavity", 0.02, Vec3(0.005, 0, 0), true);
-    add_cube(soup, "beside", 0.06, Vec3(0.1, 0, 0));
-    EXPECT_NEAR(volume(convex_parts(soup)), 2 * 0.06 * 0.06 * 0.06 - 8e-6, 1e-15);
-  }
-  PolygonSoup nested;
-  add_cube(nested, "outer", 0.1, Vec3(0));
-  add_cube(nested, "gap", 0.08, Vec3(0), true);
-  add_cube(nested, "core", 0.06, Vec3(0));
-  add_cube(nested, "hole", 0.02, Vec3(0), true);
-  const std::vector<ConvexMesh> parts = convex_parts(nested);
-  EXPECT_NEAR(volume(parts), 1e-3 - 0.512e-3 + 0.216e-3 - 0.008e-3, 1e-15);
-  for (const Vec3& point : {Vec3(0), Vec3(0.035, 0, 0)}) {
-    EXPECT_TRUE(std::all_of(parts.begin(), parts.end(),
-                            [&](const ConvexMesh& part) { return out_of(part, point) > 0; }));
-  }
-}
-
-TEST(ConvexParts, AVoidInTheShellThatOtherGroupsMakeGoesWithIt) {
-  PolygonSoup soup;
-  add_cube(soup, "sides", 0.06, Vec3(0));
-  add_cube(soup, "cavity", 0.02, Vec3(0), true);
-  soup.group_of[0] = static_cast<std::uint32_t>(soup.group_names.size());
-  soup.group_names.push_back("lid");
-  EXPECT_NEAR(volume(convex_parts(soup)), 0.06 * 0.06 * 0.06 - 8e-6, 1e-15);
-}
-
-TEST(ConvexParts, AVoidInNothingIsNamed) {
-  for (const Vec3& at : {Vec3(0.1, 0, 0), Vec3(0.03, 0, 0)}) {  // beside it; half in it
-    PolygonSoup soup;
-    add_cube(soup, "shell", 0.06, Vec3(0));
-    add_cube(soup, "cavity", 0.02, at, true);
-    EXPECT_EQ(refusal(soup),
-              "group 'cavity': inside out: all faces are clockwise seen from outside, as of a "
-              "void; expected counter-clockwise, or another closed group round it");
-  }
-}
-
-TEST(ConvexParts, ManyGroupsTakeTheirOwnVerticesOnly) {
-  PolygonSoup soup;
-  const auto add = [&](std::size_t count) {
-    for (std::size_t i = soup.group_names.size(); i < count; ++i)
-      add_cube(soup, std::to_string(i), 0.01,
-               0.03 * Vec3(double(i % 25), double(i / 25 % 25), double(i / 625)));
-  };
-  add(3000);
-  const std::vector<ConvexMesh> parts = convex_parts(soup);
-  ASSERT_EQ(parts.size(), 3000U);
-  EXPECT_EQ(parts[1234].vertices().size(), 8U);
-  EXPECT_LT(glm::length(parts[1234].centre() - 0.03 * Vec3(9, 24, 1)), 1e-12);
-  add(10001);
-  EXPECT_EQ(refusal(soup),
-            "too many groups: expected at most 10000 that are closed by themselves, found more");
-}
-
-TEST(ConvexParts, FacesOfAGroupKeepTheirNumbersInMessages) {
-  PolygonSoup soup;
-  add_cube(soup, "closed", 0.02, Vec3(0));
-  add_cube(soup, "open", 0.02, Vec3(0.1, 0, 0));
-  soup.faces.pop_back();
-  soup.group_of.pop_back();
-  const std::string text = refusal(soup);
-  bool named = false;
-  for (std::uint32_t f = 6; f < 11; ++f) {
-    std::string corners;
-    for (const std::uint32_t corner : soup.faces[f])
-      corners += (corners.empty() ? "" : " ") + std::to_string(corner);
-    named = named || text.find(" of face " + std::to_string(f) + " (vertices " + corners +
-                               ") has no face") != std::string::npos;
-  }
-  EXPECT_TRUE(named) << text;
-}
-
-TEST(ConvexParts, GroupsThatAreOnlyPaintAreOneSolid) {
-  PolygonSoup soup = solids::l_shape().soup;
-  soup.group_names = {"ends", "sides"};
-  for (std::size_t f = 0; f < soup.faces.size(); ++f) soup.group_of.push_back(f < 2 ? 0 : 1);
-  EXPECT_EQ(convex_parts(soup).size(), 2U);
 }
 
 }  // namespace

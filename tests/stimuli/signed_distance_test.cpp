@@ -17,7 +17,7 @@ namespace {
 using testing::placed;
 
 constexpr ShapeKind kShapes[] = {ShapeKind::sphere, ShapeKind::cone, ShapeKind::cylinder,
-                                 ShapeKind::cube};
+                                 ShapeKind::cube, ShapeKind::box};
 
 ObjectSpec solid_of(ShapeKind shape, double radius = 0.03, double height = 0.06) {
   ObjectSpec spec;
@@ -25,6 +25,7 @@ ObjectSpec solid_of(ShapeKind shape, double radius = 0.03, double height = 0.06)
   spec.radius = radius;
   spec.height = height;
   spec.edge = height;
+  spec.size = {height, 0.05, 2 * radius};
   return spec;
 }
 
@@ -130,6 +131,8 @@ TEST(SignedDistance, AtPlacesThatAreKnown) {
   expect_distance(solid_of(ShapeKind::cube), {0, -0.02, 0}, -0.01, {0, -1, 0});
   expect_distance(solid_of(ShapeKind::cube), {-0.06, 0.07, 0}, 0.05, {-0.6, 0.8, 0});
   expect_distance(solid_of(ShapeKind::cube), {0, 0, 0}, -0.03, {1, 0, 0});
+  expect_distance(solid_of(ShapeKind::box), {-0.06, 0.065, 0.01}, 0.05, {-0.6, 0.8, 0});
+  expect_distance(solid_of(ShapeKind::box), {0, 0, 0}, -0.025, {0, 1, 0});
 
   const ObjectSpec rod = solid_of(ShapeKind::cylinder);
   expect_distance(rod, {0, 0.05, 0.01}, 0.02, {0, 1, 0});

@@ -23,7 +23,7 @@ std::vector<std::string> how_to_read(const AccuracyReport& report) {
       significant(1e3 * s.length) + " mm (rendering/accuracy/analytic_stroke.h; seeds 1 to " +
       std::to_string(s.paths) +
       "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
-      "mm. Forces at 800 N/m.");
+      "mm; box of 80 x 60 x 40 mm. Forces at 800 N/m.");
   all.emplace_back(
       "A result is compared with the exact local minimum of the penetration depth that is nearest "
       "to "

@@ -138,6 +138,8 @@ std::string to_text(const Explanation& e) {
     pad(line, 58);
     out += line + c.stage.why + '\n';
   }
+  for (const std::string& note : e.notes) out += "\nNote: " + note + ".";
+  if (!e.notes.empty()) out += '\n';
   if (e.rest_ns) {
     out += "\nThe rest of a tick in contact: " + nanoseconds(e.rest_ns) +
            " ns: writing results, prefetching, tracking other parts.";
@@ -175,7 +177,8 @@ nlohmann::ordered_json to_json(const Explanation& e) {
           {"contact_ns", figure(e.contact_ns)},
           {"free_ns", figure(e.free_ns)},
           {"rest_of_contact_ns", figure(e.rest_ns)},
-          {"stages", std::move(stages)}};
+          {"stages", std::move(stages)},
+          {"notes", e.notes}};
 }
 
 }  // namespace palpate::runner

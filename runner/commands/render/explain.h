@@ -24,6 +24,7 @@ struct Explanation {
   std::optional<double> contact_ns, free_ns;  ///< of a whole tick
   std::optional<double> rest_ns;              ///< of contact_ns: not accounted for by the stages
   std::vector<StageCost> stages;
+  std::vector<std::string> notes = {};  ///< on the scene, a sentence each
 };
 
 Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer);

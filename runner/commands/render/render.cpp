@@ -5,6 +5,7 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "stimuli/parts/overlaps.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -19,9 +20,23 @@ std::string given(const po::variables_map& values, const char* option, const cha
   return values[option].as<std::string>();
 }
 
+/// Of groups of mesh files that overlap.
+void add_overlaps(const stimuli::ObjectSpec& object, const std::string& pointer,
+                  std::vector<std::string>& notes) {
+  for (std::size_t i = 0; i < object.parts.size(); ++i)
+    add_overlaps(object.parts[i], pointer + "/parts/" + std::to_string(i), notes);
+  for (const std::string& overlap : stimuli::group_overlaps(object))
+    notes.push_back(pointer + " (" + stimuli::printable(object.file_name) +
+                    "): " + stimuli::printable(overlap));
+}
+
 void explain_scene(Outputs& outputs, const rendering::Scene& scene,
-                   const rendering::Renderer& renderer) {
-  const Explanation explanation = explain_with_costs(scene, renderer);
+                   const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
+  Explanation explanation = explain_with_costs(scene, renderer);
+  for (std::size_t i = 0; i < spec.objects.size(); ++i) {
+    if (!spec.objects[i].soft)
+      add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), explanation.notes);
+  }
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
@@ -71,7 +86,7 @@ int render_command(const std::vector<std::string>& args) {
   if (explains) {
     const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
     for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
-    explain_scene(outputs, build_scene(scene_path, spec, renderer), renderer);
+    explain_scene(outputs, build_scene(scene_path, spec, renderer), spec, renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");

@@ -18,11 +18,13 @@ namespace palpate::rendering {
 namespace {
 
 constexpr stimuli::ShapeKind kShapes[] = {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
-                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube};
+                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube,
+                                          stimuli::ShapeKind::box};
 
 stimuli::ObjectSpec primitive(stimuli::ShapeKind shape, int fineness = 0) {
   stimuli::ObjectSpec spec;
   spec.shape = shape;
+  spec.size = {0.08, 0.05, 0.03};
   spec.subdivisions = fineness;
   spec.segments = 8 << fineness;
   return spec;

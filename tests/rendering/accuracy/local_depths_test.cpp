@@ -22,11 +22,13 @@ using testing::random_direction;
 using testing::uniform;
 
 constexpr stimuli::ShapeKind kShapes[] = {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
-                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube};
+                                          stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube,
+                                          stimuli::ShapeKind::box};
 
 stimuli::ObjectSpec primitive(stimuli::ShapeKind shape) {
   stimuli::ObjectSpec spec;
   spec.shape = shape;
+  spec.size = {0.08, 0.05, 0.03};
   return spec;
 }
 
@@ -197,17 +199,19 @@ TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
   }
 }
 
-TEST(LocalDepths, OfACubeThePolyhedronAndTheAnalyticShapeAgree) {
-  const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::cube);
-  const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
-  for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
-    const auto analytic = local_depths(spec, probe);
-    const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
-    ASSERT_EQ(analytic.size(), polyhedral.size());
-    for (std::size_t i = 0; i < analytic.size(); ++i) {
-      EXPECT_NEAR(analytic[i].depth, polyhedral[i].depth, 1e-16);
-      EXPECT_NEAR(analytic[i].probe_fraction, polyhedral[i].probe_fraction, 1e-12);
-      EXPECT_NEAR(analytic[i].flat_angle, polyhedral[i].flat_angle, 1e-9);
+TEST(LocalDepths, OfCubesAndBoxesThePolyhedronAndTheAnalyticShapeAgree) {
+  for (const stimuli::ShapeKind shape : {stimuli::ShapeKind::cube, stimuli::ShapeKind::box}) {
+    const stimuli::ObjectSpec spec = primitive(shape);
+    const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
+    for (const LineProbe& probe : inside_poses(spec, 300, 10)) {
+      const auto analytic = local_depths(spec, probe);
+      const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
+      ASSERT_EQ(analytic.size(), polyhedral.size());
+      for (std::size_t i = 0; i < analytic.size(); ++i) {
+        EXPECT_NEAR(analytic[i].depth, polyhedral[i].depth, 1e-16);
+        EXPECT_NEAR(analytic[i].probe_fraction, polyhedral[i].probe_fraction, 1e-12);
+        EXPECT_NEAR(analytic[i].flat_angle, polyhedral[i].flat_angle, 1e-9);
+      }
     }
   }
 }

@@ -1,17 +1,15 @@
-// The oracle of contact with unions of convex parts: against closed forms, against other brute
-// force, and by the definition of an ideal tool.
+// The oracle of contact with unions of convex parts: against closed forms and other brute force.
+// By the definition of an ideal tool: union_oracle_audit_test.cpp.
 
 #include "rendering/verification/union_oracle.h"
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 
 #include "rendering/renderer.h"
-#include "rendering/verification/nearest_point.h"
 #include "rendering/verification/random_paths.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
@@ -66,75 +64,6 @@ void expect_near(const Vec3& found, const Vec3& expected, double tolerance, cons
   EXPECT_LE(glm::length(found - expected), tolerance)
       << what << " " << of << ": " << found.x << " " << found.y << " " << found.z << " for "
       << expected.x << " " << expected.y << " " << expected.z;
-}
-
-// What characterises the nearest point of a convex set: it lies in it, and the way to it is a sum
-// of non-negative multiples of the normals of planes that it lies on.
-TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
-  int found = 0;
-  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
-    stimuli::Random random(seed);
-    std::vector<HalfSpace> planes;
-    const std::size_t count = random.below(7);
-    for (std::size_t i = 0; i < count; ++i) {
-      const Vec3 normal = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
-      planes.push_back({normal, 2 * random.unit() - 1.5});
-    }
-    const Vec3 from{random.normal(), random.normal(), random.normal()};
-    const auto nearest = nearest_point(from, planes, 1e-14);
-    if (!nearest) continue;
-    ++found;
-    Vec3 sum = from;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double height = glm::dot(planes[i].normal, nearest->point) - planes[i].offset;
-      EXPECT_GE(height, -1e-14);
-      EXPECT_GE(nearest->multipliers[i], 0);
-      if (nearest->multipliers[i] > 0) {
-        EXPECT_LE(height, 1e-12);
-      }
-      sum += nearest->multipliers[i] * planes[i].normal;
-    }
-    expect_near(sum, nearest->point, 1e-12, "seed", static_cast<double>(seed));
-  }
-  EXPECT_GT(found, 1500);
-}
-
-TEST(NearestPoint, OfNothingIsNone) {
-  const std::array<HalfSpace, 2> apart{HalfSpace{{0, 0, 1}, 1}, HalfSpace{{0, 0, -1}, 1}};
-  EXPECT_FALSE(nearest_point(Vec3(0), apart, 1e-14).has_value());
-}
-
-// A vector is as far from a cone as it is from its nearest point there.
-TEST(DistanceToCone, IsThatOfTheNearestPoint) {
-  const std::array<Vec3, 3> corner{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
-  EXPECT_EQ(distance_to_cone({1, 2, 3}, corner), 0);
-  EXPECT_EQ(distance_to_cone({1, 2, -3}, corner), 3);
-  EXPECT_EQ(distance_to_cone({-3, 2, -4}, corner), 5);
-  EXPECT_EQ(distance_to_cone({-3, 0, -4}, {}), 5);
-  // Moreau: what is left is the nearest point of the polar cone.
-  for (std::uint64_t seed = 0; seed < 500; ++seed) {
-    stimuli::Random random(seed, {4});
-    std::vector<Vec3> normals;
-    std::vector<HalfSpace> polar;
-    for (std::size_t count = random.below(6); normals.size() < count;) {
-      normals.push_back(stimuli::uniform_rotation(random) * Vec3(0, 0, 1));
-      polar.push_back({-normals.back(), 0});
-    }
-    const Vec3 vector{random.normal(), random.normal(), random.normal()};
-    const auto left = nearest_point(vector, polar, 1e-14);
-    ASSERT_TRUE(left) << seed;
-    EXPECT_NEAR(distance_to_cone(vector, normals), glm::length(left->point), 1e-12) << seed;
-  }
-}
-
-TEST(DistanceToCone, IsExactBetweenNearlyAntiparallelNormals) {
-  for (const double opening : {1e-1, 1e-2, 1e-3, 1e-4}) {
-    const std::array<Vec3, 2> wedge{glm::normalize(Vec3(opening, 0, 1)),
-                                    glm::normalize(Vec3(opening, 0, -1))};
-    EXPECT_LE(distance_to_cone({1, 0, 0.3}, wedge), 1e-11) << opening;
-    EXPECT_NEAR(distance_to_cone({1, 0.2, 0.3}, wedge), 0.2, 1e-11) << opening;
-    EXPECT_NEAR(distance_to_cone({-1, 0, 0}, wedge), 1, opening) << opening;
-  }
 }
 
 // The sums are those of the brute-force reference for one part.
@@ -326,75 +255,6 @@ TEST(UnionOracle, CutSolidsEqualWholeOnes) {
     }
   }
   EXPECT_GT(in_contact, 3000);
-}
-
-struct Covered {
-  long in_contact = 0, several = 0, lagged = 0;
-};
-
-// By definition: outside all parts, and at a local minimum of the distance from the virtual tool.
-void expect_ideal(const UnionWalk& walk, std::uint64_t seed, Covered& covered) {
-  const UnionOracle oracle(walk.parts, walk.tool);
-  OraclePose last = walk.path[0];
-  for (std::size_t i = 0; i < walk.path.size(); ++i) {
-    const OraclePose& pose = walk.path[i];
-    const OracleTick tick = oracle.tick(last, pose);
-    ASSERT_FALSE(tick.failed) << seed << " tick " << i;
-    const OracleAudit audit = oracle.audit(tick.ideal, pose.tip, 1e-11 * oracle.size());
-    ASSERT_LE(audit.penetration, 1e-12 * oracle.size()) << seed << " tick " << i;
-    ASSERT_LE(audit.descent, 1e-9 * oracle.size()) << seed << " tick " << i;
-    Vec3 sum;
-    for (const OracleContact& contact : tick.contacts) {
-      EXPECT_GT(contact.share, 0);
-      sum += contact.share * contact.normal;
-    }
-    ASSERT_LE(glm::length(sum - (tick.ideal.tip - pose.tip)), 1e-10 * oracle.size()) << seed;
-    covered.in_contact += !tick.contacts.empty();
-    covered.several += tick.contacts.size() > 1;
-    covered.lagged += tick.lagged;
-    last = tick.ideal;
-  }
-}
-
-TEST(UnionOracle, IsAtALocalMinimumOutsideOfRandomClusters) {
-  Covered covered;
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    expect_ideal(random_union_walk(4, seed, 400), seed, covered);
-    if (HasFatalFailure()) return;
-  }
-  EXPECT_GT(covered.in_contact, 5'000);
-  EXPECT_GT(covered.several, 1'500);
-  EXPECT_LT(covered.lagged, covered.in_contact / 50);
-}
-
-TEST(UnionOracle, IsAtALocalMinimumWhereWhatCanCoincideDoes) {
-  Covered covered;
-  for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {5});
-    std::vector<std::uint8_t> bytes(300);
-    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.below(256));
-    expect_ideal(grid_walk(bytes, 300), seed, covered);
-    if (HasFatalFailure()) return;
-  }
-  EXPECT_GT(covered.in_contact, 5'000);
-  EXPECT_GT(covered.several, 1'000);
-  EXPECT_LT(covered.lagged, covered.in_contact / 50);
-}
-
-// And the audit sees what is not.
-TEST(UnionOracle, TheAuditSeesWhatIsWrong) {
-  const UnionOracle oracle(groove(90 * kDegree), kPoint);
-  const Vec3 virtual_tip(0.001, 0, -0.003);
-  const double touching = 1e-11 * oracle.size();
-  const auto audit = [&](const Vec3& ideal) {
-    return oracle.audit({ideal, Mat3(1)}, virtual_tip, touching);
-  };
-  EXPECT_LE(audit({0, 0, 0}).descent, 1e-17);
-  EXPECT_NEAR(audit({0, 0, 1e-6}).descent, glm::length(Vec3(1e-3, 0, -3.001e-3)), 1e-9);  // floats
-  EXPECT_NEAR(audit({1e-6, 0, -1e-6}).penetration, 1e-6, 1e-15);  // to the seam
-  EXPECT_NEAR(audit({3e-6, 0, -1e-6}).penetration, 4e-6 * std::sqrt(0.5), 1e-15);
-  // On one wall, from where it slides down.
-  EXPECT_GT(audit({0.01, 0, 0.01}).descent, 0.01);
 }
 
 }  // namespace

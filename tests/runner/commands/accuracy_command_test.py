@@ -29,10 +29,10 @@ class Accuracy(unittest.TestCase):
         numbers, figure, page = self.dir / "a.json", self.dir / "a.svg", self.dir / "a.html"
         done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure, "--report", page)
         self.assertEqual(done.stderr, "")
-        for shape in ["sphere", "cone", "cylinder", "cube"]:
+        for shape in ["sphere", "cone", "cylinder", "cube", "box"]:
             self.assertRegex(done.stdout, rf"(?m)^  {shape}: .*\.$")
         result = json.loads(numbers.read_text())
-        self.assertEqual([r["shape"] for r in result["recommended"]], ["sphere", "cone", "cylinder", "cube"])
+        self.assertEqual([r["shape"] for r in result["recommended"]], ["sphere", "cone", "cylinder", "cube", "box"])
         # 80 triangles are too few for a sphere and enough for a cube.
         self.assertIsNone(result["recommended"][0]["triangles_for_device"])
         self.assertEqual(result["recommended"][3]["triangles_for_device"], 12)
@@ -58,7 +58,7 @@ class Accuracy(unittest.TestCase):
                 self.assertIn(f"{peer['name']:<12}absent", done.stdout)
         seen = {(r["shape"], r["triangles"], r["probe"], r["method"]) for r in result["rows"]}
         self.assertEqual(len(seen), len(result["rows"]))
-        self.assertEqual(len(seen), 8 * 2 * len(methods))
+        self.assertEqual(len(seen), 9 * 2 * len(methods))
         for row in result["rows"]:
             self.assertGreater(row["ns_per_tick"], 0)
             if row["method"] == "tick":

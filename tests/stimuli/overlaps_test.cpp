@@ -1,0 +1,96 @@
+// What convex parts have in common, against sampled points and boxes that are known.
+
+#include "stimuli/parts/overlaps.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "stimuli/orientation.h"
+#include "stimuli/primitives.h"
+#include "tests/shared/random_polyhedron.h"
+#include "tests/stimuli/part_checks.h"
+
+namespace palpate::stimuli {
+namespace {
+
+ConvexMesh box_at(const Vec3& low, const Vec3& high, const Quat& turn = Quat(1, 0, 0, 0)) {
+  PolygonSoup soup = cube(1);
+  for (Vec3& v : soup.vertices) v = turn * (0.5 * (low + high) + v * (high - low));
+  return ConvexMesh(soup);
+}
+
+TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
+  Random random(3);
+  for (int i = 0; i < 20; ++i) {
+    const Quat turn = i == 0 ? Quat(1, 0, 0, 0) : uniform_rotation(random);
+    const ConvexMesh one = box_at(Vec3(0), Vec3(0.02, 0.03, 0.04), turn);
+    const auto with = [&](const Vec3& low, const Vec3& high) {
+      const ConvexMesh other = box_at(low, high, turn);
+      EXPECT_NEAR(common_volume(one, other), common_volume(other, one), 1e-18);
+      return common_volume(one, other);
+    };
+    EXPECT_NEAR(with(Vec3(0.01), Vec3(0.05)), 0.01 * 0.02 * 0.03, 1e-17);
+    EXPECT_NEAR(with(Vec3(0.005), Vec3(0.01)), 0.005 * 0.005 * 0.005, 1e-18);  // within
+    // Faces in common, from inside and from outside.
+    EXPECT_NEAR(with(Vec3(0), Vec3(0.02, 0.03, 0.04)), 0.02 * 0.03 * 0.04, 1e-17);
+    EXPECT_NEAR(with(Vec3(0), Vec3(0.01, 0.03, 0.04)), 0.01 * 0.03 * 0.04, 1e-17);
+    EXPECT_NEAR(with(Vec3(0.02, 0, 0), Vec3(0.04, 0.03, 0.04)), 0, 1e-17);
+    EXPECT_NEAR(with(Vec3(0.02, 0.01, -0.01), Vec3(0.04, 0.05, 0.02)), 0, 1e-17);
+    EXPECT_EQ(with(Vec3(0.06), Vec3(0.08)), 0);
+  }
+}
+
+TEST(CommonVolume, OfRandomPolyhedraIsThatOfSampledPoints) {
+  Random random(4);
+  for (int i = 0; i < 30; ++i) {
+    const ConvexMesh a(testing::random_polyhedron(random, 12, Vec3(0.03, 0.02, 0.04)));
+    PolygonSoup moved = testing::random_polyhedron(random, 20, Vec3(0.02, 0.03, 0.03));
+    for (Vec3& v : moved.vertices) v += Vec3(0.03 * random.unit(), 0.01, 0);
+    const ConvexMesh b(moved);
+    int in_a = 0, in_both = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const Vec3 p = a.centre() + a.radius() * Vec3(2 * random.unit() - 1, 2 * random.unit() - 1,
+                                                    2 * random.unit() - 1);
+      if (checks::out_of(a, p) > 0) continue;
+      ++in_a;
+      in_both += checks::out_of(b, p) <= 0;
+    }
+    const double share = static_cast<double>(in_both) / in_a;
+    EXPECT_NEAR(common_volume(a, b) / checks::volume(a), share, 0.025) << i;
+  }
+}
+
+TEST(GroupOverlaps, NameTheGroupsAndHowMuch) {
+  const auto notes = [](double apart) {
+    const std::string path = ::testing::TempDir() + "overlapping_groups.obj";
+    std::ofstream file(path);
+    for (int b = 0; b < 2; ++b) {
+      file << "g box" << b << "\n";
+      const PolygonSoup box = cube(0.02);
+      for (const Vec3& v : box.vertices)
+        file << "v " << v.x + b * apart << ' ' << v.y << ' ' << v.z << '\n';
+      for (const auto& face : box.faces) {
+        file << 'f';
+        for (const std::uint32_t corner : face) file << ' ' << 8 * b + static_cast<int>(corner) + 1;
+        file << '\n';
+      }
+    }
+    file.close();
+    ObjectSpec spec;
+    spec.shape = ShapeKind::mesh;
+    spec.file = path;
+    return group_overlaps(spec);
+  };
+  EXPECT_EQ(notes(0.015), std::vector<std::string>{
+                              "group 'box0' and group 'box1' overlap by 2e-06 m^3, 25 % of group "
+                              "'box0'; they are touched as one object"});
+  EXPECT_TRUE(notes(0.02).empty());
+  EXPECT_TRUE(notes(0.03).empty());
+}
+
+}  // namespace
+}  // namespace palpate::stimuli
