@@ -155,13 +155,13 @@ Measured facing(const CastMesh& part, ContactFeature start, const Vec3& tip, con
                 const Vec3& out) {
   const stimuli::ConvexMesh& mesh = part.mesh;
   if (start.kind != Kind::none) {
-    const Measured known = measured<kSegment>(mesh, start, tip, d);
+    Measured known = measured<kSegment>(mesh, start, tip, d);
     if (glm::dot(known.normal, out) > 0 &&
         (part.trees.support_map() == nullptr || is_near<kSegment>(mesh, known, tip, d)))
       return known;
   }
   if (const FacetMap* const map = part.trees.facet_map(); map != nullptr) {
-    const Measured under = measure_facet<kSegment>(mesh, map->facet_under(tip, d), tip, d);
+    Measured under = measure_facet<kSegment>(mesh, map->facet_under(tip, d), tip, d);
     if (glm::dot(under.normal, out) > 0) return under;
   }
   const std::uint32_t vertex = vertex_under(part, out);
@@ -233,14 +233,14 @@ template <bool kSegment>
 WalkResult located(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d) {
   start = usable<kSegment>(part.mesh, start);
   if (start.kind != Kind::none) {
-    const WalkResult same = kSegment ? same_feature_segment(part.mesh, start, tip, d)
-                                     : same_feature_point(part.mesh, start, tip);
+    WalkResult same = kSegment ? same_feature_segment(part.mesh, start, tip, d)
+                               : same_feature_point(part.mesh, start, tip);
     if (same.depth < 0) return same;
     start = same.feature;
   }
   Measured outward;
   if (!outward_facet<kSegment>(part, start, tip, d, outward)) {
-    const WalkResult nearest = scanned<kSegment>(part, tip, d);
+    WalkResult nearest = scanned<kSegment>(part, tip, d);
     if (nearest.feature.kind == Kind::none) return nearest;
     outward = measured<kSegment>(part.mesh, nearest.feature, tip, d);
   }

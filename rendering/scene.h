@@ -171,13 +171,13 @@ class Scene {
   std::vector<PartGroup> groups_;
   std::vector<BreakingParts> breaking_;
   std::size_t object_states_ = 0;
-  BoundingTree part_tree_;
-  std::vector<Sphere> node_spheres_;
-  double most_radius_ = 0;
   double tool_reach_ = 0;
   Tool tool_;
   std::size_t features_index_ = 0;
   std::shared_ptr<const SceneMotion> motion_;
+  BoundingTree part_tree_;
+  std::vector<Sphere> node_spheres_;
+  double most_radius_ = 0;
 };
 
 /// Of the radius: room to move before the list of near parts must be rebuilt.

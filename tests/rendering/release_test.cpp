@@ -113,7 +113,11 @@ TEST_P(Layers, ABrokenLayerFadesAndComesBackWhenTheObjectHasBeenLeft) {
 }
 
 TEST_P(Layers, ABrokenLayerHoldsNothing) {
-  const Scene scene(layered_cube(0, {{0.001, 500, 0, 1.0}}, GetParam()));
+  std::vector<SceneObject> parts = layered_cube(0, {{0.001, 500, 0, 1.0}}, GetParam());
+  for (SceneObject& part : parts) {
+    if (part.layer == 0) part.layer = kNotFelt;
+  }
+  const Scene scene(parts);
   RenderState state = scene.initial_state();
   for (double depth = -0.002; depth < 0.004; depth += 1e-5)
     ray_renderer().tick(scene, state, at_depth(depth), kTick);

@@ -11,7 +11,7 @@
 
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
-#include "tests/shared/random_polyhedron.h"
+#include "stimuli/random.h"
 #include "tests/stimuli/part_checks.h"
 
 namespace palpate::stimuli {
@@ -44,12 +44,15 @@ TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
   }
 }
 
-TEST(CommonVolume, OfRandomPolyhedraIsThatOfSampledPoints) {
+TEST(CommonVolume, OfSolidsInAnyOrientationIsThatOfSampledPoints) {
   Random random(4);
   for (int i = 0; i < 30; ++i) {
-    const ConvexMesh a(testing::random_polyhedron(random, 12, Vec3(0.03, 0.02, 0.04)));
-    PolygonSoup moved = testing::random_polyhedron(random, 20, Vec3(0.02, 0.03, 0.03));
-    for (Vec3& v : moved.vertices) v += Vec3(0.03 * random.unit(), 0.01, 0);
+    const Vec3 half(0.03, 0.02, 0.04);
+    const ConvexMesh a = box_at(-half, half, uniform_rotation(random));
+    PolygonSoup moved = i % 2 == 0 ? cylinder(0.02, 0.06, 7) : icosphere(0.03, 1);
+    const Quat turn = uniform_rotation(random);
+    const Vec3 by(0.04 * random.unit(), 0.01, 0);
+    for (Vec3& v : moved.vertices) v = turn * v + by;
     const ConvexMesh b(moved);
     int in_a = 0, in_both = 0;
     for (int k = 0; k < 20000; ++k) {
