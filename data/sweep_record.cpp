@@ -68,6 +68,14 @@ std::string json_differences(const std::string& a, const std::string& b) {
   return out.empty() ? "their layout alone" : out;
 }
 
+std::vector<std::string> measures_of(const std::string& task) {
+  if (task == "compare") return {"threshold", "jnd"};
+  if (task == "detect") return {"threshold", "d_prime"};
+  if (task == "rate") return {"exponent"};
+  if (task == "adjust") return {"pse", "jnd"};
+  return {"accuracy", "time"};
+}
+
 }  // namespace
 
 std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
@@ -96,8 +104,36 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
   return out;
 }
 
+std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
+  std::vector<TaskCellColumns> cells;
+  const auto protocol = nlohmann::json::parse(plan.protocol, nullptr, false);
+  if (!protocol.is_object() || protocol.value("version", 1) != 2) return cells;
+  const auto add = [&](TaskCellColumns cell) {
+    const std::string place = "_" + cell.block + (cell.stimulus.empty() ? "" : "_" + cell.stimulus) +
+                              "_" + cell.renderer;
+    for (const std::string& measure : cell.measures) {
+      cell.columns.push_back(measure + place);
+      cell.columns.push_back(measure + "_se" + place);
+    }
+    cells.push_back(std::move(cell));
+  };
+  for (const auto& block : protocol.at("blocks")) {
+    if (block.value("practice", false)) continue;
+    const std::string task = block.at("task"), name = block.at("name");
+    for (const auto& renderer : block.value("renderers", protocol.at("renderers"))) {
+      for (const auto& stimulus : block.at("stimuli"))
+        add({task, name, stimulus, renderer, measures_of(task), {}});
+      if (task == "identify") add({task, name, "", renderer, {"bits"}, {}});
+    }
+  }
+  return cells;
+}
+
 std::vector<std::string> figure_columns(const SweepPlan& plan) {
   std::vector<std::string> out;
+  for (const TaskCellColumns& cell : task_columns(plan))
+    out.insert(out.end(), cell.columns.begin(), cell.columns.end());
+  if (!out.empty()) return out;
   for (const char* what : {"gain_", "gain_se_"}) {
     for (const std::string& shape : plan.shapes) out.push_back(what + shape);
   }

@@ -44,7 +44,22 @@ struct SweepRow {
 /// its standard error); then for each renderer and shape time_R_S (s, mean of participants' means
 /// over correct answers), accuracy_R_S, time_outs_R_S (share of trials) and contact_share_R_S
 /// (share of the time with forces on).
+///
+/// Of a protocol of version 2, for each block B that is no practice, stimulus S and renderer R, means
+/// over the participants and their standard errors: compare and detect threshold_B_S_R (compare with
+/// levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare jnd_..., detect
+/// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify accuracy_... and time_... (s)
+/// likewise, and bits_B_R. Participants without the figure are left out.
 std::vector<std::string> figure_columns(const SweepPlan& plan);
+
+/// What is measured in a cell of a protocol of version 2, and the names of its columns.
+struct TaskCellColumns {
+  std::string task, block, stimulus, renderer;  ///< stimulus "": identify, all together
+  std::vector<std::string> measures;            ///< "threshold", ..., each with an error
+  std::vector<std::string> columns;             ///< a measure and its error in turn
+};
+/// Empty: version 1.
+std::vector<TaskCellColumns> task_columns(const SweepPlan& plan);
 /// point, status, reason, the parameters, the figures.
 std::vector<std::string> sweep_columns(const SweepPlan& plan);
 /// Two columns of one name, or a parameter and a shape (whose name stands for its gain in a

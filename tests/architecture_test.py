@@ -85,8 +85,8 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
-    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan",
-    "protocols/procedures": "procedure procedure_spec psychometric",
+    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan tasks/typical_participant",
+    "protocols/procedures": "procedure procedure_spec psychometric recovery",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
@@ -95,7 +95,7 @@ PUBLIC = {
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
-    "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis task_analysis",
+    "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis task_analysis threshold_plan",
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
     "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
@@ -109,7 +109,7 @@ PUBLIC = {
     "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
-                      "replay_comparison session_plan simulated_session simulated_study station",
+                      "replay_comparison session_plan simulated_session simulated_study socket_advisor station",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",

@@ -112,6 +112,7 @@ void add_box(Panel& panel, const Spread& spread, const std::string& text, double
 
 Figure gains_figure(const SweepAnalysis& analysis) {
   Figure figure = sweep_figure(analysis, "gains", "Gains over the space of settings");
+  if (analysis.table.shapes.empty()) return figure;  // of tasks
   const std::size_t shapes = shown_shapes_of(analysis, figure);
   double low = 0, high = 25;
   for (std::size_t s = 0; s < shapes; ++s) {

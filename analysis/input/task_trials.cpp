@@ -6,10 +6,13 @@
 #include <map>
 #include <stdexcept>
 #include <string_view>
+#include <tuple>
+#include <utility>
 
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/text.h"
+#include "data/files/formula_guard.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -37,24 +40,31 @@ class TaskRow {
   std::string_view text(std::string_view column) const {
     const auto place = columns_.find(column);
     if (place == columns_.end() || place->second >= reader_.fields().size()) return {};
-    const std::string_view field = reader_.fields()[place->second];
-    return field == "NA" || field == "n/a" ? std::string_view() : field;
+    return data::unguarded(reader_.fields()[place->second]);
   }
+  /// "" also where other programs wrote that nothing is there; a name may be NA.
+  std::string_view value(std::string_view column) const {
+    const std::string_view field = text(column);
+    return field == "NA" || field == "n/a" || field == "nan" || field == "NaN" ? std::string_view()
+                                                                               : field;
+  }
+  bool has(std::string_view column) const { return columns_.find(column) != columns_.end(); }
 
   std::optional<double> number(std::string_view column) {
-    const std::string_view field = text(column);
+    const std::string_view field = value(column);
     if (field.empty()) return std::nullopt;
     double value = 0;
     const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    if (error == std::errc() && end == field.data() + field.size() && std::isfinite(value))
+    constexpr double kMost = 1e15;
+    if (error == std::errc() && end == field.data() + field.size() && std::abs(value) <= kMost)
       return value;
-    add_fault(column, "expected a number or nothing");
+    add_fault(column, "expected a number from -1e15 to 1e15, or nothing");
     return std::nullopt;
   }
 
   /// From 1; 1 where there is none.
   int whole(std::string_view column) {
-    const std::string_view field = text(column);
+    const std::string_view field = value(column);
     int value = 1;
     if (field.empty()) return value;
     const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
@@ -64,7 +74,7 @@ class TaskRow {
   }
 
   bool yes(std::string_view column) {
-    const std::string_view field = text(column);
+    const std::string_view field = value(column);
     if (field.empty() || field == "0") return false;
     if (field != "1") add_fault(column, "expected 0, 1 or nothing");
     return field == "1";
@@ -84,16 +94,42 @@ class TaskRow {
   std::vector<protocols::Fault>& faults_;
 };
 
+/// Of data of others, which have no such column. \return false: nothing tells
+bool success_of(TaskRow& row, TaskTrial& trial) {
+  const bool known = row.has("correct");
+  if (trial.task == "identify") {
+    trial.success = trial.response == trial.shape;
+  } else if (trial.task == "detect") {
+    trial.success = trial.response == "yes";
+  } else if (trial.response == "same" || trial.response == "different") {
+    trial.success = trial.response == "different";
+  } else if (trial.task == "compare" && row.has("comparison_interval")) {
+    trial.success = trial.response == row.value("comparison_interval");
+  } else if (trial.task == "compare") {
+    return false;
+  }
+  if (!known && trial.task == "identify") trial.correct = trial.success;
+  if (!known && trial.task == "detect") trial.correct = trial.success != trial.catch_trial;
+  return true;
+}
+
+/// Of an export: as many as have an onset.
+int intervals_of(const TaskRow& row) {
+  const std::string_view onsets = row.value("interval_onsets");
+  if (onsets.empty()) return 0;
+  return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
+}
+
 TaskTrial read_trial(TaskRow& row) {
   TaskTrial trial;
   trial.participant = row.text("participant_id");
-  trial.task = row.text("task");
+  trial.task = row.value("task");
   if (trial.task.empty()) trial.task = "identify";  // of a study of version 1
   trial.block_name = row.text("block_name");
   trial.track = row.text("track");
   trial.renderer = row.text("renderer");
   trial.shape = row.text("shape");
-  trial.response = row.text("response");
+  trial.response = trial.task == "identify" ? row.text("response") : row.value("response");
   trial.level = row.number("level");
   trial.standard_level = row.number("standard_level");
   trial.number = row.number("number");
@@ -109,6 +145,11 @@ TaskTrial read_trial(TaskRow& row) {
   trial.response_time = row.number("response_time");
   if (trial.response_time && *trial.response_time < 0)
     row.add_fault("response_time", "expected a time in s, 0 or more");
+  trial.intervals = intervals_of(row);
+  trial.protocol_sha256 = row.value("protocol_sha256");
+  if (!row.has("success") && !success_of(row, trial))
+    row.add_fault("success",
+                  "expected a column success (1: the comparison was chosen), or comparison_interval");
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
     row.add_fault("task", "expected identify, compare, detect, rate or adjust");
@@ -117,12 +158,18 @@ TaskTrial read_trial(TaskRow& row) {
 
 }  // namespace
 
+bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256) {
+  constexpr std::size_t kDigits = 6;
+  return wanted.empty() || wanted == name ||
+         (wanted.size() >= kDigits && sha256.compare(0, wanted.size(), wanted) == 0);
+}
+
 bool has_task_column(const std::string& path) {
   CsvReader reader(path);
   return read_header(reader).count("task") > 0;
 }
 
-TaskTable read_task_trials_csv(const std::string& path) {
+TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol) {
   TaskTable table;
   table.source = table.provenance.source = path;
   std::vector<protocols::Fault> faults;
@@ -132,25 +179,42 @@ TaskTable read_task_trials_csv(const std::string& path) {
     if (columns.count(needed) == 0)
       faults.push_back({path, "line 1", std::string("expected a column ") + needed});
   }
+  const bool numbered = columns.count("session") > 0 && columns.count("trial") > 0;
+  std::map<std::tuple<std::string, std::pair<std::string, std::string>, int, int, int>, std::size_t>
+      seen;  // line of each trial
   while (faults.size() < kMostTaskFaults && reader.next()) {
     TaskRow row(path, columns, reader, faults);
     if (!reader.fault().empty()) {
       faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
       continue;
     }
+    const std::pair named(std::string(row.value("protocol_name")),
+                          std::string(row.value("protocol_sha256")));
+    if (!is_protocol(protocol, named.first, named.second)) continue;
     const bool simulated = row.yes("simulated");
     table.simulated |= simulated;
     if (row.yes("practice")) {
       ++table.n_practice;
-    } else {
-      table.trials.push_back(read_trial(row));
-      table.trials.back().simulated = simulated;
+      continue;
     }
+    table.trials.push_back(read_trial(row));
+    TaskTrial& trial = table.trials.back();
+    trial.simulated = simulated;
+    if (std::find(table.protocols.begin(), table.protocols.end(), named) == table.protocols.end())
+      table.protocols.push_back(named);
+    const auto [first, is_new] = seen.emplace(
+        std::tuple(trial.participant, named, trial.session, trial.block, trial.trial),
+        reader.line());
+    if (numbered && !is_new)
+      row.add_fault("trial", "expected each trial once: it is in line " +
+                                 std::to_string(first->second) + ", too");
   }
   if (faults.empty() && !reader.fault().empty())
     faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
   if (faults.empty() && table.trials.empty())
-    faults.push_back({path, "line 1", "expected at least one trial that is not practice"});
+    faults.push_back({path, "line 1",
+                      "expected at least one trial that is not practice" +
+                          (protocol.empty() ? "" : " of the protocol " + protocol)});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   return table;
 }

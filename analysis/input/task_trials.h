@@ -3,9 +3,11 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/input/trials.h"
+#include "data/record.h"
 
 namespace palpate::analysis {
 
@@ -17,6 +19,8 @@ struct TaskTrial {
   bool catch_trial = false, success = false, correct = false, answered = false;
   int session = 1, block = 1, trial = 1;
   bool timed_out = false, simulated = false;
+  int intervals = 0;            ///< compare: how many; 0: unknown
+  std::string protocol_sha256;  ///< "": unknown
   std::optional<double> response_time;  ///< s; none: not in the source
 };
 
@@ -26,15 +30,18 @@ struct TaskTable {
   std::size_t n_practice = 0;     ///< left out
   bool simulated = false;         ///< some of them
   Provenance provenance;          ///< of all of them
+  /// Whose trials they are: name and SHA-256, each once.
+  std::vector<std::pair<std::string, std::string>> protocols;
 };
 
 /// Whether a CSV file has a column "task" (an export of a study of version 2).
 bool has_task_column(const std::string& path);
 
 /// Reads an export of trials. Needs participant_id, task, renderer and shape; of level,
-/// standard_level, success, number, confidence, ... what is there. \throws protocols::InputError
-/// with every fault.
-TaskTable read_task_trials_csv(const std::string& path);
+/// standard_level, success, number, confidence, ... what is there. \param protocol  name of the
+/// protocol whose trials are read, or six or more digits that its SHA-256 begins with; "": all.
+/// \throws protocols::InputError with every fault.
+TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol = "");
 
 /// The trials of identification without catch trials and levels as those of a study of version 1;
 /// nullopt: there are none, or their times or places are not in the source.
@@ -42,8 +49,13 @@ std::optional<TrialTable> identification_of(const TaskTable& table);
 
 /// Whether a database holds a protocol of version 2. \throws what data::Store::open throws.
 bool has_tasks(const std::string& database);
+/// A completed trial as it is stored.
+TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record);
 /// Reads the completed trials of a database. \throws protocols::InputError if there are none, and
-/// what data::Store::open throws.
-TaskTable read_task_trials_store(const std::string& path);
+/// what data::Store::open throws. \param protocol  as above
+TaskTable read_task_trials_store(const std::string& path, const std::string& protocol = "");
+
+/// Whether a protocol is the one that is named by its name or what its SHA-256 begins with.
+bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256);
 
 }  // namespace palpate::analysis

@@ -5,38 +5,10 @@
 #include "analysis/input/task_trials.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
+#include "stimuli/printable.h"
 
 namespace palpate::analysis {
 namespace {
-
-TaskTrial task_trial_of(const data::StoredTrial& stored) {
-  const data::TrialRecord& record = stored.record;
-  TaskTrial trial;
-  trial.participant = stored.participant.code;
-  trial.task = "identify";  // of a study of version 1
-  trial.renderer = record.renderer;
-  trial.shape = record.shape;
-  trial.response = record.response;
-  trial.correct = record.correct;
-  if (record.task) {
-    trial.task = record.task->task;
-    trial.block_name = record.task->block_name;
-    trial.track = std::to_string(record.task->track);
-    trial.level = record.task->level;
-    trial.standard_level = record.task->standard_level;
-    trial.number = record.task->number;
-    trial.confidence = record.task->confidence;
-    trial.catch_trial = record.task->catch_trial;
-    trial.success = record.task->success;
-  }
-  trial.answered = !record.timed_out && (!trial.response.empty() || trial.number);
-  trial.session = record.session;
-  trial.block = record.block;
-  trial.trial = record.trial;
-  trial.timed_out = record.timed_out;
-  trial.response_time = record.response_time;
-  return trial;
-}
 
 std::string listed(const std::vector<std::string>& parts) {
   std::string all;
@@ -60,17 +32,51 @@ bool has_tasks(const std::string& database) {
   return false;
 }
 
-TaskTable read_task_trials_store(const std::string& path) {
+TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
+  TaskTrial trial;
+  trial.participant = participant;
+  trial.task = "identify";  // of a study of version 1
+  trial.renderer = record.renderer;
+  trial.shape = record.shape;
+  trial.response = record.response;
+  trial.correct = record.correct;
+  if (record.task) {
+    trial.task = record.task->task;
+    trial.block_name = record.task->block_name;
+    trial.track = std::to_string(record.task->track);
+    trial.level = record.task->level;
+    trial.standard_level = record.task->standard_level;
+    trial.number = record.task->number;
+    trial.confidence = record.task->confidence;
+    trial.catch_trial = record.task->catch_trial;
+    trial.success = record.task->success;
+    trial.intervals = static_cast<int>(record.task->intervals.size());
+  }
+  trial.answered = !record.timed_out && (!trial.response.empty() || trial.number);
+  trial.session = record.session;
+  trial.block = record.block;
+  trial.trial = record.trial;
+  trial.timed_out = record.timed_out;
+  trial.response_time = record.response_time;
+  return trial;
+}
+
+TaskTable read_task_trials_store(const std::string& path, const std::string& protocol) {
   data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   TaskTable table;
   table.source = table.provenance.source = path;
   std::vector<std::string> names, observers;
   store.for_each_trial([&](const data::StoredTrial& stored) {
+    if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
+    const std::pair known(stored.protocol_name, stored.protocol_sha256);
+    if (std::find(table.protocols.begin(), table.protocols.end(), known) == table.protocols.end())
+      table.protocols.push_back(known);
     table.simulated |= stored.participant.simulated;
     if (stored.record.practice) {
       ++table.n_practice;
     } else {
-      table.trials.push_back(task_trial_of(stored));
+      table.trials.push_back(task_trial_of(stored.participant.code, stored.record));
+      table.trials.back().protocol_sha256 = stored.protocol_sha256;
       table.trials.back().simulated = stored.participant.simulated;
       note_once(stored.protocol_name, names);
       note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
@@ -82,7 +88,9 @@ TaskTable read_task_trials_store(const std::string& path) {
   table.provenance.observer_sha256 = listed(observers);
   if (table.trials.empty())
     throw protocols::InputError(
-        {{path, "trials", "expected at least one completed trial that is not practice"}});
+        {{path, "trials",
+          "expected at least one completed trial that is not practice" +
+              (protocol.empty() ? "" : " of the protocol " + stimuli::printable(protocol))}});
   return table;
 }
 

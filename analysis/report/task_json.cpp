@@ -34,18 +34,19 @@ TaskJson fit_json(const ParticipantFunction& one) {
   fit["threshold_ci95"] = ends_json(one.fit.threshold_ci95);
   fit["slope"] = one.fit.parameters.slope;
   fit["slope_ci95"] = ends_json(one.fit.slope_ci95);
+  fit["determined"] = one.determined;
   fit["slope_at_bound"] = one.fit.slope_at_bound;
   fit["guess"] = one.fit.parameters.guess;
   fit["lapse"] = one.fit.parameters.lapse;
   fit["log_likelihood"] = one.fit.log_likelihood;
   fit["deviance"] = one.goodness.deviance;
   fit["deviance_p"] = maybe(one.goodness.p);
-  fit["pse"] = one.discrimination.pse;
-  fit["pse_ci95"] = ends_json(one.discrimination.pse_ci95);
-  fit["jnd"] = maybe(one.discrimination.jnd);
-  fit["jnd_ci95"] = ends_json(one.discrimination.jnd_ci95);
-  fit["weber_fraction"] = maybe(one.discrimination.weber_fraction);
-  fit["weber_fraction_ci95"] = ends_json(one.discrimination.weber_fraction_ci95);
+  fit["pse"] = maybe(one.figures.pse);
+  fit["pse_ci95"] = ends_json(one.figures.pse_ci95);
+  fit["jnd"] = maybe(one.figures.jnd);
+  fit["jnd_ci95"] = ends_json(one.figures.jnd_ci95);
+  fit["weber_fraction"] = maybe(one.figures.weber_fraction);
+  fit["weber_fraction_ci95"] = ends_json(one.figures.weber_fraction_ci95);
   return fit;
 }
 
@@ -109,6 +110,14 @@ TaskJson magnitude_json(const TaskCell& cell) {
   return out;
 }
 
+TaskJson information_json(const InformationTransfer& transfer) {
+  return {{"bits", maybe(transfer.plain)},
+          {"bits_corrected", maybe(transfer.corrected)},
+          {"se", maybe(transfer.se)},
+          {"stimulus_entropy_bits", transfer.stimulus_entropy},
+          {"categories", maybe(transfer.categories)}};
+}
+
 TaskJson cell_json(const TaskCell& cell) {
   TaskJson out{{"task", cell.task},
                {"block_name", cell.block_name},
@@ -118,7 +127,9 @@ TaskJson cell_json(const TaskCell& cell) {
                {"n_answered", cell.answered},
                {"n_correct", cell.correct},
                {"standard_level", maybe(cell.standard_level)},
-               {"forced_choice", cell.forced_choice}};
+               {"forced_choice", cell.forced_choice},
+               {"same_different", cell.same_different},
+               {"n_intervals", cell.task == "compare" ? TaskJson(cell.intervals) : TaskJson()}};
   for (const ParticipantFunction& one : cell.functions)
     out["psychometric_functions"].push_back(function_json(one));
   if (cell.magnitude) out["magnitude_estimation"] = magnitude_json(cell);
@@ -131,12 +142,16 @@ TaskJson cell_json(const TaskCell& cell) {
                                   {"sd", maybe(one.sd)},
                                   {"jnd", maybe(one.jnd)},
                                   {"start_effect", maybe(one.start_effect)}});
-  if (cell.information)
-    out["information_transfer"] = {{"bits", maybe(cell.information->plain)},
-                                   {"bits_corrected", maybe(cell.information->corrected)},
-                                   {"se", maybe(cell.information->se)},
-                                   {"stimulus_entropy_bits", cell.information->stimulus_entropy},
-                                   {"categories", maybe(cell.information->categories)}};
+  if (cell.information) {
+    TaskJson& bits = out["information_transfer"] = information_json(*cell.information);
+    bits["mean_of_participants_bits_corrected"] = maybe(cell.information_mean);
+    bits["mean_of_participants_ci95"] = ends_json(cell.information_ci95);
+    for (std::size_t i = 0; i < cell.informations.size(); ++i) {
+      TaskJson one{{"participant_id", cell.participants[i]}};
+      one.update(information_json(cell.informations[i]));
+      bits["participants"].push_back(std::move(one));
+    }
+  }
   TaskJson confidence;
   put_status(confidence, cell.confidence.undefined);
   if (cell.confidence.area) {
@@ -158,6 +173,7 @@ TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
   }
   out["reference"] = one.conditions[0];
   out["natural_logarithms"] = one.logarithms;
+  out["n_undetermined"] = one.n_undetermined;
   put_status(out, one.comparison.undefined);
   out["participant_sd"] = maybe(one.comparison.participant_sd);
   out["residual_sd"] = maybe(one.comparison.residual_sd);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -29,29 +30,34 @@ std::string optional_interval(const std::optional<double>& value,
   return interval ? with_interval(*value, *interval) : short_number(*value);
 }
 
-std::string function_text(const TaskCell& cell, const ParticipantFunction& one) {
+std::string detection_text(const ParticipantFunction& one) {
+  if (!one.detectability.d_prime) return "";
+  return ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
+         ", criterion " +
+         optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
+}
+
+std::string function_text(const ParticipantFunction& one) {
   std::string text = "  " + pad_right(stimuli::printable(one.participant), 12);
-  if (!one.fit.undefined.empty()) return text + "no function: " + one.fit.undefined + "\n";
-  if (cell.forced_choice || cell.task == "detect") {
-    text += "threshold " + with_interval(one.fit.parameters.threshold, one.fit.threshold_ci95);
-    if (cell.forced_choice && cell.standard_level)
-      text +=
-          ", JND " + short_number(std::abs(one.fit.parameters.threshold - *cell.standard_level));
+  const std::string detected = detection_text(one);
+  if (!one.fit.undefined.empty())
+    return text + "no function: " + one.fit.undefined + detected + "\n";
+  if (one.figures.pse) {
+    text += "PSE " + optional_interval(one.figures.pse, one.figures.pse_ci95);
   } else {
-    text += "PSE " + with_interval(one.discrimination.pse, one.discrimination.pse_ci95) + ", JND " +
-            optional_interval(one.discrimination.jnd, one.discrimination.jnd_ci95);
-    if (one.discrimination.weber_fraction)
-      text += ", Weber fraction " + short_number(*one.discrimination.weber_fraction);
+    text += "threshold " + with_interval(one.fit.parameters.threshold, one.fit.threshold_ci95);
   }
-  text += ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
+  if (one.figures.jnd) text += ", JND " + optional_interval(one.figures.jnd, one.figures.jnd_ci95);
+  if (one.figures.weber_fraction)
+    text += ", Weber fraction " + short_number(*one.figures.weber_fraction);
+  text += one.fit.slope_at_bound
+              ? ", slope not determined"
+              : ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
+  if (!one.determined) text += ", threshold NOT DETERMINED by these levels";
   if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
   if (one.posterior.undefined.empty())
     text += "; Bayes " + with_interval(one.posterior.mean.threshold, one.posterior.threshold_ci95);
-  if (one.detectability.d_prime)
-    text += ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
-            ", criterion " +
-            optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
-  return text + "\n";
+  return text + detected + "\n";
 }
 
 std::string magnitude_text(const TaskCell& cell) {
@@ -96,14 +102,18 @@ std::string cell_text(const TaskCell& cell) {
   text += ": " + counted(cell.trials, "trial", "trials") + " of " +
           counted(cell.participants.size(), "participant", "participants") + ", " +
           std::to_string(cell.answered) + " answered\n";
-  for (const ParticipantFunction& one : cell.functions) text += function_text(cell, one);
+  for (const ParticipantFunction& one : cell.functions) text += function_text(one);
   if (cell.magnitude) text += magnitude_text(cell);
   text += adjustment_text(cell);
   if (cell.information && cell.information->plain) {
     text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
             short_number(cell.information->stimulus_entropy) + "; less the bias of few trials " +
-            short_number(*cell.information->corrected) + " bit, " +
-            short_number(*cell.information->categories) + " categories\n";
+            short_number(std::max(0.0, *cell.information->corrected)) + " bit, " +
+            short_number(*cell.information->categories) + " categories";
+    if (cell.information_mean)
+      text += "; mean of the participants' " +
+              optional_interval(cell.information_mean, cell.information_ci95);
+    text += "\n";
   }
   if (cell.confidence.area)
     text += "  confidence: area under the type 2 ROC " +
@@ -129,6 +139,9 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   add(one.renderer);
   text += one.logarithms ? " (ratios)\n" : " (differences)\n";
   if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
+  if (one.n_undetermined > 0)
+    text += "  " + counted(one.n_undetermined, "function", "functions") +
+            " left out: no threshold among the levels shown\n";
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);
@@ -181,8 +194,8 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   text +=
       "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare "
       "with "
-      "levels on\none side of the standard: guesses 0.5, the threshold is at half of what is above "
-      "(75 % without lapses);\ndetect: guesses free. d': log-linear correction. Bayes: posterior "
+      "levels on\none side of the standard: guesses 1 / intervals, the threshold is half-way from "
+      "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
       "mean of the threshold on a grid.\n";
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);

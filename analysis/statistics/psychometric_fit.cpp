@@ -23,6 +23,13 @@ double rate_of(const RateModel& rate, double x) {
   return rate.most * s * s;
 }
 
+/// How a minimum is looked for: a grid, from whose best places searches begin.
+struct Search {
+  int thresholds = 21, slopes = 19;
+  std::size_t starts = 4;
+};
+constexpr Search kWholeSearch{}, kOneStart{21, 19, 1}, kQuickSearch{11, 9, 1};
+
 /// Minus log likelihood over (threshold, log slope, free rates), any of the first two held.
 class Objective {
  public:
@@ -61,36 +68,77 @@ class Objective {
                     tolerance);
   }
 
-  /// The best point from the best start of a grid.
-  SimplexMinimum best(double tolerance) const {
-    constexpr int kThresholds = 15, kSlopes = 9;
-    double least = kInfinity, threshold = data_.low, log_slope = 0;
-    Objective on_grid(*this);
-    const double range = data_.high - data_.low;
-    for (int t = 0; t < kThresholds; ++t) {
-      const double held = threshold_.value_or(data_.low + range * t / (kThresholds - 1));
-      on_grid.hold_threshold(held);
-      for (int s = 0; s < kSlopes; ++s) {
-        const double flat = data_.least_log_slope(), steep = data_.most_log_slope();
-        const double slope = log_slope_.value_or(flat + (steep - flat) * s / (kSlopes - 1));
-        on_grid.hold_log_slope(slope);
-        const double value = on_grid({0.5, 0.5});
-        if (value < least) {
-          least = value;
-          threshold = held;
-          log_slope = slope;
-        }
-      }
+  /// The best point from the best starts of a grid: the likelihood may have several maxima.
+  SimplexMinimum best(const Search& search, double tolerance) const {
+    SimplexMinimum found;
+    found.value = kInfinity;
+    for (const Start& start : starts_of_grid(search)) {
+      SimplexMinimum one = best_from(start.place, 0.1, tolerance);
+      if (one.value < found.value) found = std::move(one);
     }
-    std::vector<double> start;
-    if (!threshold_) start.push_back(threshold);
-    if (!log_slope_) start.push_back(log_slope);
-    if (model_.guess.free) start.push_back(0.5);
-    if (model_.lapse.free) start.push_back(0.5);
-    return best_from(start, 0.1, tolerance);
+    return found;
   }
 
  private:
+  struct Start {
+    double value = 0;
+    int threshold = 0, slope = 0;  ///< cell of the grid
+    std::vector<double> place;
+  };
+
+  /// Rates of the grid, as best_from takes them: near 0 and near their most.
+  std::vector<std::vector<double>> rates_of_grid() const {
+    std::vector<std::vector<double>> all{{}};
+    for (const RateModel* rate : {&model_.guess, &model_.lapse}) {
+      if (!rate->free) continue;
+      std::vector<std::vector<double>> longer;
+      for (const std::vector<double>& one : all) {
+        for (const double x : {0.25, 1.3}) {
+          longer.push_back(one);
+          longer.back().push_back(x);
+        }
+      }
+      all = std::move(longer);
+    }
+    return all;
+  }
+
+  /// The best ones, each two cells from those that are better.
+  std::vector<Start> starts_of_grid(const Search& search) const {
+    constexpr int kApart = 2;
+    const double range = data_.high - data_.low;
+    const double flat = data_.least_log_slope(), steep = data_.most_log_slope();
+    std::vector<Start> all;
+    const std::vector<std::vector<double>> rates = rates_of_grid();
+    for (int t = 0; t < (threshold_ ? 1 : search.thresholds); ++t) {
+      for (int s = 0; s < (log_slope_ ? 1 : search.slopes); ++s) {
+        Start best;
+        best.value = kInfinity;
+        for (const std::vector<double>& rate : rates) {
+          std::vector<double> place;
+          if (!threshold_) place.push_back(data_.low + range * t / (search.thresholds - 1));
+          if (!log_slope_) place.push_back(flat + (steep - flat) * s / (search.slopes - 1));
+          place.insert(place.end(), rate.begin(), rate.end());
+          const double value = (*this)(place);
+          if (value < best.value) best = {value, t, s, std::move(place)};
+        }
+        if (best.value < kInfinity) all.push_back(std::move(best));
+      }
+    }
+    std::stable_sort(all.begin(), all.end(),
+                     [](const Start& a, const Start& b) { return a.value < b.value; });
+    std::vector<Start> chosen;
+    for (Start& one : all) {
+      const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const Start& other) {
+        return std::abs(one.threshold - other.threshold) < kApart &&
+               std::abs(one.slope - other.slope) < kApart;
+      });
+      if (!near) chosen.push_back(std::move(one));
+      if (chosen.size() >= search.starts) break;
+    }
+    return chosen;
+  }
+
   const PlacedData& data_;
   const PsychometricModel& model_;
   std::optional<double> threshold_, log_slope_;
@@ -131,8 +179,8 @@ std::optional<double> profile_end(const Profile& profile, double inside, double 
   return 0.5 * (inside + outside);
 }
 
-/// Loss allowed less the smallest loss with a parameter held, each search beginning where the one
-/// before ended.
+/// Loss allowed less the smallest loss with a parameter held. Each search begins where the one before
+/// ended, and at the best place of a grid: there may be another valley.
 class Profile {
  public:
   using Hold = void (Objective::*)(std::optional<double>);
@@ -143,6 +191,8 @@ class Profile {
   double operator()(double held) {
     (objective_.*hold_)(held);
     SimplexMinimum best = objective_.best_from(place_, 0.02, 1e-8);
+    SimplexMinimum other = objective_.best(kOneStart, 1e-8);
+    if (other.value < best.value) best = std::move(other);
     place_ = std::move(best.place);
     return allowed_ - best.value;
   }
@@ -199,15 +249,16 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
   return "";
 }
 
-/// Point estimates alone, as the simulations need them.
+/// Point estimates alone, as the simulations need them. 
 PsychometricFit fit_point(const std::vector<LevelCount>& counts, const PlacedData& data,
-                          const PsychometricModel& model, SimplexMinimum& best) {
+                          const PsychometricModel& model, const Search& search,
+                          SimplexMinimum& best) {
   PsychometricFit fit;
   fit.undefined = reason_not_to_fit(counts, data);
   for (const LevelCount& count : counts) fit.trials += count.trials;
   if (!fit.undefined.empty()) return fit;
   const Objective objective(data, model);
-  best = objective.best(1e-11);
+  best = objective.best(search, 1e-11);
   const auto point = objective.point(best.place);
   fit.log_likelihood = -best.value;
   fit.parameters = {protocols::level_at(model.function.scale, point.threshold),
@@ -247,7 +298,7 @@ PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
                                  const PsychometricModel& model) {
   const PlacedData data = place_counts(counts, model.function);
   SimplexMinimum best;
-  PsychometricFit fit = fit_point(counts, data, model, best);
+  PsychometricFit fit = fit_point(counts, data, model, kWholeSearch, best);
   if (!fit.undefined.empty()) return fit;
   fit.threshold_ci95 = threshold_interval(data, model, best);
   fit.slope_ci95 = slope_interval(data, model, best, std::log(fit.parameters.slope));
@@ -273,7 +324,7 @@ GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const Psych
     }
     const PlacedData data = place_counts(simulated, model.function);
     SimplexMinimum best;
-    const PsychometricFit refit = fit_point(simulated, data, model, best);
+    const PsychometricFit refit = fit_point(simulated, data, model, kQuickSearch, best);
     // All answers alike: any function that goes there fits without deviance.
     const double deviance = refit.undefined.empty() ? deviance_of(simulated, refit) : 0;
     if (deviance >= result.deviance * (1 - 1e-9)) ++as_large;

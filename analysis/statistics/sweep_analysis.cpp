@@ -139,6 +139,14 @@ void add_notes(SweepAnalysis& analysis) {
   }
 }
 
+/// Of a protocol of version 2: every figure that has a standard error.
+void add_task_drivers(SweepAnalysis& out) {
+  const SweepTable& table = out.table;
+  for (std::size_t c = table.parameters.size(); c + 1 < table.columns.size(); c += 2)
+    out.drivers.push_back(
+        drivers_of(table, table.columns[c], table.values[c], table.values[c + 1], out.seed));
+}
+
 }  // namespace
 
 PatternShare pattern_share(const SweepTable& table, const std::string& expression) {
@@ -187,6 +195,7 @@ SweepAnalysis analyze_sweep(SweepTable table, const std::string& pattern,
     out.gains.push_back(spread_of(gains, errors));
     out.drivers.push_back(drivers_of(out.table, "gain_" + shape, gains, errors, out.seed));
   }
+  if (out.table.shapes.empty()) add_task_drivers(out);
   if (out.pattern)
     out.drivers.push_back(drivers_of(out.table, "pattern", out.pattern->at, {}, out.seed));
   add_notes(out);

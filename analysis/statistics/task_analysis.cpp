@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <tuple>
+#include <utility>
 
 namespace palpate::analysis {
 namespace {
@@ -111,30 +113,66 @@ std::vector<LevelCount> with_catch_trials(std::vector<LevelCount> counts,
   return counts;
 }
 
+/// Of a forced choice.
+LevelFigures distance_from_standard(const PsychometricFit& fit, std::optional<double> standard) {
+  LevelFigures figures;
+  if (!standard) return figures;
+  const double away = fit.parameters.threshold - *standard;
+  const Interval ends = fit.threshold_ci95;
+  const Interval distance = away >= 0 ? Interval{ends.low - *standard, ends.high - *standard}
+                                      : Interval{*standard - ends.high, *standard - ends.low};
+  figures.jnd = std::abs(away);
+  figures.jnd_ci95 = {std::max(0.0, distance.low), distance.high};
+  if (!(*standard > 0)) return figures;
+  figures.weber_fraction = *figures.jnd / *standard;
+  figures.weber_fraction_ci95 = {figures.jnd_ci95->low / *standard,
+                                 figures.jnd_ci95->high / *standard};
+  return figures;
+}
+
+LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& model,
+                        const TaskCell& cell) {
+  if (cell.task == "detect" || cell.same_different) return {};
+  if (cell.forced_choice) return distance_from_standard(fit, cell.standard_level);
+  const Discrimination found = discrimination(fit, model.function, cell.standard_level);
+  return {found.pse,      found.jnd,      found.weber_fraction,
+          found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
+}
+
 ParticipantFunction function_of(const std::string& participant, const Trials& trials,
                                 const TaskCell& cell, int simulations, std::uint64_t seed) {
   ParticipantFunction result;
   result.participant = participant;
-  result.counts = counts_of_levels(trials);
-  result.model.function.easier = easier_of(result.counts);
-  if (cell.forced_choice) result.model.guess.value = 0.5;
+  result.tracks = tracks_of(trials);
+  const bool catches = cell.task == "detect" || cell.same_different;
   const DetectionCounts detections = detections_of(trials);
+  const DetectionTask asked =
+      cell.same_different ? DetectionTask::same_different : DetectionTask::yes_no;
+  if (catches) result.detectability = detectability(detections, asked);
+  if (!catches) result.detectability.undefined = "nothing is detected";
+  result.counts = counts_of_levels(trials);
+  result.fit.undefined = cell.no_function;
+  result.posterior.undefined = cell.no_function;
+  if (!cell.no_function.empty()) return result;
+  result.model.function.easier = easier_of(result.counts);
+  if (cell.forced_choice) result.model.guess.value = 1.0 / cell.intervals;
   std::vector<LevelCount> counts = result.counts;
-  if (cell.task == "detect") {
+  if (catches) {
     result.model.guess = {0, true, 0.5};
     counts = with_catch_trials(counts, detections, result.model.function.easier);
   }
   result.model.lapse = {0, true, 0.06};
   result.fit = fit_psychometric(counts, result.model);
+  result.posterior = psychometric_posterior(counts, result.model);
   if (result.fit.undefined.empty()) {
     result.goodness = goodness_of_fit(counts, result.model, result.fit, simulations, seed);
-    result.discrimination = discrimination(result.fit, result.model.function, cell.standard_level);
+    result.figures = figures_of(result.fit, result.model, cell);
+    const double threshold = result.fit.parameters.threshold;
+    const Interval& ends = result.fit.threshold_ci95;
+    result.determined = threshold >= result.counts.front().level &&
+                        threshold <= result.counts.back().level && std::isfinite(ends.low) &&
+                        std::isfinite(ends.high);
   }
-  result.posterior = psychometric_posterior(counts, result.model);
-  result.tracks = tracks_of(trials);
-  result.detectability =
-      cell.task == "detect" ? detectability(detections, DetectionTask::yes_no) : Detectability{};
-  if (cell.task != "detect") result.detectability.undefined = "no yes/no task";
   return result;
 }
 
@@ -142,14 +180,17 @@ void add_functions(TaskCell& cell, const Trials& trials, int simulations, std::u
   bool above = false, below = false;
   for (const TaskTrial* trial : trials) {
     if (trial->standard_level) cell.standard_level = trial->standard_level;
+    if (trial->intervals > 0) cell.intervals = trial->intervals;
+    cell.same_different |= trial->response == "same" || trial->response == "different";
     if (!trial->level || !trial->standard_level || trial->catch_trial) continue;
     above |= *trial->level > *trial->standard_level;
     below |= *trial->level < *trial->standard_level;
   }
-  const bool same_different = std::any_of(trials.begin(), trials.end(), [](const auto* trial) {
-    return trial->response == "same" || trial->response == "different";
-  });
-  cell.forced_choice = cell.task == "compare" && above != below && !same_different;
+  const bool compares = cell.task == "compare";
+  cell.forced_choice = compares && above != below && !cell.same_different;
+  if (compares && above && below && (cell.same_different || cell.intervals > 2))
+    cell.no_function =
+        "levels lie on both sides of the standard: successes are no monotonic function of them";
   for (const auto& [participant, own] : by_participant(trials))
     cell.functions.push_back(function_of(participant, own, cell, simulations, seed));
 }
@@ -196,6 +237,19 @@ InformationTransfer transfer_of(const Trials& trials) {
   return information_transfer(counts);
 }
 
+/// Miller's bias is of each participant, and so are mappings of stimuli to answers.
+void add_information(TaskCell& cell, const Trials& trials) {
+  cell.information = transfer_of(trials);
+  std::vector<double> bits;
+  for (const auto& [participant, own] : by_participant(trials)) {
+    cell.informations.push_back(transfer_of(own));
+    if (cell.informations.back().corrected) bits.push_back(*cell.informations.back().corrected);
+  }
+  if (bits.size() < 2) return;
+  cell.information_mean = std::accumulate(bits.begin(), bits.end(), 0.0) / bits.size();
+  cell.information_ci95 = t_test(bits).log_ratio_ci95;
+}
+
 Type2Roc confidence_of(const Trials& trials) {
   std::vector<ConfidenceTrial> sure;
   for (const TaskTrial* trial : trials) {
@@ -220,7 +274,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std:
     add_functions(cell, trials, simulations, seed);
   if (cell.task == "rate") add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
-  if (cell.task == "identify") cell.information = transfer_of(trials);
+  if (cell.task == "identify") add_information(cell, trials);
   cell.confidence = confidence_of(trials);
   return cell;
 }

@@ -12,38 +12,52 @@
 namespace palpate::analysis {
 namespace {
 
-/// A figure of each participant of a cell.
-using Figures = std::vector<std::pair<std::string, double>>;
+struct Figures {
+  std::vector<std::pair<std::string, double>> of;  ///< participant and figure
+  std::size_t n_undetermined = 0;
+  bool ratios = true;  ///< they have a true zero: no level is 0 or below
+
+  void add(const std::string& participant, double value) { of.emplace_back(participant, value); }
+};
 
 struct Measure {
   const char* name;
   std::function<Figures(const TaskCell&)> of;
 };
 
-Figures thresholds(const TaskCell& cell, bool two_sided) {
+/// Of functions with such a figure.
+Figures of_functions(const TaskCell& cell,
+                     const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
   Figures figures;
-  const bool has_pse = cell.task == "compare" && !cell.forced_choice;
-  if (has_pse != two_sided) return figures;
   for (const ParticipantFunction& one : cell.functions) {
-    if (one.fit.undefined.empty())
-      figures.emplace_back(one.participant, one.fit.parameters.threshold);
+    if (!one.counts.empty()) figures.ratios &= one.counts.front().level > 0;
+    const std::optional<double> found = value(one);
+    if (!found) continue;
+    if (one.determined) figures.add(one.participant, *found);
+    if (!one.determined) ++figures.n_undetermined;
   }
   return figures;
 }
 
+/// Where it is neither a PSE nor counted from a standard.
+Figures thresholds(const TaskCell& cell) {
+  return of_functions(cell, [](const ParticipantFunction& one) -> std::optional<double> {
+    if (!one.fit.undefined.empty() || one.figures.pse || one.figures.jnd) return std::nullopt;
+    return one.fit.parameters.threshold;
+  });
+}
+
+Figures pses(const TaskCell& cell) {
+  return of_functions(cell, [](const ParticipantFunction& one) { return one.figures.pse; });
+}
+
 Figures jnds(const TaskCell& cell) {
-  Figures figures;
-  if (cell.task != "compare") return figures;
-  for (const ParticipantFunction& one : cell.functions) {
-    if (!one.fit.undefined.empty()) continue;
-    std::optional<double> jnd = one.discrimination.jnd;
-    if (cell.forced_choice) {
-      jnd.reset();
-      if (cell.standard_level) jnd = std::abs(one.fit.parameters.threshold - *cell.standard_level);
-    }
+  Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
     // A function that is as steep as can be has none.
-    if (jnd && *jnd > 0 && !one.fit.slope_at_bound) figures.emplace_back(one.participant, *jnd);
-  }
+    const bool none = one.fit.slope_at_bound && !cell.forced_choice;
+    return none ? std::nullopt : one.figures.jnd;
+  });
+  figures.ratios = true;  // distances
   return figures;
 }
 
@@ -51,7 +65,7 @@ Figures exponents(const TaskCell& cell) {
   Figures figures;
   if (!cell.magnitude) return figures;
   for (const StevensLine& line : cell.magnitude->lines) {
-    if (line.exponent) figures.emplace_back(cell.participants[line.participant], *line.exponent);
+    if (line.exponent) figures.add(cell.participants[line.participant], *line.exponent);
   }
   return figures;
 }
@@ -59,13 +73,13 @@ Figures exponents(const TaskCell& cell) {
 Figures settings(const TaskCell& cell) {
   Figures figures;
   for (const Adjustment& one : cell.adjustments)
-    figures.emplace_back(cell.participants[one.participant], one.pse);
+    figures.add(cell.participants[one.participant], one.pse);
   return figures;
 }
 
 std::vector<Measure> measures() {
-  return {{"threshold", [](const TaskCell& cell) { return thresholds(cell, false); }},
-          {"pse", [](const TaskCell& cell) { return thresholds(cell, true); }},
+  return {{"threshold", thresholds},
+          {"pse", pses},
           {"jnd", jnds},
           {"exponent", exponents},
           {"pse", settings}};
@@ -82,9 +96,11 @@ std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells
   std::map<std::string, std::size_t> numbers;
   for (const TaskCell* cell : cells) {
     const Figures figures = measure.of(*cell);
-    if (figures.empty()) continue;
+    if (figures.of.empty() && figures.n_undetermined == 0) continue;
     result.task = cell->task;
-    for (const auto& [participant, value] : figures) {
+    result.logarithms &= figures.ratios;
+    result.n_undetermined += figures.n_undetermined;
+    for (const auto& [participant, value] : figures.of) {
       const auto number = numbers.emplace(participant, numbers.size()).first->second;
       all.push_back({number, result.conditions.size(), value});
       result.logarithms &= value > 0;

@@ -21,6 +21,7 @@ struct TaskComparison {
   /// Renderers, or "BLOCK, STIMULUS"; the first is the reference.
   std::vector<std::string> conditions;
   bool logarithms = false;
+  std::size_t n_undetermined = 0;  ///< functions whose threshold the data do not tell: left out
   ThresholdComparison comparison;
 };
 

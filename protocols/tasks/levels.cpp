@@ -126,6 +126,16 @@ std::string unit_of_level(const std::string& of) {
   return "1";
 }
 
+int side_of_levels(const Protocol& protocol, const TaskBlock& block) {
+  if (block.task != TaskKind::compare || block.same_different || block.intervals > 2) return 0;
+  const std::vector<double> levels = levels_of(block);
+  const std::optional<double> standard =
+      block.standard ? own_level(protocol, block, *block.standard) : std::nullopt;
+  if (levels.empty() || !standard) return 0;
+  if (levels.front() >= *standard && levels.back() > *standard) return 1;
+  return levels.back() <= *standard && levels.front() < *standard ? -1 : 0;
+}
+
 Protocol with_all_levels(const Protocol& protocol) {
   Protocol all = protocol;
   for (const TaskBlock& block : protocol.blocks) {

@@ -19,6 +19,10 @@ std::vector<double> levels_of(const TaskBlock& block);
 /// The level that a stimulus has by itself; none: the number has no place in it.
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus);
 
+/// Where the levels of a comparison of two intervals stand: 1, -1: all above, below that of the
+/// standard (or at it); 0: on both sides, or nothing is compared.
+int side_of_levels(const Protocol& protocol, const TaskBlock& block);
+
 /// The protocol with a stimulus more for every level of every block; version 1: as it is.
 Protocol with_all_levels(const Protocol& protocol);
 

@@ -15,6 +15,7 @@
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_answers.h"
 #include "protocols/tasks/task_plan.h"
+#include "protocols/tasks/typical_participant.h"
 
 namespace palpate::protocols {
 namespace {
@@ -289,6 +290,35 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
   }
 }
 
+/// Which levels have more successes of two intervals follows from what is asked. \return nullopt: the
+/// task does not tell
+std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
+  if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
+    return std::nullopt;
+  if (const int side = side_of_levels(protocol, block); side != 0)
+    return side > 0 ? Easier::higher : Easier::lower;
+  if (!block.standard || !own_level(protocol, block, *block.standard)) return std::nullopt;
+  return block.asks_smaller ? Easier::lower : Easier::higher;
+}
+
+void check_easier(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
+                  FaultList& faults) {
+  const std::optional<Easier> expected = block.level ? expected_easier(protocol, block) : std::nullopt;
+  if (!expected) return;
+  for (std::size_t i = 0; i < block.procedures.size(); ++i) {
+    const std::optional<Easier> easier = easier_of(block.procedures[i]);
+    if (!easier || *easier == *expected) continue;
+    const bool one_side = side_of_levels(protocol, block) != 0;
+    const std::string place =
+        pointer + "/procedure" + (block.procedures.size() > 1 ? "/" + std::to_string(i) : "");
+    faults.add(place + "/easier",
+               std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
+                   (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
+                             : "': levels lie on both sides of the standard, and what counts is that "
+                               "the comparison is chosen"));
+  }
+}
+
 void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
   if (!name.empty() && !names.insert(name).second)
     item.faults().add(item.pointer("name"),
@@ -345,6 +375,8 @@ void check_blocks(const Protocol& protocol, FaultList& faults) {
     }
   }
   faults.throw_if_any();
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
+    check_easier(protocol, protocol.blocks[i], block_pointer(i), faults);
   long long trials = 0;
   for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
   if (trials > kMostTaskTrials) {

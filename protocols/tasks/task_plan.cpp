@@ -428,10 +428,17 @@ void TaskPlan::find_next() {
   next_ = std::move(trial);
 }
 
+void TaskPlan::propose(double level) {
+  next_->level = level;
+  for (Interval& interval : next_->intervals) {
+    if (!interval.standard) interval.level = level;
+  }
+}
+
 void TaskPlan::answered(const TrialOutcome& outcome) {
   if (tracks_ && !outcome.answered) ++unanswered_;
   if (tracks_ && outcome.answered && !next_->catch_trial)
-    tracks_->record({*next_->level, outcome.success});
+    tracks_->record({outcome.level.value_or(*next_->level), outcome.success});
   ++shown_;
   ++done_;
   find_next();

@@ -22,6 +22,8 @@ struct TrialOutcome {
   bool correct = false;
   bool success = false;  ///< of what is asked about: the comparison chosen, "yes", "different"
   bool answered = true;  ///< false: a time-out; an adaptive level comes again
+  /// At which it was shown, where that was not the plan's; none: the plan's.
+  std::optional<double> level = std::nullopt;
 };
 
 class TaskPlan {
@@ -35,6 +37,9 @@ class TaskPlan {
   std::size_t size() const;  ///< at most, as far as is known now
   int last_block() const { return first_block_ + static_cast<int>(order_.size()) - 1; }
   bool block_begins() const { return shown_ == 0; }
+  /// The next trial is shown at another level, which the procedure takes note of with the answer.
+  /// \pre it is one of an adaptive block, and no catch trial
+  void propose(double level);
   void answered(const TrialOutcome& outcome);
   /// The tracks of an adaptive block under way.
   const std::optional<InterleavedTracks>& tracks() const { return tracks_; }

@@ -24,6 +24,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_trials.h"
+#include "stimuli/printable.h"
 
 namespace palpate::runner {
 
@@ -60,13 +61,29 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
 constexpr int kRefits = 199;  // of each goodness of fit
 constexpr std::uint64_t kRefitSeed = 2026;
 
+/// Blocks of one name in two protocols are two things. \throws UsageError
+void require_one_protocol(const analysis::TaskTable& table, const std::string& wanted) {
+  if (table.protocols.size() < 2) return;
+  std::string names;
+  bool one_name = true;
+  for (const auto& [name, sha256] : table.protocols) {
+    names += (names.empty() ? "" : ", ") + stimuli::printable(name) + " (" + sha256.substr(0, 12) + ")";
+    one_name &= name == table.protocols.front().first;
+  }
+  if (one_name && !wanted.empty()) return;  // of one name, as was asked for
+  throw UsageError(stimuli::printable(table.source) + ": has trials of several protocols (" + names +
+                   "); say which with --protocol NAME, or with the begin of its checksum");
+}
+
 /// A study of version 2, or its export.
 void analyze_tasks_of(const std::string& database, const std::string& csv,
-                      const analysis::AnalysisSettings& settings, Outputs& outputs) {
+                      const std::string& protocol, const analysis::AnalysisSettings& settings,
+                      Outputs& outputs) {
+  analysis::TaskTable table = csv.empty() ? analysis::read_task_trials_store(database, protocol)
+                                          : analysis::read_task_trials_csv(csv, protocol);
+  require_one_protocol(table, protocol);
   const analysis::TaskAnalysis found =
-      analysis::analyze_tasks(csv.empty() ? analysis::read_task_trials_store(database)
-                                          : analysis::read_task_trials_csv(csv),
-                              kRefits, kRefitSeed, settings, PALPATE_VERSION);
+      analysis::analyze_tasks(std::move(table), kRefits, kRefitSeed, settings, PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
@@ -97,8 +114,8 @@ bool is_of_tasks(const std::string& database, const std::string& csv) {
 int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--json FILE]\n"
-      "       [--report FILE.html] [--figures DIR] [--force]";
+      "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--protocol NAME]\n"
+      "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
@@ -119,7 +136,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
       "      time_ray_cone; + - * /, < <= > >= == !=, && || !, min, max, abs, parentheses)";
-  std::string database, csv, sweep, pattern, json, report, figures;
+  std::string database, csv, sweep, pattern, protocol, json, report, figures;
   analysis::AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -128,6 +145,8 @@ int analyze_command(const std::vector<std::string>& args) {
   add("sweep", po::value(&sweep)->value_name("FILE"), "a sweep's file");
   add("pattern", po::value(&pattern)->value_name("EXPR"),
       "of a sweep: what to look for at each point; default: the paper's pattern");
+  add("protocol", po::value(&protocol)->value_name("NAME"),
+      "of which protocol, where there are several: its name, or what its SHA-256 begins with");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
@@ -145,8 +164,8 @@ int analyze_command(const std::vector<std::string>& args) {
     std::cout << text;
     return 0;
   }
-  if (is_of_tasks(database, csv)) {
-    analyze_tasks_of(database, csv, settings, outputs);
+  if (is_of_tasks(database, csv) || !protocol.empty()) {
+    analyze_tasks_of(database, csv, protocol, settings, outputs);
     return 0;
   }
 

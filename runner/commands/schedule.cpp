@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <iomanip>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/csv_text.h"
+#include "runner/commands/shared/recovery_table.h"
 #include "runner/commands/shared/schedule_rows.h"
 #include "runner/commands/shared/task_schedule.h"
 
@@ -73,29 +75,42 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
 
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate schedule PROTOCOL.json --participant N [--format table|csv|json]";
+  line.usage = "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format table|csv|json]";
   line.summary =
       "Prints the trials that a participant will get, in order, without running them.\n"
       "Where answers choose the levels: the rule, and an example.";
   line.example =
       "  palpate schedule protocols/ho2000.json --participant 1\n"
-      "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv";
+      "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv\n"
+      "  palpate schedule protocols/size-questplus.json --recover 200";
   line.positional_names = {"PROTOCOL.json"};
-  line.options.add_options()("participant", po::value<int>()->required()->value_name("N"),
+  line.options.add_options()("participant", po::value<int>()->value_name("N"),
                              "participant number: 1, 2, ...")(
       "format", po::value<std::string>()->default_value("table")->value_name("FORMAT"),
-      "table, csv or json");
+      "table, csv or json")(
+      "recover", po::value<int>()->value_name("N"),
+      "instead: bias and spread of the thresholds that its adaptive procedures find, over N "
+      "simulated participants whose threshold is known")(
+      "seed", po::value<std::uint64_t>()->default_value(1)->value_name("S"), "of --recover");
   const auto values = line.parse(args);
   if (!values) return 0;
-  const int participant = (*values)["participant"].as<int>();
   const auto format = (*values)["format"].as<std::string>();
-  check_participant_number(participant);
   if (format != "table" && format != "csv" && format != "json") {
     throw UsageError("--format: expected table, csv or json, found '" + format + "'");
   }
 
   const protocols::Protocol protocol =
       protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
+  if (values->count("recover")) {
+    const int count = (*values)["recover"].as<int>();
+    if (count < 2 || count > 100000) throw UsageError("--recover: must be 2 to 100000");
+    std::cout << recovery_text(protocol, count, (*values)["seed"].as<std::uint64_t>(), format);
+    return 0;
+  }
+  if (values->count("participant") == 0)
+    throw UsageError("expected --participant N\nUsage: " + line.usage + "\nMore: add --help");
+  const int participant = (*values)["participant"].as<int>();
+  check_participant_number(participant);
   if (protocol.version == 2) {
     std::cout << task_schedule_text(protocol, participant, format);
     return 0;

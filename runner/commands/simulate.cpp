@@ -27,7 +27,8 @@ namespace po = boost::program_options;
 
 struct SimulateSettings {
   StudyOptions study;
-  std::string database, shard;
+  std::string database, shard, advisor;
+  double advisor_time_out = 1;
   int jobs = 1;
 };
 
@@ -38,7 +39,7 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
   CommandLine line;
   line.usage =
       "palpate simulate PROTOCOL.json --db FILE [--participants N] [--seed S] [--jobs J]\n"
-      "       [--shard K/N|auto]";
+      "       [--shard K/N|auto] [--ask SOCKET]";
   line.summary =
       "Runs the whole study with simulated participants through the renderers, device layer, "
       "session and\n"
@@ -61,8 +62,17 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
        "sessions simulated at a time")  //
       ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
        "only the K-th of N parts of the participants; auto: the task of a Slurm array");
+  line.options.add_options()  //
+      ("ask", po::value(&settings.advisor)->value_name("SOCKET"),
+       "Unix domain socket of a program that proposes the levels of adaptive blocks; one session "
+       "at a time")  //
+      ("ask-time-out-s",
+       po::value(&settings.advisor_time_out)->default_value(1, "1")->value_name("S"),
+       "without an answer in that time the block's own procedure chooses, which is on record");
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
+  check_advisor(settings.advisor, settings.advisor_time_out);
+  if (!settings.advisor.empty()) settings.jobs = 1;
   check_study_options(*values, settings.study);
   if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
   return settings;
@@ -75,6 +85,8 @@ StudyPlan plan_of(const SimulateSettings& settings) {
   StudyPlan plan;
   plan.seed = settings.study.seed;
   plan.jobs = settings.jobs;
+  plan.advisor = settings.advisor;
+  plan.advisor_time_out = settings.advisor_time_out;
   plan.before = static_cast<int>(shard.first(settings.study.participants));
   plan.participants = static_cast<int>(shard.last(settings.study.participants));
   return plan;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "protocols/tasks/levels.h"
+#include "protocols/tasks/typical_participant.h"
 
 namespace palpate::runner {
 
@@ -39,17 +40,28 @@ int TaskJudgement::index_of(const char* name) const {
   return static_cast<int>(at - answers.begin());
 }
 
-void TaskJudgement::feel(const protocols::Interval& interval, std::optional<double> measured,
-                         bool noisy) {
-  measured_ = measured.has_value();
-  last_level_ = measured.value_or(level_of(interval));
+/// Standard deviation, in the level's unit.
+double TaskJudgement::noise_of_difference(double reference) const {
+  if (block().level && block().level->orientation) return settings_.turn_sd;
+  if (reference != 0) return settings_.weber * std::abs(reference);
+  const std::vector<double> levels = protocols::levels_of(block());
+  if (levels.empty()) return 0;
+  return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
+}
+
+void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) {
+  measured_ = felt.measured.has_value();
+  touched_ = felt.touched;
+  last_level_ = felt.measured.value_or(level_of(interval));
   double reference = last_level_;
   if (block().standard) {
     protocols::Interval standard;
     standard.stimulus = *block().standard;
     reference = level_of(standard);
   }
-  const double sd = noisy ? 0 : settings_.weber * std::abs(reference) / std::sqrt(2.0);
+  if (const auto levels = protocols::levels_of(block()); !felt.touched && !levels.empty())
+    last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
+  const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
   const double estimate = last_level_ + sd * random_.normal();
   estimates_.push_back(estimate);
   feels_standard_ = interval.standard;
@@ -60,7 +72,10 @@ void TaskJudgement::feel(const protocols::Interval& interval, std::optional<doub
 std::optional<int> TaskJudgement::compared() {
   const TaskBlock& asked = block();
   if (estimates_.size() < 2) return std::nullopt;
-  const double sd = settings_.weber * std::max(1e-300, std::abs(estimates_.front()));
+  double reference = estimates_.front();
+  if (asked.standard)
+    reference = protocols::own_level(protocol_, asked, *asked.standard).value_or(reference);
+  const double sd = std::max(1e-300, noise_of_difference(reference));
   if (asked.same_different) {
     evidence_ = std::abs(estimates_[0] - estimates_[1]) / sd;
     return index_of(evidence_ > 1 ? "different" : "same");
@@ -72,20 +87,16 @@ std::optional<int> TaskJudgement::compared() {
 }
 
 int TaskJudgement::detected() {
-  const std::vector<double> levels = protocols::levels_of(block());
-  protocols::PsychometricParameters parameters;
-  const double range = levels.empty() ? 1 : levels.back() - levels.front();
-  parameters.threshold = levels.empty() ? 0.5 : levels.front() + settings_.threshold * range;
-  parameters.slope = 1 / (settings_.spread * std::max(range, 1e-12));
-  parameters.guess = settings_.false_alarm;
-  parameters.lapse = settings_.lapse;
-  const protocols::PsychometricFunction function{protocols::PsychometricShape::normal,
-                                                 protocols::LevelScale::linear,
-                                                 protocols::Easier::higher};
   double yes = settings_.false_alarm;
-  if (!trial_.catch_trial) {
-    yes = trial_.level ? protocols::psychometric_probability(function, parameters, *trial_.level)
-                       : 1 - settings_.lapse;
+  if (!trial_.catch_trial && touched_) {
+    yes = 1 - settings_.lapse;
+    if (trial_.level) {
+      const protocols::PsychometricParticipant typical = protocols::typical_participant(
+          protocol_, block(),
+          {settings_.threshold, settings_.spread, settings_.false_alarm, settings_.lapse});
+      yes = protocols::psychometric_probability(typical.function, typical.parameters,
+                                                *trial_.level);
+    }
   }
   evidence_ = 4 * std::abs(yes - 0.5);
   return index_of(random_.unit() < yes ? "yes" : "no");

@@ -6,7 +6,7 @@
 //             chosen. Of two intervals, the comparison is chosen with probability
 //             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
 //             same_different: differ by more than sd
-//   detect    "yes" by a psychometric function (protocols/procedures/psychometric.h)
+//   detect    "yes" by a psychometric function (protocols/tasks/typical_participant.h)
 //   rate      number = level^exponent, times exp(noise)
 //   adjust    turns towards the standard until the estimates are less than half a turn apart
 //   identify  what differs in stiffness alone: the stimulus whose stiffness is nearest, as a ratio,
@@ -25,7 +25,9 @@ namespace palpate::runner {
 
 struct JudgementSettings {
   double weber = 0.15;     ///< noise of a difference of two estimates, as a share of the standard
-  double threshold = 0.5;  ///< detect: where, as a share of the range of levels
+                           ///< (of the largest level where that is 0)
+  double turn_sd = 3;      ///< degrees; the same where an orientation is judged
+  double threshold = 0.5;  ///< detect: where, as a share of the range of levels, from the hard end
   double spread = 0.1;     ///< detect: sd of the function, likewise
   double false_alarm = 0.05;
   double lapse = 0.02;
@@ -41,9 +43,13 @@ class TaskJudgement {
 
   /// Before the first interval of a trial.
   void begin(const protocols::Trial& trial, const stimuli::Random& random);
-  /// What an interval is felt as. \param measured  the level as the hand met it (level_percept.h);
-  /// none: the true one. \param noisy  the noise is in it already
-  void feel(const protocols::Interval& interval, std::optional<double> measured, bool noisy);
+  /// What an interval is felt as.
+  struct Felt {
+    std::optional<double> measured;  ///< level as the hand met it (level_percept.h); none: the true one
+    bool noisy = false;              ///< the noise is in it already
+    bool touched = true;             ///< false: any level will do
+  };
+  void feel(const protocols::Interval& interval, const Felt& felt);
   /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.
   int answer();
   double number();  ///< rate: a number typed
@@ -57,6 +63,7 @@ class TaskJudgement {
   int detected();
   int adjusted();
   int identified();
+  double noise_of_difference(double reference) const;
 
   const protocols::Protocol& protocol_;
   JudgementSettings settings_;
@@ -67,6 +74,7 @@ class TaskJudgement {
   bool feels_standard_ = false;
   double last_level_ = 0;
   bool measured_ = false;  ///< the last one was
+  bool touched_ = true;    ///< likewise
   double evidence_ = 0;    ///< how clear the answer was, in sd
 };
 

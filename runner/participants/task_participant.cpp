@@ -137,7 +137,8 @@ std::optional<Answer> TaskParticipant::step(const Sample& sample) {
   if (judged_ || (!enough && time < longest)) return std::nullopt;
   judged_ = true;
   const std::optional<double> length = percept_.length();
-  judgement_.feel(*view_.shown, length ? length : percept_.stiffness(), length.has_value());
+  judgement_.feel(*view_.shown, {length ? length : percept_.stiffness(), length.has_value(),
+                                 percept_.contact_ticks() > 0});
   if (limited_) return std::nullopt;  // it is answered afterwards, without forces
   return answer(sample.time_ns);
 }

@@ -12,22 +12,30 @@
 namespace palpate::runner {
 namespace {
 
+/// By the protocol's name or what its SHA-256 begins with.
+bool is_named(const data::StoredTrial& trial, const std::string& protocol) {
+  constexpr std::size_t kDigits = 6;
+  return protocol.empty() || trial.protocol_name == protocol ||
+         (protocol.size() >= kDigits && trial.protocol_sha256.starts_with(protocol));
+}
+
 data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
                              const std::string& protocol) {
   std::optional<data::StoredTrial> found;
   bool cut_off = false;
   std::string protocols;
   for (data::StoredTrial& trial : store.attempts(name)) {
-    if (!protocol.empty() && trial.protocol_name != protocol) continue;
+    if (!is_named(trial, protocol)) continue;
     if (!trial.cut_off_reason.empty()) {
       cut_off = true;
       continue;
     }
-    protocols += (protocols.empty() ? "" : ", ") + trial.protocol_name;
+    protocols += (protocols.empty() ? "" : ", ") + trial.protocol_name + " " +
+                 trial.protocol_sha256.substr(0, 12);
     if (found) {
       throw data::StoreRefused("--trial " + to_string(name) +
                                ": there is one in each of several protocols (" + protocols +
-                               "); say which with --protocol NAME");
+                               "); say which with --protocol NAME, or with the begin of its checksum");
     }
     found = std::move(trial);
   }

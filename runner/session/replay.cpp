@@ -96,7 +96,7 @@ void replay(
     const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
     const std::function<void(std::size_t, const data::SampleRecord&, const Sample&)>& visit) {
   const auto intervals = samples_of_intervals(recorded);
-  std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other);
+  const std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other);
   // One whose time was over before it began has none.
   const std::size_t least = shown.size() - (recorded.task && recorded.timed_out ? 1 : 0);
   if (intervals.size() > shown.size() || intervals.size() < least)
@@ -112,7 +112,7 @@ void replay(
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     ReplayDevice device(intervals[i], protocol.servo_rate);
     Servo servo(device, device, protocol.servo_rate, limits);
-    servo.prepare(std::move(shown[i].scene), renderer_for(shown[i].renderer), kAnywhere);
+    servo.prepare(shown[i].scene, renderer_for(shown[i].renderer), kAnywhere);
     for (const data::SampleRecord& sample : intervals[i]) {
       servo.hold_steps((sample.faults & rendering::render_fault::kSoftLate) != 0);
       Sample again = servo.tick();

@@ -30,7 +30,7 @@ class RunRecord final : public TrialLog {
   /// Enrols and begins the run now, where that has not been done.
   void begin();
   /// \param at_ns  session clock. \throws StoreRefused: a text that no database keeps.
-  void note(std::int64_t at_ns, const std::string& text);
+  void note(std::int64_t at_ns, const std::string& text) override;
   /// Where nothing has begun, nothing is on record.
   void end(data::RunEnd how, std::int64_t ended_ns);
   /// Notes that will be written when the run begins.

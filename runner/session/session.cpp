@@ -84,6 +84,7 @@ void Session::step() {
     case State::response:
       station_.log.finish(record_);
       if (events_ != nullptr) events_->recorded(record_);
+      tell_level();
       tell_feedback();
       state_ = before_trial();
       if (state_ == State::end) {
@@ -163,6 +164,7 @@ std::optional<Answer> Session::wait_for_answer(ServoState& servo) {
 }
 
 bool Session::run_trial() {
+  ask_level();
   const protocols::Trial& trial = station_.plan.next();
   record_ = planned_record(trial);
   record_.attempt = station_.log.begin(record_, station_.clock.now_ns());

@@ -100,6 +100,8 @@ class Session {
   void take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
+  void ask_level();
+  void tell_level();
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   void cut_off(const std::string& reason);
@@ -119,6 +121,7 @@ class Session {
   ContactLog contact_;                   ///< likewise
   ServoQuality quality_;                 ///< likewise, of its intervals so far
   std::unique_ptr<LevelScenes> scenes_;  ///< version 2
+  int asked_trial_ = 0;                  ///< the last one whose level an advisor was asked for
 };
 
 }  // namespace palpate::runner

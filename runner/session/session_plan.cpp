@@ -24,7 +24,8 @@ bool SessionPlan::block_begins() const {
 }
 
 protocols::TrialOutcome outcome_of(const data::TrialRecord& record) {
-  return {record.correct, record.task ? record.task->success : record.correct, !record.timed_out};
+  if (!record.task) return {record.correct, record.correct, !record.timed_out};
+  return {record.correct, record.task->success, !record.timed_out, record.task->level};
 }
 
 void SessionPlan::answered(const protocols::TrialOutcome& outcome) {

@@ -29,6 +29,10 @@ class SessionPlan {
   }
   /// True at the first trial of a block (of a session, for the first).
   bool block_begins() const;
+  /// Version 2: the next trial, of an adaptive block, is shown at another level.
+  void propose(double level) {
+    if (tasks_) tasks_->propose(level);
+  }
   /// The next trial has been answered.
   void answered(const protocols::TrialOutcome& outcome);
   void answered(bool correct) { answered(protocols::TrialOutcome{correct, correct}); }

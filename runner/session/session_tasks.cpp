@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "protocols/sha256.h"
 #include "protocols/tasks/levels.h"
+#include "protocols/tasks/task_plan.h"
 #include "runner/session/session.h"
 #include "runner/session/session_end.h"
 
@@ -19,9 +21,12 @@ using protocols::TaskKind;
 
 constexpr double kTaskSecond_ns = 1e9;
 
-/// Whether the comparison is what the question of `compare` asks for.
-bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskRecord& task) {
+/// Whether the comparison is what the question of `compare` asks for. At the standard's own level,
+/// which either could be, as at the other levels.
+bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskRecord& task,
+                         int side) {
   if (block.intervals > 2 || !task.level || !task.standard_level) return true;
+  if (side != 0) return (side > 0) != block.asks_smaller;
   return block.asks_smaller ? *task.level <= *task.standard_level
                             : *task.level >= *task.standard_level;
 }
@@ -213,7 +218,10 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
       } else {
         const auto at = static_cast<std::size_t>(record_.response.front() - '1');
         task.success = !trial.intervals[at].standard;
-        record_.correct = task.success == comparison_is_right(block, task);
+        const int side = protocols::side_of_levels(station_.protocol, block);
+        record_.correct = task.success == comparison_is_right(block, task, side);
+        // On one side of the standard it is a forced choice: right answers count.
+        if (side != 0) task.success = record_.correct;
       }
       break;
     case TaskKind::detect:
@@ -230,6 +238,32 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
       record_.response = protocols::level_text(*task.number);
       break;
   }
+}
+
+/// Once a trial, however often it is shown; without an answer the block's own procedure goes on, which
+/// is on record.
+void Session::ask_level() {
+  const protocols::Trial& trial = station_.plan.next();
+  if (station_.advisor == nullptr || !trial.level || trial.task_block < 0) return;
+  if (!protocols::is_adaptive(task_of(trial)) || asked_trial_ == trial.trial) return;
+  asked_trial_ = trial.trial;
+  if (const std::optional<double> level = station_.advisor->ask(trial)) {
+    station_.plan.propose(*level);
+    return;
+  }
+  const nlohmann::ordered_json event = {{"level_from_own_procedure",
+                                         {{"session", trial.session},
+                                          {"trial", trial.trial},
+                                          {"level", *trial.level},
+                                          {"reason", station_.advisor->trouble()}}}};
+  station_.log.note(station_.clock.now_ns(),
+                    event.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+void Session::tell_level() {
+  if (station_.advisor != nullptr && record_.task &&
+      protocols::is_adaptive(task_of(station_.plan.next())))
+    station_.advisor->tell(record_);
 }
 
 void Session::begin_task_block() {

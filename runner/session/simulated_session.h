@@ -11,6 +11,7 @@
 #include "runner/participants/simulated.h"
 #include "runner/participants/task_participant.h"
 #include "runner/scene_builder.h"
+#include "runner/session/level_advisor.h"
 #include "runner/session/session_plan.h"
 #include "runner/session/trial_log.h"
 
@@ -36,6 +37,7 @@ struct SimulatedSession {
   SessionPlan plan;
   std::int64_t clock_ns = 0;  ///< where its clock stands
   data::ClockStamp utc;
+  LevelAdvisor* advisor = nullptr;
 };
 
 /// \param halting  asked between trials; one that was shown is finished

@@ -6,6 +6,7 @@
 #include <deque>
 #include <exception>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -16,6 +17,7 @@
 #include "runner/session/protocol_info.h"
 #include "runner/session/session.h"
 #include "runner/session/simulated_session.h"
+#include "runner/session/socket_advisor.h"
 
 namespace palpate::runner {
 namespace {
@@ -27,6 +29,8 @@ struct Work {
   std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
   std::int64_t clock_ns = 0;                     ///< where the session's clock stood
   data::RunInfo info;
+  std::vector<std::string> answered_pages;
+  std::vector<data::TrialRecord> completed;  ///< where somebody else proposes levels
 };
 
 /// From the workers to the thread that owns the store.
@@ -46,6 +50,28 @@ class Queue {
     if (error && !error_) error_ = error;
     done_.notify_all();
   }
+  /// Answers to a page are kept by the thread that owns the store, before the session's next trial.
+  void push(std::size_t work, const std::vector<data::PageAnswer>& answers) {
+    const std::lock_guard lock(mutex_);
+    pages_.emplace_back(work, answers);
+  }
+  void push(std::size_t work, std::int64_t at_ns, const std::string& note) {
+    const std::lock_guard lock(mutex_);
+    notes_.push_back({work, at_ns, note});
+  }
+  struct Note {
+    std::size_t work = 0;
+    std::int64_t at_ns = 0;
+    std::string text;
+  };
+  std::deque<Note> take_notes() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(notes_, {});
+  }
+  std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>> take_pages() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(pages_, {});
+  }
   /// Waits for up to 0.2 s, or until the workers are done or held up; takes what has come.
   std::deque<std::pair<std::size_t, data::TrialRecord>> take(int workers, bool& all_done) {
     std::unique_lock lock(mutex_);
@@ -64,22 +90,36 @@ class Queue {
   std::mutex mutex_;
   std::condition_variable drained_, done_;
   std::deque<std::pair<std::size_t, data::TrialRecord>> records_;
+  std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>> pages_;
+  std::deque<Note> notes_;
   int workers_done_ = 0;
   std::exception_ptr error_;
 };
 
 class QueueLog final : public TrialLog {
  public:
-  QueueLog(Queue& queue, std::size_t work) : queue_(queue), work_(work) {}
+  /// \param answered_pages  of earlier runs of the session
+  QueueLog(Queue& queue, std::size_t work, std::vector<std::string> answered_pages)
+      : queue_(queue), work_(work), answered_(std::move(answered_pages)) {}
   int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
   void finish(const data::TrialRecord& record) override { queue_.push(work_, record); }
   void cut_off(const std::string& reason) override {
     throw std::runtime_error("a simulated trial was cut off: " + reason);
   }
+  void answered(const std::vector<data::PageAnswer>& answers) override {
+    queue_.push(work_, answers);
+  }
+  void note(std::int64_t at_ns, const std::string& text) override {
+    queue_.push(work_, at_ns, text);
+  }
+  bool has_answers(const std::string& page) override {
+    return std::find(answered_.begin(), answered_.end(), page) != answered_.end();
+  }
 
  private:
   Queue& queue_;
   std::size_t work_;
+  std::vector<std::string> answered_;
 };
 
 SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
@@ -89,11 +129,18 @@ SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
 }
 
 void run_session(const SimulatedStudy& study, const Work& work, std::size_t index, Queue& queue,
-                 const std::function<bool()>& halting) {
-  QueueLog log(queue, index);
+                 const StudyPlan& plan, const std::function<bool()>& halting) {
+  std::unique_ptr<SocketAdvisor> advisor;
+  if (!plan.advisor.empty())
+    advisor = std::make_unique<SocketAdvisor>(
+        study.protocol,
+        SocketAdvisor::Settings{plan.advisor, plan.advisor_time_out,
+                                work.participant.enrolled_number, work.session},
+        work.completed);
+  QueueLog log(queue, index, work.answered_pages);
   run_simulated_session(study,
                         {work.participant.enrolled_number, plan_of(study.protocol, work),
-                         work.clock_ns, work.info.clock},
+                         work.clock_ns, work.info.clock, advisor.get()},
                         log, halting);
 }
 
@@ -117,8 +164,10 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       }
       for (const data::TrialRecord& record : before.completed)
         work.answers.push_back(outcome_of(record));
+      if (!plan.advisor.empty()) work.completed = before.completed;
       work.clock_ns = before.latest_ns;
       work.info = simulated_run(protocol, settings, number, session);
+      if (!protocol.pages.empty()) work.answered_pages = store.answered_pages(participant, session);
       const SessionPlan trials = plan_of(protocol, work);
       progress.recorded += static_cast<std::int64_t>(trials.done());
       progress.expected += static_cast<std::int64_t>(trials.size());
@@ -135,6 +184,7 @@ class Recorder {
            std::string event)
       : store_(store), work_(work), event_(std::move(event)) {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
+    has_pages_ = protocol.version == 2;
   }
 
   void record(std::deque<std::pair<std::size_t, data::TrialRecord>>&& came,
@@ -142,13 +192,8 @@ class Recorder {
     std::map<std::size_t, std::vector<data::TrialRecord>> by_work;
     for (auto& [index, record] : came) by_work[index].push_back(std::move(record));
     for (auto& [index, records] : by_work) {
-      auto run = runs_.find(index);
-      if (run == runs_.end()) {
-        const data::RunInfo& info = work_[index].info;
-        run = runs_.emplace(index, store_.begin_run(work_[index].participant, info)).first;
-        if (!event_.empty()) store_.add_note(run->second, info.clock.monotonic_ns, event_);
-      }
-      store_.record_simulated(run->second, records);
+      const data::Run& run = run_of(index);
+      store_.record_simulated(run, records);
       SessionPlan& plan = plans_[index];
       for (const data::TrialRecord& record : records) {
         const std::size_t size = plan.size();
@@ -163,9 +208,23 @@ class Recorder {
       progress.simulated_seconds += static_cast<double>(records.back().response_ns - clock) * 1e-9;
       clock = records.back().response_ns;
       if (plan.finished()) {
-        store_.end_run(run->second, data::RunEnd::done, clock);
-        runs_.erase(run);
+        finished_.push_back(index);
       }
+    }
+    if (!has_pages_) end_finished();
+  }
+  /// After the trials of the same time: pages after the last trial belong to its run, too.
+  void record(
+      const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
+    for (const auto& [index, answers] : pages) store_.add_page_answers(run_of(index), answers);
+  }
+  void record(const std::deque<Queue::Note>& notes) {
+    for (const Queue::Note& note : notes) store_.add_note(run_of(note.work), note.at_ns, note.text);
+  }
+  void end_finished() {
+    for (const std::size_t index : std::exchange(finished_, {})) {
+      store_.end_run(run_of(index), data::RunEnd::done, work_[index].clock_ns);
+      runs_.erase(index);
     }
   }
   void pause() {
@@ -175,8 +234,20 @@ class Recorder {
   }
 
  private:
+  const data::Run& run_of(std::size_t index) {
+    auto run = runs_.find(index);
+    if (run == runs_.end()) {
+      const data::RunInfo& info = work_[index].info;
+      run = runs_.emplace(index, store_.begin_run(work_[index].participant, info)).first;
+      if (!event_.empty()) store_.add_note(run->second, info.clock.monotonic_ns, event_);
+    }
+    return run->second;
+  }
+
   data::Store& store_;
   std::vector<Work>& work_;
+  std::vector<std::size_t> finished_;
+  bool has_pages_ = false;  ///< or notes, which may come after the last trial
   const std::string event_;
   std::vector<SessionPlan> plans_;
   std::map<std::size_t, data::Run> runs_;
@@ -255,7 +326,7 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
     std::exception_ptr error;
     try {
       for (std::size_t i = next++; i < sessions.size() && !halting(); i = next++) {
-        run_session(study, sessions[i], i, queue, halting);
+        run_session(study, sessions[i], i, queue, plan, halting);
       }
     } catch (...) {
       error = std::current_exception();
@@ -272,6 +343,9 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
     if (failure) continue;  // the workers are finishing their trials; nothing more can be recorded
     try {
       recorder.record(std::move(came), progress);
+      recorder.record(queue.take_pages());
+      recorder.record(queue.take_notes());
+      if (all_done) recorder.end_finished();
       if (report) report(progress);
     } catch (...) {
       failure = std::current_exception();

@@ -21,6 +21,8 @@ struct StudyPlan {
   std::uint64_t seed = 1;  ///< of the participants; the schedule has the protocol's own
   int jobs = 1;            ///< threads
   std::string event = {};  ///< for each session's record; empty: none
+  std::string advisor = {};     ///< socket of a program that proposes levels; empty: none
+  double advisor_time_out = 1;  ///< s
 };
 
 struct StudyProgress {

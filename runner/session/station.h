@@ -11,6 +11,7 @@
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/force_direction_check.h"
+#include "runner/session/level_advisor.h"
 #include "runner/session/markers.h"
 #include "runner/session/run_record.h"
 #include "runner/session/session_plan.h"
@@ -28,6 +29,7 @@ struct Station {
   Clock& clock;          ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
   data::ClockStamp utc;  ///< one moment on the session clock and in UTC
   TrialLog& log;         ///< takes every trial before the next one begins. Live: the run record
+  LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; none: nobody does
 };
 
 /// Of a live session: a person, a device, two displays. Threads and processes of their own have the

@@ -21,6 +21,8 @@ class TrialLog {
   virtual void cut_off(const std::string& reason) = 0;
   /// The answers to a page of version 2, together. A log that keeps none loses them.
   virtual void answered(const std::vector<data::PageAnswer>& /*answers*/) {}
+  /// An event of the session, as JSON. A log that keeps none loses it. \param at_ns  session clock
+  virtual void note(std::int64_t /*at_ns*/, const std::string& /*text*/) {}
   /// Whether a page of this session has been answered: it is not shown again.
   virtual bool has_answers(const std::string& /*page*/) { return false; }
 };

@@ -11,6 +11,7 @@ import tempfile
 import unittest
 
 PALPATE = sys.argv.pop(1)
+PEOPLE = 5  # of a forced choice
 COLUMNS = ["participant_id", "session", "block", "trial", "renderer", "shape", "response", "correct",
            "response_time", "practice", "timed_out", "simulated", "task", "block_name", "track", "level",
            "standard_level", "catch_trial", "success", "number", "confidence"]
@@ -68,7 +69,9 @@ class Tasks(unittest.TestCase):
 
     def write(self, rows):
         with open(self.path / "trials.csv", "w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
+            there = {name: None for row in rows for name in row}
+            columns = [name for name in COLUMNS if name in there] + [name for name in there if name not in COLUMNS]
+            writer = csv.DictWriter(file, columns, extrasaction="raise", restval="")
             writer.writeheader()
             writer.writerows(rows)
 
@@ -130,6 +133,125 @@ class Tasks(unittest.TestCase):
             for one in cell["psychometric_functions"]:
                 self.assertEqual(one["fit"]["guess"], 0.5)
                 self.assertAlmostEqual(one["fit"]["threshold"], 600, delta=30)
+
+    def forced(self, draw, level, guess, **more):
+        """40 trials at six levels above a standard of 300; the threshold is 350, the slope 0.06 per N/m."""
+        return [{"participant_id": f"T{person}", "session": 1, "block": 1, "trial": person * 1000 + i + 1, "renderer": "point",
+                 "shape": "ball", "response": "1", "correct": 0, "response_time": 1, "practice": 0, "timed_out": 0, "simulated": 1,
+                 "task": "compare", "block_name": "b", "track": 1, "level": x, "standard_level": 300, "catch_trial": 0,
+                 "success": int(draw.random() < guess + (1 - guess) * logistic(0.06 * (x - level))), **more}
+                for person in range(PEOPLE) for i, x in enumerate(list(range(310, 420, 18)) * 40)]
+
+    def found(self, rows):
+        self.write(rows)
+        self.assertEqual(self.analyze("--json", self.path / "found.json", "--force").returncode, 0)
+        return json.loads((self.path / "found.json").read_text())
+
+    def test_three_intervals_are_guessed_by_a_third(self):
+        rows = [{**row, "interval_onsets": "0;1;2"} for row in self.forced(random.Random(5), 350, 1 / 3)]
+        cell, = self.found(rows)["cells"]
+        self.assertEqual((cell["n_intervals"], cell["forced_choice"]), (3, True))
+        held = 0
+        for one in cell["psychometric_functions"]:
+            fit = one["fit"]
+            self.assertAlmostEqual(fit["guess"], 1 / 3)
+            self.assertIsNone(fit["pse"])
+            # The JND of a forced choice is the threshold's distance from the standard, in text and JSON alike.
+            self.assertAlmostEqual(fit["jnd"], fit["threshold"] - 300)
+            self.assertAlmostEqual(fit["weber_fraction"], fit["jnd"] / 300)
+            self.assertAlmostEqual(fit["jnd_ci95"][0], fit["threshold_ci95"][0] - 300)
+            held += fit["threshold_ci95"][0] <= 350 <= fit["threshold_ci95"][1]
+        self.assertGreaterEqual(held, PEOPLE - 2)
+        both = [{**row, "standard_level": 350} for row in rows]
+        cell, = self.found(both)["cells"]
+        self.assertIn("both sides", cell["psychometric_functions"][0]["fit"]["reason"])
+
+    def test_same_different_has_guesses_of_its_catch_trials_and_a_d_prime(self):
+        draw = random.Random(6)
+        rows = self.forced(draw, 350, 0.2)
+        for row in rows:
+            row["response"] = "different" if row["success"] else "same"
+        for person in range(PEOPLE):
+            for i in range(160):
+                success = int(draw.random() < 0.2)
+                rows.append({**rows[0], "participant_id": f"T{person}", "trial": 100000 + i, "level": "", "catch_trial": 1,
+                             "success": success, "response": "different" if success else "same"})
+        cell, = self.found(rows)["cells"]
+        self.assertEqual((cell["same_different"], cell["forced_choice"]), (True, False))
+        for one in cell["psychometric_functions"]:
+            self.assertAlmostEqual(one["fit"]["guess"], 0.2, delta=0.1)
+            self.assertAlmostEqual(one["fit"]["threshold"], 350, delta=15)
+            self.assertIsNone(one["fit"]["pse"])
+            self.assertGreater(one["detectability"]["d_prime"], 1)
+
+    def test_thresholds_that_nothing_tells_are_not_compared(self):
+        draw = random.Random(7)
+        rows = self.forced(draw, 350, 0.5)
+        for row in rows:
+            row["participant_id"] += "" if row["participant_id"] != "T4" else "x"
+        other = [{**row, "renderer": "ray", "trial": row["trial"] + 500,
+                  "success": int(draw.random() < 0.5 + 0.5 * logistic(0.06 * (row["level"] - 360)))} for row in rows]
+        for row in other:  # one of them guesses all the time
+            if row["participant_id"] == "T1":
+                row["success"] = int(draw.random() < 0.5)
+        found = self.found(rows + other)
+        one, = found["renderer_comparisons"]
+        self.assertEqual((one["measure"], one["natural_logarithms"]), ("jnd", True))
+        self.assertGreaterEqual(one["n_undetermined"], 1)
+        self.assertLess(one["differences"][0]["n_pairs"], PEOPLE)
+        self.assertLess(abs(one["differences"][0]["mean"]), 1)
+
+    def test_without_success_it_follows_from_the_answer_or_is_asked_for(self):
+        rows = rows_of_a_study(1)
+        with_column = self.found(rows)["cells"]
+        for row in rows:
+            row["comparison_interval"] = "2" if row["task"] == "compare" else ""
+            del row["success"]
+        cells = self.found(rows)["cells"]
+        for a, b in zip(with_column, cells):
+            if a["task"] in ("compare", "detect"):
+                self.assertEqual([one["levels"] for one in a["psychometric_functions"]],
+                                 [one["levels"] for one in b["psychometric_functions"]])
+        for row in rows:
+            del row["comparison_interval"]
+        self.write(rows)
+        done = self.analyze()
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("comparison_interval", done.stderr)
+
+    def test_trials_given_twice_are_refused_and_somebody_may_be_called_NA(self):
+        rows = self.forced(random.Random(8), 350, 0.5)
+        for row in rows:
+            row["participant_id"] = row["participant_id"].replace("T1", "NA")
+        cell, = self.found(rows)["cells"]
+        self.assertIn("NA", [one["participant_id"] for one in cell["psychometric_functions"]])
+        self.write(rows + rows[:3])
+        done = self.analyze()
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("expected each trial once", done.stderr)
+
+    def test_several_protocols_are_told_apart(self):
+        rows = [{**row, "protocol_name": "one", "protocol_sha256": "ab12cd34ef"} for row in self.forced(random.Random(9), 350, 0.5)]
+        rows += [{**row, "protocol_name": "two", "protocol_sha256": "77aa55"} for row in self.forced(random.Random(9), 390, 0.5)]
+        self.write(rows)
+        done = self.analyze()
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("--protocol", done.stderr)
+        for wanted, threshold in (("one", 350), ("ab12cd", 350), ("two", 390)):
+            self.assertEqual(self.analyze("--protocol", wanted, "--json", self.path / "p.json", "--force").returncode, 0)
+            cell, = json.loads((self.path / "p.json").read_text())["cells"]
+            mean = sum(one["fit"]["threshold"] for one in cell["psychometric_functions"]) / PEOPLE
+            self.assertAlmostEqual(mean, threshold, delta=15)
+        self.assertEqual(self.analyze("--protocol", "three").returncode, 2)
+
+    def test_perfect_answers_transmit_no_more_than_there_is(self):
+        rows = [row for row in rows_of_a_study(1) if row["task"] == "identify"]
+        for row in rows:
+            row["response"], row["correct"] = row["shape"], 1
+        cell, = self.found(rows)["cells"]
+        self.assertEqual(cell["information_transfer"]["bits_corrected"], 1)
+        self.assertEqual(cell["information_transfer"]["mean_of_participants_bits_corrected"], 1)
+        self.assertEqual(len(cell["information_transfer"]["participants"]), 6)
 
     def test_report_and_figures_show_points_fits_and_tracks(self):
         self.write([row for row in rows_of_a_study(4) if row["participant_id"] < "T2"])

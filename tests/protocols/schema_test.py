@@ -16,7 +16,7 @@ PROGRAM_ONLY = {
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
     "too-many-trials", "tool-radius", "tool-segment-without-length", "two-keys",
-    "v2-adjust-limits", "v2-answer-without-key", "v2-labels-alike", "v2-level-of-another-shape", "v2-level-out-of-range",
+    "v2-adjust-limits", "v2-answer-without-key", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-of-another-shape", "v2-level-out-of-range",
     "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
     "v2-standard-without-the-number", "v2-two-keys", "v2-unknown-stimuli",

@@ -8,6 +8,7 @@
 #include "analysis/report/plan_report.h"
 #include "protocols/json_document.h"
 #include "runner/commands/plan/options.h"
+#include "runner/commands/plan/thresholds.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
@@ -36,7 +37,7 @@ int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect "
-      "SHAPE=PERCENT,...]";
+      "SHAPE=PERCENT,...]\n       palpate plan --jnd-effect PERCENT [--weber W]";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
       "given power. Studies are simulated from the mixed model fitted to a pilot, or from given\n"
@@ -45,9 +46,12 @@ int plan_command(const std::vector<std::string>& args) {
   line.example =
       "  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9\n"
       "  palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \\\n"
-      "      --trials 20,40 --json plan.json --figure power.svg";
+      "      --trials 20,40 --json plan.json --figure power.svg\n"
+      "  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)";
   PlanOptions options;
   add_plan_options(line, options);
+  ThresholdOptions thresholds;
+  add_threshold_options(line, thresholds);
   auto add = line.options.add_options();
   add("jobs", po::value(&options.jobs)->value_name("J"), "threads; default: one a core");
   add("json", po::value(&options.json)->value_name("FILE"), "write every number as JSON");
@@ -63,6 +67,10 @@ int plan_command(const std::vector<std::string>& args) {
                      "\nMore: add --help");
   }
   Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
+  if (values->count("jnd-effect")) {
+    plan_thresholds_of(thresholds, options, *values, outputs);
+    return 0;
+  }
   analysis::PlanSettings settings = settings_of(options, *values);
   analysis::Pilot pilot = starting_point(options, *values);
   analysis::StudyModel model = model_of(pilot, options, *values);

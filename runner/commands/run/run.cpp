@@ -27,6 +27,7 @@
 #include "runner/session/device_check.h"
 #include "runner/session/live_session.h"
 #include "runner/session/preflight_dialogue.h"
+#include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {
@@ -227,7 +228,14 @@ int run_command(const std::vector<std::string>& args) {
   for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
   const std::string resumed = resumption(store, participant, session, plan);
 
-  const LiveStation station{{protocol, library, plan, servo, clock, began, record},
+  std::optional<SocketAdvisor> advisor;
+  if (!settings.advisor.empty())
+    advisor.emplace(protocol,
+                    SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
+                                            participant.enrolled_number, session},
+                    progress.completed);
+  const LiveStation station{{protocol, library, plan, servo, clock, began, record,
+                             advisor ? &*advisor : nullptr},
                             record,
                             device,
                             open.guard,

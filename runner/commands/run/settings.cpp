@@ -5,6 +5,7 @@
 #include "data/record.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/study_options.h"
 
 namespace palpate::runner {
 namespace {
@@ -25,6 +26,7 @@ void check(RunSettings& settings) {
   if (settings.response_latency &&
       !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
     throw UsageError("--response-latency: must be 0 or more seconds");
+  check_advisor(settings.advisor, settings.advisor_time_out);
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
@@ -68,6 +70,11 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "asked")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
        "falcon, falcon2, mouse or simulated")  //
+      ("ask", po::value(&settings.advisor)->value_name("SOCKET"),
+       "Unix domain socket of a program that proposes the levels of adaptive blocks")  //
+      ("ask-time-out-s",
+       po::value(&settings.advisor_time_out)->default_value(1, "1")->value_name("S"),
+       "without an answer in that time the block's own procedure chooses, which is on record")  //
       ("session", po::value(&session)->value_name("N"),
        "default: the first that is not completed")  //
       ("consent", po::value(&settings.consent)->value_name("VERSION"),

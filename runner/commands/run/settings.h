@@ -18,6 +18,8 @@ struct RunSettings {
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
        without_noise = false, new_participant = false, after_withdrawal = false,
        marker_codes = false;
+  std::string advisor;          ///< socket of a program that proposes levels; empty: none
+  double advisor_time_out = 1;  ///< s
 };
 
 /// None where --help was asked for and printed. \throws UsageError

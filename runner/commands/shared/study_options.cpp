@@ -1,6 +1,8 @@
 #include "runner/commands/shared/study_options.h"
 
 #include "runner/commands/shared/simulation.h"
+#include "runner/session/socket_advisor.h"
+#include "stimuli/printable.h"
 
 namespace palpate::runner {
 
@@ -25,6 +27,15 @@ void check_study_options(const po::variables_map& values, StudyOptions& options)
   check_simulated_participants(options.participants);
   check_participant_version(options.version);
   options.protocol = values["PROTOCOL.json"].as<std::string>();
+}
+
+void check_advisor(const std::string& path, double time_out) {
+  if (!(time_out >= 0.01 && time_out <= 60))
+    throw UsageError("--ask-time-out-s: must be 0.01 to 60 seconds");
+  if (path.empty()) return;
+  if (const std::string fault = socket_fault(path); !fault.empty())
+    throw UsageError("--ask: expected the Unix domain socket of a program that listens, found " +
+                     stimuli::printable(path) + ": " + fault);
 }
 
 }  // namespace palpate::runner

@@ -23,4 +23,7 @@ void add_study_options(CommandLine& line, StudyOptions& options);
 void check_study_options(const boost::program_options::variables_map& values,
                          StudyOptions& options);
 
+/// \throws UsageError: the path is no socket, or the time is out of range
+void check_advisor(const std::string& path, double time_out);
+
 }  // namespace palpate::runner

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "protocols/tasks/levels.h"
+#include "protocols/tasks/typical_participant.h"
 #include "stimuli/random.h"
 
 namespace palpate::runner {
@@ -58,18 +59,14 @@ std::string words(const protocols::Limits& spec) {
 }
 
 /// With the threshold in the middle of the levels.
-bool succeeds(const protocols::TaskBlock& block, const protocols::Trial& trial,
-              stimuli::Random& random) {
-  const std::vector<double> levels = protocols::levels_of(block);
+bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
+              const protocols::Trial& trial, stimuli::Random& random) {
   const double draw = random.unit();
-  if (!trial.level || levels.size() < 2) return draw < 0.75;
-  const double middle = 0.5 * (levels.front() + levels.back());
-  const double spread = 0.15 * (levels.back() - levels.front());
-  const protocols::PsychometricParameters parameters{middle, 1 / spread, 0.05, 0.02};
-  const protocols::PsychometricFunction function{protocols::PsychometricShape::normal,
-                                                 protocols::LevelScale::linear,
-                                                 protocols::Easier::higher};
-  return draw < protocols::psychometric_probability(function, parameters, *trial.level);
+  if (!trial.level || protocols::levels_of(block).size() < 2) return draw < 0.75;
+  const protocols::PsychometricParticipant typical =
+      protocols::typical_participant(protocol, block);
+  return draw < protocols::psychometric_probability(typical.function, typical.parameters,
+                                                    *trial.level);
 }
 
 }  // namespace
@@ -107,7 +104,7 @@ std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol
     while (!plan.finished()) {
       const protocols::Trial& trial = plan.next();
       const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
-      const bool success = succeeds(block, trial, random);
+      const bool success = succeeds(protocol, block, trial, random);
       trials.push_back(trial);
       plan.answered({success, success, true});
     }

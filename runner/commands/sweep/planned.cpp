@@ -19,6 +19,8 @@ using nlohmann::json;
 json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
   json out = json::parse(protocol.source_text);
   if (settings.repetitions == 0) return out;
+  if (protocol.version == 2)
+    throw UsageError("--repetitions: the blocks of a protocol of version 2 have their own");
   out["repetitions"] = settings.repetitions;
   if (protocol.blocks_per_renderer > settings.repetitions) {
     out["blocks_per_renderer"] = settings.repetitions;
@@ -35,10 +37,17 @@ std::string sha256_of_files(const protocols::Protocol& protocol) {
   return all.empty() ? "" : protocols::sha256_hex(all);
 }
 
+/// \throws UsageError
+void check_names_of_columns(const data::SweepPlan& plan, const std::string& space) {
+  if (const auto alike = data::columns_alike(plan)) {
+    throw UsageError(space + ": the parameter '" + alike->first +
+                     "' has the name of another column or of a shape, '" + alike->second +
+                     "'; give it another one");
+  }
+}
+
 data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& study,
                               const Design& design, const protocols::Protocol& protocol) {
-  if (protocol.version == 2)
-    throw UsageError("sweeps measure how shapes are identified: expected a protocol of version 1");
   data::SweepPlan plan;
   plan.protocol = study.protocol().dump();
   plan.files_sha256 = sha256_of_files(protocol);
@@ -51,6 +60,10 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   plan.program_version = PALPATE_VERSION;
   for (const protocols::SweepParameter& one : study.space().parameters)
     plan.parameters.push_back(one.name);
+  if (protocol.version == 2) {  // columns are of its blocks
+    check_names_of_columns(plan, settings.space);
+    return plan;
+  }
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     plan.shapes.push_back(stimulus.name);
   // The analysis' order: gains are of the ray against the point, whichever is listed first.
@@ -59,11 +72,7 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
     if (std::count(protocol.renderers.begin(), protocol.renderers.end(), kind) > 0)
       plan.renderers.emplace_back(to_string(kind));
   }
-  if (const auto alike = data::columns_alike(plan)) {
-    throw UsageError(settings.space + ": the parameter '" + alike->first +
-                     "' has the name of another column or of a shape, '" + alike->second +
-                     "'; give it another one");
-  }
+  check_names_of_columns(plan, settings.space);
   return plan;
 }
 

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <exception>
+#include <map>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/task_analysis.h"
 #include "runner/session/simulated_session.h"
 #include "runner/session/simulated_study.h"
 #include "stimuli/printable.h"
@@ -103,6 +107,84 @@ class TrialCollection {
   std::vector<Cell> cells_;
 };
 
+std::optional<double> mean_of(const std::vector<double>& values) {
+  if (values.empty()) return std::nullopt;
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// A figure of each participant of a cell of a task.
+std::vector<double> figures_of_participants(const analysis::TaskCell& cell,
+                                            const std::string& measure) {
+  std::vector<double> values;
+  const auto add = [&](const std::optional<double>& value) {
+    if (value) values.push_back(*value);
+  };
+  for (const analysis::ParticipantFunction& one : cell.functions) {
+    if (measure == "d_prime") add(one.detectability.d_prime);
+    if (!one.fit.undefined.empty() || !one.determined) continue;
+    if (measure == "threshold") add(one.fit.parameters.threshold);
+    if (measure == "jnd") add(one.figures.jnd);
+  }
+  if (cell.magnitude && measure == "exponent") {
+    for (const analysis::StevensLine& line : cell.magnitude->lines) add(line.exponent);
+  }
+  for (const analysis::Adjustment& one : cell.adjustments) {
+    if (measure == "pse") add(one.pse);
+    if (measure == "jnd") add(one.jnd);
+  }
+  for (const analysis::InformationTransfer& one : cell.informations) {
+    if (measure == "bits") add(one.corrected);
+  }
+  return values;
+}
+
+/// Shares correct, or means of the times of correct answers, of each participant with a stimulus.
+std::vector<double> identified(const analysis::TaskTable& table, const data::TaskCellColumns& cell,
+                               bool times) {
+  struct Sum {
+    double sum = 0;
+    int n = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const analysis::TaskTrial& trial : table.trials) {
+    if (trial.block_name != cell.block || trial.shape != cell.stimulus ||
+        trial.renderer != cell.renderer)
+      continue;
+    if (times && !(trial.correct && *trial.response_time >= kTooFast)) continue;
+    Sum& own = sums[trial.participant];
+    own.sum += times ? *trial.response_time : trial.correct ? 1 : 0;
+    ++own.n;
+  }
+  std::vector<double> values;
+  for (const auto& [participant, own] : sums) values.push_back(own.sum / own.n);
+  return values;
+}
+
+/// Of a protocol of version 2, in the order of figure_columns().
+std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
+                                                   analysis::TaskTable table) {
+  const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), 0, 1);
+  std::vector<std::optional<double>> out;
+  for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
+    const auto cell = std::find_if(
+        found.cells.begin(), found.cells.end(), [&](const analysis::TaskCell& one) {
+          return one.block_name == wanted.block && one.renderer == wanted.renderer &&
+                 one.shape == (wanted.task == "identify" ? "" : wanted.stimulus);
+        });
+    for (const std::string& measure : wanted.measures) {
+      std::vector<double> values;
+      if (measure == "accuracy" || measure == "time") {
+        values = identified(found.table, wanted, measure == "time");
+      } else if (cell != found.cells.end()) {
+        values = figures_of_participants(*cell, measure);
+      }
+      out.push_back(mean_of(values));
+      out.push_back(analysis::t_test(values).se);
+    }
+  }
+  return out;
+}
+
 std::vector<json> values_of_point(const Sweep& sweep, std::int64_t point) {
   std::vector<json> values;
   const std::vector<double> shares = sweep.design.at(point);
@@ -151,13 +233,17 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
     const SimulatedSettings settings = read_simulated_settings(study.settings.dump());
     limit_for_simulation(protocol, settings);
     TrialCollection trials(sweep.plan);
+    analysis::TaskTable tasks;
     const bool done = simulate_in_memory(
         protocol, settings, sweep.plan.participants, study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
-          trials.add(participant, record, contact_ticks);
+          if (!record.task) return trials.add(participant, record, contact_ticks);
+          if (!record.practice)
+            tasks.trials.push_back(analysis::task_trial_of(simulated_code(participant), record));
         });
     if (!done) return std::nullopt;
-    row.figures = trials.figures();
+    row.figures = protocol.version == 2 ? task_figures_of(sweep.plan, std::move(tasks))
+                                        : trials.figures();
   } catch (const std::exception& error) {
     row.reason = reason_of(error);
     row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);

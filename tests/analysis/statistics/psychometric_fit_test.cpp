@@ -8,6 +8,8 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "analysis/statistics/psychometric_bayes.h"
 #include "stimuli/random.h"
@@ -73,6 +75,80 @@ TEST(PsychometricFit, AgreesWithR) {
     near(fit.slope_ci95.low, "slope_low");
     near(fit.slope_ci95.high, "slope_high");
   }
+}
+
+TEST(PsychometricFit, AgreesWithPsignifit) {
+  const auto cases = PsychometricJson::parse(
+      std::ifstream(PALPATE_SOURCE_DIR "/tests/analysis/fixtures/psignifit.json"));
+  ASSERT_GE(cases.size(), 5U);
+  for (const PsychometricJson& one : cases) {
+    PsychometricModel model;
+    if (one["shape"] == "normal") model.function.shape = PsychometricShape::normal;
+    model.guess.value = one["guess"];
+    model.lapse = {0, true, one["most_lapse"]};
+    std::vector<LevelCount> counts;
+    for (std::size_t i = 0; i < one["levels"].size(); ++i)
+      counts.push_back({one["levels"][i], one["n"], one["k"][i]});
+    const PsychometricFit fit = fit_psychometric(counts, model);
+    const double threshold = one["threshold"], slope = one["slope"], lapse = one["lapse"];
+    // Its search ends earlier than this one, and never lower; it prints six digits.
+    const double deviance = goodness_of_fit(counts, model, fit, 0, 1).deviance;
+    EXPECT_LE(deviance, one["deviance"].get<double>() + 1e-4) << one["name"];
+    EXPECT_NEAR(deviance, one["deviance"].get<double>(), 5e-3) << one["name"];
+    EXPECT_NEAR(fit.parameters.threshold, threshold, 2e-3 * threshold) << one["name"];
+    EXPECT_NEAR(fit.parameters.slope, slope, 2e-2 * slope) << one["name"];
+    EXPECT_NEAR(fit.parameters.lapse, lapse, 3e-3) << one["name"];
+  }
+}
+
+/// Plain search of a grid within the bounds of the fit: lapses 0 to 0.06, guesses 0.5.
+double least_of_grid(const std::vector<LevelCount>& counts, const PsychometricModel& model) {
+  double least = 1e300;
+  for (double threshold = 305; threshold <= 395; threshold += 0.5) {
+    for (double slope = 0.005; slope < 2; slope *= 1.05) {
+      for (double lapse = 0; lapse <= 0.0601; lapse += 0.006) {
+        double loss = 0;
+        for (const LevelCount& count : counts) {
+          const double p = psychometric_probability(model.function,
+                                                    {threshold, slope, 0.5, lapse}, count.level);
+          loss -= count.successes * std::log(p) +
+                  (count.trials - count.successes) * std::log1p(-p);
+        }
+        if (loss < least) least = loss;
+      }
+    }
+  }
+  return least;
+}
+
+TEST(PsychometricFit, IsNoLocalMaximum) {
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  model.lapse = {0, true, 0.06};
+  const std::vector<std::pair<int, std::vector<int>>> studies{{10, {4, 9, 8, 9, 9}},
+                                                              {10, {5, 7, 4, 9, 8}},
+                                                              {20, {15, 13, 11, 19, 18}},
+                                                              {20, {15, 11, 14, 14, 20}},
+                                                              {10, {4, 7, 10, 8, 10}},
+                                                              {10, {9, 7, 10, 7, 10}}};
+  for (const auto& [trials, successes] : studies) {
+    std::vector<LevelCount> counts;
+    for (std::size_t i = 0; i < successes.size(); ++i)
+      counts.push_back({310 + 20.0 * static_cast<double>(i), trials, successes[i]});
+    const PsychometricFit fit = fit_psychometric(counts, model);
+    EXPECT_LE(-fit.log_likelihood, least_of_grid(counts, model) + 1e-6);
+  }
+}
+
+TEST(PsychometricFit, IntervalsReachOverAValley) {
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  model.lapse = {0, true, 0.06};
+  std::vector<LevelCount> counts;
+  int i = 0;
+  for (const int successes : {4, 7, 10, 8, 10}) counts.push_back({310 + 20.0 * i++, 10, successes});
+  // At 350, twice the loss of profile likelihood is 3.18.
+  EXPECT_GE(fit_psychometric(counts, model).threshold_ci95.high, 350);
 }
 
 TEST(PsychometricFit, SaysWhereThereIsNone) {

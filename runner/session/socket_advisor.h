@@ -1,0 +1,67 @@
+#pragma once
+// Levels proposed by a program at a Unix domain socket on this machine: one JSON object a line.
+//
+//   to it    {"type": "begin", "version": 1, "protocol": NAME, "participant": NUMBER, "session": S,
+//             "history": [TRIAL, ...]}              once a connection; trials that are on record
+//            {"type": "ask", "trial": T, "block": NAME, "track": K, "stimulus": NAME,
+//             "renderer": NAME, "path": POINTER, "least": X, "most": Y, "own": LEVEL}
+//            {"type": "tell", TRIAL...}             after every trial of an adaptive block
+//            {"type": "refused", "trial": T, "message": TEXT}
+//   from it  {"type": "level", "trial": T, "level": X}
+//
+// TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial".
+// Answers to earlier questions are ignored. Who does not answer in time, or answers nonsense, is
+// asked again before the next trial; who is gone, or sends a line that is too long, is called again.
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "runner/session/level_advisor.h"
+
+namespace palpate::runner {
+
+/// Why nobody can be asked at a socket; empty: somebody listens.
+std::string socket_fault(const std::string& path);
+
+class SocketAdvisor final : public LevelAdvisor {
+ public:
+  static constexpr std::size_t kMostLine = 65536;  ///< bytes
+
+  struct Settings {
+    std::string path;      ///< of the socket at which the program listens
+    double time_out = 1;   ///< s, for an answer
+    int participant = 1;   ///< number
+    int session = 1;
+  };
+  /// Connects. \param protocol  must outlive it. \param history  completed trials of the session.
+  /// \throws std::invalid_argument: nobody listens there
+  SocketAdvisor(const protocols::Protocol& protocol, Settings settings,
+                const std::vector<data::TrialRecord>& history);
+  ~SocketAdvisor() override;
+  SocketAdvisor(const SocketAdvisor&) = delete;
+  SocketAdvisor& operator=(const SocketAdvisor&) = delete;
+
+  std::optional<double> ask(const protocols::Trial& next) override;
+  void tell(const data::TrialRecord& record) override;
+  const std::string& trouble() const override { return trouble_; }
+
+ private:
+  using Deadline = std::chrono::steady_clock::time_point;
+  bool connect();
+  void disconnect();
+  bool send(const std::string& line);
+  /// The next line; nullopt: none until then, and trouble_ says why.
+  std::optional<std::string> receive(Deadline until);
+  std::optional<double> level_in(const std::string& line, const protocols::Trial& next);
+  std::string refusal(const std::string& message, int trial) const;
+
+  const protocols::Protocol& protocol_;
+  Settings settings_;
+  std::string history_;  ///< of all trials so far, as JSON, separated by commas
+  int socket_ = -1;
+  std::string received_;  ///< bytes of a line that is not complete
+  std::string trouble_;
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,217 @@
+"""Levels proposed by a program at a socket: one that answers, one that dies, hangs, sends rubbish, sends a megabyte.
+Usage: ask_level_test.py PALPATE propose_levels.py"""
+
+import csv
+import json
+import pathlib
+import socket
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+
+PALPATE, EXAMPLE = sys.argv.pop(1), sys.argv.pop(1)
+TRIALS = 12
+PROTOCOL = {
+    "version": 2, "name": "asked", "renderers": ["point"], "orientation": "fixed", "home": {"rest_s": 0.1}, "seed": 4,
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2, "stiffness_n_per_m": 300}],
+    "blocks": [
+        {"name": "constant", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+         "level": {"path": "/stiffness_n_per_m"}, "procedure": {"kind": "constant", "levels": [200, 400], "repetitions": 1}},
+        {"name": "stairs", "task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/stiffness_n_per_m"},
+         "procedure": {"kind": "staircase", "start": 500, "min": 300, "max": 600, "steps": [50], "down": 2,
+                       "stop": {"trials": TRIALS}}}]}
+
+
+class Program(threading.Thread):
+    """Listens, keeps what it is sent, and answers as `reply` says: bytes, None (nothing) or "die"."""
+
+    def __init__(self, path, reply):
+        super().__init__(daemon=True)
+        self.reply, self.messages, self.connections = reply, [], 0
+        self.server = socket.socket(socket.AF_UNIX)
+        self.server.bind(str(path))
+        self.server.listen()
+        self.start()
+
+    def run(self):
+        while True:
+            try:
+                connection, _ = self.server.accept()
+            except OSError:
+                return
+            self.connections += 1
+            with connection:
+                try:
+                    self.serve(connection)
+                except OSError:
+                    pass
+
+    def serve(self, connection):
+        for line in connection.makefile("r"):
+            message = json.loads(line)
+            self.messages.append(message)
+            if message["type"] != "ask":
+                continue
+            answer = self.reply(message)
+            if answer == "die":
+                connection.shutdown(socket.SHUT_RDWR)
+                return
+            if answer is not None:
+                connection.sendall(answer)
+
+    def of(self, kind):
+        return [message for message in self.messages if message["type"] == kind]
+
+
+def level(message, value):
+    return (json.dumps({"type": "level", "trial": message["trial"], "level": value}) + "\n").encode()
+
+
+class AskLevel(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        self.protocol = self.dir / "asked.json"
+        self.protocol.write_text(json.dumps(PROTOCOL))
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def program(self, reply):
+        program = Program(self.dir / "socket", reply)
+        self.addCleanup(program.server.close)
+        return program
+
+    def simulate(self, db, *more, status=0):
+        return self.palpate("simulate", self.protocol, "--db", db, "--participants", 1, *more, status=status)
+
+    def asked(self, reply, name="a.db", time_out=5):
+        program = self.program(reply)
+        db = self.dir / name
+        self.simulate(db, "--ask", self.dir / "socket", "--ask-time-out-s", time_out)
+        return program, db
+
+    def levels(self, db):
+        out = db.with_suffix(".csv")
+        self.palpate("export", "--db", db, "--format", "csv", "--out", out, "--force")
+        with open(out) as file:
+            return [float(row["level"]) for row in csv.DictReader(file) if row["block_name"] == "stairs"]
+
+    def events(self, db):
+        with sqlite3.connect(db) as base:
+            found = [json.loads(text)["level_from_own_procedure"] for (text,) in base.execute("SELECT text FROM notes")
+                     if "level_from_own_procedure" in text]
+        base.close()
+        return found
+
+    def test_levels_are_asked_for_shown_and_told(self):
+        program, db = self.asked(lambda message: level(message, 310.5 + message["trial"]))
+        asked = program.of("ask")
+        self.assertEqual(len(asked), TRIALS)
+        self.assertEqual(self.levels(db), [310.5 + message["trial"] for message in asked])
+        self.assertEqual(self.events(db), [])
+        begin, = program.of("begin")
+        self.assertEqual((begin["protocol"], begin["participant"], begin["session"], begin["history"]), ("asked", 1, 1, []))
+        for message in asked:
+            self.assertEqual((message["block"], message["least"], message["most"], message["path"]),
+                             ("stairs", 300, 600, "/stiffness_n_per_m"))
+        told = program.of("tell")
+        self.assertEqual([message["level"] for message in told], self.levels(db))
+        self.assertTrue(all(message["answered"] and message["success"] == message["correct"] for message in told))
+
+    def test_the_program_that_is_shipped_converges(self):
+        path = self.dir / "socket"
+        program = subprocess.Popen([sys.executable, EXAMPLE, str(path)])
+        self.addCleanup(program.wait)
+        self.addCleanup(program.terminate)
+        while not path.exists():
+            self.assertIsNone(program.poll())
+        db = self.dir / "example.db"
+        self.simulate(db, "--ask", path)
+        levels = self.levels(db)
+        self.assertEqual((len(levels), self.events(db)), (TRIALS, []))
+        self.assertGreater(len(set(levels)), 3)
+        self.assertTrue(all(300 <= one <= 600 for one in levels))
+
+    def own_procedure(self):
+        db = self.dir / "own.db"
+        self.simulate(db)
+        return self.levels(db)
+
+    def test_who_dies_hangs_or_sends_rubbish_leaves_the_procedure_to_itself(self):
+        expected = self.own_procedure()
+        cases = {"dies": (lambda message: "die", "gone", 5),
+                 "hangs": (lambda message: None, "in time", 0.02),
+                 "rubbish": (lambda message: b"\x00\xff{]\n", "expected {", 5),
+                 "a list": (lambda message: b"[1, 2]\n", "expected {", 5),
+                 "no number": (lambda message: level(message, "soft"), "expected a level from 300 to 600", 5),
+                 "NaN": (lambda message: level(message, None), "expected a level from 300 to 600", 5),
+                 "too stiff": (lambda message: level(message, 601), "expected a level from 300 to 600", 5),
+                 "of the future": (lambda message: level({"trial": message["trial"] + 1}, 400), "expected the answer to trial", 5),
+                 "a megabyte": (lambda message: b"1" * 1_000_000, "more than 65536 bytes", 5),
+                 "old answers": (lambda message: level({"trial": 0}, 400) * 3000, "in time", 0.1)}
+        for number, (name, (reply, reason, time_out)) in enumerate(cases.items()):
+            with self.subTest(name):
+                (self.dir / "socket").unlink(missing_ok=True)
+                program, db = self.asked(reply, f"{number}.db", time_out)
+                self.assertEqual(self.levels(db), expected)
+                events = self.events(db)
+                self.assertEqual([one["level"] for one in events], expected)
+                for event in events:
+                    self.assertTrue(reason in event["reason"] or "gone" in event["reason"], event["reason"])
+                self.assertIn(reason, events[0]["reason"])
+                if "expected" in reason:
+                    self.assertIn(reason, program.of("refused")[0]["message"])
+
+    def test_an_answer_that_comes_after_refusals_counts_again(self):
+        _, db = self.asked(lambda message: level(message, 450) if message["trial"] > 6 else level(message, -1))
+        levels, events = self.levels(db), self.events(db)
+        self.assertEqual([one["trial"] for one in events], [trial for trial in range(3, 7)])
+        self.assertEqual(levels[len(events):], [450] * (TRIALS - len(events)))
+
+    def test_what_is_recorded_is_not_asked_for_again(self):
+        program, whole = self.asked(lambda message: level(message, 400 + message["trial"]))
+        expected = self.levels(whole)
+        # A session that was cut off: the same, with its last five trials taken away.
+        (self.dir / "socket").unlink()
+        program = self.program(lambda message: level(message, 400 + message["trial"]))
+        part = self.dir / "part.db"
+        stopping = subprocess.Popen([PALPATE, "simulate", self.protocol, "--db", part, "--participants", "1", "--ask",
+                                     self.dir / "socket"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while len(program.of("ask")) < 5 and stopping.poll() is None:
+            pass
+        stopping.terminate()
+        stopping.wait()
+        before = len(program.of("ask"))
+        self.simulate(part, "--ask", self.dir / "socket")
+        self.assertEqual(self.levels(part), expected)
+        asked = [message["trial"] for message in program.of("ask")]
+        self.assertEqual(sorted(asked), sorted(set(asked)))
+        history = program.of("begin")[-1]["history"]
+        if before < TRIALS:
+            self.assertEqual([one["level"] for one in history if one["block"] == "stairs"],
+                             [400 + trial for trial in asked[:before]])
+
+    def test_wrong_usage_is_refused_before_anything_is_stored(self):
+        db = self.dir / "no.db"
+        (self.dir / "file").write_text("")
+        for where in ("nowhere", "file"):
+            self.assertIn("--ask", self.simulate(db, "--ask", self.dir / where, status=2).stderr)
+        dead = socket.socket(socket.AF_UNIX)
+        dead.bind(str(self.dir / "dead"))
+        dead.close()
+        self.assertIn("nobody listens", self.simulate(db, "--ask", self.dir / "dead", status=2).stderr)
+        self.program(lambda message: None)
+        for time_out in ("0", "-1", "nan", "1000"):
+            self.assertIn("--ask-time-out-s", self.simulate(db, "--ask", self.dir / "socket", "--ask-time-out-s", time_out,
+                                                            status=2).stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

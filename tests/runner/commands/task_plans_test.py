@@ -1,0 +1,98 @@
+"""palpate plan of thresholds and palpate sweep of a protocol of version 2. Usage: task_plans_test.py PALPATE"""
+
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE = sys.argv.pop(1)
+BALL = {"name": "ball", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2, "stiffness_n_per_m": 300}
+DIE = {"name": "die", "shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 300}
+PROTOCOL = {
+    "version": 2, "name": "swept", "renderers": ["point"], "orientation": "fixed", "home": {"rest_s": 0.1}, "seed": 4,
+    "stimuli": [BALL, DIE],
+    "blocks": [
+        {"name": "stiffer", "task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/stiffness_n_per_m"},
+         "procedure": {"kind": "constant", "levels": [200, 250, 300, 350, 400], "repetitions": 8}},
+        {"name": "rough", "task": "rate", "stimuli": ["ball"], "min": 0.001, "level": {"path": "/stiffness_n_per_m"},
+         "procedure": {"kind": "constant", "levels": [100, 400], "repetitions": 4}},
+        {"name": "which", "task": "identify", "stimuli": ["ball", "die"], "repetitions": 2, "keys": {"1": "ball", "2": "die"}}]}
+SPACE = {"version": 1, "parameters": [
+    {"name": "delay", "of": "participant", "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": 0.05, "high": 0.3}]}
+
+
+class TaskPlans(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=500)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def powers(self, *more, name="plan.json"):
+        out = self.dir / name
+        said = self.palpate("plan", *more, "--studies", 100, "--json", out, "--force").stdout
+        self.assertIn("SIMULATED STUDIES", said)
+        found = json.loads(out.read_text())["powers"]
+        for one in found:
+            low, high = one["power_ci95"]
+            self.assertLessEqual(low, one["power"])
+            self.assertGreaterEqual(high, one["power"])
+            self.assertEqual(one["studies"], 100)
+        return {(one["trials"], one["participants"]): one for one in found}
+
+    def test_power_for_a_difference_of_jnds_grows_with_participants_and_trials(self):
+        found = self.powers("--jnd-effect", 30, "--trials", "70,210", "--participants", "4-14")
+        self.assertGreater(found[210, 14]["power"], 0.7)
+        self.assertGreater(found[210, 14]["power"], found[210, 4]["power"] + 0.2)
+        self.assertGreaterEqual(found[210, 14]["power"], found[70, 14]["power"])
+        self.assertEqual(self.powers("--jnd-effect", 30, "--trials", "70,210", "--participants", "4-14", name="b.json"), found)
+
+    def test_without_a_difference_the_error_rate_is_alpha(self):
+        found = self.powers("--jnd-effect", 0, "--trials", "105", "--participants", "8-8")[105, 8]
+        self.assertLessEqual(found["power"], 0.12)  # 0.05 but for the error of 100 studies
+        self.assertGreaterEqual(found["coverage"], 0.88)
+
+    def test_wrong_usage_is_refused(self):
+        for wrong in (["--jnd-effect", 99], ["--jnd-effect", "nan"], ["--jnd-effect", 20, "--weber", 0],
+                      ["--jnd-effect", 20, "--gain-sd", 1], ["--jnd-effect", 20, "--participants", "1-4"],
+                      ["--jnd-effect", 20, "--trials", "0"]):
+            self.palpate("plan", *wrong, status=2)
+
+    def test_a_sweep_has_the_figures_of_every_cell(self):
+        protocol, space, db = self.dir / "swept.json", self.dir / "space.json", self.dir / "a.sweep"
+        protocol.write_text(json.dumps(PROTOCOL))
+        space.write_text(json.dumps(SPACE))
+        arguments = ["sweep", protocol, "--space", space, "--points", 3, "--participants", 2]
+        self.palpate(*arguments, "--db", db)
+        table = self.dir / "a.csv"
+        self.palpate("export", "--db", db, "--format", "csv", "--out", table)
+        rows = list(csv.DictReader(table.read_text().splitlines()))
+        self.assertEqual(len(rows), 3)
+        for row in rows:
+            self.assertEqual(row["status"], "ok", row["reason"])
+            self.assertAlmostEqual(float(row["threshold_stiffer_ball_point"]), 300, delta=45)
+            self.assertGreater(float(row["jnd_stiffer_ball_point"]), 5)
+            self.assertGreater(float(row["threshold_se_stiffer_ball_point"]), 0)
+            self.assertAlmostEqual(float(row["exponent_rough_ball_point"]), 0.8, delta=0.4)
+            for stimulus in ("ball", "die"):
+                self.assertTrue(0 <= float(row[f"accuracy_which_{stimulus}_point"]) <= 1)
+            self.assertLessEqual(float(row["bits_which_point"]), 1)
+        # As simulate and analyze find them: the point's seeds are on record.
+        said = self.palpate("analyze", "--sweep", db, "--pattern", "threshold_stiffer_ball_point > 200",
+                            "--json", self.dir / "a.json", "--report", self.dir / "a.html").stdout
+        self.assertIn("threshold_stiffer_ball_point", said)
+        self.palpate(*arguments, "--db", self.dir / "b.sweep")
+        self.palpate("export", "--db", self.dir / "b.sweep", "--format", "csv", "--out", self.dir / "b.csv")
+        self.assertEqual((self.dir / "b.csv").read_text(), table.read_text())
+        self.palpate(*arguments, "--db", self.dir / "c.sweep", "--repetitions", 2, status=2)
+
+
+if __name__ == "__main__":
+    unittest.main()
