@@ -305,6 +305,11 @@ PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
   return fit;
 }
 
+PsychometricFit quick_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model) {
+  SimplexMinimum best;
+  return fit_point(counts, place_counts(counts, model.function), model, kQuickSearch, best);
+}
+
 GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model,
                               const PsychometricFit& fit, int simulations, std::uint64_t seed) {
   GoodnessOfFit result;

@@ -49,6 +49,9 @@ struct PsychometricFit {
 PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
                                  const PsychometricModel& model);
 
+/// The same without intervals, by a quicker search: for simulations.
+PsychometricFit quick_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model);
+
 /// Deviance from the saturated model and its place in the distribution of refitted simulations.
 struct GoodnessOfFit {
   double deviance = 0;

@@ -32,7 +32,7 @@ std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, doub
     for (int k = 0; k < count.trials; ++k) count.successes += random.unit() < p ? 1 : 0;
     if (count.trials > 0) counts.push_back(count);
   }
-  const PsychometricFit fit = fit_psychometric(counts, model);
+  const PsychometricFit fit = quick_fit(counts, model);
   if (!fit.undefined.empty() || fit.slope_at_bound) return std::nullopt;
   const double threshold = fit.parameters.threshold;
   if (threshold < counts.front().level || threshold > counts.back().level) return std::nullopt;

@@ -156,6 +156,7 @@ std::vector<double> identified(const analysis::TaskTable& table, const data::Tas
     ++own.n;
   }
   std::vector<double> values;
+  values.reserve(sums.size());
   for (const auto& [participant, own] : sums) values.push_back(own.sum / own.n);
   return values;
 }
