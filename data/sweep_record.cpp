@@ -109,8 +109,8 @@ std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
   const auto protocol = nlohmann::json::parse(plan.protocol, nullptr, false);
   if (!protocol.is_object() || protocol.value("version", 1) != 2) return cells;
   const auto add = [&](TaskCellColumns cell) {
-    const std::string place = "_" + cell.block + (cell.stimulus.empty() ? "" : "_" + cell.stimulus) +
-                              "_" + cell.renderer;
+    const std::string place =
+        "_" + cell.block + (cell.stimulus.empty() ? "" : "_" + cell.stimulus) + "_" + cell.renderer;
     for (const std::string& measure : cell.measures) {
       cell.columns.push_back(measure + place);
       cell.columns.push_back(measure + "_se" + place);

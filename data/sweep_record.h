@@ -45,11 +45,12 @@ struct SweepRow {
 /// over correct answers), accuracy_R_S, time_outs_R_S (share of trials) and contact_share_R_S
 /// (share of the time with forces on).
 ///
-/// Of a protocol of version 2, for each block B that is no practice, stimulus S and renderer R, means
-/// over the participants and their standard errors: compare and detect threshold_B_S_R (compare with
-/// levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare jnd_..., detect
-/// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify accuracy_... and time_... (s)
-/// likewise, and bits_B_R. Participants without the figure are left out.
+/// Of a protocol of version 2, for each block B that is no practice, stimulus S and renderer R,
+/// means over the participants and their standard errors: compare and detect threshold_B_S_R
+/// (compare with levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare
+/// jnd_..., detect d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify
+/// accuracy_... and time_... (s) likewise, and bits_B_R. Participants without the figure are left
+/// out.
 std::vector<std::string> figure_columns(const SweepPlan& plan);
 
 /// What is measured in a cell of a protocol of version 2, and the names of its columns.

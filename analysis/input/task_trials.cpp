@@ -148,8 +148,9 @@ TaskTrial read_trial(TaskRow& row) {
   trial.intervals = intervals_of(row);
   trial.protocol_sha256 = row.value("protocol_sha256");
   if (!row.has("success") && !success_of(row, trial))
-    row.add_fault("success",
-                  "expected a column success (1: the comparison was chosen), or comparison_interval");
+    row.add_fault(
+        "success",
+        "expected a column success (1: the comparison was chosen), or comparison_interval");
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
     row.add_fault("task", "expected identify, compare, detect, rate or adjust");
@@ -202,9 +203,9 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
     trial.simulated = simulated;
     if (std::find(table.protocols.begin(), table.protocols.end(), named) == table.protocols.end())
       table.protocols.push_back(named);
-    const auto [first, is_new] = seen.emplace(
-        std::tuple(trial.participant, named, trial.session, trial.block, trial.trial),
-        reader.line());
+    const auto [first, is_new] =
+        seen.emplace(std::tuple(trial.participant, named, trial.session, trial.block, trial.trial),
+                     reader.line());
     if (numbered && !is_new)
       row.add_fault("trial", "expected each trial once: it is in line " +
                                  std::to_string(first->second) + ", too");

@@ -19,8 +19,8 @@ struct TaskTrial {
   bool catch_trial = false, success = false, correct = false, answered = false;
   int session = 1, block = 1, trial = 1;
   bool timed_out = false, simulated = false;
-  int intervals = 0;            ///< compare: how many; 0: unknown
-  std::string protocol_sha256;  ///< "": unknown
+  int intervals = 0;                    ///< compare: how many; 0: unknown
+  std::string protocol_sha256;          ///< "": unknown
   std::optional<double> response_time;  ///< s; none: not in the source
 };
 

@@ -195,7 +195,8 @@ std::string task_report_text(const TaskAnalysis& analysis) {
       "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare "
       "with "
       "levels on\none side of the standard: guesses 1 / intervals, the threshold is half-way from "
-      "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
+      "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. "
+      "Bayes: posterior "
       "mean of the threshold on a grid.\n";
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);

@@ -31,21 +31,22 @@ std::string threshold_plan_text(const ThresholdPlan& plan) {
                      "JNDs, alpha " +
                      fixed(study.alpha, 3) + "\n\n";
   for (const std::size_t trials : plan.settings.trials) text += conclusion_of(plan, trials);
-  text += "\n  trials  participants  power  95 % of the simulation  bias of the ratio  coverage  "
-          "left out\n";
+  text +=
+      "\n  trials  participants  power  95 % of the simulation  bias of the ratio  coverage  "
+      "left out\n";
   for (const ThresholdPower& one : plan.powers) {
     const double pairs = static_cast<double>(one.participants * one.studies);
-    text += "  " + pad_left(std::to_string(one.trials), 6) + "  " +
-            pad_left(std::to_string(one.participants), 12) + "  " +
-            pad_left(fixed(one.power, 2), 5) + "  " +
-            pad_left(fixed(one.ci95.low, 2) + " to " + fixed(one.ci95.high, 2), 22) + "  " +
-            pad_left(fixed(100 * (std::exp(one.bias) - 1), 1) + " %", 17) + "  " +
-            pad_left(fixed(one.coverage, 2), 8) + "  " +
-            pad_left(fixed(100 * static_cast<double>(one.undetermined) / pairs, 1) + " %", 8) +
-            "\n";
+    text +=
+        "  " + pad_left(std::to_string(one.trials), 6) + "  " +
+        pad_left(std::to_string(one.participants), 12) + "  " + pad_left(fixed(one.power, 2), 5) +
+        "  " + pad_left(fixed(one.ci95.low, 2) + " to " + fixed(one.ci95.high, 2), 22) + "  " +
+        pad_left(fixed(100 * (std::exp(one.bias) - 1), 1) + " %", 17) + "  " +
+        pad_left(fixed(one.coverage, 2), 8) + "  " +
+        pad_left(fixed(100 * static_cast<double>(one.undetermined) / pairs, 1) + " %", 8) + "\n";
   }
   return text +
-         "\nConstant stimuli, two intervals, seven levels around the standard; each JND is fitted as "
+         "\nConstant stimuli, two intervals, seven levels around the standard; each JND is fitted "
+         "as "
          "analyze does.\nLeft out: JNDs that the data of a participant do not tell.\n";
 }
 

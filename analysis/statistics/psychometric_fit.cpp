@@ -179,8 +179,8 @@ std::optional<double> profile_end(const Profile& profile, double inside, double 
   return 0.5 * (inside + outside);
 }
 
-/// Loss allowed less the smallest loss with a parameter held. Each search begins where the one before
-/// ended, and at the best place of a grid: there may be another valley.
+/// Loss allowed less the smallest loss with a parameter held. Each search begins where the one
+/// before ended, and at the best place of a grid: there may be another valley.
 class Profile {
  public:
   using Hold = void (Objective::*)(std::optional<double>);
@@ -249,7 +249,7 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
   return "";
 }
 
-/// Point estimates alone, as the simulations need them. 
+/// Point estimates alone, as the simulations need them.
 PsychometricFit fit_point(const std::vector<LevelCount>& counts, const PlacedData& data,
                           const PsychometricModel& model, const Search& search,
                           SimplexMinimum& best) {

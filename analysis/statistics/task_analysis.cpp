@@ -246,8 +246,8 @@ void add_information(TaskCell& cell, const Trials& trials) {
     if (cell.informations.back().corrected) bits.push_back(*cell.informations.back().corrected);
   }
   if (bits.size() < 2) return;
-  cell.information_mean = std::accumulate(bits.begin(), bits.end(), 0.0) /
-                          static_cast<double>(bits.size());
+  cell.information_mean =
+      std::accumulate(bits.begin(), bits.end(), 0.0) / static_cast<double>(bits.size());
   cell.information_ci95 = t_test(bits).log_ratio_ci95;
 }
 

@@ -27,9 +27,10 @@ struct Track {
   std::vector<std::size_t> reversals;
 };
 
-/// What is read off a participant's function, whatever its task measures. PSE: of two intervals with
-/// levels on both sides of the standard. JND there: half the distance of the levels of 25 and 75 %;
-/// of a forced choice the threshold's distance from the standard. Weber fraction: JND / standard.
+/// What is read off a participant's function, whatever its task measures. PSE: of two intervals
+/// with levels on both sides of the standard. JND there: half the distance of the levels of 25 and
+/// 75 %; of a forced choice the threshold's distance from the standard. Weber fraction: JND /
+/// standard.
 struct LevelFigures {
   std::optional<double> pse, jnd, weber_fraction;
   std::optional<Interval> pse_ci95, jnd_ci95, weber_fraction_ci95;
@@ -42,13 +43,13 @@ struct ParticipantFunction {
   PsychometricModel model;
   PsychometricFit fit;
   GoodnessOfFit goodness;
-  /// The threshold lies among the levels shown, and its interval is closed. Others are reported, but
-  /// not compared.
+  /// The threshold lies among the levels shown, and its interval is closed. Others are reported,
+  /// but not compared.
   bool determined = false;
   LevelFigures figures;
   PsychometricPosterior posterior;  ///< of the same counts and model
   std::vector<Track> tracks;        ///< of more than one trial
-  Detectability detectability;  ///< detect and same/different with catch trials; else undefined
+  Detectability detectability;      ///< detect and same/different with catch trials; else undefined
 };
 
 /// All trials of one task with a stimulus and a renderer in a block.
@@ -59,10 +60,10 @@ struct TaskCell {
   /// compare: 1 / `intervals` of the answers succeed without a difference: all levels lie on one
   /// side of the standard.
   bool forced_choice = false;
-  bool same_different = false;  ///< compare: that is what is answered
-  int intervals = 2;            ///< compare
-  std::string no_function;      ///< why no psychometric function is fitted; empty: one is
-  std::vector<std::string> participants;           ///< that `magnitude`, `adjustments` number
+  bool same_different = false;            ///< compare: that is what is answered
+  int intervals = 2;                      ///< compare
+  std::string no_function;                ///< why no psychometric function is fitted; empty: one is
+  std::vector<std::string> participants;  ///< that `magnitude`, `adjustments` number
   std::vector<ParticipantFunction> functions;      ///< compare, detect
   std::optional<MagnitudeEstimation> magnitude;    ///< rate
   std::vector<Adjustment> adjustments;             ///< adjust
@@ -71,7 +72,7 @@ struct TaskCell {
   /// Mean of the participants' corrected bits, and its t interval.
   std::optional<double> information_mean;
   std::optional<Interval> information_ci95;
-  Type2Roc confidence;                             ///< undefined: nobody was asked
+  Type2Roc confidence;  ///< undefined: nobody was asked
 };
 
 struct TaskAnalysis {

@@ -26,8 +26,9 @@ struct Measure {
 };
 
 /// Of functions with such a figure.
-Figures of_functions(const TaskCell& cell,
-                     const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
+Figures of_functions(
+    const TaskCell& cell,
+    const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
   Figures figures;
   for (const ParticipantFunction& one : cell.functions) {
     if (!one.counts.empty()) figures.ratios &= one.counts.front().level > 0;

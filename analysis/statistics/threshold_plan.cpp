@@ -25,8 +25,8 @@ std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, doub
   for (int i = 0; i < kPlanLevels; ++i) {
     const double place = 2.0 * i / (kPlanLevels - 1) - 1;
     LevelCount count{kStandard + place * study.reach * assumed, 0, 0};
-    const double p = 0.5 * study.lapse +
-                     (1 - study.lapse) / (1 + std::exp(-slope * (count.level - pse)));
+    const double p =
+        0.5 * study.lapse + (1 - study.lapse) / (1 + std::exp(-slope * (count.level - pse)));
     const auto index = static_cast<std::size_t>(i);
     count.trials = static_cast<int>(trials / kPlanLevels + (index < trials % kPlanLevels ? 1 : 0));
     for (int k = 0; k < count.trials; ++k) count.successes += random.unit() < p ? 1 : 0;

@@ -290,8 +290,8 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
   }
 }
 
-/// Which levels have more successes of two intervals follows from what is asked. \return nullopt: the
-/// task does not tell
+/// Which levels have more successes of two intervals follows from what is asked. \return nullopt:
+/// the task does not tell
 std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
   if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
     return std::nullopt;
@@ -303,7 +303,8 @@ std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock&
 
 void check_easier(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
                   FaultList& faults) {
-  const std::optional<Easier> expected = block.level ? expected_easier(protocol, block) : std::nullopt;
+  const std::optional<Easier> expected =
+      block.level ? expected_easier(protocol, block) : std::nullopt;
   if (!expected) return;
   for (std::size_t i = 0; i < block.procedures.size(); ++i) {
     const std::optional<Easier> easier = easier_of(block.procedures[i]);
@@ -311,11 +312,12 @@ void check_easier(const Protocol& protocol, const TaskBlock& block, const std::s
     const bool one_side = side_of_levels(protocol, block) != 0;
     const std::string place =
         pointer + "/procedure" + (block.procedures.size() > 1 ? "/" + std::to_string(i) : "");
-    faults.add(place + "/easier",
-               std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
-                   (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
-                             : "': levels lie on both sides of the standard, and what counts is that "
-                               "the comparison is chosen"));
+    faults.add(
+        place + "/easier",
+        std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
+            (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
+                      : "': levels lie on both sides of the standard, and what counts is that "
+                        "the comparison is chosen"));
   }
 }
 

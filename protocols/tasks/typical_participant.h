@@ -7,15 +7,15 @@
 namespace palpate::protocols {
 
 struct TypicalSettings {
-  double place = 0.5;         ///< of the threshold, as a share of the levels' range, from the hard end
-  double spread = 0.15;       ///< sd of the function, likewise
+  double place = 0.5;    ///< of the threshold, as a share of the levels' range, from the hard end
+  double spread = 0.15;  ///< sd of the function, likewise
   double false_alarm = 0.05;  ///< detect, same/different
   double lapse = 0.02;
 };
 
 /// Cumulative normal on the scale of the block's first adaptive procedure, with its easier levels.
-/// compare: guesses 1 / intervals; with levels on both sides of the standard none, and the threshold
-/// at the standard. \param block  with levels
+/// compare: guesses 1 / intervals; with levels on both sides of the standard none, and the
+/// threshold at the standard. \param block  with levels
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,
                                             const TypicalSettings& settings = {});
 

@@ -67,12 +67,13 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
   std::string names;
   bool one_name = true;
   for (const auto& [name, sha256] : table.protocols) {
-    names += (names.empty() ? "" : ", ") + stimuli::printable(name) + " (" + sha256.substr(0, 12) + ")";
+    names +=
+        (names.empty() ? "" : ", ") + stimuli::printable(name) + " (" + sha256.substr(0, 12) + ")";
     one_name &= name == table.protocols.front().first;
   }
   if (one_name && !wanted.empty()) return;  // of one name, as was asked for
-  throw UsageError(stimuli::printable(table.source) + ": has trials of several protocols (" + names +
-                   "); say which with --protocol NAME, or with the begin of its checksum");
+  throw UsageError(stimuli::printable(table.source) + ": has trials of several protocols (" +
+                   names + "); say which with --protocol NAME, or with the begin of its checksum");
 }
 
 /// A study of version 2, or its export.

@@ -75,7 +75,8 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
 
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format table|csv|json]";
+  line.usage =
+      "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format table|csv|json]";
   line.summary =
       "Prints the trials that a participant will get, in order, without running them.\n"
       "Where answers choose the levels: the rule, and an example.";

@@ -94,8 +94,8 @@ int TaskJudgement::detected() {
       const protocols::PsychometricParticipant typical = protocols::typical_participant(
           protocol_, block(),
           {settings_.threshold, settings_.spread, settings_.false_alarm, settings_.lapse});
-      yes = protocols::psychometric_probability(typical.function, typical.parameters,
-                                                *trial_.level);
+      yes =
+          protocols::psychometric_probability(typical.function, typical.parameters, *trial_.level);
     }
   }
   evidence_ = 4 * std::abs(yes - 0.5);

@@ -45,9 +45,10 @@ class TaskJudgement {
   void begin(const protocols::Trial& trial, const stimuli::Random& random);
   /// What an interval is felt as.
   struct Felt {
-    std::optional<double> measured;  ///< level as the hand met it (level_percept.h); none: the true one
-    bool noisy = false;              ///< the noise is in it already
-    bool touched = true;             ///< false: any level will do
+    std::optional<double>
+        measured;         ///< level as the hand met it (level_percept.h); none: the true one
+    bool noisy = false;   ///< the noise is in it already
+    bool touched = true;  ///< false: any level will do
   };
   void feel(const protocols::Interval& interval, const Felt& felt);
   /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.

@@ -13,8 +13,8 @@ namespace palpate::runner {
 class LevelAdvisor {
  public:
   virtual ~LevelAdvisor() = default;
-  /// Before a trial of an adaptive block, forces off. \return the level to be shown, within those of
-  /// levels_of(block); nullopt: the block's own procedure goes on, and trouble() says why
+  /// Before a trial of an adaptive block, forces off. \return the level to be shown, within those
+  /// of levels_of(block); nullopt: the block's own procedure goes on, and trouble() says why
   virtual std::optional<double> ask(const protocols::Trial& next) = 0;
   /// A trial of an adaptive block is on record.
   virtual void tell(const data::TrialRecord& record) = 0;

@@ -33,9 +33,9 @@ data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
     protocols += (protocols.empty() ? "" : ", ") + trial.protocol_name + " " +
                  trial.protocol_sha256.substr(0, 12);
     if (found) {
-      throw data::StoreRefused("--trial " + to_string(name) +
-                               ": there is one in each of several protocols (" + protocols +
-                               "); say which with --protocol NAME, or with the begin of its checksum");
+      throw data::StoreRefused(
+          "--trial " + to_string(name) + ": there is one in each of several protocols (" +
+          protocols + "); say which with --protocol NAME, or with the begin of its checksum");
     }
     found = std::move(trial);
   }

@@ -240,8 +240,8 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
   }
 }
 
-/// Once a trial, however often it is shown; without an answer the block's own procedure goes on, which
-/// is on record.
+/// Once a trial, however often it is shown; without an answer the block's own procedure goes on,
+/// which is on record.
 void Session::ask_level() {
   const protocols::Trial& trial = station_.plan.next();
   if (station_.advisor == nullptr || !trial.level || trial.task_block < 0) return;

@@ -66,8 +66,8 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
     participant = std::make_unique<SimulatedParticipant>(own, study.hypotheses, stylus, protocol,
                                                          study.seed, session.participant);
   }
-  const Station station{protocol, study.library, session.plan, servo, clock,
-                        session.utc, log, session.advisor};
+  const Station station{protocol, study.library, session.plan, servo,
+                        clock,    session.utc,   log,          session.advisor};
   Session trials(station, *participant);
   // A trial that was shown is recorded, also when it is the last for now.
   while (trials.state() != Session::State::end &&

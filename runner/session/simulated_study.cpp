@@ -214,8 +214,7 @@ class Recorder {
     if (!has_pages_) end_finished();
   }
   /// After the trials of the same time: pages after the last trial belong to its run, too.
-  void record(
-      const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
+  void record(const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
     for (const auto& [index, answers] : pages) store_.add_page_answers(run_of(index), answers);
   }
   void record(const std::deque<Queue::Note>& notes) {

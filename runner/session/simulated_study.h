@@ -16,11 +16,11 @@
 namespace palpate::runner {
 
 struct StudyPlan {
-  int participants = 7;    ///< the number of the last one
-  int before = 0;          ///< the number before that of the first one
-  std::uint64_t seed = 1;  ///< of the participants; the schedule has the protocol's own
-  int jobs = 1;            ///< threads
-  std::string event = {};  ///< for each session's record; empty: none
+  int participants = 7;         ///< the number of the last one
+  int before = 0;               ///< the number before that of the first one
+  std::uint64_t seed = 1;       ///< of the participants; the schedule has the protocol's own
+  int jobs = 1;                 ///< threads
+  std::string event = {};       ///< for each session's record; empty: none
   std::string advisor = {};     ///< socket of a program that proposes levels; empty: none
   double advisor_time_out = 1;  ///< s
 };

@@ -109,9 +109,8 @@ void SocketAdvisor::disconnect() {
 
 /// All of it: who reads nothing has no more room for it soon.
 bool SocketAdvisor::send(const std::string& line) {
-  const auto until = steady_clock::now() +
-                     std::chrono::duration_cast<steady_clock::duration>(
-                         std::chrono::duration<double>(settings_.time_out));
+  const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
+                                               std::chrono::duration<double>(settings_.time_out));
   std::size_t sent = 0;
   while (sent < line.size()) {
     const ssize_t now = ::send(socket_, line.data() + sent, line.size() - sent, MSG_NOSIGNAL);
@@ -176,8 +175,8 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
                                               const protocols::Trial& next) {
   const std::string found = "; found " + stimuli::printable(line, kMostShown);
   const auto message = nlohmann::json::parse(line, nullptr, false);
-  if (!message.is_object() || !message.contains("trial") ||
-      !message["trial"].is_number_integer() || message.value("type", nlohmann::json()) != "level") {
+  if (!message.is_object() || !message.contains("trial") || !message["trial"].is_number_integer() ||
+      message.value("type", nlohmann::json()) != "level") {
     trouble_ = R"(expected {"type": "level", "trial": )" + std::to_string(next.trial) +
                R"(, "level": X})" + found;
     return std::nullopt;
@@ -202,9 +201,8 @@ std::optional<double> SocketAdvisor::ask(const protocols::Trial& next) {
   if (socket_ < 0 && !connect()) return std::nullopt;
   const auto& block = protocol_.blocks[static_cast<std::size_t>(next.task_block)];
   const std::vector<double> levels = protocols::levels_of(block);
-  const auto until = steady_clock::now() +
-                     std::chrono::duration_cast<steady_clock::duration>(
-                         std::chrono::duration<double>(settings_.time_out));
+  const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
+                                               std::chrono::duration<double>(settings_.time_out));
   if (!send(line_of({{"type", "ask"},
                      {"trial", next.trial},
                      {"block", block.name},

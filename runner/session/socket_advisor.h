@@ -11,7 +11,8 @@
 //
 // TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial".
 // Answers to earlier questions are ignored. Who does not answer in time, or answers nonsense, is
-// asked again before the next trial; who is gone, or sends a line that is too long, is called again.
+// asked again before the next trial; who is gone, or sends a line that is too long, is called
+// again.
 
 #include <chrono>
 #include <string>
@@ -29,9 +30,9 @@ class SocketAdvisor final : public LevelAdvisor {
   static constexpr std::size_t kMostLine = 65536;  ///< bytes
 
   struct Settings {
-    std::string path;      ///< of the socket at which the program listens
-    double time_out = 1;   ///< s, for an answer
-    int participant = 1;   ///< number
+    std::string path;     ///< of the socket at which the program listens
+    double time_out = 1;  ///< s, for an answer
+    int participant = 1;  ///< number
     int session = 1;
   };
   /// Connects. \param protocol  must outlive it. \param history  completed trials of the session.

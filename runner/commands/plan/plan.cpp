@@ -47,7 +47,8 @@ int plan_command(const std::vector<std::string>& args) {
       "  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9\n"
       "  palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \\\n"
       "      --trials 20,40 --json plan.json --figure power.svg\n"
-      "  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)";
+      "  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   "
+      "(thresholds)";
   PlanOptions options;
   add_plan_options(line, options);
   ThresholdOptions thresholds;

@@ -234,19 +234,19 @@ int run_command(const std::vector<std::string>& args) {
                     SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
                                             participant.enrolled_number, session},
                     progress.completed);
-  const LiveStation station{{protocol, library, plan, servo, clock, began, record,
-                             advisor ? &*advisor : nullptr},
-                            record,
-                            device,
-                            open.guard,
-                            servo,
-                            open.guard != nullptr ? &direction_check : nullptr,
-                            [&signals] { return signals.end_requested(); },
-                            display->participant(),
-                            display->console(),
-                            settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
-                            markers,
-                            noise.get()};
+  const LiveStation station{
+      {protocol, library, plan, servo, clock, began, record, advisor ? &*advisor : nullptr},
+      record,
+      device,
+      open.guard,
+      servo,
+      open.guard != nullptr ? &direction_check : nullptr,
+      [&signals] { return signals.end_requested(); },
+      display->participant(),
+      display->console(),
+      settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
+      markers,
+      noise.get()};
   const Beforehand known{settings, admission,      limited,
                          progress, servo_began_ns, news(resumed, *display, limited)};
   const LiveSession::Outcome outcome = run_beside_display(station, known, *display, emergency);

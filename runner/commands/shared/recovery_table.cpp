@@ -23,7 +23,8 @@ struct RecoveredProcedure {
   protocols::Recovery recovery;
 };
 
-/// QUEST+ is tried with a participant that it can find: of its function, in the middle of its grids.
+/// QUEST+ is tried with a participant that it can find: of its function, in the middle of its
+/// grids.
 protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
                                                    const protocols::TaskBlock& block,
                                                    const protocols::ProcedureSpec& procedure) {
@@ -47,13 +48,13 @@ std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, i
       const protocols::ProcedureSpec& procedure = block.procedures[i];
       if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
       const auto participant = participant_for(protocol, block, procedure);
-      all.push_back({&block, i + 1, participant,
-                     protocols::true_threshold(procedure, participant),
+      all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
                      protocols::simulate_recovery(procedure, participant, participants, seed)});
     }
   }
   if (all.empty())
-    throw UsageError("--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
+    throw UsageError(
+        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
   return all;
 }
 
@@ -61,8 +62,7 @@ std::string table_text(const std::vector<RecoveredProcedure>& all, int participa
                        std::uint64_t seed) {
   std::string text = std::to_string(participants) +
                      " SIMULATED participants whose function is known, seed " +
-                     std::to_string(seed) +
-                     "; bias and spread on the scale of the procedure\n";
+                     std::to_string(seed) + "; bias and spread on the scale of the procedure\n";
   for (const RecoveredProcedure& one : all) {
     std::array<char, 300> line{};
     std::snprintf(line.data(), line.size(),
@@ -83,9 +83,9 @@ std::string recovery_text(const protocols::Protocol& protocol, int participants,
                           const std::string& format) {
   const std::vector<RecoveredProcedure> all = recovered(protocol, participants, seed);
   if (format == "table") return table_text(all, participants, seed);
-  const std::vector<std::string> columns{"block",   "procedure", "participants", "seed",
-                                         "true_threshold", "bias", "bias_se",      "spread",
-                                         "mean_trials",    "without_estimate"};
+  const std::vector<std::string> columns{
+      "block", "procedure", "participants", "seed",        "true_threshold",
+      "bias",  "bias_se",   "spread",       "mean_trials", "without_estimate"};
   CsvText csv(columns, "\r\n");
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const RecoveredProcedure& one : all) {

@@ -65,8 +65,8 @@ bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& b
   if (!trial.level || protocols::levels_of(block).size() < 2) return draw < 0.75;
   const protocols::PsychometricParticipant typical =
       protocols::typical_participant(protocol, block);
-  return draw < protocols::psychometric_probability(typical.function, typical.parameters,
-                                                    *trial.level);
+  return draw <
+         protocols::psychometric_probability(typical.function, typical.parameters, *trial.level);
 }
 
 }  // namespace

@@ -167,8 +167,8 @@ std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
   const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), 0, 1);
   std::vector<std::optional<double>> out;
   for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
-    const auto cell = std::find_if(
-        found.cells.begin(), found.cells.end(), [&](const analysis::TaskCell& one) {
+    const auto cell =
+        std::find_if(found.cells.begin(), found.cells.end(), [&](const analysis::TaskCell& one) {
           return one.block_name == wanted.block && one.renderer == wanted.renderer &&
                  one.shape == (wanted.task == "identify" ? "" : wanted.stimulus);
         });
@@ -243,8 +243,8 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
             tasks.trials.push_back(analysis::task_trial_of(simulated_code(participant), record));
         });
     if (!done) return std::nullopt;
-    row.figures = protocol.version == 2 ? task_figures_of(sweep.plan, std::move(tasks))
-                                        : trials.figures();
+    row.figures =
+        protocol.version == 2 ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();
   } catch (const std::exception& error) {
     row.reason = reason_of(error);
     row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);

@@ -109,10 +109,9 @@ double least_of_grid(const std::vector<LevelCount>& counts, const PsychometricMo
       for (double lapse = 0; lapse <= 0.0601; lapse += 0.006) {
         double loss = 0;
         for (const LevelCount& count : counts) {
-          const double p = psychometric_probability(model.function,
-                                                    {threshold, slope, 0.5, lapse}, count.level);
-          loss -= count.successes * std::log(p) +
-                  (count.trials - count.successes) * std::log1p(-p);
+          const double p =
+              psychometric_probability(model.function, {threshold, slope, 0.5, lapse}, count.level);
+          loss -= count.successes * std::log(p) + (count.trials - count.successes) * std::log1p(-p);
         }
         if (loss < least) least = loss;
       }
@@ -125,12 +124,9 @@ TEST(PsychometricFit, IsNoLocalMaximum) {
   PsychometricModel model;
   model.guess.value = 0.5;
   model.lapse = {0, true, 0.06};
-  const std::vector<std::pair<int, std::vector<int>>> studies{{10, {4, 9, 8, 9, 9}},
-                                                              {10, {5, 7, 4, 9, 8}},
-                                                              {20, {15, 13, 11, 19, 18}},
-                                                              {20, {15, 11, 14, 14, 20}},
-                                                              {10, {4, 7, 10, 8, 10}},
-                                                              {10, {9, 7, 10, 7, 10}}};
+  const std::vector<std::pair<int, std::vector<int>>> studies{
+      {10, {4, 9, 8, 9, 9}},      {10, {5, 7, 4, 9, 8}},   {20, {15, 13, 11, 19, 18}},
+      {20, {15, 11, 14, 14, 20}}, {10, {4, 7, 10, 8, 10}}, {10, {9, 7, 10, 7, 10}}};
   for (const auto& [trials, successes] : studies) {
     std::vector<LevelCount> counts;
     for (std::size_t i = 0; i < successes.size(); ++i)
