@@ -142,8 +142,13 @@ void ExploreView::draw_looks() {
   ImGui::SetNextItemWidth(0.4F * ImGui::GetContentRegionAvail().x);
   ImGui::Combo("cut across", &cut_axis_, "nothing\0x\0y\0z\0");
   if (cut_axis_ > 0) ImGui::SliderFloat("at", &cut_at_, -1, 1, "%.2f of the size");
-  if (settings_.keep_picture && wide_button("Keep this picture", ImGui::GetContentRegionAvail().x))
-    keep_picture();
+  if (!settings_.keep_picture) return;
+  if (wide_button("Keep this picture", ImGui::GetContentRegionAvail().x)) keep_picture();
+  if (clip_ != nullptr) {
+    ImGui::ProgressBar(static_cast<float>(clip_->done()), {-1, 0}, "drawing the clip");
+  } else if (wide_button("Keep the last 5 s as a clip", ImGui::GetContentRegionAvail().x)) {
+    keep_clip();
+  }
 }
 
 void ExploreView::draw_material() {

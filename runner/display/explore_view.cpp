@@ -72,10 +72,9 @@ void ExploreView::step(int moments) {
   source_.hold(true);
 }
 
-ScenePicture ExploreView::picture() const {
+ScenePicture ExploreView::picture(const SceneMoment* moment) const {
   SceneDrawingSettings looks = settings_.looks;
   looks.labels = labels_;
-  const SceneMoment* const moment = timeline_.shown();
   const SceneMoment none;
   ScenePicture out = settings_.drawing.picture(moment != nullptr ? *moment : none,
                                                dark_ ? dark_theme() : light_theme(), looks);
@@ -98,12 +97,28 @@ void ExploreView::keep_picture() {
   constexpr int kWide = 1280, kHigh = 720;
   Camera camera = camera_;
   camera.resize(kWide, kHigh);
-  renderer_.draw(picture(), camera, dark_ ? dark_theme() : light_theme(), kWide, kHigh);
-  note_ = settings_.keep_picture(png_of(renderer_.pixels(), kWide, kHigh));
+  renderer_.draw(picture(timeline_.shown()), camera, dark_ ? dark_theme() : light_theme(), kWide, kHigh);
+  note_ = settings_.keep_picture(png_of(renderer_.pixels(), kWide, kHigh), ".png");
+}
+
+void ExploreView::keep_clip() {
+  if (!settings_.keep_picture || clip_ != nullptr || timeline_.empty()) return;
+  clip_ = std::make_unique<ExploreClip>(timeline_, camera_);
+}
+
+void ExploreView::continue_clip() {
+  if (clip_ == nullptr) return;
+  const auto draw = [this](const SceneMoment& moment) { return picture(&moment); };
+  const std::optional<std::string> clip =
+      clip_->go_on(timeline_, draw, dark_ ? dark_theme() : light_theme());
+  if (!clip) return;
+  clip_.reset();
+  note_ = settings_.keep_picture(*clip, ".webp");
 }
 
 void ExploreView::draw(double seconds, const Modifiers& modifiers) {
   take_moments(seconds);
+  continue_clip();
   const ImGuiViewport* const all = ImGui::GetMainViewport();
   emergency_bottom_ = draw_emergency(emergency_highlit_);
   ImGui::SetNextWindowPos({all->WorkPos.x, all->WorkPos.y + emergency_bottom_});
@@ -144,7 +159,7 @@ void ExploreView::draw_scene(const Modifiers& modifiers, float width, float heig
   }
   const ImVec2 at = ImGui::GetCursorScreenPos(), scale = ImGui::GetIO().DisplayFramebufferScale;
   const unsigned texture =
-      renderer_.draw(picture(), camera_, dark_ ? dark_theme() : light_theme(),
+      renderer_.draw(picture(timeline_.shown()), camera_, dark_ ? dark_theme() : light_theme(),
                      static_cast<int>(width * scale.x), static_cast<int>(height * scale.y));
   // OpenGL textures have their origin at the lower left.
   // NOLINTNEXTLINE(performance-no-int-to-ptr): the identity that the OpenGL back end asks for

@@ -2,11 +2,13 @@
 // What the window of a scene shows: its panels, and what they keep from frame to frame.
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "runner/display/console_view.h"
+#include "runner/display/explore_clip.h"
 #include "runner/display/explore_window.h"
 #include "runner/display/scene/scene_renderer.h"
 #include "runner/display/timeline.h"
@@ -28,6 +30,7 @@ class ExploreView {
   void pause_or_go_on();
   void step(int moments);
   void keep_picture();
+  void keep_clip();
 
  private:
   void take_moments(double seconds);
@@ -40,7 +43,8 @@ class ExploreView {
   void draw_values();
   void draw_looks();
   void draw_material();
-  ScenePicture picture() const;
+  ScenePicture picture(const SceneMoment* moment) const;
+  void continue_clip();
 
   ExploreSettings settings_;
   TouchSource& source_;
@@ -49,6 +53,7 @@ class ExploreView {
   std::optional<PointerControl> control_;
   Timeline timeline_;
   std::vector<SceneMoment> fresh_;
+  std::unique_ptr<ExploreClip> clip_;  ///< while one is drawn
   std::string under_pointer_, note_;
   bool labels_ = false, dark_ = true;
   int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z

@@ -20,8 +20,8 @@ struct ExploreSettings {
   SceneDrawingSettings looks;    ///< at first
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the scene; nullptr: none
   WorkspaceMap workspace = {};   ///< of the servo, for the mouse
-  /// Keeps a picture and says where, or why not; empty: no pictures are kept.
-  std::function<std::string(const std::string& png)> keep_picture = {};
+  /// Keeps a picture (".png") or a clip (".webp") and says where, or why not; empty: none are kept.
+  std::function<std::string(const std::string& bytes, const char* kind)> keep_picture = {};
   /// Asked once a frame: true ends the window.
   std::function<bool()> end_requested = {};
 };

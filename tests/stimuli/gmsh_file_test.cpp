@@ -80,6 +80,15 @@ TEST(GmshFile, EveryFaultIsNamedWithItsLine) {
   expect_fault(with(good, "2 6 1 9", "2 99999999999 1 9"), "line 9", "at most");
 }
 
+TEST(GmshFile, ElementsFillSpaceOnce) {
+  const std::string two = "3 1 4 2\n2 1 2 4 7\n3 1 2 4 5\n";
+  expect_fault(with(two_tetrahedra(), two, "3 1 4 3\n2 1 2 4 7\n3 1 2 4 5\n4 5 1 2 4\n"), "line 32",
+               "each tetrahedron once");
+  expect_fault(with(two_tetrahedra(), two, "3 1 4 3\n2 1 2 4 7\n3 1 2 4 5\n4 1 2 4 9\n"), "line 32",
+               "at most two tetrahedra on a face");
+  expect_fault(with(two_tetrahedra(), "2 6 1 9", "2 5 1 9"), "line 23", "5 nodes");
+}
+
 TEST(GmshFile, NoCutOfAFileIsMoreThanAFault) {
   const std::string good = two_tetrahedra();
   for (std::size_t length = 0; length + 2 < good.size(); ++length)

@@ -61,6 +61,10 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
       throw UsageError("--" + std::string(option) +
                        " goes with the window: leave out --frames and --animation");
   Outputs outputs(values, {"animation"}, {"SCENE.json", "trajectory"});
+  const std::string animation =
+      values.count("animation") > 0 ? text_of(values, "animation") : std::string();
+  if (!animation.empty() && !animation.ends_with(".webp"))
+    throw UsageError("--animation " + animation + ": expected a name that ends in .webp");
   if (values.count("frames") > 0) check_frames_folder(settings.folder, settings.may_replace);
   const std::string scene_path = text_of(values, "SCENE.json");
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);

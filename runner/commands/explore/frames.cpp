@@ -74,10 +74,11 @@ TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& sp
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
                    const rendering::RenderState& state) {
                  const bool shown = next < rows.size() && rows[next] == row++;
+                 // Arrows are sized by the whole path, whichever rows become pictures.
+                 for (const ContactPlace& contact : contact_places(scene, state, rendering))
+                   out.strongest = std::max(out.strongest, glm::length(contact.force));
                  if (!shown) return;
                  const SceneMoment moment = moment_of(pose, spec, scene, rendering, state);
-                 for (const ContactPlace& contact : moment.contacts)
-                   out.strongest = std::max(out.strongest, glm::length(contact.force));
                  out.most_torque = std::max(out.most_torque, glm::length(torque_on_hand(moment)));
                  // A path with gaps shows a row more than once.
                  for (; next < rows.size() && rows[next] == row - 1; ++next)

@@ -40,14 +40,14 @@ protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
   return out;
 }
 
-/// Keeps pictures as scene-1.png and so on, the first number that is free.
-std::string keep_in(const std::string& folder, const std::string& png) {
+/// Keeps pictures as scene-1.png and so on, the first number that is free; clips likewise.
+std::string keep_in(const std::string& folder, const std::string& bytes, const char* kind) {
   try {
     fs::create_directories(folder);
     for (int number = 1;; ++number) {
-      const fs::path path = fs::path(folder) / ("scene-" + std::to_string(number) + ".png");
+      const fs::path path = fs::path(folder) / ("scene-" + std::to_string(number) + kind);
       if (fs::exists(path)) continue;
-      write_whole(path.string(), png);
+      write_whole(path.string(), bytes);
       return "kept as " + path.string();
     }
   } catch (const std::exception& fault) {
@@ -65,8 +65,8 @@ ExploreSettings window_settings(const protocols::SceneSpec& spec,
                       .drawing = std::move(drawing),
                       .looks = {.sides = renderer.side_contact(), .labels = settings.labels}};
   if (!settings.pictures.empty())
-    out.keep_picture = [folder = settings.pictures](const std::string& png) {
-      return keep_in(folder, png);
+    out.keep_picture = [folder = settings.pictures](const std::string& bytes, const char* kind) {
+      return keep_in(folder, bytes, kind);
     };
   return out;
 }

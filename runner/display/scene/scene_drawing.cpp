@@ -33,6 +33,7 @@ constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.0
 constexpr double kLengthOfOneNewton = 0.35;  // of the size
 constexpr double kTurnOfOneNewtonMetre = 3;  // radius, of the size
 constexpr double kLeastForce = 0.005;        // N; less is not drawn
+constexpr double kLeastTorque = 1e-4;        // N m; likewise
 constexpr double kRedOfSize = 0.2;           // of the radius: so far has given way what is red
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
@@ -327,7 +328,7 @@ void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
   const double radius =
       size * (settings.metres_per_newton_metre > 0 ? settings.metres_per_newton_metre
                                                    : kTurnOfOneNewtonMetre * size_);
-  if (!finite(torque) || radius < kLeastTurn * size_) return;
+  if (!finite(torque) || size < kLeastTorque || radius < kLeastTurn * size_) return;
   const rendering::LineProbe& held = moment.held ? *moment.held : moment.sample.probe;
   out.turns.push_back({0.5 * (held.tip + held.tail), torque / size,
                        static_cast<float>(std::min(radius, kLongestTurn * size_)),
