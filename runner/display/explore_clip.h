@@ -15,8 +15,8 @@ namespace palpate::runner {
 /// Needs the current OpenGL context of the window.
 class ExploreClip {
  public:
-  static constexpr double kSpan = 5, kEvery = 0.04;       ///< s, of the path
-  static constexpr int kWide = 640, kHigh = 360;          ///< px
+  static constexpr double kSpan = 5, kEvery = 0.04;  ///< s, of the path
+  static constexpr int kWide = 640, kHigh = 360;     ///< px
 
   /// The last kSpan before the moment that is shown; from the first where that is it.
   ExploreClip(const Timeline& timeline, const Camera& camera);

@@ -97,7 +97,8 @@ void ExploreView::keep_picture() {
   constexpr int kWide = 1280, kHigh = 720;
   Camera camera = camera_;
   camera.resize(kWide, kHigh);
-  renderer_.draw(picture(timeline_.shown()), camera, dark_ ? dark_theme() : light_theme(), kWide, kHigh);
+  renderer_.draw(picture(timeline_.shown()), camera, dark_ ? dark_theme() : light_theme(), kWide,
+                 kHigh);
   note_ = settings_.keep_picture(png_of(renderer_.pixels(), kWide, kHigh), ".png");
 }
 
