@@ -113,6 +113,7 @@ std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
   const std::span<const rendering::BodyPose> bodies = state.motion.bodies();
   if (bodies.empty()) return {};
   std::vector<Pose> out;
+  out.reserve(objects.size());
   for (const stimuli::ObjectSpec& object : objects) out.push_back(object.pose);
   for (const rendering::BodyPose& body : bodies) {
     Pose& pose = out[static_cast<std::size_t>(body.object)];
@@ -164,6 +165,7 @@ std::shared_ptr<const DrawnMesh> SceneDrawing::drawn_soft(const Object& object,
   const std::vector<Vec3>& rest = object.soft->rest;
   const std::vector<Vec3> places(now.places.begin(), now.places.end());
   std::vector<float> tints;
+  tints.reserve(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double moved = glm::distance(places[i], rest[i]) / (kRedOfSize * object.top);
     tints.push_back(static_cast<float>(std::clamp(moved, 0.0, 1.0)));

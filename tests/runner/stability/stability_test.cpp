@@ -10,6 +10,7 @@
 #include "runner/servo/passivity.h"
 #include "runner/stability/boundary.h"
 #include "runner/stability/integrators.h"
+#include "runner/stability/soft_map.h"
 
 namespace palpate::runner {
 namespace {
@@ -197,6 +198,18 @@ TEST(Integrators, TheExactOneIsExactAndTheOthersConverge) {
     }
   }
   EXPECT_GT(blown_up, 2);
+}
+
+TEST(SoftMap, ScenesHaveWhatComesToRestAndNotWhatSwings) {
+  const SoftSwing calm = press_and_hold({.young = 1e5, .stiffness = 3000, .rate = 62.5});
+  EXPECT_TRUE(calm.accepted);
+  EXPECT_TRUE(calm.settles()) << calm.swing;
+  EXPECT_GT(calm.force, 0.1);
+  const SoftSwing wild =
+      press_and_hold({.young = 1e3, .stiffness = 3000, .rate = 125, .damping = 0});
+  EXPECT_TRUE(wild.finite);
+  EXPECT_FALSE(wild.settles()) << wild.swing;
+  EXPECT_FALSE(wild.accepted);
 }
 
 }  // namespace
