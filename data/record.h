@@ -11,6 +11,13 @@
 
 namespace palpate::data {
 
+/// Where a stimulus that moves is, by the column names of `palpate render --bodies`. World frame.
+struct BodyRecord {
+  std::array<double, 3> centre{};  ///< m, of mass
+  std::array<double, 4> orientation_wxyz{1, 0, 0, 0};
+  std::array<double, 3> velocity{}, spin{};  ///< m/s, of the centre of mass; rad/s
+};
+
 /// One servo tick of a trial; recorded if the protocol has samples = true.
 struct SampleRecord {
   std::uint32_t tick = 0;               ///< from time zero of the trial
@@ -27,6 +34,8 @@ struct SampleRecord {
   std::uint8_t contact_type = 0;
   std::uint8_t buttons = 0;
   std::uint32_t faults = 0;  ///< fault bits of the tick
+  std::uint8_t bodies = 0;   ///< 1: the stimulus moves, after the tick as `body` says
+  BodyRecord body;
 };
 
 /// One presentation within a trial of version 2 of protocols.

@@ -21,7 +21,7 @@ void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body) {
     stimuli::Body& read = body.emplace();
     const auto number = [&section](const char* key, std::optional<double>& out,
                                    const NumberRange& range) {
-      if (!section.has(key)) return;
+      if (section.member(key) == nullptr) return;  // known now, for faults of unknown ones
       double value = 1;
       section.number(key, value, range);
       out = value;

@@ -5,6 +5,7 @@
 
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "protocols/parse_body.h"
 #include "protocols/parse_object.h"
 #include "protocols/parse_tool.h"
 #include "protocols/schedule.h"
@@ -297,6 +298,7 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
   });
   read_tool(reader, protocol.tool);
   read_reach(reader, protocol.reach);
+  read_gravity(reader, protocol.gravity);
   reader.section("servo", [&](ObjectReader& section) {
     section.number("rate_hz", protocol.servo_rate, {100, 10000, "Hz"});
     section.boolean("passivity_controller", protocol.passivity_controller);

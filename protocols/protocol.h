@@ -85,6 +85,7 @@ struct Protocol {
   } workspace;
   ToolSpec tool;                   ///< on the virtual stylus
   std::optional<ReachSpec> reach;  ///< the virtual stylus is longer than the real one
+  Vec3 gravity{0, 0, 0};           ///< m/s^2, on stimuli that move or give
   stimuli::Material material;
   double servo_rate = 1000;           ///< Hz
   bool passivity_controller = false;  ///< dissipates the energy that sampling would generate

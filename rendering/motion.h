@@ -24,6 +24,13 @@ struct BodyPose {
   Pose moved;        ///< from where the scene placed the object to where it is
 };
 
+/// Somebody draws an object by a spring beside the probe, as with the mouse.
+struct BodyPull {
+  int object = -1;  ///< index in the scene; -1: none is drawn
+  Vec3 on_object;   ///< m, world; the place on it, where the scene placed the object at first
+  Vec3 to;          ///< m, world; where that place is drawn to
+};
+
 /// All that moves, from tick to tick.
 class MotionState {
  public:
@@ -31,6 +38,8 @@ class MotionState {
   virtual std::unique_ptr<MotionState> clone() const = 0;
   /// By object. Valid until the next tick, which changes them in place.
   virtual std::span<const BodyPose> bodies() const = 0;
+  /// From the next tick on until the next call. Objects that cannot be drawn stay as they are.
+  virtual void pull(const BodyPull& /*pull*/) noexcept {}
 
  protected:
   MotionState() = default;

@@ -304,6 +304,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
 
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
     : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
+      gravity_(protocol.gravity),
       tool_(tool_of(protocol.tool)) {
   SceneBuilder builder;
   for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
@@ -315,7 +316,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
       std::vector<rendering::SceneObject> objects;
       try {
         const rendering::Scene scene =
-            builder.build({stimulus.object}, sides, {}, Vec3(0), soft_radius_);
+            builder.build({stimulus.object}, sides, {}, gravity_, soft_radius_);
         for (const auto& object : rendering::soft_objects(scene)) {
           soft_.back() = object;
           for (const Vec3& node : object->rest) reach = std::max(reach, glm::length(node));
@@ -362,12 +363,12 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
     object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
   std::shared_ptr<const rendering::SoftObject> soft = soft_[trial.stimulus];
   if (soft == nullptr)
-    return rendering::moving_scene(std::move(objects), moving, Vec3(0), sides, tool_);
+    return rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_);
   if (trial.orientation != Quat(1, 0, 0, 0)) {
     const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
     soft = rendering::build_soft_object(spec,
                                         stimuli::compose({Vec3(0), trial.orientation}, spec.pose),
-                                        {soft_radius_, Vec3(0), 0});
+                                        {soft_radius_, gravity_, 0});
   }
   return rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects), {soft},
                                sides, tool_);

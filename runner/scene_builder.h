@@ -97,6 +97,7 @@ class StimulusLibrary {
   std::vector<std::vector<rendering::MovingObject>> moving_;  ///< by stimulus: itself or nothing
   std::vector<double> reaches_;
   std::vector<SharpEdges> edges_;
+  Vec3 gravity_;  ///< m/s^2
   rendering::Tool tool_;
 };
 

@@ -83,15 +83,16 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
        << record.started_inside << record.max_force << record.contact_share << record.edge_dwell;
   const auto count = static_cast<std::int64_t>(record.samples.size());
   const std::string packed = count > 0 ? pack_samples(record.samples) : "";
-  bind << (count > 0 ? std::optional(checksum_of_samples(kSamplesPacking, count, packed.data(),
-                                                         packed.size()))
-                     : std::nullopt)
+  const int packing = packing_for(record.samples);
+  bind << (count > 0
+               ? std::optional(checksum_of_samples(packing, count, packed.data(), packed.size()))
+               : std::nullopt)
        << (record.task ? std::optional(task_text(*record.task)) : std::nullopt) << id;
   update.exec();
   if (count == 0) return;
   SQLite::Statement insert(
       db, "INSERT INTO samples (attempt_id, packing, count, data) VALUES (?, ?, ?, ?)");
-  Binder(insert) << id << kSamplesPacking << count;
+  Binder(insert) << id << packing << count;
   insert.bindNoCopy(4, packed.data(), static_cast<int>(packed.size()));
   insert.exec();
 }

@@ -13,7 +13,8 @@ namespace palpate::data {
 namespace {
 
 constexpr std::size_t bytes_a_sample(int packing) {
-  return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0);
+  return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0) +
+         (packing > 3 ? 1 + 13 * 8 : 0);
 }
 // Limits of the count that is read, so that a damaged one cannot make the decoder allocate memory
 // out of proportion to the compressed bytes: at most a trial of an hour at the highest rate, and
@@ -80,6 +81,21 @@ void visit_columns(int packing, Visitor&& column) {
     column(
         [](auto& s) -> auto& { return s.faults; }, kByte);
   }
+  if (packing < 4) return;
+  column(
+      [](auto& s) -> auto& { return s.bodies; }, kByte);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.body.centre[i]; }, kReal);
+  for (int i = 0; i < 4; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.body.orientation_wxyz[i]; }, kReal);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.body.velocity[i]; }, kReal);
+  for (int i = 0; i < 3; ++i)
+    column(
+        [i](auto& s) -> auto& { return s.body.spin[i]; }, kReal);
 }
 
 constexpr std::size_t kCrcSize = 4;
@@ -164,11 +180,18 @@ std::string compressed(const std::vector<unsigned char>& planes, int level) {
 
 }  // namespace
 
+int packing_for(const std::vector<SampleRecord>& samples) {
+  const bool moves =
+      std::any_of(samples.begin(), samples.end(), [](const auto& s) { return s.bodies > 0; });
+  return moves ? kSamplesPacking : kPlainSamplesPacking;
+}
+
 std::string pack_samples(const std::vector<SampleRecord>& samples) {
   const std::size_t count = samples.size();
-  std::vector<unsigned char> planes(count * bytes_a_sample(kSamplesPacking));
+  const int packing = packing_for(samples);
+  std::vector<unsigned char> planes(count * bytes_a_sample(packing));
   std::size_t offset = 0;
-  visit_columns(kSamplesPacking, [&](auto get, auto form) {
+  visit_columns(packing, [&](auto get, auto form) {
     using Field = decltype(form);
     using Pattern = Bits<Field>;
     Pattern before = 0;

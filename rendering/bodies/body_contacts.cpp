@@ -128,7 +128,10 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
     if (!places) return;
     find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
     for (const ManifoldPoint& point : state_.manifold.points()) {
-      if (state_.contacts.size() == BodyWorldState::kMostContacts) return;
+      if (state_.contacts.size() == BodyWorldState::kMostContacts) {
+        state_.dropped = true;
+        return;
+      }
       state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
                                  point.place, state_.manifold.normal, point.gap,
                                  static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
@@ -287,7 +290,7 @@ void BodyContacts::add_row(std::uint32_t a, std::uint32_t b, const Vec3& place,
                            const Vec3& direction, double least_speed, double bound, int leader,
                            int spring) {
   if (state_.problem.full()) {
-    ++state_.not_converged;
+    state_.dropped = true;
     return;
   }
   Row row;

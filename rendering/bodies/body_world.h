@@ -36,6 +36,7 @@ struct MovingBody {
 
 /// What stands still: the parts of one object.
 struct Obstacle {
+  int object = 0;
   std::vector<CollidingPart> parts;
   Vec3 centre;
   double radius = 0;
@@ -106,6 +107,7 @@ struct BodyWorldState {
   std::vector<GapMemory> gaps;  ///< of each part pair
   std::vector<SleepState> sleep;
   std::size_t sleeping = 0;         ///< bodies
+  bool dropped = false;             ///< contacts or friction of them, since this was set to false
   std::uint64_t not_converged = 0;  ///< problems that met the limit of pivots
 
   // Room. Copies of a state have none until they make it.

@@ -94,6 +94,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   const LineProbe last = state.has_last || !touches ? state.last : probe;
   Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
   const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
+  state.world.dropped = false;
   const int steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
   for (int i = 0; i < steps; ++i) {
     const auto at = [&](int k) {
@@ -123,6 +124,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
 }
 
 void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {
+  if (state.drawn.object >= 0) draw(state, stroke.duration);
   state.before = state.world.motion;
   if (stroke.duration > 0) step_bodies(world_, state.world, stroke.duration);
   if (stroke.touches) {
@@ -143,6 +145,31 @@ void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stro
     if (!is_finite(state.world.motion[i])) state.world.motion[i] = world_.bodies[i].start;
   }
   settle(state, stroke);
+}
+
+/// A critically damped spring of the same period for every mass.
+void MovingBodies::draw(BodiesState& state, double duration) const {
+  constexpr double kRate = 20, kMost = 100;  // rad/s; m/s^2
+  for (std::uint32_t i = 0; i < world_.bodies.size(); ++i) {
+    const MovingBody& body = world_.bodies[i];
+    if (body.object != state.drawn.object) continue;
+    BodyMotion& motion = state.world.motion[i];
+    const Quat turn = motion.orientation * glm::conjugate(body.placed.orientation);
+    const Vec3 arm = turn * (state.drawn.on_object - body.placed.position);
+    const Vec3 speed = motion.velocity + glm::cross(spin_of(body.inertia, motion), arm);
+    const Vec3 wanted = kRate * kRate * (state.drawn.to - motion.centre - arm) - 2 * kRate * speed;
+    const double size = glm::length(wanted);
+    if (!(size > 0) || !std::isfinite(size)) continue;
+    const Vec3 direction = wanted / size;
+    const Vec3 moment = glm::cross(arm, direction);
+    const double per_mass =
+        body.inertia.per_mass +
+        glm::dot(moment, world_per_inertia(body.inertia, motion.orientation) * moment);
+    const double impulse = std::min(size, kMost) / per_mass * duration;
+    wake(state.world, i);
+    motion.velocity += impulse * body.inertia.per_mass * direction;
+    motion.spin_momentum += impulse * moment;
+  }
 }
 
 /// Renders each body in its frame, where it will be unless the probe holds it up.

@@ -31,6 +31,7 @@ class BodiesState final : public MotionState {
  public:
   std::unique_ptr<MotionState> clone() const override;
   std::span<const BodyPose> bodies() const override { return poses; }
+  void pull(const BodyPull& by) noexcept override { drawn = by; }
 
   RenderState fixed;                ///< of what stands still
   std::vector<RenderState> shapes;  ///< of each body, in its frame
@@ -56,6 +57,7 @@ class BodiesState final : public MotionState {
   std::size_t most_contacts = 0;
   std::vector<ProbeContact> contacts;
   std::vector<PressingSpring> springs;
+  BodyPull drawn;
   LineProbe last;
   Mat3 last_frame = Mat3(1);
   bool has_last = false;
@@ -78,6 +80,7 @@ class MovingBodies final : public SceneMotion {
     bool touches = true;  ///< false: the probe is not where it can be
   };
   void step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
+  void draw(BodiesState& state, double duration) const;
   void feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
   void find_probe_contacts(BodiesState& state, const Stroke& stroke) const;
   void go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const;

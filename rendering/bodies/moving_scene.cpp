@@ -75,6 +75,7 @@ MovingBody make_body(const MovingObject& moving, const std::vector<SceneObject>&
 
 Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
   Obstacle obstacle;
+  obstacle.object = parts.front().object;
   for (const SceneObject& part : parts) {
     if (part.layer > 0) continue;
     obstacle.parts.push_back(colliding(part, part.pose));
@@ -122,7 +123,48 @@ void check_masses(const BodyWorld& world) {
   refuse(lightest->object, text.str());
 }
 
+/// What overlaps at first would fly apart.
+void check_overlaps(const BodyWorld& world) {
+  constexpr double kMostOverlap = 1e-4;  // m; less comes apart slowly
+  for (const BodyPair& pair : world.pairs) {
+    const MovingBody& a = world.bodies[pair.a];
+    const std::vector<CollidingPart>& parts =
+        pair.obstacle ? world.obstacles[pair.b].parts : world.bodies[pair.b].parts;
+    const Pose frame = pair.obstacle ? Pose{} : world.bodies[pair.b].placed;
+    double overlap = 0;
+    for (std::uint32_t k = pair.first; k < pair.first + pair.count; ++k) {
+      GapMemory memory;
+      const PartPair& both = world.part_pairs[k];
+      const ConvexPlace at_a = place_of(a.parts[both.part_a], a.placed);
+      const ConvexPlace at_b = place_of(parts[both.part_b], frame);
+      overlap = std::max(overlap, -gap_between(at_a, at_b, 0, memory).distance);
+    }
+    if (overlap <= kMostOverlap) continue;
+    std::ostringstream text;
+    text << "is " << 1e3 * overlap << " mm inside of object "
+         << (pair.obstacle ? world.obstacles[pair.b].object : world.bodies[pair.b].object)
+         << " at first; expected at most " << 1e3 * kMostOverlap << " mm";
+    refuse(a.object, text.str());
+  }
+}
+
 }  // namespace
+
+std::optional<MovingSummary> moving_summary(const Scene& scene) {
+  const auto* const moving = dynamic_cast<const MovingBodies*>(scene.motion());
+  if (moving == nullptr) return std::nullopt;
+  const BodyWorld& world = moving->world();
+  MovingSummary out;
+  out.bodies = world.bodies.size();
+  out.obstacles = world.obstacles.size();
+  out.part_pairs = world.part_pairs.size();
+  out.lightest = HUGE_VAL;
+  for (const MovingBody& body : world.bodies) {
+    out.lightest = std::min(out.lightest, body.inertia.mass);
+    out.heaviest = std::max(out.heaviest, body.inertia.mass);
+  }
+  return out;
+}
 
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps) {
@@ -166,6 +208,7 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
     if (!obstacle.parts.empty()) world.obstacles.push_back(std::move(obstacle));
   }
   world.pair_up();
+  check_overlaps(world);
   auto motion = std::make_shared<const MovingBodies>(
       std::move(world), Scene(std::move(fixed), side_contact, tool), std::move(shapes));
   return Scene(std::move(parts), side_contact, tool, std::move(motion));

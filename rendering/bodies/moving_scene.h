@@ -3,6 +3,8 @@
 // stands still, so the contact law and the ideal tool go with it; what the hand is pushed with, it
 // is pushed back with.
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "rendering/scene.h"
@@ -27,5 +29,14 @@ inline constexpr std::size_t kMostBodies = 64;
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact = true, const Tool& tool = {},
                    bool sleeps = true);
+
+/// What of a scene moves, in numbers.
+struct MovingSummary {
+  std::size_t bodies = 0, obstacles = 0;
+  std::size_t part_pairs = 0;  ///< of convex parts that may meet
+  double lightest = 0, heaviest = 0;  ///< kg
+};
+/// Empty where nothing moves as a rigid body, or something gives besides.
+std::optional<MovingSummary> moving_summary(const Scene& scene);
 
 }  // namespace palpate::rendering

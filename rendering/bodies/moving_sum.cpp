@@ -61,6 +61,7 @@ void MovingBodies::add_body(const Renderer& renderer, const BodiesState& state, 
 Rendering MovingBodies::sum(const Renderer& renderer, const BodiesState& state,
                             const Rendering& fixed, const LineProbe& probe) const {
   Rendering out = fixed;
+  if (state.world.dropped) out.faults |= render_fault::kContactsDropped;
   for (std::size_t i = 0; i < world_.bodies.size(); ++i) add_body(renderer, state, i, probe, out);
   out.device1 = out.force - out.device2;
   const Vec3 all = out.force + out.torque + out.device2;

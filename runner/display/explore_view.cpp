@@ -172,12 +172,44 @@ void ExploreView::draw_scene(const Modifiers& modifiers, float width, float heig
                              ImGuiButtonFlags_MouseButtonMiddle);
   steer(modifiers, at.x, at.y);
   const float font = ImGui::GetFontSize();
-  const char* const hint =
-      control_ && timeline_.state() == Timeline::State::following
-          ? "pointer: the tip    wheel: press harder    left: turn    right: look    middle: move"
-          : "drag: look    middle or Shift: move    wheel: nearer";
+  const char* const hint = control_ && timeline_.state() == Timeline::State::following
+                               ? (shown != nullptr && !shown->poses.empty()
+                                      ? "pointer: the tip    wheel: press    left: turn    Shift "
+                                        "and left: pull an object    "
+                                        "right: look"
+                                      : "pointer: the tip    wheel: press harder    left: turn    "
+                                        "right: look    middle: "
+                                        "move")
+                               : "drag: look    middle or Shift: move    wheel: nearer";
   ImGui::GetWindowDrawList()->AddText({at.x + 0.8F * font, at.y + height - 1.6F * font},
                                       IM_COL32(150, 158, 168, 255), hint);
+}
+
+/// Shift and the left button draw an object that moves, at the place under the pointer, in the
+/// plane of the picture. \return whether one is drawn
+bool ExploreView::pull(const Modifiers& modifiers, const glm::vec2& at, bool left) {
+  const SceneMoment* const shown = timeline_.shown();
+  const bool wanted = left && modifiers.shift && shown != nullptr && source_.live() &&
+                      timeline_.state() == Timeline::State::following;
+  if (!wanted || shown->poses.empty()) {
+    if (pull_.object >= 0) source_.pull(pull_ = {});
+    return false;
+  }
+  if (pull_.object < 0) {
+    const glm::vec3 eye = camera_.eye();
+    const auto hit = settings_.drawing.hit(
+        eye, glm::normalize(camera_.unproject(at, camera_.centre()) - eye), shown->poses);
+    if (!hit || !settings_.objects[hit->object].body) return false;
+    const Pose& now = shown->poses[hit->object];
+    const Pose& first = settings_.objects[hit->object].pose;
+    const Vec3 local = glm::conjugate(now.orientation) * (Vec3(hit->place) - now.position);
+    pull_.object = static_cast<int>(hit->object);
+    pull_.on_object = first.orientation * local + first.position;
+    pulled_from_ = hit->place;
+  }
+  pull_.to = Vec3(camera_.unproject(at, pulled_from_));
+  source_.pull(pull_);
+  return true;
 }
 
 void ExploreView::steer(const Modifiers& modifiers, float x, float y) {
@@ -198,6 +230,7 @@ void ExploreView::steer(const Modifiers& modifiers, float x, float y) {
   } else if (pointer.orbit || (left && !touches)) {
     camera_.orbit(-kOrbitPerPixel * pointer.moved.x, kOrbitPerPixel * pointer.moved.y);
   }
+  if (pull(modifiers, pointer.at, left)) return;
   const SceneMoment* const shown = timeline_.shown();
   const auto line_of_sight = [&](const glm::vec3& from, const glm::vec3& along) {
     return settings_.drawing.hit(from, along, shown ? shown->poses : std::vector<Pose>());

@@ -36,6 +36,7 @@ class ExploreView {
   void take_moments(double seconds);
   void draw_scene(const Modifiers& modifiers, float width, float height);
   void steer(const Modifiers& modifiers, float x, float y);
+  bool pull(const Modifiers& modifiers, const glm::vec2& at, bool left);
   void draw_time(float width);
   void draw_plot(float width, float height);
   void draw_side();
@@ -55,6 +56,8 @@ class ExploreView {
   std::vector<SceneMoment> fresh_;
   std::unique_ptr<ExploreClip> clip_;  ///< while one is drawn
   std::string under_pointer_, note_;
+  rendering::BodyPull pull_;        ///< by the pointer; object -1: none
+  glm::vec3 pulled_from_{0, 0, 0};  ///< m; where the pointer took hold: the pull stays as far away
   bool labels_ = false, dark_ = true;
   int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z
   float cut_at_ = 0;        ///< of the size of the scene

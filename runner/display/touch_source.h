@@ -21,6 +21,8 @@ class TouchSource {
   virtual void hold(bool held) = 0;
   /// Touches these from now on: the same shapes, of other materials.
   virtual void show(const std::vector<stimuli::ObjectSpec>& objects) = 0;
+  /// Draws an object that moves, until the next call; where nothing is live, nothing happens.
+  virtual void pull(const rendering::BodyPull& /*by*/) noexcept {}
   /// Zero force at once and until clear_fault().
   virtual void emergency_zero() noexcept = 0;
   virtual void clear_fault() noexcept = 0;

@@ -23,6 +23,11 @@ class Ring {
     written_.store(at + 1, std::memory_order_release);
     return true;
   }
+  /// By the writer: how many more have room.
+  std::size_t room() const noexcept {
+    return slots_.size() -
+           (written_.load(std::memory_order_relaxed) - read_.load(std::memory_order_acquire));
+  }
   /// By the reader. False where there is nothing.
   bool pop(T& value) noexcept {
     const std::size_t at = read_.load(std::memory_order_relaxed);

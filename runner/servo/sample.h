@@ -37,6 +37,7 @@ struct Sample {
   rendering::Rendering rendering;  ///< as rendered
   Vec3 device1, device2;           ///< N, as commanded after the limits
   std::uint8_t buttons = 0;
+  std::uint8_t bodies = 0;  ///< poses of this tick in TickSource::bodies()
   std::uint32_t faults = 0;
   DeviceTrouble trouble = DeviceTrouble::none;
 };

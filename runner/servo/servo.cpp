@@ -85,6 +85,16 @@ void Servo::clear_fault() noexcept {
   clear_trip();
 }
 
+std::span<const rendering::BodyPose> Servo::bodies() const noexcept {
+  if (shown_ == nullptr || sample_.phase != Phase::feeling) return {};
+  return shown_->state.motion.bodies();
+}
+
+void Servo::pull(const rendering::BodyPull& by) noexcept {
+  if (shown_ == nullptr) return;
+  if (rendering::MotionState* const motion = shown_->state.motion.get()) motion->pull(by);
+}
+
 bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
   const HomeZone& home = shown_->home;
   // It is the hand that rests: a long virtual stylus trembles more.
@@ -192,6 +202,7 @@ const Sample& Servo::tick() noexcept {
   sample_.rendering = shown_->renderer->tick(shown_->scene, shown_->state, sample_.probe,
                                              static_cast<double>(sample_.period_ns) * 1e-9);
   if (workspace_.reach) sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
+  sample_.bodies = static_cast<std::uint8_t>(bodies().size());
   sample_.faults |= sample_.rendering.faults;
   constexpr std::uint32_t kEnds =
       rendering::render_fault::kNonFinite | rendering::render_fault::kSoftStalled;
@@ -212,6 +223,7 @@ ServoQuality Servo::stop() noexcept {
   sample_.waiting = Waiting::nothing;
   sample_.device1 = sample_.device2 = Vec3(0);
   sample_.rendering = {};
+  sample_.bodies = 0;
   shown_ = nullptr;
   quality_.max_force = std::sqrt(strongest2_);
   return std::exchange(quality_, {});

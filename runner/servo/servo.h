@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/servo/device.h"
 #include "runner/servo/force_limiter.h"
 #include "runner/servo/passivity.h"
+#include "runner/servo/ring.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/tick_source.h"
 #include "runner/workspace_map.h"
@@ -25,6 +27,9 @@ struct TrialScene {
     rendering::pace_by_tick(state);
     // A soft body's shadow would be a body of its own, with steps of its own.
     if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
+    constexpr std::size_t kTicks = 2048;  // that wait for the session at most
+    const std::size_t bodies = state.motion.bodies().size();
+    if (bodies > 0) poses = std::make_unique<Ring<rendering::BodyPose>>(kTicks * bodies);
   }
 
   const rendering::Scene scene;
@@ -32,6 +37,8 @@ struct TrialScene {
   rendering::RenderState state;                  ///< the servo's alone while the scene is shown
   std::optional<rendering::RenderState> shadow;  ///< likewise; a tick behind: for keep_warm()
   HomeZone home;
+  /// Of what moves, tick by tick: from a servo's thread to the session's. None where nothing moves.
+  std::unique_ptr<Ring<rendering::BodyPose>> poses;
 };
 
 class Servo final : public TickSource {
@@ -45,6 +52,13 @@ class Servo final : public TickSource {
   /// the device's own transfer.
   const Sample& tick() noexcept;
   const Sample& next() noexcept override { return tick(); }
+  std::span<const rendering::BodyPose> bodies() const noexcept override;
+  /// Somebody draws an object of the scene, until it is told otherwise.
+  void pull(const rendering::BodyPull& by) noexcept;
+  /// Of the scene that is shown; none: nothing in it moves.
+  Ring<rendering::BodyPose>* poses() noexcept {
+    return shown_ != nullptr ? shown_->poses.get() : nullptr;
+  }
   ServoQuality stop() noexcept override;
 
   /// As prepare, but without allocating and without a new start of the ticks' times. `shown` must

@@ -60,6 +60,8 @@ void ServoThread::take_requests() noexcept {
     servo_.begin(*incoming_.exchange(nullptr, std::memory_order_acquire));
     gap_ = lost_samples_ = false;
   }
+  rendering::BodyPull pull;
+  if (pull_.read(pull)) servo_.pull(pull);
   const std::uint32_t asked = stops_asked_.load(std::memory_order_acquire);
   if (asked != stops_done_.load(std::memory_order_relaxed)) {
     quality_ = servo_.stop();
@@ -68,17 +70,27 @@ void ServoThread::take_requests() noexcept {
   }
 }
 
+/// To the session; false where there is no room.
+bool ServoThread::hand_over(const Sample& sample) noexcept {
+  if (sample.bodies > 0) {
+    Ring<rendering::BodyPose>& poses = *servo_.poses();
+    if (ring_.room() == 0 || poses.room() < sample.bodies) return false;
+    for (const rendering::BodyPose& pose : servo_.bodies()) poses.push(pose);
+  }
+  return ring_.push(sample);
+}
+
 void ServoThread::publish(const Sample& sample) noexcept {
   off_.store((sample.faults & servo_fault::kTripped) != 0 || sample.phase != Phase::feeling);
   health_.add(sample, servo_.period_ns());
   latest_.write(sample);
   if (sample.phase == Phase::idle) return;
   if (!gap_) {
-    gap_ = !ring_.push(sample);
+    gap_ = !hand_over(sample);
   } else {
     Sample after_gap = sample;
     after_gap.faults |= servo_fault::kSamplesLost;
-    gap_ = !ring_.push(after_gap);
+    gap_ = !hand_over(after_gap);
   }
   if (!gap_) return;
   lost_samples_ = true;
@@ -102,6 +114,7 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
   while (ring_.pop(popped_)) {
   }
   popped_ = {};
+  popped_bodies_.resize(shown->state.motion.bodies().size());
   scenes_.push_back(std::move(shown));
   scene_set_ = true;
   incoming_.store(&scenes_.back()->trial, std::memory_order_release);
@@ -112,10 +125,11 @@ const Sample& ServoThread::next() noexcept {
   while (!ring_.pop(popped_)) {
     if (steady_clock::now() >= give_up) {
       popped_.faults |= servo_fault::kStalled | servo_fault::kTripped;
-      break;
+      return popped_;
     }
     std::this_thread::sleep_for(kNap);
   }
+  for (std::size_t i = 0; i < popped_.bodies; ++i) scenes_.back()->poses->pop(popped_bodies_[i]);
   return popped_;
 }
 

@@ -46,6 +46,11 @@ class ServoThread final : public TickSource {
   /// last sample with kStalled and kTripped.
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
+  std::span<const rendering::BodyPose> bodies() const noexcept override {
+    return {popped_bodies_.data(), popped_.bodies};
+  }
+  /// Somebody draws an object of the scene, until it is told otherwise. By one thread, any.
+  void pull(const rendering::BodyPull& by) noexcept { pull_.write(by); }
 
   /// Where the tool touched, with ServoSettings::touched_places: of the ticks with contact alone,
   /// in order; some are lost where the session does not keep up. By the session's thread.
@@ -76,6 +81,7 @@ class ServoThread final : public TickSource {
   void take_requests() noexcept;
   void publish(const Sample& sample) noexcept;
   void publish_places(const Sample& sample) noexcept;
+  bool hand_over(const Sample& sample) noexcept;
 
   const RealtimeSettings realtime_;
   Servo servo_;
@@ -104,12 +110,14 @@ class ServoThread final : public TickSource {
   TripleBuffer<Sample> latest_;
   Ring<TouchedPlaces> places_;
   bool tells_places_;
+  TripleBuffer<rendering::BodyPull> pull_;
   // The servo's own:
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};
   std::atomic<int> thread_id_{0};
   Sample popped_;
+  std::vector<rendering::BodyPose> popped_bodies_;  ///< the session thread's, with popped_
   std::jthread thread_;
 };
 

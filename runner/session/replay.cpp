@@ -8,6 +8,7 @@
 #include "runner/devices/replay.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo.h"
+#include "runner/session/body_record.h"
 #include "runner/session/level_scenes.h"
 
 namespace palpate::runner {
@@ -92,9 +93,9 @@ std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
   return intervals;
 }
 
-void replay(
-    const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
-    const std::function<void(std::size_t, const data::SampleRecord&, const Sample&)>& visit) {
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+            const std::function<void(std::size_t, const data::SampleRecord&,
+                                     const ReplayedSample&)>& visit) {
   const auto intervals = samples_of_intervals(recorded);
   const std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other);
   // One whose time was over before it began has none.
@@ -115,7 +116,9 @@ void replay(
     servo.prepare(shown[i].scene, renderer_for(shown[i].renderer), kAnywhere);
     for (const data::SampleRecord& sample : intervals[i]) {
       servo.hold_steps((sample.faults & rendering::render_fault::kSoftLate) != 0);
-      Sample again = servo.tick();
+      ReplayedSample again;
+      static_cast<Sample&>(again) = servo.tick();
+      if (again.bodies > 0) again.body = servo.bodies().front();
       if (reach) again.rendering = rendering::felt(*reach, again.rendering);
       visit(i, sample, again);
     }
@@ -123,8 +126,10 @@ void replay(
   }
 }
 
-bool equals_record(const data::SampleRecord& recorded, const Sample& again) {
+bool equals_record(const data::SampleRecord& recorded, const ReplayedSample& again) {
   const rendering::Rendering& r = again.rendering;
+  if (recorded.bodies > 0 && !(again.body && same_body(recorded.body, body_record(*again.body))))
+    return false;
   return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
          recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
          recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&

@@ -18,6 +18,11 @@ namespace palpate::runner {
 std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
     const data::TrialRecord& recorded);
 
+/// What a tick has come to.
+struct ReplayedSample : Sample {
+  std::optional<rendering::BodyPose> body;  ///< of a stimulus that moves
+};
+
 /// Puts a recorded trial through the servo and a renderer again, interval by interval.
 /// \param recorded  with samples
 /// \param other     false: the recorded renderer, which gives the recorded forces, to the bit;
@@ -25,13 +30,13 @@ std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
 ///                  the other one, as it would have shown the same path
 /// \param visit     number of the interval from 0, each recorded tick and what comes of it now
 /// \throws std::invalid_argument where protocol and record do not agree
-void replay(
-    const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
-    const std::function<void(std::size_t, const data::SampleRecord&, const Sample&)>& visit);
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+            const std::function<void(std::size_t, const data::SampleRecord&,
+                                     const ReplayedSample&)>& visit);
 
 /// Whether a tick's rendering is what is on record, bit by bit (a zero's sign aside, which the
 /// store does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault
-/// bits.
-bool equals_record(const data::SampleRecord& recorded, const Sample& again);
+/// bits; of a stimulus that moves, where it is and how fast it goes.
+bool equals_record(const data::SampleRecord& recorded, const ReplayedSample& again);
 
 }  // namespace palpate::runner

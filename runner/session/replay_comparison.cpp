@@ -72,7 +72,7 @@ ForceSummary render_again(const protocols::Protocol& protocol, const data::Trial
   double time = 0;
   out.ticks.reserve(record.samples.size());
   replay(protocol, record, false,
-         [&](std::size_t interval, const data::SampleRecord& was, const Sample& is) {
+         [&](std::size_t interval, const data::SampleRecord& was, const ReplayedSample& is) {
            if (interval == out.intervals.size()) {
              out.intervals.push_back(interval_of(record, interval));
              time = 0;

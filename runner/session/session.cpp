@@ -6,6 +6,7 @@
 
 #include "data/files/utc.h"
 #include "runner/safety/fault_table.h"
+#include "runner/session/body_record.h"
 
 namespace palpate::runner {
 namespace {
@@ -267,6 +268,10 @@ void Session::record_sample(const Sample& sample) {
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
   kept.faults = sample.faults;
+  if (const auto bodies = station_.servo.bodies(); !bodies.empty()) {
+    kept.bodies = 1;  // a stimulus is one object
+    kept.body = body_record(bodies.front());
+  }
   record_.samples.push_back(kept);
 }
 

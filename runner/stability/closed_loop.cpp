@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "rendering/bodies/moving_scene.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
 #include "stimuli/inset.h"
@@ -44,7 +45,7 @@ rendering::SceneObject ridge(double h, double x, const stimuli::Material& materi
 
 std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ray,
                                                const stimuli::Material& material) {
-  constexpr double kHalf = 0.03, kRadius = 0.03, kWall = 0.5;
+  constexpr double kHalf = 0.03, kRadius = 0.03, kWall = 0.5, kThick = 0.02;
   switch (contact_case) {
     case ContactCase::wall:
       return {object(stimuli::cube(2 * kWall), {{0, 0, -kWall}, {1, 0, 0, 0}}, material, 0)};
@@ -65,6 +66,11 @@ std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ra
       }
       return walls;
     }
+    case ContactCase::body:
+      return {
+          object(stimuli::cube(2 * kWall), {{0, 0, -kWall - kThick}, {1, 0, 0, 0}}, material, 0),
+          object(stimuli::box({0.1, 0.1, kThick}), {{0, 0, -0.5 * kThick}, {1, 0, 0, 0}}, material,
+                 1)};
   }
   throw std::invalid_argument("no such situation");
 }
@@ -88,6 +94,16 @@ std::vector<rendering::SceneObject> with_layers(std::vector<rendering::SceneObje
   return out;
 }
 
+rendering::Scene scene_of(ContactCase contact_case, bool ray, const stimuli::Material& material) {
+  std::vector<rendering::SceneObject> objects =
+      with_layers(objects_of(contact_case, ray, material));
+  if (contact_case != ContactCase::body) return rendering::Scene(std::move(objects), ray);
+  constexpr double kMass = 0.01;  // kg
+  rendering::MovingObject body{1, {}, objects.back().pose};
+  body.body.mass = kMass;
+  return rendering::moving_scene(std::move(objects), {body}, Vec3(0), ray);
+}
+
 /// The stylus at height 0, with its lowest point near the origin.
 rendering::LineProbe stylus_at_height_0(ContactCase contact_case, bool ray) {
   if (!ray) {
@@ -97,7 +113,7 @@ rendering::LineProbe stylus_at_height_0(ContactCase contact_case, bool ray) {
     const Vec3 tip(x, 0.7e-3, 0);
     return {tip, tip + Vec3(0, 0, kLength)};
   }
-  if (contact_case == ContactCase::wall) {
+  if (contact_case == ContactCase::wall || contact_case == ContactCase::body) {
     const Vec3 tip(0.001, 0.002, 0);
     return {tip, tip + kLength * glm::normalize(Vec3(1, 0, 1))};
   }
@@ -286,6 +302,8 @@ const char* to_string(ContactCase contact_case) {
       return "sphere";
     case ContactCase::two_objects:
       return "two objects";
+    case ContactCase::body:
+      return "body on a wall";
   }
   return "";
 }
@@ -293,19 +311,20 @@ const char* to_string(ContactCase contact_case) {
 LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
                      const stimuli::Material& material)
     : renderer_(&renderer_for(kind)),
-      scene_(with_layers(objects_of(contact_case, renderer_->side_contact(), material)),
-             renderer_->side_contact()) {
+      scene_(scene_of(contact_case, renderer_->side_contact(), material)) {
   const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
   rendering::RenderState state = scene_.initial_state();
   rendering::Rendering r;
   constexpr double kStep = 1e-6;
+  // s; damping hardly acts. A body is stepped by the millisecond.
+  const double slow = contact_case == ContactCase::body ? 0.05 : 1;
   // Lowered from above to the wanted depth, as first contact needs a path from outside.
   for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
     rest_ = lowered(start, down, down);
-    r = renderer_->tick(scene_, state, rest_, 1);
+    r = renderer_->tick(scene_, state, rest_, slow);
     if (down > 0.05) throw std::logic_error("nothing under the stylus");
   }
-  r = renderer_->tick(scene_, state, rest_, 1);  // a second tick at rest: without damping force
+  r = renderer_->tick(scene_, state, rest_, slow);  // a second tick at rest: without damping force
   force_tip_ = r.device1.z;
   force_tail_ = r.device2.z;
   contacts_ = static_cast<int>(r.contacts);

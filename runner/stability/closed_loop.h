@@ -41,9 +41,11 @@ enum class ContactCase {
   edge,         ///< a cube's edge: the ray lies across it, the point touches a face near it
   sphere,       ///< met by the tip (point), by the side (ray)
   two_objects,  ///< the ray lies across two edges; the point is in a groove between two walls
+  body,         ///< a body of 10 g that can move and lies on a plane, met by the tip
 };
 inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
-                                                ContactCase::sphere, ContactCase::two_objects};
+                                                ContactCase::sphere, ContactCase::two_objects,
+                                                ContactCase::body};
 const char* to_string(ContactCase contact_case);
 
 /// A scene and the equilibrium of the stylus in it.

@@ -48,7 +48,7 @@ void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
                  kAnywhere);
 }
 
-void LiveTouch::keep(const Sample& sample) {
+void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> bodies) {
   if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
   last_ns_ = sample.time_ns;
   SceneMoment moment{.sample = sample, .contacts = {}};
@@ -59,6 +59,7 @@ void LiveTouch::keep(const Sample& sample) {
   }
   const WorkspaceMap& map = settings_.servo.workspace;
   if (map.reach) moment.held = unstretched(*map.reach, sample.probe);
+  moment.poses = object_poses(shown_, bodies);
   const std::lock_guard lock(mutex_);
   if (fresh_.size() == Timeline::kMost)  // of a display that stalls: the last minute is enough
     fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
@@ -122,7 +123,8 @@ void LiveTouch::record(const std::stop_token& stop) {
       std::this_thread::sleep_for(kIdle);
       continue;
     }
-    keep(servo_.next());
+    const Sample& sample = servo_.next();
+    keep(sample, servo_.bodies());
   }
 }
 

@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,6 +45,7 @@ class LiveTouch final : public TouchSource {
   void take(std::vector<SceneMoment>& out) override;
   void hold(bool held) override { held_.store(held); }
   void show(const std::vector<stimuli::ObjectSpec>& objects) override;
+  void pull(const rendering::BodyPull& by) noexcept override { servo_.pull(by); }
   void emergency_zero() noexcept override;
   void clear_fault() noexcept override { servo_.clear_fault(); }
   std::string trouble() const override;
@@ -55,7 +57,7 @@ class LiveTouch final : public TouchSource {
  private:
   void record(const std::stop_token& stop);
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
-  void keep(const Sample& sample);
+  void keep(const Sample& sample, std::span<const rendering::BodyPose> bodies);
   void add_contacts(SceneMoment& moment);
   void update_soft(std::int64_t now_ns);
 

@@ -6,7 +6,9 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <sstream>
 
+#include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/soft/soft_scene.h"
 
 namespace palpate::runner {
@@ -73,6 +75,26 @@ StageCost soft_stage(const rendering::SoftObject& object) {
   return {{"soft body", rendering::StageTime::tick, true, text}, std::nullopt};
 }
 
+/// What bodies do beside the contact law, with all of them in motion and the probe far away.
+StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer& renderer,
+                       const rendering::MovingSummary& moving) {
+  constexpr int kTicks = 500;
+  const auto now = [] { return std::chrono::steady_clock::now(); };
+  rendering::RenderState state = scene.initial_state();
+  const rendering::LineProbe far{Vec3(1e3), Vec3(1e3) + Vec3(0, 0, 0.12)};
+  const auto began = now();
+  for (int i = 0; i < kTicks; ++i) renderer.tick(scene, state, far, 1e-3);
+  const std::chrono::duration<double, std::nano> took = now() - began;
+  std::ostringstream text;
+  text.precision(3);
+  text << moving.bodies << (moving.bodies == 1 ? " object moves" : " objects move") << " ("
+       << moving.lightest << " to " << moving.heaviest << " kg), " << moving.obstacles
+       << " stand still; " << moving.part_pairs << " pairs of convex parts may meet; "
+       << 1e-3 * took.count() / kTicks
+       << " us a tick over the first half second without the probe; what rests sleeps";
+  return {{"moving bodies", rendering::StageTime::tick, true, text.str()}, std::nullopt};
+}
+
 }  // namespace
 
 Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer) {
@@ -105,6 +127,8 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
     if (with.stage.runs) with.ns = cost(with.stage.name);
     explanation.stages.push_back(std::move(with));
   }
+  if (const auto moving = rendering::moving_summary(scene))
+    explanation.stages.push_back(bodies_stage(scene, renderer, *moving));
   for (const auto& object : soft) explanation.stages.push_back(soft_stage(*object));
   explanation.rest_ns = explanation.contact_ns;
   for (const StageCost& c : explanation.stages) {

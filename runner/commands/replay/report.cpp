@@ -1,5 +1,6 @@
 #include "runner/commands/replay/report.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -71,6 +72,18 @@ void put(std::string& row, const RenderedForce& shown) {
   put(row, shown.depth);
 }
 
+/// Empty cells in an interval in which nothing moves.
+void put(std::string& row, int bodies, const data::BodyRecord& body) {
+  if (bodies == 0) {
+    row += std::string(13, ',');
+    return;
+  }
+  put_vector(row, body.centre);
+  for (const double q : body.orientation_wxyz) put(row, q);
+  put_vector(row, body.velocity);
+  put_vector(row, body.spin);
+}
+
 /// A line for each interval of a trial of version 2.
 std::string intervals_text(const ReplayComparison& found) {
   std::string text;
@@ -97,7 +110,7 @@ Json intervals_json(const ReplayComparison& found) {
   return all;
 }
 
-std::string csv_header(bool with_other, bool with_intervals) {
+std::string csv_header(bool with_other, bool with_intervals, bool with_body) {
   std::string header = with_intervals ? "interval,tick,t" : "tick,t";
   const auto add = [&header](const std::string& vector) {
     for (const char* axis : {"_x", "_y", "_z"}) header += "," + vector + axis;
@@ -109,6 +122,11 @@ std::string csv_header(bool with_other, bool with_intervals) {
     add(whose + "_force");
     add(whose + "_torque");
     header += "," + whose + "_depth";
+  }
+  if (with_body) {
+    for (const char* column :
+         {"x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"})
+      header += std::string(",recorded_body_") + column;
   }
   return header + "\n";
 }
@@ -163,7 +181,9 @@ std::string to_json_text(const std::string& name, const RecordedTrial& trial,
 
 std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
   const bool with_intervals = trial.stored.record.task.has_value();
-  std::string text = csv_header(found.other.has_value(), with_intervals);
+  const bool with_body = std::any_of(found.ticks.begin(), found.ticks.end(),
+                                     [](const auto& tick) { return tick.recorded->bodies > 0; });
+  std::string text = csv_header(found.other.has_value(), with_intervals, with_body);
   for (const ReplayedTick& tick : found.ticks) {
     const data::SampleRecord& was = *tick.recorded;
     if (with_intervals) text += std::to_string(tick.interval) + ",";
@@ -173,6 +193,7 @@ std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
     put(text, was.depth);
     put(text, tick.again);
     if (found.other) put(text, tick.other);
+    if (with_body) put(text, was.bodies, was.body);
     text += "\n";
   }
   return text;

@@ -110,7 +110,11 @@ std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_surfaces(
 
 std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
                                const rendering::RenderState& state) {
-  const std::span<const rendering::BodyPose> bodies = state.motion.bodies();
+  return object_poses(objects, state.motion.bodies());
+}
+
+std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
+                               std::span<const rendering::BodyPose> bodies) {
   if (bodies.empty()) return {};
   std::vector<Pose> out;
   out.reserve(objects.size());

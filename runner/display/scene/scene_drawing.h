@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,10 @@ struct SceneMoment {
   /// Of soft objects; those that are not there are drawn at rest.
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft = {};
 };
+
+/// Of objects of which some have moved; empty where none can.
+std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
+                               std::span<const rendering::BodyPose> bodies);
 
 struct SceneDrawingSettings {
   bool sides = true;                   ///< the side of the stylus touches, not its tip alone
