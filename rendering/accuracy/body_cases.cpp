@@ -131,6 +131,55 @@ BodyCase cradle() {
 
 BodyBox ground() { return {{1, 1, 0.1}, 0, {{0, 0, -0.05}, kUpright}, {}, {}, 0.5, 0.3}; }
 
+/// Corner after corner, now one, now two at once: nothing takes energy out.
+BodyCase tumbling_bounces(bool quick) {
+  BodyCase c;
+  c.name = "tumbling on a floor, restitution 1";
+  c.measure = "energy, relative";
+  c.gravity = {0, 0, -9.81};
+  c.duration = quick ? 1 : 10;
+  BodyBox floor = ground(), box{{0.05, 0.03, 0.04}, 0.1, {{0, 0, 0.2}, kUpright}};
+  floor.restitution = 1;
+  floor.friction = 0;
+  box.spin = {1, 2, 3};
+  c.boxes = {floor, box};
+  const auto energy = [box](const BoxMotion& at) {
+    return box_energy(box, at) + box.mass * 9.81 * at.centre.z;
+  };
+  const double before = energy({box.pose.position, kUpright, Vec3(0), box.spin});
+  c.error = [=](std::span<const BoxMotion> at) { return std::abs(energy(at[0]) / before - 1); };
+  return c;
+}
+
+/// A plank lands on an edge askew and goes on sliding. Newton's restitution with
+/// Coulomb's friction in closed form, in the plane of the fall.
+BodyCase plank() {
+  BodyCase c;
+  c.name = "plank on its edge, with friction";
+  c.measure = "speed, relative";
+  c.duration = 0.06;
+  const double restitution = 0.6, friction = 0.1, angle = 0.4;
+  BodyBox floor = ground(), box{{0.2, 0.06, 0.04}, 0.3, {}};
+  const Quat turn = glm::angleAxis(angle, Vec3(0, 1, 0));
+  const Vec3 corner = turn * Vec3(0.1, 0, -0.02);  // lowest
+  box.pose = {{0, 0, 0.0499 - corner.z}, turn};
+  box.velocity = {-3, 0, -1};
+  floor.restitution = box.restitution = restitution;
+  floor.friction = box.friction = friction;
+  c.boxes = {floor, box};
+  const double moment = box_moments(box.size, box.mass).y, per_mass = 1 / box.mass;
+  // The floor drags along +x: impulses (friction n, n) at the corner.
+  const double lever = corner.z * friction - corner.x;  // of n about y
+  const double n = (1 + restitution) / (per_mass - corner.x * lever / moment);
+  const Vec3 velocity = box.velocity + n * per_mass * Vec3(friction, 0, 1);
+  const double spin = n * lever / moment;
+  c.error = [=](std::span<const BoxMotion> at) {
+    return std::max(glm::distance(at[0].velocity, velocity),
+                    0.1 * glm::distance(at[0].spin, Vec3(0, spin, 0)));
+  };
+  return c;
+}
+
 BodyCase heavy_on_light(bool quick) {
   BodyCase c;
   c.name = "10 kg on 1 g";
@@ -198,8 +247,12 @@ BodyCase collisions() {
 }  // namespace
 
 std::vector<BodyCase> body_cases(bool quick) {
-  return {tumbling(quick),       coin(),      head_on(), oblique(), rod(), cradle(), collisions(),
-          heavy_on_light(quick), stack(quick)};
+  return {tumbling(quick), coin(),
+          head_on(),       oblique(),
+          rod(),           plank(),
+          cradle(),        tumbling_bounces(quick),
+          collisions(),    heavy_on_light(quick),
+          stack(quick)};
 }
 
 }  // namespace palpate::rendering

@@ -2,6 +2,8 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <cmath>
+
 #include "rendering/accuracy/body_engines.h"
 
 namespace palpate::rendering::peers {
@@ -47,8 +49,8 @@ class BulletBodies final : public BodyEngine {
     const Quat& q = box.pose.orientation;
     info.m_startWorldTransform =
         btTransform(btQuaternion(q.x, q.y, q.z, q.w), bullet_vector(box.pose.position));
-    info.m_restitution = box.restitution;
-    info.m_friction = box.friction;
+    info.m_restitution = std::sqrt(box.restitution);  // it multiplies those of a pair
+    info.m_friction = std::sqrt(box.friction);
     info.m_linearSleepingThreshold = info.m_angularSleepingThreshold = 0;
     bodies_.push_back(std::make_unique<btRigidBody>(info));
     bodies_.back()->setLinearVelocity(bullet_vector(box.velocity));

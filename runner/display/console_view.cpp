@@ -114,7 +114,7 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
   const unsigned texture =
-      scene_.draw(state_.objects, state_.tool, state_.sample, camera_,
+      scene_.draw(state_.objects, state_.tool, state_.sample, state_.bodies, camera_,
                   static_cast<int>(width * scale.x), static_cast<int>(height * scale.y));
   // OpenGL textures have their origin at the lower left.
   // NOLINTNEXTLINE(performance-no-int-to-ptr): the identity that the OpenGL back end asks for

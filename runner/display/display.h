@@ -98,12 +98,13 @@ struct ConsoleState {
   int seconds_left = 0;            ///< of a break
   Checklist checklist;             ///< before the first trial; else without steps
   int session = 0, block = 0, blocks = 0, trial = 0, trials = 0;
-  double elapsed = 0;                 ///< s, of this session
-  double remaining = 0;               ///< s, estimated, without breaks; 0 while unknown
-  std::vector<double> times;          ///< s, identification times so far, in order
-  std::vector<std::string> messages;  ///< newest last: faults, notes, actions
-  std::size_t older_messages = 0;     ///< dropped before the first
-  Sample sample;                      ///< the servo's newest
+  double elapsed = 0;                       ///< s, of this session
+  double remaining = 0;                     ///< s, estimated, without breaks; 0 while unknown
+  std::vector<double> times;                ///< s, identification times so far, in order
+  std::vector<std::string> messages;        ///< newest last: faults, notes, actions
+  std::size_t older_messages = 0;           ///< dropped before the first
+  Sample sample;                            ///< the servo's newest
+  std::vector<rendering::BodyPose> bodies;  ///< of what moves, where the session has seen it last
   std::shared_ptr<const std::vector<stimuli::ObjectSpec>>
       objects;                                ///< of the current trial, virtual frame
   rendering::Tool tool;                       ///< that the stylus carries; empty: none

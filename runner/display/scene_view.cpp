@@ -13,13 +13,14 @@ SceneView::SceneView() : renderer_(SceneRenderer::live_quality()) {}
 
 std::optional<glm::vec3> SceneView::hit(const glm::vec3& from, const glm::vec3& along) const {
   if (!drawing_) return std::nullopt;
-  const auto found = drawing_->hit(from, along);
+  const auto found = drawing_->hit(from, along, poses_);
   if (!found) return std::nullopt;
   return found->place;
 }
 
 unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
-                         const Camera& camera, int width, int height) {
+                         std::span<const rendering::BodyPose> bodies, const Camera& camera,
+                         int width, int height) {
   if (objects != shown_ || !drawing_) {
     trouble_.clear();
     shown_ = objects;
@@ -30,7 +31,10 @@ unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, co
       drawing_.emplace(std::vector<stimuli::ObjectSpec>(), tool);
     }
   }
+  poses_.clear();
+  if (objects != nullptr) poses_ = object_poses(*objects, bodies);
   SceneMoment moment{sample, {}};
+  moment.poses = poses_;
   if (sample.rendering.contacts > 0)
     // The force that was commanded, which may be less than the rendered one.
     moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});

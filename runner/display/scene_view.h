@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,9 +21,11 @@ class SceneView {
 
   using Objects = std::shared_ptr<const std::vector<stimuli::ObjectSpec>>;
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
+  /// \param bodies  where objects that move are
   unsigned draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
-                const Camera& camera, int width, int height);
-  /// The first point where a line meets, from outside, the objects drawn last.
+                std::span<const rendering::BodyPose> bodies, const Camera& camera, int width,
+                int height);
+  /// The first point where a line meets, from outside, the objects drawn last, where they were.
   std::optional<glm::vec3> hit(const glm::vec3& from, const glm::vec3& along) const;
   /// Why the objects could not be drawn; empty: they were.
   const std::string& trouble() const { return trouble_; }
@@ -31,6 +34,7 @@ class SceneView {
   SceneRenderer renderer_;
   Objects shown_;
   std::optional<SceneDrawing> drawing_;  ///< of these
+  std::vector<Pose> poses_;              ///< of the objects; empty: none can move
   std::string trouble_;
 };
 

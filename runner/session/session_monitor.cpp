@@ -68,6 +68,11 @@ void SessionMonitor::show() {
   state_.blocks = plan.blocks();
   state_.remaining = seconds_per_trial_ * static_cast<double>(plan.size() - plan.done());
   state_.sample = sources_.forces.newest();
+  state_.bodies.clear();
+  if (feeling_) {
+    const auto bodies = station_.servo.bodies();
+    state_.bodies.assign(bodies.begin(), bodies.end());
+  }
   state_.fault = sources_.hold.fault();
   if (in_trial_) {
     state_.state = feeling_ ? "trial" : "homing";

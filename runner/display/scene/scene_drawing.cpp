@@ -120,6 +120,7 @@ std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
   out.reserve(objects.size());
   for (const stimuli::ObjectSpec& object : objects) out.push_back(object.pose);
   for (const rendering::BodyPose& body : bodies) {
+    if (static_cast<std::size_t>(body.object) >= out.size()) continue;  // of another scene
     Pose& pose = out[static_cast<std::size_t>(body.object)];
     pose = stimuli::compose(body.moved, pose);
   }

@@ -62,6 +62,39 @@ std::vector<SampleRecord> a_stroke(int ticks) {
   return samples;
 }
 
+TEST(SamplesCodec, WhereABodyWasComesBackAndOthersArePackedAsEver) {
+  std::mt19937_64 random(4);
+  std::vector<SampleRecord> samples = a_stroke(50);
+  EXPECT_EQ(packing_for(samples), kPlainSamplesPacking);
+  const std::string plain = pack_samples(samples);
+  for (std::size_t i = 10; i < samples.size(); ++i) {  // at first nothing was shown
+    SampleRecord& s = samples[i];
+    s.bodies = 1;
+    for (auto* vector : {&s.body.centre, &s.body.velocity, &s.body.spin}) {
+      for (double& x : *vector) x = std::bit_cast<double>(random());
+    }
+    for (double& x : s.body.orientation_wxyz) x = std::bit_cast<double>(random());
+  }
+  EXPECT_EQ(packing_for(samples), kSamplesPacking);
+  const std::string packed = pack_samples(samples);
+  const auto back = unpack_samples(packed.data(), packed.size(), 50, kSamplesPacking);
+  const auto bits = [](const auto& values) {
+    std::vector<std::uint64_t> out;
+    for (const double x : values) out.push_back(std::bit_cast<std::uint64_t>(x));
+    return out;
+  };
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_EQ(bits_of(back[i]), bits_of(samples[i])) << i;
+    EXPECT_EQ(back[i].bodies, samples[i].bodies) << i;
+    EXPECT_EQ(bits(back[i].body.centre), bits(samples[i].body.centre)) << i;
+    EXPECT_EQ(bits(back[i].body.orientation_wxyz), bits(samples[i].body.orientation_wxyz)) << i;
+    EXPECT_EQ(bits(back[i].body.velocity), bits(samples[i].body.velocity)) << i;
+    EXPECT_EQ(bits(back[i].body.spin), bits(samples[i].body.spin)) << i;
+  }
+  EXPECT_THROW(unpack_samples(plain.data(), plain.size(), 50, kSamplesPacking), StoreError);
+  EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 50, kPlainSamplesPacking), StoreError);
+}
+
 TEST(SamplesCodec, EveryBitPatternComesBack) {
   std::mt19937_64 random(1);
   std::vector<SampleRecord> samples(257);

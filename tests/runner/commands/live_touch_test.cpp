@@ -92,6 +92,43 @@ TEST_F(LiveTouchTest, ADisplayThatStallsMakesNoTickLateAndLosesNone) {
   EXPECT_NEAR(moments.back().contacts[0].place.y, 0.025, 1e-9);
 }
 
+/// What moves is where it is in every moment, and goes where somebody draws it.
+TEST_F(LiveTouchTest, WhatMovesIsShownAndCanBeDrawn) {
+  LiveTouch::Settings settings = settings_of();
+  stimuli::ObjectSpec ball;
+  ball.shape = stimuli::ShapeKind::cube;
+  ball.edge = 0.02;
+  ball.pose.position = {0.2, 0, 0};
+  ball.body.emplace().mass = 0.3;
+  ball.body->velocity = {0, 0, 0.01};
+  settings.spec.objects.push_back(ball);
+  LiveTouch touch(device_, clock_, std::move(settings));
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 1000; }));
+  std::vector<SceneMoment> moments;
+  touch.take(moments);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    ASSERT_EQ(moments[i].poses.size(), 2U) << i;
+    EXPECT_EQ(moments[i].poses[0].position, Vec3(0)) << i;
+    // The first tick is as long as another.
+    EXPECT_NEAR(moments[i].poses[1].position.z, 1e-5 * static_cast<double>(i + 1), 1e-9) << i;
+  }
+  const Vec3 corner(0.21, 0.01, 0.01), to(0.25, 0.03, 0);
+  touch.pull({.object = 1, .on_object = corner, .to = to});
+  SceneMoment last;
+  const auto newest = [&] {
+    moments.clear();
+    touch.take(moments);
+    if (!moments.empty()) last = moments.back();
+    return last;
+  };
+  EXPECT_TRUE(comes_true([&] {
+    const Pose pose = newest().poses.at(1);
+    return glm::distance(pose.orientation * (corner - Vec3(0.2, 0, 0)) + pose.position, to) < 1e-3;
+  }));
+  touch.pull({});
+  EXPECT_EQ(last.sample.faults, 0U);
+}
+
 TEST_F(LiveTouchTest, OfALongStallTheLastPartIsKept) {
   LiveTouch touch(device_, clock_, settings_of());
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 70'000; }));

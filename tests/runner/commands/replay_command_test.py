@@ -1,13 +1,16 @@
 """palpate replay from outside. Usage: replay_command_test.py PALPATE"""
 
 import csv
+import hashlib
 import json
+import math
 import pathlib
 import sqlite3
 import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
@@ -35,6 +38,16 @@ class Replay(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done
 
+    @staticmethod
+    def replace_samples(db, data):
+        with sqlite3.connect(db) as base:
+            attempt, packing, count = base.execute("SELECT attempt_id, packing, count FROM samples LIMIT 1").fetchone()
+            base.execute("UPDATE samples SET data = ? WHERE attempt_id = ?", (data, attempt))
+            checksum = hashlib.sha256(packing.to_bytes(4, "little") + count.to_bytes(8, "little") + data).digest()
+            base.execute("UPDATE attempts SET samples_sha256 = ? WHERE id = ?", (checksum, attempt))
+            seals.seal_again(base)
+        base.close()
+
     def study(self, name="study", **wanted):
         path, db = self.dir / f"{name}.json", self.dir / f"{name}.db"
         path.write_text(json.dumps(protocol(**wanted)))
@@ -45,6 +58,44 @@ class Replay(unittest.TestCase):
                                   "ORDER BY a.trial").fetchall()
         base.close()
         return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
+
+    def test_where_a_stimulus_that_moves_was_is_on_record_and_comes_again(self):
+        design = protocol()
+        design["gravity_m_per_s2"] = [0, 0, -0.02]
+        for stimulus in design["stimuli"]:
+            stimulus["body"] = {"mass_kg": 0.5, "damping_per_s": 1}
+        path, db, out = (self.dir / f"moves.{end}" for end in ("json", "db", "csv"))
+        path.write_text(json.dumps(design))
+        self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3)
+        self.palpate("replay", "--db", db, "--trial", "S001/1/1", "--out", out)
+        with out.open() as file:
+            rows = list(csv.DictReader(file))
+        self.assertGreater(len(rows), 100)
+        places = [[float(row[f"recorded_body_{axis}"]) for axis in "xyz"] for row in rows]
+        # At first it falls as in a fluid; then the stylus has pushed it somewhere.
+        t = 0.1
+        fallen = -0.02 * (t - 1 + math.exp(-t))
+        first = next(i for i, row in enumerate(rows) if float(row["t"]) >= t - 0.001 - 1e-9)  # it is where it is after the tick
+        self.assertTrue(all(float(row["recorded_depth"]) == 0 for row in rows[:first]))
+        self.assertAlmostEqual(places[first][2], fallen, delta=1e-8)
+        self.assertTrue(any(float(row["recorded_depth"]) > 0 for row in rows))
+        self.assertGreater(max(abs(x) for x, _, _ in places), 1e-4)
+        for row in rows[:: len(rows) // 20]:
+            q = [float(row[f"recorded_body_q{k}"]) for k in "wxyz"]
+            self.assertAlmostEqual(sum(x * x for x in q), 1, delta=1e-12)
+        # One bit of one place that is off is told.
+        with sqlite3.connect(db) as base:
+            packing, count, data = base.execute("SELECT packing, count, data FROM samples LIMIT 1").fetchone()
+        base.close()
+        self.assertEqual(packing, 4)
+        planes = bytearray(zlib.decompress(data[:-4]))
+        self.assertEqual(len(planes), count * (4 + 8 + 2 * 8 + 19 * 8 + 3 + 4 + 1 + 13 * 8))
+        body_x_low = (4 + 8 + 2 * 8 + 19 * 8 + 3 + 4 + 1) * count + 7 * count
+        planes[body_x_low + count - 1] ^= 1
+        changed = zlib.compress(bytes(planes)) + zlib.crc32(bytes(planes)).to_bytes(4, "big")
+        self.replace_samples(db, changed)
+        done = self.palpate("replay", "--db", db, "--trial", "S001/1/1", status=1)
+        self.assertIn("1 of ", done.stdout)
 
     def test_every_trial_is_equal_bit_by_bit_whatever_the_material(self):
         for name, material in [("plain", {}), ("rough", {"friction_static": 0.4, "friction_dynamic": 0.3, "damping_ns_per_m": 0.05})]:
