@@ -47,7 +47,7 @@ MAY_INCLUDE = {
     "runner/session": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices",
                                "runner/display", "runner/participants", "runner/sound"},
     "runner/sweep": SERVO | {"protocols", "runner/participants"},
-    "runner/stability": SERVO | {"protocols", "runner/devices"},
+    "runner/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
     "runner/bench": SERVO | {"runner/safety"},
 }
 # The commands, the Python module and main() may include everything.
