@@ -10,6 +10,9 @@ namespace palpate::rendering {
 
 class BodyContacts {
  public:
+  /// m; parts that are so near touch. Above rounding, below what is seen or felt.
+  static constexpr double kTouching = 1e-8;
+
   BodyContacts(const BodyWorld& world, BodyWorldState& state) : world_(world), state_(state) {}
 
   /// Sets state.near, near_parts and contacts: what touches or may meet within a time, s.

@@ -1,6 +1,7 @@
 #pragma once
 // Motion of a scene's bodies under the probe. Internal to moving_scene.cpp.
 
+#include <glm/geometric.hpp>
 #include <memory>
 #include <vector>
 
@@ -8,9 +9,27 @@
 #include "rendering/bodies/body_world.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
+#include "rendering/tool_pose.h"
 #include "rendering/union_contact.h"
 
 namespace palpate::rendering {
+
+inline Vec3 into(const Pose& frame, const Vec3& world) {
+  return glm::conjugate(frame.orientation) * (world - frame.position);
+}
+inline LineProbe into(const Pose& frame, const LineProbe& probe) {
+  return {into(frame, probe.tip), into(frame, probe.tail)};
+}
+
+inline ToolPose into(const Pose& frame, const LineProbe& probe, const Mat3& tool) {
+  const Mat3 back = glm::mat3_cast(glm::conjugate(frame.orientation));
+  const Vec3 tip = into(frame, probe.tip);
+  return {tip, into(frame, probe.tail) - tip, back * tool};
+}
+
+inline Vec3 out_of(const Pose& frame, const Vec3& local) {
+  return frame.orientation * local + frame.position;
+}
 
 /// A contact of the probe with a body, world frame.
 struct ProbeContact {

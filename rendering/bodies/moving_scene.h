@@ -33,7 +33,7 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
 /// What of a scene moves, in numbers.
 struct MovingSummary {
   std::size_t bodies = 0, obstacles = 0;
-  std::size_t part_pairs = 0;  ///< of convex parts that may meet
+  std::size_t part_pairs = 0;         ///< of convex parts that may meet
   double lightest = 0, heaviest = 0;  ///< kg
 };
 /// Empty where nothing moves as a rigid body, or something gives besides.

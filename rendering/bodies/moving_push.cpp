@@ -1,0 +1,185 @@
+// What the probe gives bodies and gets back. Part of moving_bodies.h.
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "rendering/bodies/moving_bodies.h"
+#include "rendering/bodies/spring_pass.h"
+
+namespace palpate::rendering {
+
+/// One spring on a body that touches nothing else: in closed form, with the normal and the lever in
+/// the middle of the step. Changes the body's motion.
+void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double duration) const {
+  PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  const BodyMotion& before = state.before[spring.body];
+  BodiesState::Held& held = state.held[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  // As it was at the beginning of the step.
+  const Rendering& felt = state.felt[spring.body];
+  constexpr double kSame = 1 - 2e-4;  // cosine; beyond it another feature is touched
+  const bool known =
+      held.holds &&
+      (felt.contacts == 0 ||
+       (felt.deepest.type == held.type &&
+        glm::dot(motion.orientation * held.contact.spring.normal, spring.normal) > kSame));
+  const Vec3 first_normal =
+      before.orientation *
+      (known ? held.contact.spring.normal : glm::conjugate(motion.orientation) * spring.normal);
+  const Vec3 first_place =
+      known ? out_of({before.centre, before.orientation}, held.contact.spring.place)
+            : contact.on_probe - contact.moved;
+  const Vec3 normal = glm::normalize(first_normal + spring.normal);
+  const Vec3 moment =
+      0.5 * glm::cross(first_place - before.centre + spring.place - motion.centre, normal);
+  const Quat middle = glm::normalize(before.orientation + motion.orientation);
+  const Vec3 turn = world_per_inertia(body.inertia, middle) * moment;
+  const double first_closing =
+      glm::dot(first_normal, velocity_at(spin_of(body.inertia, before), before, first_place) -
+                                 contact.moved / duration);
+  SpringStart start;
+  start.stiffness = spring.stiffness;
+  start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
+  start.growth = (spring.closing - first_closing) / duration;
+  start.speed = first_closing;
+  start.depth = spring.depth - duration * (start.speed + 0.5 * duration * start.growth);
+  const SpringPass pass = pass_spring(start, duration);
+  if (!held.holds) {
+    const double depth = std::max(0.0, start.depth);
+    held.energy = kinetic_energy(body.inertia, before) + 0.5 * spring.stiffness * depth * depth;
+    held.impulse = 0;
+    held.balanced = true;
+  }
+  held.energy += kinetic_energy(body.inertia, motion) - kinetic_energy(body.inertia, before) -
+                 glm::dot(world_.gravity, normal) * pass.double_impulse -
+                 pass.impulse * glm::dot(normal, contact.moved) / duration;
+  held.impulse += pass.impulse;
+  spring.impulse = pass.impulse;
+  contact.pressing = normal;
+  contact.depth_after = pass.depth;
+  const Vec3 mean_momentum =
+      0.5 * (before.spin_momentum + motion.spin_momentum) - pass.double_impulse / duration * moment;
+  motion.velocity -= pass.impulse * body.inertia.per_mass * normal;
+  motion.spin_momentum -= pass.impulse * moment;
+  motion.centre -= pass.double_impulse * body.inertia.per_mass * normal;
+  motion.orientation = turned_freely(body.inertia, mean_momentum, before.orientation, duration);
+  balance(state, contact, moment, duration);
+}
+
+/// On its way off the probe a body's energy, with the spring's, has to be what it came with and
+/// what hand and weight have given it since. What steps of finite length have lost or won of it
+/// (some 1e-4, where the body turns on the probe) the impulse makes good.
+void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
+                           double duration) const {
+  constexpr double kMostShare = 1e-2;  // of the whole impulse: more is no rounding of steps
+  PressingSpring& spring = contact.spring;
+  BodiesState::Held& held = state.held[spring.body];
+  if (contact.tangential != Vec3(0)) held.balanced = false;
+  if (!held.balanced) return;
+  const BodyInertia& inertia = world_.bodies[spring.body].inertia;
+  BodyMotion& motion = state.world.motion[spring.body];
+  const double leaving = glm::dot(contact.pressing, motion.velocity - contact.moved / duration) +
+                         glm::dot(moment, spin_of(inertia, motion));
+  const double per_mass =
+      inertia.per_mass + glm::dot(moment, world_per_inertia(inertia, motion.orientation) * moment);
+  const double depth = std::max(0.0, contact.depth_after);
+  const double surplus =
+      kinetic_energy(inertia, motion) + 0.5 * spring.stiffness * depth * depth - held.energy;
+  const double under = leaving * leaving - 2 * surplus * per_mass;
+  if (!(leaving < 0) || !(under >= 0.25 * leaving * leaving)) return;
+  const double impulse = std::max((leaving + std::sqrt(under)) / per_mass, -spring.impulse);
+  if (!(std::abs(impulse) <= kMostShare * held.impulse)) return;
+  spring.impulse += impulse;
+  held.energy -= impulse * glm::dot(contact.pressing, contact.moved) / duration;
+  motion.velocity -= impulse * inertia.per_mass * contact.pressing;
+  motion.spin_momentum -= impulse * moment;
+}
+
+/// Gives the bodies what the probe pushes them with.
+void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
+  const double duration = stroke.duration;
+  std::fill(state.chosen.begin(), state.chosen.end(), 0);
+  state.springs.clear();
+  for (std::size_t first = 0; first < state.contacts.size();) {
+    std::size_t end = first + 1;
+    const std::uint32_t body = state.contacts[first].spring.body;
+    while (end < state.contacts.size() && state.contacts[end].spring.body == body) ++end;
+    ProbeContact& only = state.contacts[first];
+    bool alone = end == first + 1 && only.spring.damping == 0;
+    if (alone) {
+      push_freely(state, only, duration);
+      state.held[body].holds = false;
+      // With that it must not meet anything: seen from where it began.
+      const double way = glm::distance(state.world.motion[body].centre, state.ahead[body].centre);
+      const BodyMotion pushed = state.world.motion[body];
+      std::swap(state.world.motion, state.before);
+      std::vector<char>& marked = state.chosen;
+      const char was = std::exchange(marked[body], 1);
+      alone = !mark_connected(world_, state.world, duration, 2 * way, marked);
+      std::swap(state.world.motion, state.before);
+      if (alone) marked[body] = was;
+      if (alone) {
+        hold(state, stroke, only);
+        only.spring.normal = only.pressing;
+      }
+      state.world.motion[body] = alone ? pushed : state.ahead[body];
+    } else {
+      state.chosen[body] = 1;
+    }
+    if (!alone) {
+      state.held[body].holds = false;
+      for (std::size_t k = first; k < end; ++k) {
+        PressingSpring& spring = state.contacts[k].spring;
+        const BodyMotion &from = state.before[body], &to = state.ahead[body];
+        const Vec3 began =
+            from.orientation * (glm::conjugate(to.orientation) * (spring.place - to.centre)) +
+            from.centre;
+        spring.free_speed = -glm::dot(spring.normal, spring.place - began) / duration;
+        spring.impulse = 0;
+        state.springs.push_back(spring);
+      }
+    }
+    first = end;
+  }
+  if (!state.springs.empty()) {
+    std::swap(state.world.motion, state.before);
+    mark_connected(world_, state.world, duration, 0, state.chosen);
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (!state.chosen[i]) state.world.motion[i] = state.before[i];
+    }
+    step_pressed(world_, state.world, state.chosen, state.springs, duration);
+    std::size_t next = 0;
+    for (ProbeContact& contact : state.contacts) {
+      if (next < state.springs.size() && state.springs[next].body == contact.spring.body)
+        contact.spring.impulse = state.springs[next++].impulse;
+    }
+  }
+}
+
+/// The mean force of the step, and friction's share of it. Friction is a spring along the surface;
+/// it yields as the body would within the step, so that a light body does not ring.
+void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, double duration) const {
+  const PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  const double elastic = contact.force;
+  contact.force = spring.impulse / duration;
+  contact.felt_depth = spring.stiffness > 0 ? contact.force / spring.stiffness : 0;
+  const double sideways = glm::length(contact.tangential);
+  if (!(sideways > 0)) return;
+  const Vec3 direction = contact.tangential / sideways;
+  const Vec3 moment = glm::cross(spring.place - motion.centre, direction);
+  const Vec3 turn = world_per_inertia(body.inertia, motion.orientation) * moment;
+  const double per_mass = body.inertia.per_mass + glm::dot(turn, moment);
+  const double yield = 1 + duration * duration * spring.stiffness * per_mass;
+  const double share = elastic > 0 ? std::min(1.0, contact.force / elastic) : 0;
+  contact.tangential *= share / yield;
+  contact.offset *= share / yield;
+  const double impulse = sideways * share / yield * duration;
+  motion.velocity -= impulse * body.inertia.per_mass * direction;
+  motion.spin_momentum -= impulse * moment;
+}
+}  // namespace palpate::rendering
