@@ -114,7 +114,7 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
   while (ring_.pop(popped_)) {
   }
   popped_ = {};
-  popped_bodies_.resize(shown->state.motion.bodies().size());
+  popped_bodies_.resize(shown->trial.state.motion.bodies().size());
   scenes_.push_back(std::move(shown));
   scene_set_ = true;
   incoming_.store(&scenes_.back()->trial, std::memory_order_release);
@@ -129,7 +129,8 @@ const Sample& ServoThread::next() noexcept {
     }
     std::this_thread::sleep_for(kNap);
   }
-  for (std::size_t i = 0; i < popped_.bodies; ++i) scenes_.back()->poses->pop(popped_bodies_[i]);
+  for (std::size_t i = 0; i < popped_.bodies; ++i)
+    scenes_.back()->trial.poses->pop(popped_bodies_[i]);
   return popped_;
 }
 
