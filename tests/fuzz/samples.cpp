@@ -16,7 +16,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto samples = data::unpack_samples(data + 4, size - 4, count, packing);
     if (static_cast<std::int64_t>(samples.size()) != count) std::abort();
     const std::string again = data::pack_samples(samples);
-    const auto back = data::unpack_samples(again.data(), again.size(), count, data::packing_for(samples));
+    const auto back =
+        data::unpack_samples(again.data(), again.size(), count, data::packing_for(samples));
     if (data::pack_samples(back) != again) std::abort();
   } catch (const data::StoreError&) {
   }

@@ -147,9 +147,8 @@ TEST(Stability, EachCaseTouchesItsObjects) {
       const LoopScene scene(contact_case, renderer, stimuli::Material{});
       EXPECT_EQ(scene.contacts(), contact_case == ContactCase::two_objects ? 2 : 1);
       EXPECT_GT(scene.force_tip(), 0);
-      const bool side =
-          renderer == protocols::RendererKind::ray && contact_case != ContactCase::wall &&
-          contact_case != ContactCase::body;
+      const bool side = renderer == protocols::RendererKind::ray &&
+                        contact_case != ContactCase::wall && contact_case != ContactCase::body;
       EXPECT_EQ(scene.force_tail() > 0, side) << to_string(contact_case);
     }
   }
