@@ -215,6 +215,8 @@ void read_texts(ObjectReader& reader, Protocol& protocol) {
     section.text("type_number", protocol.texts.type_number);
     section.text("agree", protocol.texts.agree);
     section.text("disagree", protocol.texts.disagree);
+    section.text("other_number", protocol.texts.other_number);
+    section.text("answer_first", protocol.texts.answer_first);
   });
 }
 
@@ -271,9 +273,10 @@ void read_identification(ObjectReader& reader, Protocol& protocol) {
 }
 
 /// Version 2: blocks of tasks, and pages.
-void read_tasks(ObjectReader& reader, Protocol& protocol) {
+void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
   read_blocks(reader, protocol);
-  read_pages(reader, protocol);
+  read_pages(reader, protocol, files);
+  read_periphery(reader, protocol);
   read_orientation(reader, protocol);
   reader.section("sessions", [&](ObjectReader& section) {
     section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
@@ -374,8 +377,13 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   read_renderer_order(reader, protocol);
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
-  read_stimuli(reader, protocol, {folder_of(file_name), stored});
-  (protocol.version == 2 ? read_tasks : read_identification)(reader, protocol);
+  const MeshFiles files{folder_of(file_name), stored};
+  read_stimuli(reader, protocol, files);
+  if (protocol.version == 2) {
+    read_tasks(reader, protocol, files);
+  } else {
+    read_identification(reader, protocol);
+  }
   read_apparatus(reader, protocol);
   check_radius(reader, protocol.tool,
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),

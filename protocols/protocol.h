@@ -108,8 +108,21 @@ struct Protocol {
     std::string type_number = "Type a number, then Enter.";
     std::string agree = "I agree";
     std::string disagree = "I do not agree";
+    std::string other_number = "Please type another number:";  ///< the range follows
+    std::string answer_first = "Please type an answer first.";
   } texts;
   std::optional<MaskingNoise> masking_noise;
+  /// Version 2: tones in the participant's headphones.
+  struct Sounds {
+    bool ready = false, go = false, feedback = false;
+    double level_db = -24;  ///< root mean square, dB re full scale
+  };
+  std::optional<Sounds> sounds;
+  /// Version 2: what stands for a key of the keyboard. "escape" is the emergency.
+  struct Responses {
+    std::map<std::string, std::string> joystick;  ///< "button 1", "axis 1 +", "hat 1 up" -> key
+    std::map<std::string, std::string> box;       ///< of a serial response box: byte -> key
+  } responses;
   bool samples = false;
   std::uint64_t seed = 0;
 
@@ -118,6 +131,9 @@ struct Protocol {
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
+
+  std::string language;     ///< of a translation of its texts; "": as it is written
+  std::string translation;  ///< the file of that, byte for byte
 
   std::string source_text;  ///< the file as it was read, byte for byte
   std::string sha256;       ///< of source_text, lower-case hexadecimal

@@ -85,7 +85,7 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
-    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan tasks/typical_participant",
+    "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
     "protocols/procedures": "procedure procedure_spec psychometric recovery",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
@@ -107,7 +107,7 @@ PUBLIC = {
     "runner/devices/falcon": "homing open parameters registration weighing",
     "runner/display": "display explore_window text_display timeline touch_source window",
     "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
-    "runner/participants": "keyboard respondent settings_document simulated simulated_settings task_participant",
+    "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay_comparison session_plan simulated_session simulated_study socket_advisor station",
     "runner/sweep": "design swept_study",

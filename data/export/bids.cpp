@@ -80,7 +80,8 @@ std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool si
          (relative ? kRelativeSentence : "") + kGuardSentence +
          "\n"
          "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
-         "trials were\nshown again. They are in no other table.\n";
+         "trials were\nshown again. They are in no other table. sourcedata/pages.csv, where it is there, "
+         "has the\nparticipants' answers to pages: personal data.\n";
 }
 
 class BidsWriter : public DatasetWriter {
@@ -91,6 +92,7 @@ class BidsWriter : public DatasetWriter {
   static bool has_file(const std::string& name);
 
   std::string begin_attempts() override { return "sourcedata/attempts.csv"; }
+  std::string begin_pages() override;
   void add(const StoredTrial& trial) override;
   void end_table() override;
   void describe_dataset(bool simulated) override;
@@ -222,6 +224,16 @@ void BidsWriter::write_sidecar() {
   write(table_.stem + "_beh.json", json_text(json));
 }
 
+std::string BidsWriter::begin_pages() {
+  const ProtocolFacts facts = all_facts(labels_);
+  Json json;
+  for (const Column& column : page_columns())
+    json[column.name] = describe_column(column, facts, settings_.fault_bits);
+  for (const auto& [place, question] : facts.questions) json["item"]["Levels"][place] = question;
+  write("sourcedata/pages.json", json_text(json));
+  return "sourcedata/pages.csv";
+}
+
 void BidsWriter::describe_participants() {
   std::string table = "participant_id\tsimulated\n";
   for (const auto& [code, simulated] : participants_)
@@ -259,7 +271,7 @@ void BidsWriter::describe_dataset(bool simulated) {
 bool BidsWriter::has_file(const std::string& name) {
   static const std::regex pattern(
       R"(dataset_description\.json|README|participants\.(tsv|json)|)"
-      R"(sourcedata/([0-9A-Za-z]+_protocol\.json|attempts\.csv)|stimuli/[0-9A-Za-z]+/[^/]+|)"
+      R"(sourcedata/([0-9A-Za-z]+_protocol\.json|attempts\.csv|pages\.(csv|json))|stimuli/[0-9A-Za-z]+/[^/]+|)"
       R"(sub-[0-9A-Za-z]+/ses-\d+/beh/sub-[0-9A-Za-z]+_ses-\d+_task-[0-9A-Za-z]+(_run-\d+)?)"
       R"((_beh\.(tsv|json)|_recording-haptic_physio\.(tsv\.gz|json)))");
   return std::regex_match(name, pattern);

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "data/export/delimited_row.h"
+#include "data/export/page_table.h"
 #include "data/files/formula_guard.h"
 
 namespace palpate::data {
@@ -39,6 +40,12 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
   out.write(row.end());
   describe_table("trials", trial_columns(settings.times, tasks), facts, settings, out);
   describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
+  if (!settings.pages) return;
+  describe_table("pages", page_columns(), facts, settings, out);
+  for (const auto& [place, question] : facts.questions) {
+    row << "pages" << "item" << "" << place << question;
+    out.write(row.end());
+  }
 }
 
 }  // namespace palpate::data

@@ -10,6 +10,7 @@
 #include "data/export/codebook.h"
 #include "data/export/column_values.h"
 #include "data/export/cut_off_attempts.h"
+#include "data/export/page_table.h"
 #include "data/files/atomic_file.h"
 #include "data/files/output_check.h"
 #include "data/files/text_sink.h"
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 struct CsvPaths {
   fs::path trials;
   std::optional<fs::path> attempts;  // if attempts were cut off
+  std::optional<fs::path> pages;     // if they are asked for
   std::string codebook;              // "": none
 };
 
@@ -50,15 +52,23 @@ CsvPaths checked_paths(Store& store, const std::string& path, const ExportSettin
     throw StoreRefused(
         path + ": that name is reserved for the attempts that were cut off; choose another");
   }
-  CsvPaths paths{.trials = trials, .attempts = {}, .codebook = settings.codebook};
+  const fs::path pages = trials.parent_path() / "pages.csv";
+  if (settings.pages && trials.filename() == pages.filename()) {
+    throw StoreRefused(path +
+                       ": that name is reserved for the answers to pages; choose another");
+  }
+  CsvPaths paths{.trials = trials, .attempts = {}, .pages = {}, .codebook = settings.codebook};
+  if (settings.pages) paths.pages = pages;
   if (store.counts().cut_off > 0) paths.attempts = attempts;
   ProtectedFiles others;
   others.add(store.path(), "it is the database itself, or SQLite's file beside it");
   require_writable(trials, settings.force, others);
   if (paths.attempts) require_writable(attempts, settings.force, others);
+  if (paths.pages) require_writable(pages, settings.force, others);
   if (!paths.codebook.empty()) {
     others.add(trials.string(), "the trials go there");
     others.add(attempts.string(), "that name is reserved for the attempts that were cut off");
+    if (paths.pages) others.add(pages.string(), "the answers to pages go there");
     require_writable(paths.codebook, settings.force, others);
   }
   return paths;
@@ -102,6 +112,12 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
     result.attempts_path = paths.attempts->string();
     write_file(result.attempts_path, [&](TextSink& sink) {
       result.attempts = write_attempts(store, sink, clock, participants, counter);
+    });
+  }
+  if (paths.pages) {
+    result.pages_path = paths.pages->string();
+    write_file(result.pages_path, [&](TextSink& sink) {
+      result.answers = write_pages(store, sink, clock, participants);
     });
   }
   if (!paths.codebook.empty()) {

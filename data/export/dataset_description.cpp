@@ -193,6 +193,8 @@ ProtocolFacts all_facts(const std::map<std::string, StudyLabel>& labels) {
     facts.stimuli.insert(facts.stimuli.end(), study.facts.stimuli.begin(),
                          study.facts.stimuli.end());
     facts.blocks.insert(facts.blocks.end(), study.facts.blocks.begin(), study.facts.blocks.end());
+    facts.questions.insert(facts.questions.end(), study.facts.questions.begin(),
+                           study.facts.questions.end());
   }
   return facts;
 }

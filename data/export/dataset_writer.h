@@ -9,6 +9,7 @@
 #include "data/export/clock.h"
 #include "data/export/cut_off_attempts.h"
 #include "data/export/dataset_description.h"
+#include "data/export/page_table.h"
 #include "data/export/settings.h"
 #include "data/files/atomic_folder.h"
 #include "data/files/text_sink.h"
@@ -37,6 +38,8 @@ class DatasetWriter {
   virtual void end_table() = 0;  ///< after the last trial
   /// \return the name of the table of attempts that were cut off
   virtual std::string begin_attempts() = 0;
+  /// \return the name of the table of answers to pages
+  virtual std::string begin_pages() = 0;
   /// Writes what describes the tables, after all of them. \param simulated participants are in it
   virtual void describe_dataset(bool simulated) = 0;
   std::int64_t samples() const { return samples_; }  ///< written so far
@@ -79,6 +82,11 @@ ExportResult export_dataset(Store& store, const std::string& path, const ExportS
   if (store.counts().cut_off > 0) {
     FileSink file(writer.folder().prepare(writer.begin_attempts()));
     result.attempts = write_attempts(store, file, clock, participants, counter);
+    file.close(false);
+  }
+  if (settings.pages) {
+    FileSink file(writer.folder().prepare(writer.begin_pages()));
+    result.answers = write_pages(store, file, clock, participants);
     file.close(false);
   }
   result.simulated = participants.any_simulated();

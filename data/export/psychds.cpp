@@ -54,6 +54,8 @@ std::string dataset_readme(const std::string& name, const std::string& about, bo
          "1 uN and torques to 1 uN m.\n"
          "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
          "were cut off; their\ntrials were shown again.\n"
+         "`data/study-T_description-pages_data.csv`, where it is there, has the participants' answers "
+         "to pages:\npersonal data.\n"
          "Every column is described in `dataset_description.json`; an empty field is a missing "
          "value. The protocol\nthat was run is in `materials/`, byte for byte; "
          "`protocol_sha256` is its checksum.\n\n" +
@@ -74,6 +76,10 @@ class PsychDsWriter : public DatasetWriter {
   std::string begin_attempts() override {
     use(attempt_columns(settings_.times));
     return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";
+  }
+  std::string begin_pages() override {
+    use(page_columns());
+    return "data/study-" + labels_.begin()->second.label + "_description-pages_data.csv";
   }
 
  private:
@@ -162,6 +168,7 @@ Json PsychDsWriter::variables() const {
   add({&interval_column(), 1});
   add({&kTimeOfTick, 1});
   add(sample_columns());
+  add(page_columns());
   return all;
 }
 
@@ -185,7 +192,7 @@ void PsychDsWriter::describe_dataset(bool simulated) {
 bool PsychDsWriter::has_file(const std::string& name) {
   static const std::regex pattern(
       R"(dataset_description\.json|README\.md|materials/[0-9A-Za-z]+(_protocol\.json|/[^/]+)|)"
-      R"(data/study-[0-9A-Za-z]+_description-attempts_data\.csv|)"
+      R"(data/study-[0-9A-Za-z]+_description-(attempts|pages)_data\.csv|)"
       R"(data/subject-[0-9A-Za-z]+/study-[0-9A-Za-z]+_subject-[0-9A-Za-z]+)"
       R"((_session-\d+(_trial-\d+)?_description-haptic)?_data\.csv)");
   return std::regex_match(name, pattern);

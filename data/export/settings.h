@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/record.h"
@@ -28,6 +29,7 @@ struct ProtocolFacts {
   double servo_rate = 1000;  ///< Hz
   std::vector<StimulusFacts> stimuli = {};
   std::vector<BlockFacts> blocks = {};  ///< empty: version 1
+  std::vector<std::pair<std::string, std::string>> questions = {};  ///< "PAGE, ITEM" -> its text
 };
 
 /// Meaning of a bit of the columns `faults`.
@@ -49,6 +51,7 @@ struct ExportSettings {
   Times times = Times::absolute;
   std::string codebook = {};  ///< csv: a file that describes the columns; "" for none
   std::vector<FaultMeaning> fault_bits = {};  ///< lowest first
+  bool pages = false;  ///< with the answers to pages, which are personal data
   /// Parses the text of a protocol; called by exports with descriptions only. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};
   /// Called every so many trials with their number; may throw to stop the export, which then leaves
@@ -62,6 +65,8 @@ struct ExportResult {
   std::int64_t samples = 0;   ///< servo ticks
   bool simulated = false;     ///< contains simulated participants
   std::string attempts_path;  ///< csv only
+  std::int64_t answers = 0;   ///< to pages
+  std::string pages_path;     ///< csv only
   /// Why the export could not be recorded in the database (forget will not list it), or "".
   std::string not_recorded;
 };

@@ -53,7 +53,8 @@ std::vector<StoredPageAnswer> Store::page_answers() {
       row >> one.participant;
       row >> one.protocol_name >> one.session >> clock.utc_ns >> clock.monotonic_ns;
       row >> one.answer;
-      one.utc = format_utc(to_unix_ns(clock, one.answer.at_ns));
+      one.unix_ns = to_unix_ns(clock, one.answer.at_ns);
+      one.utc = format_utc(one.unix_ns);
     }
     return all;
   });

@@ -73,6 +73,7 @@ struct StoredPageAnswer {
   int session = 1;
   std::string utc;
   PageAnswer answer;
+  std::int64_t unix_ns = 0;  ///< the same as utc
 };
 
 /// A run and how it ended, for reports.

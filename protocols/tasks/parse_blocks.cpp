@@ -30,6 +30,7 @@ constexpr NumberRange kWait{0, 60, "s"};
 constexpr NumberRange kPresentation{0, 3600, "s", true};
 constexpr NumberRange kShareOfTrials{0, 0.5};
 constexpr long long kMostTaskTrials = 1000000;
+constexpr int kPracticeLimit = 100;
 
 std::optional<int> index_of(const Protocol& protocol, const std::string& name) {
   const auto at = std::find_if(protocol.stimuli.begin(), protocol.stimuli.end(),
@@ -231,6 +232,47 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
   }
 }
 
+/// Whether it is practice, or until when.
+void read_practice(ObjectReader& reader, TaskBlock& block) {
+  const json* const value = reader.member("practice");
+  if (value == nullptr) return;
+  if (!value->is_object()) return reader.boolean("practice", block.practice);
+  block.practice = true;
+  reader.section("practice", [&](ObjectReader& practice) {
+    PracticeCriterion criterion;
+    criterion.most_trials = kPracticeLimit;
+    practice.section(
+        "criterion",
+        [&](ObjectReader& section) {
+          section.integer("correct", criterion.correct, {1, 1000}, Presence::required);
+          section.integer("of", criterion.of, {1, 1000}, Presence::required);
+          if (criterion.correct > criterion.of) {
+            section.faults().add(section.pointer("correct"),
+                                 "expected at most as many as 'of', the last answers that count");
+          }
+        },
+        Presence::required);
+    practice.integer("limit", criterion.most_trials, {1, 10000});
+    if (criterion.most_trials < criterion.of) {
+      practice.faults().add(practice.pointer("limit"),
+                            "expected at least as many trials as the criterion counts");
+    }
+    block.criterion = criterion;
+  });
+}
+
+void check_practice(ObjectReader& reader, const TaskBlock& block) {
+  if (!block.criterion) return;
+  if (block.task == TaskKind::rate || block.task == TaskKind::adjust) {
+    reader.faults().add(reader.pointer("practice"),
+                        "expected no criterion: no answer to this task is right or wrong");
+  } else if (is_adaptive(block)) {
+    reader.faults().add(reader.pointer("practice"),
+                        "expected no criterion with an adaptive procedure, which keeps the share "
+                        "of right answers where it is");
+  }
+}
+
 TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   TaskBlock block;
   std::optional<TaskKind> task;
@@ -245,13 +287,14 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   if (!task) return block;  // its other keys depend on it
   block.task = *task;
   reader.integer("session", block.session, {1, 1000});
-  reader.boolean("practice", block.practice);
+  read_practice(reader, block);
   reader.text("instructions", block.instructions);
   reader.text("question", block.question);
   read_block_renderers(reader, protocol, block);
   read_stimulus_names(reader, protocol, block);
   read_task_keys(reader, protocol, block);
   read_variation(reader, block);
+  check_practice(reader, block);
   reader.section("order", [&](ObjectReader& order) {
     order.integer("max_run", block.max_run, kManyTimes);
     order.integer("min_distance", block.min_distance, kManyTimes);

@@ -2,14 +2,17 @@
 // Reading of what version 2 of a protocol has besides: blocks of tasks, and pages.
 
 #include "protocols/object_reader.h"
+#include "protocols/parse_object.h"
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {
 
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);
-/// Reads pages, which refer to the blocks.
-void read_pages(ObjectReader& reader, Protocol& protocol);
+/// Reads pages, which refer to the blocks. \param files  where their pictures are
+void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files);
+/// Reads sounds and responses: what is heard and pressed beside screen and keyboard.
+void read_periphery(ObjectReader& reader, Protocol& protocol);
 /// Every stimulus can have every level that a block may show, and the blocks have an order.
 void check_blocks(const Protocol& protocol, FaultList& faults);
 

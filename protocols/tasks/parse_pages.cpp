@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cstddef>
 #include <set>
+#include <stdexcept>
 #include <utility>
 
 #include "protocols/tasks/parse_blocks.h"
+#include "stimuli/input_file.h"
 
 namespace palpate::protocols {
 namespace {
@@ -12,6 +14,8 @@ using nlohmann::json;
 
 constexpr std::size_t kMostPages = 100, kMostItems = 100, kMostChoices = 20;
 constexpr NumberRange kPageNumber{-1e12, 1e12};
+constexpr std::uintmax_t kMostPictureBytes = 8 << 20;
+constexpr const char* kPngBegins = "\x89PNG\r\n\x1a\n";
 
 void read_choices(ObjectReader& reader, PageItem& item) {
   const bool asks = item.kind == PageItem::Kind::choice || item.kind == PageItem::Kind::scale;
@@ -30,6 +34,7 @@ void read_choices(ObjectReader& reader, PageItem& item) {
     }
     item.choices.push_back(text);
   }
+  item.shown = item.choices;
 }
 
 PageItem read_item(ObjectReader& reader) {
@@ -86,7 +91,54 @@ void read_place(ObjectReader& reader, const Protocol& protocol, PageSpec& page) 
   }
 }
 
-PageSpec read_page(ObjectReader& reader, const Protocol& protocol) {
+/// Its bytes; none and a fault where it is no picture.
+std::shared_ptr<const std::string> read_picture(const std::string& name, const std::string& pointer,
+                                                const MeshFiles& files, FaultList& faults) {
+  std::string bytes;
+  if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
+    bytes = stored->second;
+  } else {
+    const std::string path = files.folder.empty() ? name : files.folder + "/" + name;
+    try {
+      bytes = stimuli::read_whole(path, kMostPictureBytes);
+    } catch (const std::runtime_error& error) {
+      faults.add(pointer, "expected a PNG file of at most 8 MiB; " + path + ": " + error.what());
+      return nullptr;
+    }
+  }
+  if (!bytes.starts_with(kPngBegins)) {
+    faults.add(pointer, "expected a PNG file; '" + name + "' is none");
+    return nullptr;
+  }
+  return std::make_shared<const std::string>(std::move(bytes));
+}
+
+void read_pictures(ObjectReader& reader, const MeshFiles& files, PageSpec& page) {
+  const auto screens =
+      1 + static_cast<std::size_t>(std::count(page.text.begin(), page.text.end(), '\f'));
+  const json* const list = reader.array("pictures", 1, kMostPages);
+  if (list == nullptr) return;
+  if (list->size() > screens) {
+    reader.faults().add(reader.pointer("pictures"),
+                        "expected at most one picture for each screen of the text, of which there "
+                        "are " +
+                            std::to_string(screens));
+  }
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const json& value = (*list)[i];
+    const std::string pointer = child_pointer(reader.pointer("pictures"), i);
+    PagePicture& picture = page.pictures.emplace_back();
+    if (value.is_null()) continue;
+    if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+      reader.faults().add(pointer, "expected the name of a PNG file, or null" + found_text(value));
+      continue;
+    }
+    picture.file = value.get<std::string>();
+    picture.bytes = read_picture(picture.file, pointer, files, reader.faults());
+  }
+}
+
+PageSpec read_page(ObjectReader& reader, const Protocol& protocol, const MeshFiles& files) {
   PageSpec page;
   reader.name("name", page.name);
   reader.choice("kind", page.kind,
@@ -106,19 +158,20 @@ PageSpec read_page(ObjectReader& reader, const Protocol& protocol) {
     }
   }
   if (page.kind == PageSpec::Kind::questionnaire) read_items(reader, page);
+  if (page.kind == PageSpec::Kind::instructions) read_pictures(reader, files, page);
   reader.refuse_unknown_keys();
   return page;
 }
 
 }  // namespace
 
-void read_pages(ObjectReader& reader, Protocol& protocol) {
+void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
   const json* const list = reader.array("pages", 0, kMostPages);
   if (list == nullptr) return;
   std::set<std::string> names;
   for (std::size_t i = 0; i < list->size(); ++i) {
     ObjectReader item((*list)[i], child_pointer(reader.pointer("pages"), i), reader.faults());
-    protocol.pages.push_back(read_page(item, protocol));
+    protocol.pages.push_back(read_page(item, protocol, files));
     const std::string& name = protocol.pages.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),

@@ -1,6 +1,7 @@
 #pragma once
 // A block of trials of one task, as version 2 of a protocol says it: plain values. SI units.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -47,6 +48,12 @@ struct ConfidenceSpec {
   std::vector<ScaleStep> scale;  ///< from the least; the keys 1, 2, ... in order
 };
 
+/// Practice is over once so many of the last answers were right, at the latest after most_trials.
+struct PracticeCriterion {
+  int correct = 1, of = 1;
+  int most_trials = 1;
+};
+
 struct TaskBlock {
   std::string name;  ///< unique within the protocol
   TaskKind task = TaskKind::identify;
@@ -82,6 +89,8 @@ struct TaskBlock {
   std::optional<ConfidenceSpec> confidence;
   bool feedback = false;
   double time_out = 60;  ///< s, for the answer, from the begin of the last interval
+  /// practice: its trials come again in rounds; none: once
+  std::optional<PracticeCriterion> criterion;
 };
 
 /// A text to read or questions to answer, before the first block, between blocks or after the last.
@@ -92,6 +101,12 @@ struct PageItem {
   std::vector<std::string> choices;   ///< choice, and labels of a scale's steps
   std::optional<double> least, most;  ///< number
   bool required = true;
+  std::vector<std::string> shown{};  ///< instead of `choices`, which are what is stored
+};
+/// A PNG file that a page shows.
+struct PagePicture {
+  std::string file;  ///< as the protocol names it; "": none
+  std::shared_ptr<const std::string> bytes;
 };
 struct PageSpec {
   enum class Kind { instructions, consent, questionnaire };
@@ -103,6 +118,7 @@ struct PageSpec {
   std::string text;             ///< "\f" between screens of instructions
   std::string version;          ///< consent
   std::vector<PageItem> items;  ///< questionnaire
+  std::vector<PagePicture> pictures{};  ///< of each screen of the text; at most so many
 };
 
 }  // namespace palpate::protocols

@@ -184,11 +184,13 @@ std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
   return all;
 }
 
-std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index) {
+/// \param round  of practice with a criterion, from 0
+std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
+                                std::uint64_t round = 0) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
   const auto number = static_cast<std::uint64_t>(index);
   std::vector<Category> categories = categories_of(protocol, block);
-  stimuli::Random places = task_stream(protocol, participant, number, kTaskPosition);
+  stimuli::Random places = task_stream(protocol, participant, number, kTaskPosition, round);
   std::vector<std::vector<int>> left;
   left.reserve(categories.size());
   for (const Category& category : categories)
@@ -196,7 +198,7 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
   std::vector<std::size_t> shown(categories.size(), static_cast<std::size_t>(participant - 1));
   std::vector<Trial> trials;
   for (const int which : ordered_categories(
-           categories, block, task_stream(protocol, participant, number, kTaskOrder))) {
+           categories, block, task_stream(protocol, participant, number, kTaskOrder, round))) {
     const auto c = static_cast<std::size_t>(which);
     Trial trial = categories[c].trial;
     // Starts in turn; the next participant begins with the next one.
@@ -242,7 +244,9 @@ Protocol version_1_view(const Protocol& protocol, const TaskBlock* block) {
 }
 
 /// Practice has its orientations, main trials get theirs from orientations_of_version_1.
-std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index) {
+/// \param round  of practice with a criterion, from 0
+std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index,
+                                       int round = 0) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
   const Protocol view = version_1_view(protocol, &block);
   const auto before = std::count_if(
@@ -253,7 +257,7 @@ std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant
   const int number = static_cast<int>(before);
   std::vector<Trial> trials =
       block.practice
-          ? practice_round(view, participant, block.renderers.front(), number + 1)
+          ? practice_round(view, participant, block.renderers.front(), number + 1 + round)
           : block_of_trials(view, participant, block.renderers, number, block.repetitions);
   const std::vector<Track> tracks = tracks_of(block);
   for (Trial& trial : trials) {
@@ -308,6 +312,7 @@ bool is_adaptive(const TaskBlock& block) {
 }
 
 long long most_trials_of(const TaskBlock& block) {
+  if (block.criterion) return block.criterion->most_trials;
   long long trials = 0;
   for (const Track& track : tracks_of(block)) {
     trials += track.procedure == nullptr ? block.repetitions
@@ -369,22 +374,46 @@ const TaskBlock& TaskPlan::block() const { return protocol_->blocks[block_index(
 
 void TaskPlan::begin_block() {
   shown_ = unanswered_ = 0;
+  rounds_ = 0;
+  right_.clear();
   fixed_.clear();
   tracks_.reset();
-  if (has_order_of_version_1(block())) {
-    fixed_ = trials_of_version_1(*protocol_, participant_number_, order_[at_]);
-    if (!block().practice)
-      draw_orientations_of_version_1(*protocol_, participant_number_, order_[at_], fixed_);
-    return;
-  }
-  if (!is_adaptive(block())) {
-    fixed_ = fixed_trials(*protocol_, participant_number_, order_[at_]);
-    return;
-  }
+  if (!is_adaptive(block())) return add_round();
   std::vector<ProcedureSpec> specs;
   for (const Track& track : tracks_of(block())) specs.push_back(*track.procedure);
   tracks_.emplace(specs,
                   task_stream(*protocol_, participant_number_, block_index(), kTaskTracks).next());
+}
+
+void TaskPlan::add_round() {
+  const std::uint64_t round = rounds_++;
+  std::vector<Trial> more;
+  if (has_order_of_version_1(block())) {
+    more = trials_of_version_1(*protocol_, participant_number_, order_[at_],
+                               static_cast<int>(round));
+    if (!block().practice)
+      draw_orientations_of_version_1(*protocol_, participant_number_, order_[at_], more);
+  } else {
+    more = fixed_trials(*protocol_, participant_number_, order_[at_], round);
+  }
+  fixed_.insert(fixed_.end(), more.begin(), more.end());
+}
+
+bool TaskPlan::block_goes_on() {
+  if (tracks_) return tracks_->next().has_value() && unanswered_ < most_unanswered(block());
+  const auto& criterion = block().criterion;
+  if (!criterion) return shown_ < fixed_.size();
+  if (shown_ >= static_cast<std::size_t>(criterion->most_trials) || criterion_met()) return false;
+  if (shown_ == fixed_.size()) add_round();
+  return true;
+}
+
+bool TaskPlan::criterion_met() const {
+  const PracticeCriterion& criterion = *block().criterion;
+  const auto of = static_cast<std::size_t>(criterion.of);
+  if (right_.size() < of) return false;
+  return std::count(right_.end() - static_cast<std::ptrdiff_t>(of), right_.end(), true) >=
+         criterion.correct;
 }
 
 Trial TaskPlan::adaptive_trial() const {
@@ -407,10 +436,7 @@ Trial TaskPlan::adaptive_trial() const {
 void TaskPlan::find_next() {
   next_.reset();
   while (at_ < order_.size()) {
-    const bool more = tracks_
-                          ? tracks_->next().has_value() && unanswered_ < most_unanswered(block())
-                          : shown_ < fixed_.size();
-    if (more) break;
+    if (block_goes_on()) break;
     if (++at_ < order_.size()) begin_block();
   }
   if (at_ >= order_.size()) return;
@@ -439,6 +465,7 @@ void TaskPlan::answered(const TrialOutcome& outcome) {
   if (tracks_ && !outcome.answered) ++unanswered_;
   if (tracks_ && outcome.answered && !next_->catch_trial)
     tracks_->record({outcome.level.value_or(*next_->level), outcome.success});
+  right_.push_back(outcome.answered && outcome.correct);
   ++shown_;
   ++done_;
   find_next();

@@ -46,6 +46,9 @@ class TaskPlan {
 
  private:
   void begin_block();
+  void add_round();
+  bool block_goes_on();
+  bool criterion_met() const;
   void find_next();
   Trial adaptive_trial() const;
   const TaskBlock& block() const;
@@ -58,7 +61,9 @@ class TaskPlan {
   std::size_t at_ = 0;                ///< into order_
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the block
   std::size_t unanswered_ = 0;        ///< in an adaptive block
-  std::vector<Trial> fixed_;          ///< of the block; empty: adaptive
+  std::vector<Trial> fixed_;          ///< of the block so far as is known; empty: adaptive
+  std::uint64_t rounds_ = 0;          ///< that fixed_ has; more than one where practice goes on
+  std::vector<bool> right_;           ///< answers to the block
   std::optional<InterleavedTracks> tracks_;
   std::optional<Trial> next_;
 };

@@ -64,6 +64,26 @@ std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) 
   return blocks;
 }
 
+/// "PAGE, ITEM" and what it asks.
+std::vector<std::pair<std::string, std::string>> questions_of(const nlohmann::ordered_json& json) {
+  std::vector<std::pair<std::string, std::string>> questions;
+  const auto text = [](const nlohmann::ordered_json& of, const char* key) {
+    return of.is_object() && of.contains(key) && of[key].is_string() ? of[key].get<std::string>()
+                                                                     : std::string();
+  };
+  const auto list = [](const nlohmann::ordered_json& of, const char* key) {
+    return of.is_object() && of.contains(key) && of[key].is_array()
+               ? of[key]
+               : nlohmann::ordered_json::array();
+  };
+  for (const auto& page : list(json, "pages")) {
+    for (const auto& item : list(page, "items"))
+      questions.emplace_back(text(page, "name") + ", " + text(item, "name"),
+                             text(item, "question"));
+  }
+  return questions;
+}
+
 /// Reads only what an export needs from the stored text, so that old databases can be exported
 /// after the rules for protocols have changed.
 data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
@@ -78,6 +98,7 @@ data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
   }
   if (!(facts.servo_rate > 0))
     throw data::StoreRefused("protocol " + info.name + " has no servo rate");
+  facts.questions = questions_of(json);
   if (!json.contains("stimuli") || !json["stimuli"].is_array()) return facts;
   for (const auto& stimulus : json["stimuli"]) {
     if (!stimulus.is_object() || !stimulus.contains("name") || !stimulus["name"].is_string())
@@ -116,13 +137,13 @@ data::ExportResult export_as(const std::string& format, data::Store& store, cons
 struct Request {
   std::string database, format, out, codebook;
   data::Times times = data::Times::absolute;
-  bool force = false;
+  bool force = false, pages = false;
 };
 
 void add_options(CommandLine& line) {
   line.usage =
       "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
-      "       [--times relative|absolute] [--codebook FILE] [--force]";
+      "       [--times relative|absolute] [--codebook FILE] [--pages] [--force]";
   line.summary =
       "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
@@ -151,6 +172,9 @@ void add_options(CommandLine& line) {
       "relative (default of bids and psych-ds) or absolute (default of csv)");
   add("codebook", po::value<std::string>()->default_value("", "")->value_name("FILE"),
       "csv only: what every column, value and fault bit means, as a table");
+  add("pages", po::bool_switch(),
+      "the answers to pages as well, which are personal data: pages.csv in the same folder, or in "
+      "the dataset");
   add("force", po::bool_switch(), "replace an existing export");
 }
 
@@ -158,6 +182,7 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
   Request request{values["db"].as<std::string>(), values["format"].as<std::string>(),
                   values["out"].as<std::string>(), values["codebook"].as<std::string>()};
   request.force = values["force"].as<bool>();
+  request.pages = values["pages"].as<bool>();
   if (request.format != "csv" && request.format != "bids" && request.format != "psych-ds") {
     throw UsageError("no format '" + request.format +
                      "'; there are: csv, bids, psych-ds\nUsage: " + usage);
@@ -175,6 +200,7 @@ data::ExportResult write_export(const Request& request) {
   warn_of_exposure(request.database);
   data::ExportSettings settings;
   settings.force = request.force;
+  settings.pages = request.pages;
   settings.program_version = PALPATE_VERSION;
   settings.facts = facts_of;
   settings.times = request.times;
@@ -193,6 +219,10 @@ void print(const Request& request, const data::ExportResult& done) {
     std::cerr << stimuli::printable(done.attempts_path) << ": " << done.attempts
               << " attempts that were cut off\n";
   }
+  if (request.pages) {
+    std::cerr << stimuli::printable(done.pages_path.empty() ? request.out : done.pages_path)
+              << ": " << done.answers << " answers to pages: personal data\n";
+  }
   if (!request.codebook.empty())
     std::cerr << stimuli::printable(request.codebook) << ": what the columns mean\n";
   if (!done.not_recorded.empty()) {
@@ -206,10 +236,10 @@ void print(const Request& request, const data::ExportResult& done) {
 namespace {
 
 void export_sweep(const Request& request, bool times_given) {
-  if (request.format != "csv" || !request.codebook.empty() || times_given) {
+  if (request.format != "csv" || !request.codebook.empty() || times_given || request.pages) {
     throw UsageError(request.database +
                      ": is the file of a sweep, which is exported with --format csv alone, without "
-                     "--times and --codebook");
+                     "--times, --codebook and --pages");
   }
   data::SweepFile sweep = data::SweepFile::open(request.database);
   const std::atomic<bool>& stop_asked = catch_stop_signals();

@@ -6,6 +6,7 @@
 
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
+#include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/task_words.h"
 #include "runner/devices/registry.h"
@@ -167,17 +168,34 @@ void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
 
 int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate validate PROTOCOL.json";
+  line.usage = "palpate validate PROTOCOL.json [--language CODE | --texts]";
   line.summary =
       "Checks a protocol with its meshes and its schedule, and lists all faults. Says which\n"
       "devices can show it, whether it can be simulated, and what prevents the others.";
-  line.example = "  palpate validate protocols/ho2000.json";
+  line.example =
+      "  palpate validate protocols/ho2000.json\n"
+      "  palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be "
+      "translated\n"
+      "  palpate validate protocols/roughness-magnitude.json --language de";
+  std::string language;
+  bool texts = false;
+  line.options.add_options()  //
+      ("language", boost::program_options::value(&language)->value_name("CODE"),
+       "check the translation of its texts, too: NAME.texts.CODE.json or texts.CODE.json beside "
+       "it")  //
+      ("texts", boost::program_options::bool_switch(&texts),
+       "print all texts that a participant reads, as JSON, and nothing else");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return 0;
   const auto file = (*values)["PROTOCOL.json"].as<std::string>();
 
-  const protocols::Protocol protocol = protocols::parse_protocol(file);
+  protocols::Protocol protocol = protocols::parse_protocol(file);
+  if (!language.empty()) protocols::translate(protocol, file, language);
+  if (texts) {
+    std::cout << protocols::texts_json(protocol);
+    return 0;
+  }
   std::vector<protocols::Fault> faults;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, faults);

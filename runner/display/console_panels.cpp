@@ -55,6 +55,10 @@ void draw_status(const ConsoleState& state, bool hidden, bool compact) {
   table_row("Block", of(state.block, state.blocks));
   table_row("Shape", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
   table_row("Renderer", state.renderer.empty() ? "-" : state.renderer);
+  if (!state.task.empty()) {
+    table_row("Task", state.task + ", interval " + of(state.interval, state.intervals));
+    table_row("Level", state.level.empty() ? "-" : hidden ? "hidden" : state.level);
+  }
   table_row("Last answer", state.answer.empty() ? "-" : hidden ? "hidden" : state.answer);
   table_row("Elapsed", duration_text(state.elapsed));
   table_row("Remaining",

@@ -187,8 +187,19 @@ void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>
   draw_notes(commands);
 }
 
+void ConsoleView::draw_answer(std::vector<ConsoleCommand>& commands) {
+  if (!state_.takes_answers) return;
+  ImGui::SetNextItemWidth(-1);
+  if (!ImGui::InputTextWithHint("##answer", "The answer that was spoken; Enter", answer_.data(),
+                                answer_.size(), ImGuiInputTextFlags_EnterReturnsTrue))
+    return;
+  commands.push_back({ConsoleCommand::Kind::answer, answer_.data(), 0});
+  answer_.fill(0);
+  ImGui::SetKeyboardFocusHere(-1);  // for the next one
+}
+
 void ConsoleView::draw_notes(std::vector<ConsoleCommand>& commands) {
-  const float field = ImGui::GetFrameHeightWithSpacing();
+  const float field = (state_.takes_answers ? 2 : 1) * ImGui::GetFrameHeightWithSpacing();
   const float room = std::max(ImGui::GetContentRegionAvail().y - field, ImGui::GetFontSize());
   ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
   ImGui::BeginChild(
@@ -213,6 +224,7 @@ void ConsoleView::draw_notes(std::vector<ConsoleCommand>& commands) {
   }
   ImGui::EndChild();
   ImGui::PopStyleColor();
+  draw_answer(commands);
   ImGui::SetNextItemWidth(-1);
   if (ImGui::InputTextWithHint("##note", "A note, stored with its time; Enter", note_.data(),
                                note_.size(), ImGuiInputTextFlags_EnterReturnsTrue)) {

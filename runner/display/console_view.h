@@ -53,6 +53,7 @@ class ConsoleView {
   void draw_view(const Modifiers& modifiers, float width, float height);
   void draw_side(double now, bool narrow, std::vector<ConsoleCommand>& commands);
   void draw_notes(std::vector<ConsoleCommand>& commands);
+  void draw_answer(std::vector<ConsoleCommand>& commands);
   static float min_notes_height();  ///< px, for the newest messages and the note field
 
   SceneView scene_;
@@ -63,7 +64,7 @@ class ConsoleView {
   double updated_at_ = 0;  ///< s
   bool has_state_ = false;
   std::deque<ForcePoint> forces_;
-  TypedText note_{};
+  TypedText note_{}, answer_{};
   EndRequest end_request_;
   float emergency_bottom_ = 40;  ///< px, lower edge of the button
   bool emergency_highlit_ = false;

@@ -84,7 +84,8 @@ void ConsoleWindow::on_key(GLFWwindow* window, int key, int scancode, int action
 }
 
 void ConsoleWindow::on_character(GLFWwindow* window, unsigned character) {
-  const auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  auto& self = *static_cast<ConsoleWindow*>(glfwGetWindowUserPointer(window));
+  if (!ImGui::GetIO().WantTextInput) self.participant_.handle_character(character);
   if (!self.ignore_character_) ImGui_ImplGlfw_CharCallback(window, character);
 }
 

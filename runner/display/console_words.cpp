@@ -28,6 +28,8 @@ const char* button_label(ConsoleCommand::Kind kind) {
       return "Enter";
     case Kind::quit:
       return "End now...";
+    case Kind::answer:
+      return "Enter";
   }
   return "";
 }

@@ -26,9 +26,10 @@ struct ConsoleCommand {
     clear_fault,
     note,  ///< free text with a time stamp
     quit,  ///< ends at once: the current trial is cut off
+    answer,  ///< the participant's, typed for them; text "": on to the next
   };
   Kind kind = Kind::note;
-  std::string text;          ///< of note and quit; of emergency_zero: the source, "the key F12"
+  std::string text;          ///< of note, quit and answer; of emergency_zero: the source, "the key F12"
   std::int64_t time_ns = 0;  ///< session clock, on arrival
 };
 
@@ -62,10 +63,18 @@ struct Page {
   int done = 0, trials = 0;                               ///< progress bar; trials 0: none
   int seconds_left = 0;                                   ///< count-down; 0: none
   Checklist checklist;
+  /// An answer that is being typed: keys come as the characters that they write.
+  enum class Typing { none, number, text } typing = Typing::none;
+  std::string typed;                             ///< so far
+  bool wheel = false;                            ///< turns of the wheel come as keys
+  int part = 0, parts = 0;                       ///< of a text on several pages, from 1; 0: alone
+  std::shared_ptr<const std::string> picture{};  ///< bytes of a PNG file, above the text; or none
 };
 
 struct KeyPress {
-  std::string key;           ///< as in the protocol: "1", "a", "space", "escape"; keypad as digits
+  /// As in the protocol: "1", "a", "space", "escape", "wheel up"; keypad as digits. Where an answer
+  /// is typed, the character in UTF-8.
+  std::string key;
   std::int64_t time_ns = 0;  ///< session clock, on arrival
 };
 
@@ -77,6 +86,8 @@ class ParticipantScreen {
   virtual std::vector<KeyPress> keys() = 0;
   /// False once it was closed by the user or its display was lost.
   virtual bool open() const = 0;
+  /// What is wrong with an input beside it, in words; empty: nothing.
+  virtual std::string trouble() const { return {}; }
 };
 
 /// How often a shape was identified correctly.
@@ -110,6 +121,11 @@ struct ConsoleState {
   rendering::Tool tool;                       ///< that the stylus carries; empty: none
   std::uint64_t ticks = 0, missed_ticks = 0;  ///< of this session
   std::int64_t longest_period_ns = 0;
+  // Version 2 of protocols:
+  std::string task;                  ///< "compare", ...; empty: version 1
+  int interval = 0, intervals = 0;   ///< of the trial
+  std::string level;                 ///< that is felt now, as text; empty: none
+  bool takes_answers = false;        ///< the experimenter types the participant's answers
 };
 
 class ExperimenterConsole {

@@ -60,13 +60,19 @@ class PageLayout {
         keys_(canvas, page, unit_, 0.94 * width) {
     const double margin = 2.5 * unit_;
     const bool goes_on = page.kind == Page::Kind::text;
+    const bool typing = page.typing != Page::Typing::none;
     go_on_top_ = height - margin - 1.9 * unit_;
     keys_top_ = (goes_on ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
     reply_top_ =
         (page.keys.empty() ? (goes_on ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
     top_ = margin + 0.6 * unit_;
-    count_top_ = reply_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);
-    room_ = count_top_ - margin / 2 - top_;
+    typed_top_ = reply_top_ - (typing ? 4 * unit_ : 0);
+    count_top_ = typed_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);
+    const double all = count_top_ - margin / 2 - top_;
+    picture_ = page.picture ? 0.6 * all : 0;
+    picture_top_ = top_;
+    top_ += picture_;
+    room_ = all - picture_;
   }
 
   std::vector<std::string> screens() const {
@@ -75,13 +81,21 @@ class PageLayout {
   }
 
   void draw(int screen) const {
-    keys_.draw(canvas_, width_ / 2, std::max(keys_top_, 0.0));
+    const auto last = static_cast<int>(screens().size()) - 1;
+    const bool answers = !page_.keys.empty() && screen >= last;
+    if (answers || page_.kind != Page::Kind::text)
+      keys_.draw(canvas_, width_ / 2, std::max(keys_top_, 0.0));
+    if (page_.picture)
+      draw_picture(canvas_, *page_.picture, width_ / 2, picture_top_, text_width(width_, unit_),
+                   0.96 * picture_);
+    if (page_.typing != Page::Typing::none)
+      draw_typed(canvas_, page_.typed, width_ / 2, typed_top_, unit_, text_width(width_, unit_));
     draw_progress(canvas_, page_, unit_, width_);
     if (page_.seconds_left > 0)
       draw_line(minutes_and_seconds(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
     if (!page_.reply.empty()) draw_line(page_.reply, 1.2 * unit_, reply_top_, kReply);
     if (page_.kind == Page::Kind::text) {
-      draw_go_on(canvas_, width_ / 2, go_on_top_, unit_);
+      if (!answers) draw_go_on(canvas_, width_ / 2, go_on_top_, unit_);
       draw_screen(screen);
     } else if (page_.kind == Page::Kind::checklist) {
       draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
@@ -107,8 +121,13 @@ class PageLayout {
     // Not centred, like the other screens, even if the last has only two lines.
     draw_text(canvas_, all[static_cast<std::size_t>(at)], kTextSize * unit_, kSmallestSize * unit_,
               width_, text_width(width_, unit_), top_, room_, kText, false);
-    if (count == 1) return;
-    const TextBlock number(canvas_, std::to_string(at + 1) + " / " + std::to_string(count), unit_);
+    if (count == 1 && page_.parts < 2) return;
+    const auto of = [](int one, int all) {
+      return std::to_string(one) + " / " + std::to_string(all);
+    };
+    std::string place = page_.parts > 1 ? of(page_.part, page_.parts) : of(at + 1, count);
+    if (page_.parts > 1 && count > 1) place += "  (" + of(at + 1, count) + ")";
+    const TextBlock number(canvas_, place, unit_);
     number.draw(canvas_, width_ / 2 + 6 * unit_, go_on_top_ + 0.3 * unit_, kQuietInk);
   }
 
@@ -117,6 +136,7 @@ class PageLayout {
   double width_, unit_;
   KeyMap keys_;
   double go_on_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
+  double typed_top_ = 0, picture_ = 0, picture_top_ = 0;
 };
 
 }  // namespace

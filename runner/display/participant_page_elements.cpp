@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace palpate::runner {
 namespace {
@@ -21,6 +22,20 @@ void draw_keycap(cairo_t* canvas, double x, double y, double width, double heigh
   set_colour(canvas, kKeycapEdge);
   cairo_set_line_width(canvas, std::max(1.0, 0.035 * height));
   cairo_stroke(canvas);
+}
+
+/// What cairo reads a PNG file from.
+struct PngBytes {
+  const std::string& all;
+  std::size_t at = 0;
+};
+
+cairo_status_t read_png(void* from, unsigned char* to, unsigned count) {
+  auto& bytes = *static_cast<PngBytes*>(from);
+  if (bytes.all.size() - bytes.at < count) return CAIRO_STATUS_READ_ERROR;
+  std::memcpy(to, bytes.all.data() + bytes.at, count);
+  bytes.at += count;
+  return CAIRO_STATUS_SUCCESS;
 }
 
 std::string keycap_label(const std::string& key) {
@@ -73,6 +88,44 @@ void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
     item.answer.draw(canvas, centre - answer.width / 2, y + (kKeycapHeight + 0.45) * unit_,
                      kQuietInk);
   }
+}
+
+void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
+                  double width, double room) {
+  PngBytes source{bytes};
+  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> picture(
+      cairo_image_surface_create_from_png_stream(&read_png, &source), &cairo_surface_destroy);
+  if (cairo_surface_status(picture.get()) != CAIRO_STATUS_SUCCESS) {
+    TextBlock(canvas, "(PNG?)", room / 8).draw(canvas, middle - room / 6, top, kReply);
+    return;
+  }
+  const double wide = cairo_image_surface_get_width(picture.get());
+  const double high = cairo_image_surface_get_height(picture.get());
+  const double scale = std::min({width / wide, room / high, 2.0});
+  cairo_save(canvas);
+  cairo_translate(canvas, middle - scale * wide / 2, top + (room - scale * high) / 2);
+  cairo_scale(canvas, scale, scale);
+  cairo_set_source_surface(canvas, picture.get(), 0, 0);
+  cairo_paint(canvas);
+  cairo_restore(canvas);
+}
+
+void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
+                double width) {
+  TextBlock words(canvas, typed + "_", 1.6 * unit);
+  // The end is what is being typed.
+  std::string shown = typed;
+  while (words.size().width > width - unit && shown.size() > 1) {
+    shown.erase(0, 1);
+    while (!shown.empty() && (static_cast<unsigned char>(shown[0]) & 0xC0U) == 0x80U)
+      shown.erase(0, 1);
+    words = TextBlock(canvas, "\u2026" + shown + "_", 1.6 * unit);
+  }
+  const double field = std::max(words.size().width + unit, std::min(10 * unit, width));
+  draw_keycap(canvas, std::round(middle - field / 2), std::round(top), std::round(field),
+              std::round(2.9 * unit));
+  words.draw(canvas, middle - words.size().width / 2,
+             top + (2.9 * unit - words.size().height) / 2, kText);
 }
 
 void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {

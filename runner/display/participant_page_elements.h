@@ -34,6 +34,12 @@ void draw_progress(cairo_t* canvas, const Page& page, double unit, double width)
 /// The current step's instruction, then a line for each step.
 void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
                     double room);
+/// A PNG file, as large as it fits, not enlarged beyond twice its size; a note where it is none.
+void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
+                  double width, double room);
+/// What is being typed, in a field.
+void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
+                double width);
 double text_width(double width, double unit);
 std::string minutes_and_seconds(int seconds);  ///< "0:25"
 

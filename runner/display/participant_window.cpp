@@ -5,6 +5,10 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "runner/display/key_names.h"
 #include "runner/display/x11_errors.h"
@@ -41,11 +45,41 @@ bool ParticipantWindow::is_answer_key(int key, int scancode) const {
                      [&](const auto& entry) { return entry.first == name; });
 }
 
+bool ParticipantWindow::handle_typing(int key, int scancode) {
+  const std::int64_t now = settings_.clock->now_ns();
+  const std::string name = on_keypad(key) ? keypad_character(key) : "";
+  ignore_character_ = !name.empty();
+  if (ignore_character_) keys_.add({name, now});
+  const std::vector<std::string> names = key_names(key, scancode);
+  const bool writes = names.empty() || names[0] == "space" || names[0].size() < 2 ||
+                      static_cast<unsigned char>(names[0][0]) >= 0x80;
+  if (ignore_character_ || writes) return !names.empty();
+  keys_.add({names[0], now});
+  return true;
+}
+
+void ParticipantWindow::handle_character(unsigned character) {
+  if (page_.typing == Page::Typing::none) return;
+  if (std::exchange(ignore_character_, false) || character < ' ' || character == 0x7f) return;
+  keys_.add({character == ' ' ? "space" : utf8_of(character), settings_.clock->now_ns()});
+}
+
+void ParticipantWindow::handle_wheel(double up) {
+  if (!page_.wheel || !std::isfinite(up)) return;
+  wheel_ += std::clamp(up, -10.0, 10.0);
+  for (; wheel_ >= 1; wheel_ -= 1) press("wheel up");
+  for (; wheel_ <= -1; wheel_ += 1) press("wheel down");
+}
+
 bool ParticipantWindow::handle_key(int key, int scancode) {
+  if (page_.typing != Page::Typing::none) return handle_typing(key, scancode);
   const std::int64_t now = settings_.clock->now_ns();
   const std::string name = match_key(key_names(key, scancode), page_.keys);
   if (name.empty()) return false;
   if (turn_page(name)) return true;
+  // The answers are shown below the last screen: until then nobody has read what they are about.
+  const bool unread = page_.kind == Page::Kind::text && screen_ + 1 < screens_;
+  if (unread && is_answer_key(key, scancode)) return true;
   keys_.add({name, now});
   return true;
 }
@@ -64,7 +98,8 @@ bool ParticipantWindow::turn_page(const std::string& key) {
 
 void ParticipantWindow::draw() {
   if (auto page = pages_.take()) {
-    if (page->kind != page_.kind || page->text != page_.text) screen_ = 0;
+    if (page->kind != page_.kind || page->text != page_.text || page->part != page_.part)
+      screen_ = 0;
     page_ = std::move(*page);
     needs_redraw_ = true;
     image_ = {};

@@ -29,6 +29,13 @@ class ParticipantWindow final : public ParticipantScreen {
   /// A key was pressed, here or in the console. \return false for a key without a name
   bool handle_key(int key, int scancode);
   bool is_answer_key(int key, int scancode) const;
+  bool typing() const { return page_.typing != Page::Typing::none; }
+  /// A character was typed, here or in the console: of an answer that is typed.
+  void handle_character(unsigned character);
+  /// The wheel was turned. \param up  notches, negative: down
+  void handle_wheel(double up);
+  /// Pressed elsewhere (a gamepad, a pedal), by its name.
+  void press(const std::string& key) { keys_.add({key, settings_.clock->now_ns()}); }
   /// Redraws if anything has changed since the last call.
   void draw();
   /// The window was uncovered: the next draw() repaints it.
@@ -44,6 +51,8 @@ class ParticipantWindow final : public ParticipantScreen {
   void paint(int width, int height);
   /// Turns to another screen of a long text. False: the key does not, or there is none.
   bool turn_page(const std::string& key);
+  /// While an answer is typed: keys that write no character, and those of the numeric pad.
+  bool handle_typing(int key, int scancode);
 
   const WindowSettings& settings_;
   GLFWwindow* window_ = nullptr;
@@ -55,6 +64,8 @@ class ParticipantWindow final : public ParticipantScreen {
   bool needs_redraw_ = true;  ///< the window does not show image_
   Mailbox<Page> pages_;
   EventQueue<KeyPress> keys_;
+  bool ignore_character_ = false;  ///< the next one: its key has been taken already
+  double wheel_ = 0;               ///< notches that make no whole one yet
   std::atomic<bool> open_{true};
 };
 

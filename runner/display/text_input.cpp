@@ -1,6 +1,7 @@
 #include "runner/display/text_input.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace palpate::runner {
@@ -22,6 +23,7 @@ constexpr CommandText kCommands[] = {
     {"zero", Kind::emergency_zero},
     {"clear", Kind::clear_fault},
     {"quit", Kind::quit},
+    {"answer", Kind::answer},
 };
 
 constexpr char kEscape = '\x1b';
@@ -62,7 +64,8 @@ const char* text_commands_help() {
          "  :stop        end after this trial        :stop block  end after this block\n"
          "               (repeat the command to cancel)\n"
          "  :zero, Esc   emergency: forces off       :clear       allow forces again\n"
-         "  :quit        end at once                 :quit withdrawn  the participant withdraws\n";
+         "  :quit        end at once                 :quit withdrawn  the participant withdraws\n"
+         "  :answer X    the participant's answer, spoken; without X: on to the next\n";
 }
 
 std::string_view text_command(Kind kind) {
@@ -80,6 +83,7 @@ ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
     return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};
   }
   for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
+                                   std::pair(std::string_view("answer "), Kind::answer),
                                    std::pair(std::string_view("quit "), Kind::quit)}) {
     if (said.rfind(word, 0) == 0)
       return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
@@ -114,6 +118,8 @@ void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vecto
   }
   if (text == ":") {
     line_ = text;
+  } else if (text[0] == kDelete || text[0] == '\b') {
+    out.emplace_back(KeyPress{"backspace", time_ns});
   } else if (enter) {
     out.emplace_back(KeyPress{"enter", time_ns});
   } else if (text == " ") {
@@ -140,6 +146,9 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
     while (end < rest.size() && (rest[end] < '@' || rest[end] > '~')) ++end;
     if (rest.substr(2, end - 2) == "24" && end < rest.size() && rest[end] == '~')
       out.emplace_back(emergency("F12"));
+    constexpr std::array kArrows = {"up", "down", "right", "left"};
+    if (end == 2 && rest.size() > 2 && rest[2] >= 'A' && rest[2] <= 'D')
+      out.emplace_back(KeyPress{kArrows[static_cast<std::size_t>(rest[2] - 'A')], time_ns});
     return std::min(end + 1, rest.size());
   }
   // Terminals send Alt and a key as Escape followed by the key. That cannot be told from Escape

@@ -17,8 +17,12 @@ std::string text_of(const Page& page) {
   if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
   if (page.done > 0 && page.kind != Page::Kind::feedback)
     text += "\n[" + std::to_string(page.done) + " of " + std::to_string(page.trials) + "]";
-  if (page.kind == kText) text += "\n[space bar: go on]";
-  if (page.kind != Page::Kind::neutral) return text;
+  if (page.parts > 1)
+    text += "\n[" + std::to_string(page.part) + " / " + std::to_string(page.parts) + "]";
+  if (page.picture) text += "\n[a picture, which the window shows]";
+  if (page.kind == kText && page.keys.empty()) text += "\n[space bar: go on]";
+  if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
+  if (page.typing != Page::Typing::none) text += "\n> " + stimuli::printable(page.typed);
   for (const auto& [key, answer] : page.keys) {
     text += text.empty() ? "" : "   ";
     text += stimuli::printable(key);
@@ -63,8 +67,11 @@ void TextScreen::show(const Page& page) {
   const Page before = std::exchange(last_, page);
   std::string text;
   if (page.kind != before.kind || page.text != before.text || page.go != before.go ||
+      page.typing != before.typing || page.keys != before.keys ||
       (page.keys.empty() && page.seconds_left > before.seconds_left) || page.kind == kText) {
     text = text_of(page);
+  } else if (page.typed != before.typed) {
+    text = "> " + stimuli::printable(page.typed);
   }
   if (page.reply != before.reply && !page.reply.empty())
     text += (text.empty() ? "" : "\n") + stimuli::printable(page.reply);

@@ -9,6 +9,7 @@
 #include <chrono>
 
 #include "runner/display/console_window.h"
+#include "runner/display/joystick.h"
 #include "runner/display/key_names.h"
 #include "runner/display/participant_window.h"
 #include "runner/display/window_layout.h"
@@ -17,7 +18,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kFrame = 1.0 / 60;  // s, between frames of the console
+constexpr double kFrame = 1.0 / 60;      // s, between frames of the console
+constexpr double kJoystickPoll = 0.002;  // s: GLFW has no events of its buttons
 
 double seconds() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -50,10 +52,19 @@ class Windows final : public DisplayLoop {
       : settings_(settings),
         layout_(lay_out_windows(settings_)),
         participant_(settings_, layout_.participant, layout_.participant_scale),
-        console_(settings_, layout_, participant_) {
+        console_(settings_, layout_, participant_),
+        joystick_(settings_.joystick.empty() ? nullptr : make_joystick()),
+        joystick_keys_(settings_.joystick) {
     GLFWwindow* const window = participant_.handle();
     glfwSetWindowUserPointer(window, this);
     glfwSetKeyCallback(window, &Windows::on_participant_key);
+    glfwSetCharCallback(window, [](GLFWwindow* from, unsigned character) {
+      static_cast<Windows*>(glfwGetWindowUserPointer(from))
+          ->participant_.handle_character(character);
+    });
+    glfwSetScrollCallback(window, [](GLFWwindow* from, double, double up) {
+      static_cast<Windows*>(glfwGetWindowUserPointer(from))->participant_.handle_wheel(up);
+    });
     glfwSetWindowRefreshCallback(window, [](GLFWwindow* from) {
       static_cast<Windows*>(glfwGetWindowUserPointer(from))->participant_.refresh();
     });
@@ -113,7 +124,8 @@ class Windows final : public DisplayLoop {
     const double next = std::max(started + kFrame, 2 * drawn - started);
     glfwPollEvents();
     for (double now = seconds(); now < next && !ended_.load(); now = seconds()) {
-      glfwWaitEventsTimeout(next - now);
+      glfwWaitEventsTimeout(joystick_ ? std::min(next - now, kJoystickPoll) : next - now);
+      poll_joystick();
     }
     if (glfwWindowShouldClose(participant_.handle()) != 0) participant_.close();
     if (glfwWindowShouldClose(console_.handle()) != 0) {
@@ -122,8 +134,22 @@ class Windows final : public DisplayLoop {
     }
   }
 
+  void poll_joystick() {
+    if (!joystick_) return;
+    for (const std::string& key : joystick_keys_.pressed(joystick_->read())) {
+      if (key == "escape") {
+        console_.send_command(ConsoleCommand::Kind::emergency_zero, "the joystick");
+      } else {
+        participant_.press(key);
+      }
+    }
+  }
+
   static void on_participant_key(GLFWwindow* window, int key, int scancode, int action, int) {
     auto& self = *static_cast<Windows*>(glfwGetWindowUserPointer(window));
+    // Held down, the key that takes back what was typed repeats.
+    if (action == GLFW_REPEAT && key == GLFW_KEY_BACKSPACE && self.participant_.typing())
+      self.participant_.handle_key(key, scancode);
     if (action != GLFW_PRESS) return;
     const bool answer = self.participant_.is_answer_key(key, scancode);
     if (key == GLFW_KEY_F12 || (key == GLFW_KEY_ESCAPE && !answer)) {
@@ -138,6 +164,8 @@ class Windows final : public DisplayLoop {
   const WindowLayout layout_;
   ParticipantWindow participant_;
   ConsoleWindow console_;
+  std::unique_ptr<Joystick> joystick_;  ///< none: the protocol maps none
+  JoystickKeys joystick_keys_;
   std::atomic<bool> ended_{false};
 };
 

@@ -2,6 +2,7 @@
 // The participant's window and the experimenter's console on a graphical display.
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,6 +25,7 @@ struct WindowSettings {
   std::function<void()> emergency;
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; nullptr: none
   WorkspaceMap workspace;        ///< of the servo, for the mouse
+  std::map<std::string, std::string> joystick;  ///< its inputs -> keys; empty: it is not looked at
   Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
 };
 

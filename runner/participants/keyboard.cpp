@@ -24,7 +24,7 @@ KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
         protocol.stimuli.begin(), protocol.stimuli.end(),
         [&wanted = name](const protocols::StimulusSpec& s) { return s.name == wanted; });
     stimuli_.push_back(static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
-    keys_.emplace_back(by == AnswerBy::keys ? key : "button " + std::to_string(keys_.size() + 1),
+    keys_.emplace_back(by != AnswerBy::buttons ? key : "button " + std::to_string(keys_.size() + 1),
                        protocols::answer_label(protocol, name));
   }
 }
@@ -41,10 +41,29 @@ void KeyboardRespondent::show(Page page) {
 }
 
 void KeyboardRespondent::reply() {
+  reply_with(protocol_.texts.other_key);
+}
+
+void KeyboardRespondent::reply_with(const std::string& text) {
   reply_until_ns_ = clock_.now_ns() + kReply_ns;
-  if (page_.reply == protocol_.texts.other_key) return;
-  page_.reply = protocol_.texts.other_key;
+  if (page_.reply == text) return;
+  page_.reply = text;
   screen_.show(page_);
+}
+
+std::vector<KeyPress> KeyboardRespondent::take_keys() {
+  std::vector<KeyPress> keys = std::exchange(spoken_, {});  // came before the others
+  std::vector<KeyPress> pressed = screen_.keys();
+  if (by_ == AnswerBy::experimenter) {
+    // Nobody answers beside the one who types; pages are read by the participant.
+    std::erase_if(pressed, [](const KeyPress& press) {
+      return press.key != "space" && press.key != "enter" && press.key != "left" &&
+             press.key != "right";
+    });
+    if (page_.typing != Page::Typing::none) pressed.clear();
+  }
+  keys.insert(keys.end(), pressed.begin(), pressed.end());
+  return keys;
 }
 
 void KeyboardRespondent::end_reply() {
@@ -55,7 +74,7 @@ void KeyboardRespondent::end_reply() {
 }
 
 void KeyboardRespondent::tend() {
-  if (!screen_.keys().empty()) reply();
+  if (!take_keys().empty()) reply();
   end_reply();
 }
 
@@ -82,7 +101,7 @@ void KeyboardRespondent::wait_until(std::int64_t when_ns) {
 
 void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
   while (true) {
-    for (const KeyPress& press : screen_.keys()) {
+    for (const KeyPress& press : take_keys()) {
       if (press.time_ns < since_ns) continue;
       if (press.key == "space" || press.key == "enter") return;
       reply();
@@ -124,6 +143,7 @@ void KeyboardRespondent::feedback(bool correct) {
   page.kind = Page::Kind::feedback;
   page.text = correct ? "\u2713" : "\u2717";
   show(std::move(page));
+  attendant_.sound(correct ? SoundCue::right : SoundCue::wrong);
   screen_.keys();
   wait_until(clock_.now_ns() + kFeedback_ns);
 }
@@ -154,12 +174,19 @@ void KeyboardRespondent::show_cue(const Sample& sample) {
   page_.kind = cue == Cue::move_away ? Page::Kind::message : Page::Kind::neutral;
   page_.go = cue == Cue::go;
   page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
-  if (task() != nullptr && cue == Cue::go) page_.text = interval_text();
+  if (cue == Cue::ready) attendant_.sound(SoundCue::ready);
+  if (task() != nullptr) {
+    if (cue == Cue::go) page_.text = interval_text();
+    const bool types = cue == Cue::go && view_.answers && task()->answers.empty();
+    page_.typing = types ? Page::Typing::number : Page::Typing::none;
+    page_.wheel =
+        cue == Cue::go && task()->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
+  }
   screen_.show(page_);
 }
 
 std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
-  if (by_ != AnswerBy::keys) return std::nullopt;
+  if (by_ == AnswerBy::buttons) return std::nullopt;
   for (std::size_t i = 0; i < keys_.size(); ++i) {
     if (keys_[i].first == key) return stimuli_[i];
   }
@@ -167,14 +194,13 @@ std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
 }
 
 void KeyboardRespondent::listen(const Sample& sample) {
-  for (const KeyPress& press : screen_.keys()) {
-    if (pending_) continue;
-    if (task() != nullptr && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
-      pending_ = meaning_in_interval(press.key);
-      if (pending_) pending_->time_ns = press.time_ns;
+  for (const KeyPress& press : take_keys()) {
+    if (task() != nullptr) {
+      listen_to_task(press);
       continue;
     }
-    const std::optional<int> stimulus = task() != nullptr ? std::nullopt : meaning(press.key);
+    if (pending_) continue;
+    const std::optional<int> stimulus = meaning(press.key);
     if (stimulus && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
       pending_ = Answer{*stimulus, press.time_ns};
     } else {
@@ -201,7 +227,7 @@ std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
   if (sample.phase == Phase::feeling && onset_ns_ == 0) onset_ns_ = sample.time_ns;
   show_cue(sample);
   listen(sample);
-  if (pending_ && sample.time_ns >= pending_->time_ns) return pending_;
+  if (pending_ && onset_ns_ > 0 && sample.time_ns >= pending_->time_ns) return pending_;
   attendant_.attend();
   return std::nullopt;
 }

@@ -19,11 +19,14 @@ class Attendant {
   virtual ~Attendant() = default;
   /// Called at every tick of a trial and every 5 ms between trials. An exception ends the wait.
   virtual void attend() = 0;
+  /// To be heard by the participant, where sounds are wanted.
+  virtual void sound(SoundCue /*cue*/) {}
 };
 
 enum class AnswerBy {
   keys,     ///< the protocol's
   buttons,  ///< of the device: button n stands for the n-th key of the protocol
+  experimenter,  ///< types what the participant says; the participant's keys go on only
 };
 
 class KeyboardRespondent final : public Respondent {
@@ -33,6 +36,7 @@ class KeyboardRespondent final : public Respondent {
                      Attendant& attendant, Clock& clock, AnswerBy by);
 
   void read(const std::string& text) override;
+  void read_screens(const std::vector<ReadScreen>& screens) override;
   void rest(const std::string& text, std::int64_t until_ns) override;
   void feedback(bool correct) override;
   void begin_trial(const protocols::Trial& trial) override;
@@ -41,6 +45,9 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
+  /// What the participant has said: a key, its label or a number; "": on to the next.
+  /// \return  false: nothing of the kind is asked now
+  bool spoken(const std::string& answer, std::int64_t time_ns);
   /// Shows a page without answer keys.
   void show_message(const std::string& text);
   /// To be called repeatedly while such a page is shown: replies to keys.
@@ -68,10 +75,17 @@ class KeyboardRespondent final : public Respondent {
   /// \return  what it means, if it ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
-  bool type(const std::string& key, bool text);  ///< false: the key is not for typing
+  std::vector<KeyPress> take_keys();  ///< pressed, or spoken and typed by the experimenter
+  void listen_to_task(const KeyPress& press);
+  std::optional<Answer> typed_answer(const std::string& key);
+  bool type(const std::string& key);  ///< false: the key is not for typing
   std::optional<double> typed_number(std::optional<double> least, std::optional<double> most) const;
+  void reply_with(const std::string& text);
+  void refuse_number(std::optional<double> least, std::optional<double> most);
   KeyPress wait_for_key(std::int64_t since_ns);
-  int choose(const std::string& question, const Keys& keys, std::int64_t& time_ns);
+  /// \return  index into keys, which are shown with the last screen; -1: gone on, without keys
+  int page_through(const std::vector<ReadScreen>& screens, const Keys& keys, Page::Kind kind,
+                   std::int64_t& time_ns);
   std::string ask_typed(const protocols::PageItem& item);
 
   const protocols::Protocol& protocol_;
@@ -91,7 +105,7 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> pending_;  ///< given, until the servo's samples have reached its time
   int task_block_ = -1;            ///< of the trial; -1: version 1
   IntervalView view_;
-  std::string typed_;
+  std::vector<KeyPress> spoken_;  ///< as keys, or pressed and not looked at yet
 };
 
 }  // namespace palpate::runner

@@ -2,9 +2,11 @@
 // The interface between a session and its participant.
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "protocols/schedule.h"
 #include "runner/servo/servo.h"
@@ -16,6 +18,7 @@ struct Answer {
   std::int64_t time_ns = 0;  ///< session clock, when the event arrived
   bool goes_on = false;      ///< no answer: on to the next interval
   double number = 0;         ///< rate: as it was typed
+  int times = 1;             ///< adjust: so many turns at once
 };
 
 /// What is asked in an interval of a trial of version 2.
@@ -24,8 +27,17 @@ struct IntervalView {
   bool answers = true;                         ///< an answer ends it; else the participant goes on
   bool felt = true;                            ///< false: after the last one, forces off
   const protocols::Interval* shown = nullptr;  ///< none where nothing is felt
-  std::string text = {};                       ///< adjust: what is felt now
+  bool continues = false;  ///< adjust, after a turn: forces go on, keys count at once
 };
+
+/// A screen to read.
+struct ReadScreen {
+  std::string text;
+  std::shared_ptr<const std::string> picture{};  ///< bytes of a PNG file; none
+};
+
+/// Short tones for the participant.
+enum class SoundCue { ready, go, right, wrong };
 
 /// Ends the current attempt of a trial; what() says why.
 class TrialCutOff : public std::runtime_error {
@@ -38,6 +50,10 @@ class Respondent {
   virtual ~Respondent() = default;
   /// Shows a text of the protocol; returns when the participant goes on. Empty: returns at once.
   virtual void read(const std::string& text) = 0;
+  /// Several screens, back and forth; returns when the participant goes on behind the last one.
+  virtual void read_screens(const std::vector<ReadScreen>& screens) {
+    for (const ReadScreen& screen : screens) read(screen.text);
+  }
   /// A break: like read, but at least until `until_ns` (session clock).
   virtual void rest(const std::string& text, std::int64_t /*until_ns*/) { read(text); }
   /// Shows whether the last answer was correct, if the protocol asks for feedback.
@@ -50,7 +66,8 @@ class Respondent {
   virtual std::optional<Answer> confidence(const protocols::ConfidenceSpec& /*asked*/) {
     return std::nullopt;
   }
-  /// Version 2: a question of a page; "": left out. Consent is "agree" or "disagree".
+  /// Version 2: a question of a page; "": left out. Consent is "agree" or "disagree", a choice one
+  /// of the item's `choices`.
   virtual std::string ask(const protocols::PageSpec& /*page*/,
                           const protocols::PageItem& /*item*/) {
     return "";

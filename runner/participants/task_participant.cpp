@@ -1,6 +1,7 @@
 #include "runner/participants/task_participant.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "protocols/tasks/levels.h"
@@ -11,6 +12,7 @@ namespace {
 constexpr double kLook = 1.5;            // s of feeling in each interval, from the first contact on
 constexpr double kLongestLook = 8;       // s, also without contact
 constexpr std::uint64_t kJudgement = 9;  // of its random stream; the hand has 1 to 3
+constexpr std::uint64_t kPages = 10;     // likewise
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
 
 /// Whether the observer of shapes can know what a block shows.
@@ -26,6 +28,13 @@ bool is_told_by_shape(const protocols::Protocol& protocol, const protocols::Task
     }
   }
   return true;
+}
+
+/// FNV-1a, to seed with.
+std::uint64_t number_of(const std::string& name) {
+  std::uint64_t hash = 14695981039346656037U;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  return hash;
 }
 
 }  // namespace
@@ -155,16 +164,19 @@ std::optional<Answer> TaskParticipant::confidence(const protocols::ConfidenceSpe
 
 std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocols::PageItem& item) {
   if (page.kind == protocols::PageSpec::Kind::consent) return "agree";
+  // Of the question itself: the same whatever was asked before.
+  stimuli::Random random(seed_, {static_cast<std::uint64_t>(number_), kPages, number_of(page.name),
+                                 number_of(item.name)});
   switch (item.kind) {
     case protocols::PageItem::Kind::number: {
-      constexpr double kPlain = 30;
-      const double least = item.least.value_or(std::min(kPlain, item.most.value_or(kPlain)));
-      const double most = item.most.value_or(std::max(kPlain, least));
-      return protocols::level_text(std::clamp(kPlain, least, most));
+      const double least = item.least.value_or(std::min(0.0, item.most.value_or(0)));
+      const double most = item.most.value_or(std::max(100.0, least));
+      const double whole = std::ceil(least) + std::floor(random.unit() * (most - least));
+      return protocols::level_text(whole <= most ? whole : least);
     }
     case protocols::PageItem::Kind::choice:
     case protocols::PageItem::Kind::scale:
-      return item.choices.front();
+      return item.choices[random.below(item.choices.size())];
     case protocols::PageItem::Kind::text:
       break;
   }

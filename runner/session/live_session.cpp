@@ -66,7 +66,8 @@ LiveSession::Outcome LiveSession::run_trials() {
       hold_.hold(fault.reason, fault.is_transient(), fault.trouble);
       say(std::string(fault.what()) + "; " + hold_.how_to_continue());
     } catch (const EndOfSession& end) {
-      if (session_.plan().finished() && end.end != data::RunEnd::withdrawn) break;
+      const bool over = session_.plan().finished() && !session_.has_open_pages();
+      if (over && end.end != data::RunEnd::withdrawn) break;
       return {end.end, end.what(), 0, 0, end.failed};
     }
   }
@@ -143,6 +144,10 @@ void LiveSession::attend() {
   check_device();
   if (!station_.screen.open())
     throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
+  if (std::string trouble = station_.screen.trouble(); trouble != told_trouble_) {
+    told_trouble_ = std::move(trouble);
+    if (!told_trouble_.empty()) say(told_trouble_);
+  }
   monitor_.show_if_due();
   forces_.end_without_guard();
 }
@@ -184,9 +189,12 @@ void LiveSession::obey(const ConsoleCommand& command) {
       plan_stop(command.kind);
       break;
     case Kind::emergency_zero:
-      hold_.emergency_zero(command.text, in_trial);
+      // While the participant says how sure they are no tick would tell of it.
+      hold_.emergency_zero(command.text, in_trial && !monitor_.asking());
       note(command.time_ns, "emergency zero: " + command.text);
       say("EMERGENCY by " + command.text + ": forces are off until the fault is cleared");
+      if (monitor_.asking())
+        throw TrialCutOff(trip_reason(servo_fault::kEmergency, DeviceTrouble::none));
       break;
     case Kind::clear_fault:
       if (in_trial) {
@@ -198,6 +206,13 @@ void LiveSession::obey(const ConsoleCommand& command) {
       break;
     case Kind::note:
       note(command.time_ns, command.text);
+      break;
+    case Kind::answer:
+      if (station_.answer_by != AnswerBy::experimenter) {
+        say("the participant answers; --spoken lets the experimenter do it");
+      } else if (!respondent_.spoken(command.text, command.time_ns)) {
+        say("'" + command.text + "' is no answer now");
+      }
       break;
     case Kind::quit:
       throw end_by_experimenter(command.text);

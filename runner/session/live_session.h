@@ -38,6 +38,7 @@ class LiveSession final : public Attendant {
 
   /// For the session's own thread. \throws EndOfSession, TrialCutOff
   void attend() override;
+  void sound(SoundCue cue) override { noise_.cue(cue); }
   /// A message for the experimenter.
   void say(const std::string& message) { monitor_.say(message); }
   /// A trial that is on record, for the accuracy so far.
@@ -63,6 +64,7 @@ class LiveSession final : public Attendant {
   KeyboardRespondent respondent_;
   Session session_;
   std::deque<ConsoleCommand> commands_;  ///< not obeyed yet
+  std::string told_trouble_;             ///< of the participant's inputs
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

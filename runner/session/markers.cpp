@@ -24,6 +24,8 @@ const char* to_string(Marker::Kind kind) {
       return "time_out";
     case Marker::Kind::cut_off:
       return "cut_off";
+    case Marker::Kind::interval:
+      return "interval";
   }
   return "";
 }

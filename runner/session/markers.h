@@ -21,6 +21,7 @@ struct Marker {
     response = 3,
     time_out = 4,
     cut_off = 5,  ///< the trial will be shown again
+    interval = 6,  ///< forces go on again, in a further interval of the trial
   };
   Kind kind = Kind::trial_start;
   std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of the event itself

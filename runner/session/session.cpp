@@ -61,8 +61,16 @@ void Session::step() {
   const auto& texts = station_.protocol.texts;
   switch (state_) {
     case State::instruction:
+      state_ = before_trial();
+      if (state_ == State::end) {  // interrupted behind the last trial
+        show_pages(protocols::PageSpec::When::after);
+        participant_.read(texts.end);
+        break;
+      }
+      state_ = State::instruction;
       show_pages(protocols::PageSpec::When::before);
       participant_.read(texts.instructions);
+      resume_task_block();
       state_ = before_trial();
       break;
     case State::practice:

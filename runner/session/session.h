@@ -45,6 +45,10 @@ class SessionEvents {
       const data::TrialRecord& record) = 0;  ///< not on record yet; also a time-out
   virtual void cut_off(const std::string& reason) = 0;
   virtual void recorded(const data::TrialRecord& record) = 0;
+  /// Version 2: an interval of the trial is about to begin.
+  virtual void interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
+  /// Version 2: how sure the participant is, is asked, with forces off, or no longer.
+  virtual void asking(bool /*now*/) {}
 };
 
 class Session {
@@ -68,6 +72,8 @@ class Session {
 
   State state() const { return state_; }
   const SessionPlan& plan() const { return station_.plan; }
+  /// Whether a page after the last trial waits for answers.
+  bool has_open_pages() const;
   /// Does what the state asks for and moves on. Between any two calls everything that happened is
   /// on record: whatever is thrown in a trial, forces are zero, the attempt is cut off, and the
   /// next call shows the trial again. \throws SessionFault; StoreError when a record could not be
@@ -97,11 +103,14 @@ class Session {
   std::optional<Answer> wait_in_interval(const IntervalView& view, std::optional<double> limit,
                                          ServoState& servo);
   void end_interval();
+  void tell_interval(const protocols::Trial& trial, const IntervalView& view);
   void take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
   void ask_level();
   void tell_level();
+  void read_instructions(const protocols::TaskBlock& block);
+  void resume_task_block();
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   void cut_off(const std::string& reason);

@@ -4,6 +4,8 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/tasks/levels.h"
+#include "runner/session/level_scenes.h"
 #include "stimuli/compose.h"
 
 namespace palpate::runner {
@@ -12,6 +14,11 @@ namespace {
 constexpr double kSecond_ns = 1e9;
 constexpr std::int64_t kFrame_ns = 33'000'000;  // of the console
 constexpr std::size_t kMostMessages = 200;
+
+/// Neither a number nor an adjusted level is right or wrong.
+bool has_right_answer(const data::TrialRecord& record) {
+  return !record.task || (record.task->task != "rate" && record.task->task != "adjust");
+}
 
 /// For the console; null: as it was shown last.
 const char* in_words(Session::State state) {
@@ -43,6 +50,7 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
   state_.session = marker_.session = station.record.session();
   for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
     state_.scores.push_back({stimulus.name, 0, 0});
+  state_.takes_answers = station.answer_by == AnswerBy::experimenter;
 }
 
 double SessionMonitor::elapsed() const {
@@ -96,7 +104,7 @@ void SessionMonitor::held() {
 }
 
 void SessionMonitor::count(const data::TrialRecord& record) {
-  if (record.practice) return;
+  if (record.practice || !has_right_answer(record)) return;
   for (ShapeScore& score : state_.scores) {
     if (score.shape != record.shape) continue;
     ++score.shown;
@@ -104,11 +112,34 @@ void SessionMonitor::count(const data::TrialRecord& record) {
   }
 }
 
+void SessionMonitor::interval(const protocols::Trial& trial, const IntervalView& view) {
+  const auto& block = station_.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+  turned_ = view.continues;
+  feeling_ = feeling_ && view.continues;
+  state_.task = to_string(block.task);
+  state_.interval = view.interval;
+  state_.intervals = view.intervals;
+  state_.level.clear();
+  const protocols::Interval* const shown = view.shown;
+  std::vector<stimuli::ObjectSpec> objects;
+  if (shown != nullptr) {
+    state_.renderer = protocols::to_string(shown->renderer);
+    if (shown->stimulus >= 0) objects.push_back(shown_object(station_.protocol, trial, *shown));
+    std::optional<double> level = shown->level;
+    if (!level && block.level && shown->stimulus >= 0)
+      level = protocols::own_level(station_.protocol, block, shown->stimulus);
+    if (level) state_.level = protocols::level_text(*level);
+  }
+  state_.objects =
+      std::make_shared<const std::vector<stimuli::ObjectSpec>>(std::move(objects));
+  show();
+}
+
 void SessionMonitor::began(const protocols::Trial& trial) {
   const protocols::StimulusSpec& stimulus =
       station_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
   in_trial_ = true;
-  feeling_ = false;
+  feeling_ = began_feeling_ = turned_ = touched_ = false;
   trial_began_ns_ = station_.clock.now_ns();
   stimuli::ObjectSpec object = stimulus.object;
   object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
@@ -127,21 +158,25 @@ void SessionMonitor::began(const protocols::Trial& trial) {
 
 void SessionMonitor::onset(const data::TrialRecord& so_far) {
   feeling_ = true;
+  if (turned_) return;  // the forces of one interval, changed
   sources_.noise.go_tone();
-  marker_.kind = Marker::Kind::trial_start;
+  marker_.kind = began_feeling_ ? Marker::Kind::interval : Marker::Kind::trial_start;
+  began_feeling_ = true;
   marker_.attempt = so_far.attempt;
   marker_.time_ns = so_far.onset_ns;
   station_.markers.send(marker_);
 }
 
 void SessionMonitor::first_contact(const data::TrialRecord&, std::int64_t time_ns) {
+  touched_ = true;
+  if (turned_) return;
   marker_.kind = Marker::Kind::first_contact;
   marker_.time_ns = time_ns;
   station_.markers.send(marker_);
 }
 
 void SessionMonitor::answered(const data::TrialRecord& record) {
-  in_trial_ = false;
+  in_trial_ = asking_ = false;
   marker_.kind = record.timed_out ? Marker::Kind::time_out : Marker::Kind::response;
   marker_.response = record.response;
   marker_.time_ns = record.response_ns;
@@ -149,7 +184,7 @@ void SessionMonitor::answered(const data::TrialRecord& record) {
 }
 
 void SessionMonitor::cut_off(const std::string& reason) {
-  in_trial_ = false;
+  in_trial_ = asking_ = false;
   marker_.kind = Marker::Kind::cut_off;
   marker_.time_ns = station_.clock.now_ns();
   station_.markers.send(marker_);
@@ -157,14 +192,18 @@ void SessionMonitor::cut_off(const std::string& reason) {
 }
 
 void SessionMonitor::recorded(const data::TrialRecord& record) {
-  state_.answer = record.timed_out ? "none in time"
-                                   : record.response + (record.correct ? ", right" : ", wrong");
+  state_.answer = record.timed_out ? "none in time" : record.response;
+  if (!record.timed_out && has_right_answer(record))
+    state_.answer += record.correct ? ", right" : ", wrong";
+  if (record.task && record.task->confidence)
+    state_.answer += "; sure: " + protocols::level_text(*record.task->confidence);
   count(record);
   state_.times.push_back(record.response_time);
   const double took = static_cast<double>(station_.clock.now_ns() - trial_began_ns_) / kSecond_ns;
   ++timed_trials_;
   seconds_per_trial_ += (took - seconds_per_trial_) / timed_trials_;
-  if (!record.response.empty() && !record.first_contact_time) {
+  const bool nothing_there = record.task && record.task->catch_trial;
+  if (!record.response.empty() && !touched_ && !nothing_there) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
   }
 }

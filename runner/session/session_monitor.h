@@ -52,6 +52,10 @@ class SessionMonitor final : public SessionEvents {
   void answered(const data::TrialRecord& record) override;
   void cut_off(const std::string& reason) override;
   void recorded(const data::TrialRecord& record) override;
+  void interval(const protocols::Trial& trial, const IntervalView& view) override;
+  void asking(bool now) override { asking_ = now; }
+  /// The trial's intervals are over, a question of it is not.
+  bool asking() const { return asking_; }
 
  private:
   const LiveStation& station_;
@@ -62,6 +66,10 @@ class SessionMonitor final : public SessionEvents {
   double seconds_per_trial_ = 0;                                 ///< mean, since the session began
   int timed_trials_ = 0;                                         ///< in that mean
   bool in_trial_ = false, feeling_ = false;
+  bool began_feeling_ = false;  ///< the first interval of the trial has begun
+  bool turned_ = false;         ///< the interval follows a turn: nothing new begins for others
+  bool touched_ = false;        ///< in any interval of the trial
+  bool asking_ = false;
 };
 
 }  // namespace palpate::runner

@@ -20,7 +20,8 @@ void SessionNoise::stop() {
   on_record_ = false;
   station_.noise->turn_off();
   const NoiseReport heard = station_.noise->report();
-  station_.record.note(station_.clock.now_ns(), to_json_text(heard));
+  if (station_.noise->has_noise())
+    station_.record.note(station_.clock.now_ns(), to_json_text(heard));
   if (heard.underruns > 0)
     say_("the masking noise had " + std::to_string(heard.underruns) + " gaps");
 }
@@ -33,7 +34,17 @@ bool SessionNoise::has_failed() {
 }
 
 void SessionNoise::go_tone() {
-  if (station_.noise != nullptr) station_.noise->tone();
+  const auto& sounds = station_.protocol.sounds;
+  if (station_.noise != nullptr && (station_.protocol.masking_noise || (sounds && sounds->go)))
+    station_.noise->tone();
+}
+
+void SessionNoise::cue(SoundCue cue) {
+  const auto& sounds = station_.protocol.sounds;
+  if (station_.noise == nullptr || !sounds) return;
+  if (cue == SoundCue::ready && sounds->ready) station_.noise->tone(Tone::ready);
+  if (cue == SoundCue::right && sounds->feedback) station_.noise->tone(Tone::right);
+  if (cue == SoundCue::wrong && sounds->feedback) station_.noise->tone(Tone::wrong);
 }
 
 }  // namespace palpate::runner

@@ -25,6 +25,8 @@ class SessionNoise {
   bool has_failed();
   /// "Go": forces are on.
   void go_tone();
+  /// Of the protocol's sounds, where it has this one.
+  void cue(SoundCue cue);
 
  private:
   const LiveStation& station_;

@@ -35,16 +35,19 @@ const protocols::TaskAnswer& chosen(const protocols::TaskBlock& block, const Ans
   return block.answers.at(static_cast<std::size_t>(answer.stimulus));
 }
 
-/// The screens of a text that it separates by form feeds.
-std::vector<std::string> screens_of(const std::string& text) {
-  std::vector<std::string> screens(1);
+/// The screens of a text that it separates by form feeds, with their pictures.
+std::vector<ReadScreen> screens_of(const std::string& text,
+                                   const std::vector<protocols::PagePicture>& pictures = {}) {
+  std::vector<ReadScreen> screens(1);
   for (const char c : text) {
     if (c == '\f') {
       screens.emplace_back();
     } else {
-      screens.back() += c;
+      screens.back().text += c;
     }
   }
+  for (std::size_t i = 0; i < std::min(screens.size(), pictures.size()); ++i)
+    screens[i].picture = pictures[i].bytes;
   return screens;
 }
 
@@ -82,6 +85,11 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
 HomeZone Session::task_home(double rest) const {
   return {least_reach_ + station_.protocol.home.margin,
           std::max(rest, station_.protocol.home.rest)};
+}
+
+void Session::tell_interval(const protocols::Trial& trial, const IntervalView& view) {
+  if (events_ != nullptr) events_->interval(trial, view);
+  participant_.begin_interval(trial, view);
 }
 
 std::optional<Answer> Session::wait_in_interval(const IntervalView& view,
@@ -122,8 +130,8 @@ std::optional<Answer> Session::show_intervals(const protocols::Trial& trial, Ser
     const auto count = static_cast<int>(trial.intervals.size());
     for (int i = 0; i < count; ++i) {
       const protocols::Interval& interval = trial.intervals[static_cast<std::size_t>(i)];
-      const IntervalView view{i + 1, count, i + 1 == count, true, &interval, ""};
-      participant_.begin_interval(trial, view);
+      const IntervalView view{i + 1, count, i + 1 == count, true, &interval};
+      tell_interval(trial, view);
       prepare_interval(trial, interval, task_home(i > 0 ? block.inter_interval : 0));
       const std::optional<double> limit =
           view.answers && !block.interval_limit ? block.time_out : block.interval_limit;
@@ -143,8 +151,8 @@ std::optional<Answer> Session::show_intervals(const protocols::Trial& trial, Ser
 std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
                                                   ServoState& servo) {
   const auto count = static_cast<int>(trial.intervals.size());
-  const IntervalView view{count, count, true, false, nullptr, ""};
-  participant_.begin_interval(trial, view);
+  const IntervalView view{count, count, true, false, nullptr};
+  tell_interval(trial, view);
   const protocols::Interval nothing{-1, trial.renderer};
   station_.servo.prepare(scenes_->scene(trial, nothing), renderer_for(trial.renderer), {0, 0});
   const auto answer = wait_in_interval(view, task_of(trial).time_out, servo);
@@ -158,13 +166,13 @@ std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
 std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState& servo) {
   const protocols::TaskBlock& block = task_of(trial);
   protocols::Interval own = trial.intervals[0];
-  bool standard = false;
+  bool standard = false, turned = false;
   HomeZone home = task_home(0);
   std::int64_t first_onset_ns = 0;
   while (true) {
     const protocols::Interval& shown = standard ? trial.intervals[1] : own;
-    const IntervalView view{standard ? 2 : 1, 2, true, true, &shown, ""};
-    participant_.begin_interval(trial, view);
+    const IntervalView view{standard ? 2 : 1, 2, true, true, &shown, turned};
+    tell_interval(trial, view);
     prepare_interval(trial, shown, home);
     const double spent =
         first_onset_ns == 0
@@ -181,21 +189,21 @@ std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState&
       if (answer) answer->number = *own.level;
       return answer;
     }
-    if (act == "switch") {
+    turned = act != "switch";
+    home = turned ? HomeZone{0, 0} : task_home(0);
+    if (!turned) {
       standard = !standard;
-      home = task_home(0);
-      continue;
-    }
-    home = {0, 0};
-    if (!standard) {
-      const double turned = *own.level + (act == "up" ? block.turn : -block.turn);
-      own.level = std::clamp(turned, *block.least, *block.most);
+    } else if (!standard) {
+      const double by = block.turn * answer->times;
+      own.level = std::clamp(*own.level + (act == "up" ? by : -by), *block.least, *block.most);
     }
   }
 }
 
 void Session::ask_confidence(const protocols::ConfidenceSpec& asked) {
+  if (events_ != nullptr) events_->asking(true);
   const std::optional<Answer> step = participant_.confidence(asked);
+  if (events_ != nullptr) events_->asking(false);
   if (!step) return;
   record_.task->confidence = asked.scale.at(static_cast<std::size_t>(step->stimulus)).number;
   record_.task->confidence_ns = step->time_ns;
@@ -270,7 +278,26 @@ void Session::begin_task_block() {
   if (station_.protocol.version == 1) return;
   const protocols::TaskBlock& block = task_of(station_.plan.next());
   show_pages(PageSpec::When::between, block.name);
-  for (const std::string& screen : screens_of(block.instructions)) participant_.read(screen);
+  read_instructions(block);
+}
+
+void Session::read_instructions(const protocols::TaskBlock& block) {
+  participant_.read_screens(screens_of(block.instructions));
+}
+
+/// A session that goes on within a block: what it is about is read again.
+void Session::resume_task_block() {
+  if (station_.protocol.version == 1 || station_.plan.finished() || station_.plan.block_begins())
+    return;
+  read_instructions(task_of(station_.plan.next()));
+}
+
+bool Session::has_open_pages() const {
+  const auto& pages = station_.protocol.pages;
+  return std::any_of(pages.begin(), pages.end(), [this](const PageSpec& page) {
+    return page.when == PageSpec::When::after && !page.items.empty() &&
+           !station_.log.has_answers(page.name);
+  });
 }
 
 void Session::show_pages(PageSpec::When when, const std::string& block) {
@@ -278,9 +305,7 @@ void Session::show_pages(PageSpec::When when, const std::string& block) {
     if (page.when != when || page.before_block != block) continue;
     if (station_.log.has_answers(page.name)) continue;
     const bool consent = page.kind == PageSpec::Kind::consent;
-    if (!consent) {
-      for (const std::string& screen : screens_of(page.text)) participant_.read(screen);
-    }
+    if (!consent) participant_.read_screens(screens_of(page.text, page.pictures));
     std::vector<data::PageAnswer> answers;
     PageItem agree;
     agree.name = "consent";

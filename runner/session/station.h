@@ -46,7 +46,7 @@ struct LiveStation : Station {
   ExperimenterConsole& console;
   AnswerBy answer_by;
   Markers& markers;    ///< for other recordings: EEG, motion capture
-  NoisePlayer* noise;  ///< in the participant's headphones; none where none is wanted
+  NoisePlayer* noise;  ///< noise and tones in the participant's headphones; none: not wanted
 };
 
 /// The radius about the origin that holds each of the library's stimuli in any orientation, m.

@@ -1,6 +1,7 @@
 #include "runner/sound/masking_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -16,26 +17,49 @@ constexpr double kBlock = 0.02;  // s, length of a block
 // its duration. A sound card is slower than that and sets the pace itself.
 constexpr double kPace = 0.9;
 
+/// Pitches of a tone's parts, Hz, one after the other; 0: it is over.
+std::array<double, 2> pitches_of(Tone tone) {
+  switch (tone) {
+    case Tone::ready:
+      return {440, 0};
+    case Tone::go:
+      return {880, 0};
+    case Tone::right:
+      return {660, 990};
+    case Tone::wrong:
+      return {220, 0};
+  }
+  return {};
+}
+
 /// Adds a tone to the samples after begin().
-class Tone {
+class ToneSignal {
  public:
-  Tone(double level_db, double rate)
-      : amplitude_(std::sqrt(2) * std::pow(10, level_db / 20)), rate_(rate), at_(kLength) {}
-  void begin() { at_ = 0; }
+  ToneSignal(double level_db, double rate)
+      : amplitude_(std::sqrt(2) * std::pow(10, level_db / 20)), rate_(rate) {}
+  void begin(Tone tone) {
+    pitches_ = pitches_of(tone);
+    part_ = 0;
+    at_ = 0;
+  }
   void add(std::vector<double>& samples) {
     for (double& sample : samples) {
-      if (at_ >= kLength) return;
+      if (part_ >= pitches_.size() || pitches_[part_] == 0) return;
       const double edge = std::min({1.0, at_ / kEdge, (kLength - at_) / kEdge});
-      sample += amplitude_ * edge * std::sin(2 * M_PI * kPitch * at_);
+      sample += amplitude_ * edge * std::sin(2 * M_PI * pitches_[part_] * at_);
       at_ += 1 / rate_;
+      if (at_ < kLength) continue;
+      at_ = 0;
+      ++part_;
     }
   }
 
  private:
-  static constexpr double kPitch = 880;                 // Hz
-  static constexpr double kLength = 0.1, kEdge = 0.01;  // s
+  static constexpr double kLength = 0.1, kEdge = 0.01;  // s, of a part
 
-  double amplitude_, rate_, at_;
+  double amplitude_, rate_, at_ = 0;
+  std::array<double, 2> pitches_{};
+  std::size_t part_ = 2;
 };
 
 }  // namespace
@@ -43,6 +67,16 @@ class Tone {
 NoisePlayer::NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed,
                          const std::string& device, Opener open)
     : noise_(noise), seed_(seed), device_(device), open_(std::move(open)), output_(open_(device_)) {
+  start();
+}
+
+NoisePlayer::NoisePlayer(double level_db, const std::string& device, Opener open)
+    : noise_{protocols::NoiseKind::pink, level_db},
+      has_noise_(false),
+      seed_(0),
+      device_(device),
+      open_(std::move(open)),
+      output_(open_(device_)) {
   start();
 }
 
@@ -80,7 +114,7 @@ void NoisePlayer::play() noexcept {
   using Clock = std::chrono::steady_clock;
   const double rate = output_->rate();
   NoiseSignal signal(noise_, rate, seed_);
-  Tone tone(noise_.level_db, rate);
+  ToneSignal tone(noise_.level_db, rate);
   std::vector<double> samples(static_cast<std::size_t>(kBlock * rate));
   std::vector<std::int16_t> frames(2 * samples.size());
   const auto pace =
@@ -88,12 +122,12 @@ void NoisePlayer::play() noexcept {
   Clock::time_point due = Clock::now();
   try {
     while (!quit_ || !signal.silent()) {
-      signal.turn(on_);
+      signal.turn(on_ && has_noise_);
       const bool heard = !signal.silent();
       signal.fill(samples);
       if (const unsigned asked = tones_; asked != tones_begun_) {
         tones_begun_ = asked;
-        tone.begin();
+        tone.begin(tone_);
       }
       tone.add(samples);
       for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -117,6 +151,14 @@ void NoisePlayer::play() noexcept {
 }
 
 std::string to_json_text(const NoisePlayer& player) {
+  if (!player.has_noise()) {
+    const nlohmann::ordered_json event = {{"sounds", "on"},
+                                          {"level_db", player.noise().level_db},
+                                          {"device", player.device()},
+                                          {"rate_hz", player.rate()},
+                                          {"latency_s", player.latency()}};
+    return event.dump();
+  }
   const nlohmann::ordered_json event = {{"masking_noise", "on"},
                                         {"kind", protocols::to_string(player.noise().kind)},
                                         {"level_db", player.noise().level_db},

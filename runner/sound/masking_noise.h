@@ -13,6 +13,9 @@
 
 namespace palpate::runner {
 
+/// Tones: short, sines.
+enum class Tone { ready, go, right, wrong };
+
 /// What was played since the noise was last turned on.
 struct NoiseReport {
   double seconds = 0;   ///< of noise, including the fades
@@ -31,6 +34,8 @@ class NoisePlayer {
   /// \throws SoundError
   NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed, const std::string& device,
               Opener open = open_sound);
+  /// Tones without noise. \param level_db  root mean square, dB re full scale
+  NoisePlayer(double level_db, const std::string& device, Opener open = open_sound);
   /// Fades out.
   ~NoisePlayer();
   NoisePlayer(const NoisePlayer&) = delete;
@@ -41,12 +46,16 @@ class NoisePlayer {
   /// Fades out; returns at once.
   void turn_off();
   /// A short tone as loud as the noise, heard latency() later; returns at once.
-  void tone() { tones_.fetch_add(1); }
+  void tone(Tone which = Tone::go) {
+    tone_ = which;
+    tones_.fetch_add(1);
+  }
   bool on() const { return on_.load(); }
   /// The output has failed since turn_on().
   bool failed() const { return failed_.load(); }
   NoiseReport report() const;  ///< also after turn_off, until the next turn_on
   const protocols::MaskingNoise& noise() const { return noise_; }
+  bool has_noise() const { return has_noise_; }  ///< false: tones alone, of noise().level_db
   std::uint64_t seed() const { return seed_; }
   const std::string& device() const { return device_; }
   double rate() const { return output_->rate(); }     ///< Hz
@@ -57,6 +66,7 @@ class NoisePlayer {
   void play() noexcept;
 
   const protocols::MaskingNoise noise_;
+  const bool has_noise_ = true;
   const std::uint64_t seed_;
   const std::string device_;
   const Opener open_;
@@ -65,6 +75,7 @@ class NoisePlayer {
   std::atomic<bool> on_{false}, failed_{false}, quit_{false};
   std::atomic<std::uint64_t> frames_{0};  ///< of noise
   std::atomic<unsigned> tones_{0};        ///< requested
+  std::atomic<Tone> tone_{Tone::go};      ///< the newest
   std::atomic<int> underruns_{0};         ///< while on
   std::atomic<double> latency_{0};
   unsigned tones_begun_ = 0;  ///< used by the thread

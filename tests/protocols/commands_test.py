@@ -26,7 +26,7 @@ def run(*args):
 class Validate(unittest.TestCase):
     def test_summarises_the_published_protocols(self):
         for path in (SOURCE / "protocols").glob("*.json"):
-            if ".schema" in path.name:
+            if ".schema" in path.name or ".texts." in path.name:
                 continue
             done = run("validate", str(path))
             self.assertEqual((done.returncode, done.stderr), (0, b""), path)

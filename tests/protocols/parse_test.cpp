@@ -31,7 +31,8 @@ std::vector<fs::path> json_files(const fs::path& folder) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const fs::path& path = entry.path();
-    const bool schema = path.stem().extension() == ".schema";
+    const bool schema = path.stem().extension() == ".schema" ||
+                        path.filename().string().find(".texts.") != std::string::npos;
     if (path.extension() == ".json" && !schema) files.push_back(path);
   }
   std::sort(files.begin(), files.end());

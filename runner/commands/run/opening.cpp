@@ -1,8 +1,10 @@
 #include "runner/commands/run/opening.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <stdexcept>
 
+#include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/display/text_display.h"
 #include "runner/session/device_check.h"
@@ -41,9 +43,12 @@ void check_fitness(const OpenDevice& open, const RunSettings& settings,
   for (const std::string& reason : incompatibilities(protocol, library, able))
     reasons += "\n" + reason;
   if (!reasons.empty()) throw UsageError("this protocol cannot be run with this device:" + reasons);
-  if (settings.buttons && protocol.response.keys.size() > 8)
+  std::size_t answers = protocol.response.keys.size();
+  for (const protocols::TaskBlock& block : protocol.blocks)
+    answers = std::max(answers, block.answers.size());
+  if (settings.buttons && answers > 8)
     throw UsageError("--buttons: a device has 8 buttons at most; the protocol has " +
-                     std::to_string(protocol.response.keys.size()) + " answers");
+                     std::to_string(answers) + " answers");
   const bool unfit =
       able.calibration.rfind("stale", 0) == 0 || able.calibration.rfind("implausible", 0) == 0;
   if (open.guard == nullptr || settings.without_calibration ||
@@ -71,9 +76,25 @@ std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& setting
 
 std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
                                         const protocols::Protocol& protocol) {
-  if (!protocol.masking_noise || settings.without_noise) return nullptr;
+  if (settings.without_noise) return nullptr;
+  if (!protocol.masking_noise) {
+    if (!protocol.sounds) return nullptr;
+    return std::make_unique<NoisePlayer>(protocol.sounds->level_db, settings.sound_device);
+  }
   return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
                                        settings.sound_device);
+}
+
+std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
+                                               const protocols::Protocol& protocol, Clock& clock,
+                                               const std::function<void()>& emergency) {
+  if (settings.response_box.empty()) return nullptr;
+  try {
+    return std::make_unique<ResponseBox>(settings.response_box, protocol.responses.box, clock,
+                                         emergency);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--response-box: ") + error.what());
+  }
 }
 
 std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
@@ -86,12 +107,8 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
     window.ui_scale = settings.ui_scale;
     window.participant_monitor = settings.participant_monitor;
     window.console_monitor = settings.console_monitor;
-    const auto& texts = protocol.texts;
-    window.texts = {texts.instructions, texts.practice,  texts.break_text,
-                    texts.end,          texts.move_away, texts.ready,
-                    texts.go,           texts.wait,      texts.other_key};
-    for (const auto& [key, name] : protocol.response.keys)
-      window.texts.push_back(protocols::answer_label(protocol, name));
+    for (const auto& [key, text] : protocols::texts_of(protocol)) window.texts.push_back(text);
+    window.joystick = protocol.responses.joystick;
     window.emergency = emergency;
     window.mouse = dynamic_cast<MouseStylus*>(&device);
     window.workspace = workspace_of(protocol);

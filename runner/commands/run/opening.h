@@ -13,6 +13,7 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/session/markers.h"
+#include "runner/participants/response_box.h"
 #include "runner/sound/masking_noise.h"
 
 namespace palpate::runner {
@@ -40,6 +41,11 @@ std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
                                         const protocols::Protocol& protocol);
 
 /// Two windows, or text where there is no display. \throws DisplayError: the mouse needs a window
+/// None where none is named. \param emergency  commands zero force at once; called in its thread
+/// \throws UsageError; std::runtime_error: its port cannot be opened
+std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
+                                               const protocols::Protocol& protocol, Clock& clock,
+                                               const std::function<void()>& emergency);
 /// \param emergency  commands zero force at once; called in the display's thread
 std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
                                           const protocols::Protocol& protocol, Clock& clock,

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +17,8 @@
 #include <vector>
 
 #include "data/store/store.h"
+#include "protocols/sha256.h"
+#include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/run/report.h"
@@ -106,6 +109,8 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   }
   if (!known.limited.empty())
     record.note(began_ns, to_json_text(known.limited, station.device, station.protocol.servo_rate));
+  if (station.protocol.sounds && station.noise == nullptr)
+    session.say("WITHOUT the protocol's sounds");
   if (station.protocol.masking_noise && station.noise == nullptr) {
     session.say("WITHOUT the protocol's masking noise");
     record.note(began_ns, R"({"masking_noise":"left out"})");
@@ -170,6 +175,35 @@ std::vector<std::string> news(const std::string& resumed, const DisplayLoop& dis
   return out;
 }
 
+AnswerBy answer_by(const RunSettings& settings) {
+  if (settings.spoken) return AnswerBy::experimenter;
+  return settings.buttons ? AnswerBy::buttons : AnswerBy::keys;
+}
+
+bool asks_for_consent(const protocols::Protocol& protocol) {
+  return std::any_of(protocol.pages.begin(), protocol.pages.end(), [](const auto& page) {
+    return page.kind == protocols::PageSpec::Kind::consent;
+  });
+}
+
+bool has_joystick(const RunSettings& settings, const protocols::Protocol& protocol) {
+  return !protocol.responses.joystick.empty() && !settings.no_window;
+}
+
+/// The texts that were shown go on record as a whole.
+void translate_texts(const RunSettings& settings, Admission& admission) {
+  protocols::Protocol& protocol = admission.protocol;
+  if (has_joystick(settings, protocol) != !protocol.responses.joystick.empty())
+    admission.warnings.emplace_back("a gamepad or pedal is looked at in a window only");
+  if (settings.language.empty()) return;
+  protocols::translate(protocol, settings.protocol, settings.language);
+  admission.notes.push_back(
+      nlohmann::ordered_json{{"language", settings.language},
+                             {"texts_sha256", protocols::sha256_hex(protocol.translation)},
+                             {"texts", protocol.translation}}
+          .dump());
+}
+
 }  // namespace
 
 int run_command(const std::vector<std::string>& args) {
@@ -183,6 +217,7 @@ int run_command(const std::vector<std::string>& args) {
   Admission admission = admit(settings);
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
+  translate_texts(settings, admission);
 
   // The device behind its watchdog, which is forked before markers and noise start their threads.
   auto marker_sinks = open_markers(settings);
@@ -204,7 +239,7 @@ int run_command(const std::vector<std::string>& args) {
       store.look_up(admission.enrolled, settings.participant, admission.number, device.simulated);
   const int session = choose_session(store, participant, protocol, settings);
   print_participant(participant, session, protocol.sessions.count, device.simulated);
-  if (settings.consent.empty())
+  if (settings.consent.empty() && !asks_for_consent(protocol))
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
 
   // The servo loop, without forces until the first trial; the displays, of which each can end them.
@@ -219,10 +254,16 @@ int run_command(const std::vector<std::string>& args) {
     servo.emergency_zero();
   };
   const auto display = open_display(settings, protocol, clock, *open.device, emergency);
+  const auto box = open_response_box(settings, protocol, clock, emergency);
+  std::optional<ScreenWithBox> box_screen;
+  if (box) box_screen.emplace(display->participant(), *box);
+  ParticipantScreen& screen =
+      box_screen ? static_cast<ParticipantScreen&>(*box_screen) : display->participant();
 
   const data::ClockStamp began = stamp_now(clock);
   RunRecord record(store, admission.enrolled, participant,
-                   run_info(settings, device, session, began), other_texts(admission));
+                   run_info(settings, device, session, began, has_joystick(settings, protocol)),
+                   other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
   SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
@@ -242,9 +283,9 @@ int run_command(const std::vector<std::string>& args) {
       servo,
       open.guard != nullptr ? &direction_check : nullptr,
       [&signals] { return signals.end_requested(); },
-      display->participant(),
+      screen,
       display->console(),
-      settings.buttons ? AnswerBy::buttons : AnswerBy::keys,
+      answer_by(settings),
       markers,
       noise.get()};
   const Beforehand known{settings, admission,      limited,

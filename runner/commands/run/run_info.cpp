@@ -17,7 +17,7 @@ data::ClockStamp stamp_now(Clock& clock) {
 }
 
 data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& device, int session,
-                       const data::ClockStamp& began) {
+                       const data::ClockStamp& began, bool joystick) {
   data::RunInfo info;
   info.session = session;
   info.clock = began;
@@ -26,7 +26,11 @@ data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& de
   info.device = settings.device;
   info.device_calibration = device.calibration;
   if (!device.serial.empty()) info.device_calibration += " (serial " + device.serial + ")";
-  info.response_device = settings.buttons ? "device buttons" : "keyboard";
+  info.response_device = settings.spoken    ? "spoken, typed by the experimenter"
+                         : settings.buttons ? "device buttons"
+                                            : "keyboard";
+  if (!settings.response_box.empty()) info.response_device += ", serial response box";
+  if (joystick) info.response_device += ", joystick";
   info.response_latency = settings.response_latency;
   info.consent_version = settings.consent;
   if (!settings.consent.empty()) info.consent_utc_ns = began.utc_ns;

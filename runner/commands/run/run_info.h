@@ -14,8 +14,9 @@ namespace palpate::runner {
 /// This moment on the session clock and in UTC.
 data::ClockStamp stamp_now(Clock& clock);
 
+/// \param joystick  whether the protocol maps one, and a window looks at it
 data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& device, int session,
-                       const data::ClockStamp& began);
+                       const data::ClockStamp& began, bool joystick);
 
 /// The protocol as shown, where its texts are not those of the one that the participant is enrolled
 /// in.

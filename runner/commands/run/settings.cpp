@@ -1,5 +1,6 @@
 #include "runner/commands/run/settings.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "data/record.h"
@@ -11,6 +12,16 @@ namespace palpate::runner {
 namespace {
 
 namespace po = boost::program_options;
+
+/// It becomes part of a file's name.
+void check_language(const std::string& language) {
+  const bool letters = std::all_of(language.begin(), language.end(), [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+  });
+  if (!letters || language.size() > 32)
+    throw UsageError("--language: must be letters, digits, - and _, such as de or pt-BR");
+}
 
 void check(RunSettings& settings) {
   settings.participant = given_or_asked(settings.participant, "participant code");
@@ -27,6 +38,9 @@ void check(RunSettings& settings) {
       !(std::isfinite(*settings.response_latency) && *settings.response_latency >= 0))
     throw UsageError("--response-latency: must be 0 or more seconds");
   check_advisor(settings.advisor, settings.advisor_time_out);
+  if (settings.spoken && settings.buttons)
+    throw UsageError("--spoken: the experimenter types the answers; leave out --buttons");
+  check_language(settings.language);
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
@@ -82,6 +96,15 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("hand", po::value(&settings.hand)->value_name("left|right"), "hand used; recorded")  //
       ("buttons", po::bool_switch(&settings.buttons),
        "the device's buttons answer, in the order of the protocol's keys")  //
+      ("spoken", po::bool_switch(&settings.spoken),
+       "the participant says the answers, the experimenter types them: in the console's field, or "
+       "':answer X'")  //
+      ("response-box", po::value(&settings.response_box)->value_name("PATH[:BAUD]"),
+       "serial port of a box whose bytes are keys (9600 baud, 8N1), as the protocol's responses "
+       "say; beside the keyboard")  //
+      ("language", po::value(&settings.language)->value_name("CODE"),
+       "show the protocol's texts as texts.CODE.json, or NAME.texts.CODE.json, beside it says "
+       "them")  //
       ("response-latency", po::value(&latency)->value_name("SECONDS"),
        "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),

@@ -1,0 +1,176 @@
+#include "protocols/tasks/texts.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <system_error>
+
+#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
+
+namespace palpate::protocols {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kLongestLabel = 80;  // bytes
+
+/// A text of the protocol; a label stands under a key, in one line.
+struct TextPlace {
+  std::string key;
+  std::string* text;
+  bool label = false;
+};
+
+class TextPlaces {
+ public:
+  explicit TextPlaces(Protocol& protocol) {
+    add_texts(protocol.texts);
+    if (protocol.version == 1) {
+      add_labels(protocol);
+    } else {
+      add_task_texts(protocol.texts);
+      for (TaskBlock& block : protocol.blocks) add_block(block);
+      for (PageSpec& page : protocol.pages) add_page(page);
+    }
+  }
+  std::vector<TextPlace> take() { return std::move(places_); }
+
+ private:
+  void add(const std::string& key, std::string& text, bool label = false) {
+    if (!text.empty()) places_.push_back({key, &text, label});
+  }
+  void add_texts(Protocol::Texts& texts) {
+    add("texts.instructions", texts.instructions);
+    add("texts.practice", texts.practice);
+    add("texts.break", texts.break_text);
+    add("texts.end", texts.end);
+    add("texts.move_away", texts.move_away);
+    add("texts.ready", texts.ready);
+    add("texts.go", texts.go);
+    add("texts.wait", texts.wait);
+    add("texts.other_key", texts.other_key);
+  }
+  void add_task_texts(Protocol::Texts& texts) {
+    add("texts.next_interval", texts.next_interval);
+    add("texts.answer_now", texts.answer_now);
+    add("texts.type_number", texts.type_number);
+    add("texts.agree", texts.agree, true);
+    add("texts.disagree", texts.disagree, true);
+    add("texts.other_number", texts.other_number);
+    add("texts.answer_first", texts.answer_first);
+  }
+  void add_labels(Protocol& protocol) {
+    for (const auto& [key, stimulus] : protocol.response.keys) {
+      std::string& label = protocol.response.labels[stimulus];
+      if (label.empty()) label = stimulus;
+      add("response.keys." + stimulus, label, true);
+    }
+  }
+  void add_block(TaskBlock& block) {
+    const std::string head = "blocks." + block.name + ".";
+    add(head + "instructions", block.instructions);
+    add(head + "question", block.question);
+    const char* const kind = block.task == TaskKind::rate ? "scale." : "keys.";
+    for (TaskAnswer& answer : block.answers) add(head + kind + answer.name, answer.label, true);
+    if (!block.confidence) return;
+    add(head + "confidence.question", block.confidence->question);
+    std::size_t step = 0;
+    for (ScaleStep& one : block.confidence->scale)
+      add(head + "confidence.scale." + std::to_string(++step), one.label, true);
+  }
+  void add_page(PageSpec& page) {
+    const std::string head = "pages." + page.name + ".";
+    add(head + "text", page.text);
+    for (PageItem& item : page.items) {
+      const std::string place = head + "items." + item.name + ".";
+      add(place + "question", item.question);
+      for (std::size_t i = 0; i < item.shown.size(); ++i)
+        add(place + "choices." + std::to_string(i + 1), item.shown[i]);
+    }
+  }
+
+  std::vector<TextPlace> places_;
+};
+
+bool is_one_line(const std::string& text) {
+  return text.size() <= kLongestLabel &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
+}
+
+/// The part of a key before its last dot: answers side by side have it in common.
+std::string group_of(const std::string& key) { return key.substr(0, key.rfind('.')); }
+
+void check_translation(const TextPlace& place, const json& value, FaultList& faults) {
+  const std::string pointer = child_pointer("", place.key);
+  if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
+    faults.add(pointer, "expected the translation of '" + place.text->substr(0, 60) + "'" +
+                            found_text(value));
+  } else if (place.label && !is_one_line(value.get_ref<const std::string&>())) {
+    faults.add(pointer, "expected a text of 1 to 80 bytes without control characters" +
+                            found_text(value));
+  }
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protocol) {
+  Protocol copy = protocol;
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (const TextPlace& place : TextPlaces(copy).take()) texts.emplace_back(place.key, *place.text);
+  return texts;
+}
+
+std::string texts_json(const Protocol& protocol) {
+  nlohmann::ordered_json all;
+  for (const auto& [key, text] : texts_of(protocol)) all[key] = text;
+  return all.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+void translate(Protocol& protocol, const std::string& language, const std::string& text,
+               const std::string& file_name) {
+  FaultList faults(file_name);
+  const json given = read_json(text, faults);
+  if (!given.is_object()) faults.add("", "expected an object of texts" + found_text(given));
+  faults.throw_if_any();
+  const std::vector<TextPlace> places = TextPlaces(protocol).take();
+  std::set<std::string> known;
+  std::set<std::pair<std::string, std::string>> labels;
+  for (const TextPlace& place : places) {
+    known.insert(place.key);
+    const auto value = given.find(place.key);
+    if (value == given.end()) {
+      faults.add(child_pointer("", place.key),
+                 "expected the translation of '" + place.text->substr(0, 60) + "': it is missing");
+      continue;
+    }
+    check_translation(place, *value, faults);
+    if (place.label && value->is_string() &&
+        !labels.emplace(group_of(place.key), value->get<std::string>()).second) {
+      faults.add(child_pointer("", place.key),
+                 "expected a label of its own, found '" + value->get<std::string>() + "' again");
+    }
+  }
+  for (const auto& [key, value] : given.items()) {
+    if (!known.contains(key) && key != "$schema")
+      faults.add(child_pointer("", key), "expected no such key: the protocol has no text there");
+  }
+  faults.throw_if_any();
+  for (const TextPlace& place : places) *place.text = given[place.key].get<std::string>();
+  protocol.language = language;
+  protocol.translation = text;
+}
+
+void translate(Protocol& protocol, const std::string& protocol_path, const std::string& language) {
+  namespace fs = std::filesystem;
+  const fs::path path(protocol_path);
+  const fs::path own = path.parent_path() / (path.stem().string() + ".texts." + language + ".json");
+  const fs::path common = path.parent_path() / ("texts." + language + ".json");
+  std::error_code error;
+  const fs::path& chosen = fs::exists(own, error) || !fs::exists(common, error) ? own : common;
+  translate(protocol, language, read_text_file(chosen.string()), chosen.string());
+}
+
+}  // namespace palpate::protocols

@@ -1,0 +1,48 @@
+#pragma once
+// Gamepads and foot pedals: what is pressed on them stands for keys of the keyboard.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace palpate::runner {
+
+struct JoystickState {
+  std::vector<bool> buttons;
+  std::vector<double> axes;        ///< -1 to 1; a pedal that is up: -1
+  std::vector<std::uint8_t> hats;  ///< bits: 1 up, 2 right, 4 down, 8 left
+};
+
+class Joystick {
+ public:
+  virtual ~Joystick() = default;
+  /// As of now; none: nothing is connected.
+  virtual std::optional<JoystickState> read() = 0;
+};
+
+/// The first one that is connected, through GLFW: to be used in the main thread, after glfwInit.
+std::unique_ptr<Joystick> make_joystick();
+
+/// Finds the moments at which something is pressed.
+class JoystickKeys {
+ public:
+  /// \param keys  "button 1", "axis 2 +", "hat 1 up" -> name of a key
+  explicit JoystickKeys(std::map<std::string, std::string> keys) : keys_(std::move(keys)) {}
+
+  /// Keys whose inputs have been pressed since the last call. What is down when it is connected
+  /// counts once it has been released. An axis is pressed beyond 0.6 and released within 0.4.
+  std::vector<std::string> pressed(const std::optional<JoystickState>& now);
+
+ private:
+  bool is_down(const std::string& input, const JoystickState& now) const;
+
+  std::map<std::string, std::string> keys_;
+  std::set<std::string> down_;  ///< inputs
+  bool connected_ = false;
+};
+
+}  // namespace palpate::runner

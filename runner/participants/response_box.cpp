@@ -1,0 +1,135 @@
+#include "runner/participants/response_box.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate::runner {
+namespace {
+
+constexpr int kUsualBaud = 9600;
+constexpr std::array<std::pair<int, speed_t>, 9> kSpeeds = {{{1200, B1200},
+                                                             {2400, B2400},
+                                                             {4800, B4800},
+                                                             {9600, B9600},
+                                                             {19200, B19200},
+                                                             {38400, B38400},
+                                                             {57600, B57600},
+                                                             {115200, B115200},
+                                                             {230400, B230400}}};
+
+/// Path and speed of "PATH[:BAUD]".
+std::pair<std::string, speed_t> port_of(const std::string& name) {
+  const std::size_t colon = name.rfind(':');
+  int baud = kUsualBaud;
+  std::string path = name;
+  if (colon != std::string::npos) {
+    const char* const end = name.data() + name.size();
+    const auto [at, error] = std::from_chars(name.data() + colon + 1, end, baud);
+    if (error != std::errc() || at != end)
+      throw std::invalid_argument("no serial port '" + name + "'; expected PATH[:BAUD]");
+    path = name.substr(0, colon);
+  }
+  const auto* const speed = std::find_if(kSpeeds.begin(), kSpeeds.end(),
+                                         [baud](const auto& one) { return one.first == baud; });
+  if (path.empty() || speed == kSpeeds.end())
+    throw std::invalid_argument("no serial port '" + name +
+                                "'; expected PATH[:BAUD] with a usual speed, such as 9600");
+  return {path, speed->second};
+}
+
+std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::string>& keys) {
+  std::map<unsigned char, std::string> bytes;
+  for (const auto& [input, key] : keys) {
+    unsigned value = static_cast<unsigned char>(input[0]);
+    if (input.size() == 4) std::from_chars(input.data() + 2, input.data() + 4, value, 16);
+    bytes[static_cast<unsigned char>(value)] = key;
+  }
+  for (unsigned char c = '!'; keys.empty() && c <= '~'; ++c)
+    bytes[c] = std::string(1, static_cast<char>(c));
+  if (keys.empty()) bytes[' '] = "space";
+  return bytes;
+}
+
+}  // namespace
+
+ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
+                         Clock& clock, std::function<void()> emergency)
+    : keys_(bytes_of(keys)), clock_(clock), emergency_(std::move(emergency)) {
+  const auto [path, speed] = port_of(name);
+  port_ = ::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  const auto refuse = [&](const std::string& why) {
+    if (port_ >= 0) ::close(port_);
+    throw std::runtime_error("the response box at " + path + ": " + why);
+  };
+  if (port_ < 0) refuse(std::strerror(errno));
+  if (tcgetattr(port_, &before_) != 0) refuse("this is no serial port");
+  termios raw = before_;
+  cfmakeraw(&raw);
+  raw.c_cflag |= static_cast<tcflag_t>(CLOCAL | CREAD);
+  cfsetispeed(&raw, speed);
+  cfsetospeed(&raw, speed);
+  if (tcsetattr(port_, TCSANOW, &raw) != 0) refuse(std::strerror(errno));
+  tcflush(port_, TCIFLUSH);  // pressed before anybody listened
+  wake_ = eventfd(0, EFD_CLOEXEC);
+  if (wake_ < 0) refuse(std::strerror(errno));
+  thread_ = std::jthread([this] { listen(); });
+}
+
+ResponseBox::~ResponseBox() {
+  eventfd_write(wake_, 1);
+  thread_.join();
+  tcsetattr(port_, TCSANOW, &before_);
+  ::close(wake_);
+  ::close(port_);
+}
+
+void ResponseBox::listen() noexcept {
+  std::array<pollfd, 2> files = {{{wake_, POLLIN, 0}, {port_, POLLIN, 0}}};
+  while (true) {
+    if (poll(files.data(), files.size(), -1) < 0) {
+      if (errno == EINTR) continue;
+      break;
+    }
+    if (files[0].revents != 0) return;
+    std::array<unsigned char, 64> bytes{};
+    const ssize_t got = read(port_, bytes.data(), bytes.size());
+    const std::int64_t now = clock_.now_ns();
+    if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (got <= 0) break;
+    for (ssize_t i = 0; i < got; ++i) {
+      const auto key = keys_.find(bytes[static_cast<std::size_t>(i)]);
+      if (key == keys_.end()) continue;
+      if (key->second == "escape") emergency_();
+      presses_.add({key->second, now});
+    }
+  }
+  failed_ = true;
+}
+
+std::string ScreenWithBox::trouble() const {
+  if (box_.failed())
+    return "the response box is gone: the keyboard answers; plug it in and start again to have it";
+  return screen_.trouble();
+}
+
+std::vector<KeyPress> ScreenWithBox::keys() {
+  std::vector<KeyPress> keys = screen_.keys();
+  const std::vector<KeyPress> more = box_.take();
+  keys.insert(keys.end(), more.begin(), more.end());
+  std::stable_sort(keys.begin(), keys.end(), [](const KeyPress& a, const KeyPress& b) {
+    return a.time_ns < b.time_ns;
+  });
+  return keys;
+}
+
+}  // namespace palpate::runner

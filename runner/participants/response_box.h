@@ -1,0 +1,65 @@
+#pragma once
+// A response box on a serial port: each byte stands for a key of the keyboard.
+
+#include <termios.h>
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "runner/display/display.h"
+#include "runner/display/mailbox.h"
+
+namespace palpate::runner {
+
+class ResponseBox {
+ public:
+  /// \param name  "PATH" or "PATH:BAUD", 9600 where it is not said; 8N1
+  /// \param keys  byte ("1", "0x05") -> name of a key; empty: printable characters are themselves.
+  /// "escape" is the emergency
+  /// \param clock  time-stamps bytes on arrival; must outlive it
+  /// \param emergency  called at once in the box's own thread
+  /// \throws std::invalid_argument: no speed of a serial port; std::runtime_error: cannot be opened
+  ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys, Clock& clock,
+              std::function<void()> emergency);
+  ~ResponseBox();
+  ResponseBox(const ResponseBox&) = delete;
+  ResponseBox& operator=(const ResponseBox&) = delete;
+
+  /// Pressed since the last call, in order of arrival.
+  std::vector<KeyPress> take() { return presses_.take(); }
+  /// It was unplugged, or its port fails: nothing comes any more.
+  bool failed() const { return failed_.load(); }
+
+ private:
+  void listen() noexcept;
+
+  std::map<unsigned char, std::string> keys_;
+  Clock& clock_;
+  const std::function<void()> emergency_;
+  int port_ = -1, wake_ = -1;
+  termios before_{};
+  EventQueue<KeyPress> presses_;
+  std::atomic<bool> failed_{false};
+  std::jthread thread_;
+};
+
+/// The participant's screen with a box beside its keyboard.
+class ScreenWithBox final : public ParticipantScreen {
+ public:
+  /// Both must outlive it.
+  ScreenWithBox(ParticipantScreen& screen, ResponseBox& box) : screen_(screen), box_(box) {}
+  void show(const Page& page) override { screen_.show(page); }
+  std::vector<KeyPress> keys() override;
+  bool open() const override { return screen_.open(); }
+  std::string trouble() const override;
+
+ private:
+  ParticipantScreen& screen_;
+  ResponseBox& box_;
+};
+
+}  // namespace palpate::runner

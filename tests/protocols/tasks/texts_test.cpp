@@ -1,0 +1,104 @@
+// Translations of a protocol's texts.
+
+#include "protocols/tasks/texts.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "protocols/parse.h"
+
+namespace palpate::protocols {
+namespace {
+
+using nlohmann::json;
+
+const std::string kPublished = PALPATE_SOURCE_DIR "/protocols/roughness-magnitude.json";
+
+Protocol everything() {
+  return parse_protocol(PALPATE_SOURCE_DIR "/tests/protocols/good/everything-v2.json");
+}
+
+std::vector<std::string> faults_of(const std::string& text) {
+  Protocol protocol = everything();
+  try {
+    translate(protocol, "xx", text, "texts.xx.json");
+  } catch (const InputError& error) {
+    std::vector<std::string> places;
+    for (const Fault& fault : error.faults()) places.push_back(fault.location);
+    return places;
+  }
+  return {};
+}
+
+TEST(Texts, AreListedOnceEachAndTranslateToThemselves) {
+  const Protocol protocol = everything();
+  std::set<std::string> keys;
+  for (const auto& [key, text] : texts_of(protocol)) {
+    EXPECT_TRUE(keys.insert(key).second) << key;
+    EXPECT_FALSE(text.empty()) << key;
+  }
+  for (const char* key :
+       {"blocks.constant.instructions", "blocks.constant.keys.2", "blocks.scale.scale.2",
+        "blocks.constant.confidence.question", "blocks.constant.confidence.scale.1",
+        "pages.consent.text", "pages.who.items.age.question", "pages.who.items.tired.choices.2",
+        "texts.agree", "texts.go"})
+    EXPECT_TRUE(keys.contains(key)) << key;
+  Protocol same = protocol;
+  translate(same, "xx", texts_json(protocol), "texts.xx.json");
+  EXPECT_EQ(texts_of(same), texts_of(protocol));
+  EXPECT_EQ(same.sha256, protocol.sha256);
+}
+
+TEST(Texts, AreReplacedEveryOneButWhatIsStoredStays) {
+  Protocol protocol = everything();
+  json other;
+  for (const auto& [key, text] : texts_of(protocol)) other[key] = "T " + key;
+  translate(protocol, "xx", other.dump(), "texts.xx.json");
+  for (const auto& [key, text] : texts_of(protocol)) EXPECT_EQ(text, "T " + key);
+  const PageItem& hand = protocol.pages[1].items[1];
+  EXPECT_EQ(hand.choices, (std::vector<std::string>{"links", "rechts"}));
+  EXPECT_EQ(hand.shown.front(), "T pages.who.items.hand.choices.1");
+  EXPECT_EQ(protocol.blocks[0].answers[1].name, "2");
+  EXPECT_EQ(protocol.blocks[0].answers[1].label, "T blocks.constant.keys.2");
+}
+
+TEST(Texts, NameEveryKeyThatIsMissingUnknownOrWrong) {
+  json texts = json::parse(texts_json(everything()));
+  EXPECT_TRUE(faults_of(texts.dump()).empty());
+  texts.erase("texts.go");
+  texts.erase("pages.consent.text");
+  texts["blocks.constant.question"] = 3;
+  texts["blocks.constant.keys.2"] = "two\nlines";
+  texts["blocks.which.keys.ball"] = "die";  // as the other one is called
+  texts["blocks.nowhere.question"] = "?";
+  std::vector<std::string> places = faults_of(texts.dump());
+  std::sort(places.begin(), places.end());
+  EXPECT_EQ(places, (std::vector<std::string>{
+                        "/blocks.constant.keys.2", "/blocks.constant.question",
+                        "/blocks.nowhere.question", "/blocks.which.keys.die", "/pages.consent.text",
+                        "/texts.go"}));
+  EXPECT_EQ(faults_of("[]").size(), 1U);
+  EXPECT_EQ(faults_of("{").size(), 1U);
+}
+
+TEST(Texts, OfThePublishedProtocolAreFoundBesideIt) {
+  Protocol protocol = parse_protocol(kPublished);
+  translate(protocol, kPublished, "de");
+  EXPECT_EQ(protocol.texts.go, "Los");
+  EXPECT_EQ(protocol.language, "de");
+  EXPECT_THROW(translate(protocol, kPublished, "tlh"), InputError);
+}
+
+TEST(Texts, OfVersion1AreItsTextsAndLabels) {
+  Protocol protocol = parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
+  json texts = json::parse(texts_json(protocol));
+  texts["response.keys.cube"] = "W\u00fcrfel";
+  translate(protocol, "de", texts.dump(), "texts.de.json");
+  EXPECT_EQ(answer_label(protocol, "cube"), "W\u00fcrfel");
+}
+
+}  // namespace
+}  // namespace palpate::protocols

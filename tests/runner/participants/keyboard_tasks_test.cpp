@@ -1,0 +1,272 @@
+// What a person's keys mean in tasks and on pages: a screen that types a script, a virtual clock.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <set>
+
+#include "protocols/parse.h"
+#include "runner/participants/keyboard.h"
+
+namespace palpate::runner {
+namespace {
+
+constexpr const char* kTasks = R"({"version": 2, "name": "t", "renderers": ["point"],
+  "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+              {"name": "box", "shape": "cube", "edge_m": 0.03}],
+  "blocks": [
+    {"name": "which", "task": "identify", "stimuli": ["ball", "box"], "repetitions": 1,
+     "keys": {"1": {"answer": "ball", "label": "Kugel"}, "2": {"answer": "box", "label": "Kasten"}}},
+    {"name": "number", "task": "rate", "stimuli": ["ball"], "repetitions": 1, "min": 0, "max": 50},
+    {"name": "equal", "task": "adjust", "stimuli": ["ball"], "standard": "ball",
+     "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 50, "starts": [200]}],
+  "texts": {"other_key": "OTHER KEY", "other_number": "OTHER NUMBER", "answer_first": "FIRST"}})";
+
+/// A press a look, each with the time of that look.
+class Scripted final : public ParticipantScreen {
+ public:
+  explicit Scripted(Clock& clock) : clock_(clock) {}
+  void show(const Page& page) override {
+    pages.push_back(page);
+    if (!page.reply.empty()) replies.insert(page.reply);
+  }
+  std::vector<KeyPress> keys() override {
+    if (script.empty()) return {};
+    std::vector<KeyPress> now;
+    for (const std::string& key : script.front()) now.push_back({key, clock_.now_ns()});
+    script.pop_front();
+    return now;
+  }
+  bool open() const override { return true; }
+  void type(const std::string& characters) {
+    for (const char c : characters)
+      script.push_back({c == ' ' ? "space" : c == '\n' ? "enter" : std::string(1, c)});
+  }
+  std::deque<std::vector<std::string>> script;
+  std::vector<Page> pages;
+  std::set<std::string> replies;
+
+ private:
+  Clock& clock_;
+};
+
+class Nobody final : public Attendant {
+ public:
+  void attend() override {
+    if (++looks > 100000) throw std::runtime_error("waits for ever");
+    if (each_look) each_look();
+  }
+  void sound(SoundCue cue) override { sounds.push_back(cue); }
+  int looks = 0;
+  std::function<void()> each_look;
+  std::vector<SoundCue> sounds;
+};
+
+class KeyboardTasks : public testing::Test {
+ protected:
+  KeyboardRespondent& person(AnswerBy by = AnswerBy::keys) {
+    person_.emplace(protocol_, screen_, nobody_, clock_, by);
+    return *person_;
+  }
+  void begin(int block, const IntervalView& view) {
+    trial_.task_block = block;
+    if (!view.continues) person_->begin_trial(trial_);
+    person_->begin_interval(trial_, view);
+  }
+  Sample felt(std::uint8_t buttons = 0) {
+    Sample sample;
+    sample.phase = Phase::feeling;
+    sample.time_ns = clock_.now_ns();
+    sample.buttons = buttons;
+    return sample;
+  }
+  /// Ticks until there is an answer.
+  std::optional<Answer> answer(int ticks = 200) {
+    for (int i = 0; i < ticks; ++i) {
+      if (const auto given = person_->step(felt())) return given;
+      clock_.wait_until(clock_.now_ns() + 1'000'000);
+    }
+    return std::nullopt;
+  }
+  std::string ask(const protocols::PageItem& item, const std::string& keys) {
+    screen_.script.push_back({});
+    screen_.type(keys);
+    return person_->ask({}, item);
+  }
+
+  protocols::Protocol protocol_ = protocols::parse_protocol_text(kTasks, "t.json");
+  VirtualClock clock_{1'000'000'000};
+  Scripted screen_{clock_};
+  Nobody nobody_;
+  std::optional<KeyboardRespondent> person_;
+  protocols::Trial trial_;
+};
+
+TEST_F(KeyboardTasks, NumbersAreTypedWithPointCommaMinusAndBackspace) {
+  for (const auto& [typed, number] : std::vector<std::pair<std::string, double>>{
+           {"12.5\n", 12.5}, {"7,25\n", 7.25}, {".5\n", 0.5}, {"0\n", 0}, {"-0\n", 0}, {"5.\n", 5}}) {
+    person();
+    begin(1, {});
+    screen_.script = {{}, {}};
+    screen_.type(typed);
+    const auto given = answer();
+    ASSERT_TRUE(given) << typed;
+    EXPECT_EQ(given->number, number) << typed;
+    EXPECT_FALSE(std::signbit(given->number));
+  }
+  screen_.script = {{}, {}, {"4"}, {"2"}, {"backspace"}, {"3"}, {"enter"}};
+  person();
+  begin(1, {});
+  EXPECT_EQ(answer()->number, 43);
+}
+
+TEST_F(KeyboardTasks, WhatIsNoNumberInRangeIsRefusedAndKept) {
+  for (const char* typed : {"\n", "51\n", "-1\n", "1.2.3\n", "--1\n", "1-\n", ".\n"}) {
+    screen_.replies.clear();
+    person();
+    begin(1, {});
+    screen_.script = {{}, {}};
+    screen_.type(typed);
+    EXPECT_FALSE(answer()) << typed;
+    const std::string said = std::string(typed) == "\n" ? "FIRST" : "OTHER NUMBER";
+    EXPECT_EQ(screen_.replies, std::set<std::string>{said + " (0 \u2013 50)"}) << typed;
+    EXPECT_EQ(screen_.pages.back().typed + "\n", typed);
+  }
+  // Digits without end overflow no number and no field.
+  person();
+  begin(1, {});
+  screen_.script = {{}, {}};
+  screen_.type(std::string(400, '9') + "\n");
+  EXPECT_FALSE(answer(1000));
+  EXPECT_EQ(screen_.pages.back().typed.size(), 200U);
+}
+
+TEST_F(KeyboardTasks, TurnsAreCountedAlsoWhileTheNextIntervalIsMade) {
+  person();
+  begin(2, {1, 2, true, true, nullptr});
+  screen_.script = {{}, {}, {"2", "2", "2"}};
+  const auto first = answer();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->times, 3);
+  screen_.script = {{"wheel down", "1"}};  // before the first tick with forces
+  begin(2, {1, 2, true, true, nullptr, true});
+  const auto second = answer();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->stimulus, 0);
+  EXPECT_EQ(second->times, 2);
+  begin(2, {2, 2, true, true, nullptr});
+  screen_.script = {{}, {}, {"2"}};
+  EXPECT_FALSE(answer()) << "the standard cannot be turned";
+}
+
+TEST_F(KeyboardTasks, AKeyBeforeTheForcesIsNoAnswer) {
+  person();
+  begin(0, {});
+  screen_.script = {{"1"}, {"2"}};
+  Sample before = felt();
+  before.phase = Phase::homing;
+  EXPECT_FALSE(person_->step(before));
+  EXPECT_EQ(answer()->stimulus, 1);
+  EXPECT_TRUE(screen_.replies.contains("OTHER KEY"));
+}
+
+TEST_F(KeyboardTasks, SpokenAnswersAreTypedByTheExperimenterAlone) {
+  person(AnswerBy::experimenter);
+  begin(0, {});
+  screen_.script = {{}, {"1"}, {"2"}};  // the participant's own keys
+  EXPECT_FALSE(answer(20));
+  EXPECT_FALSE(person_->spoken("Pyramide", clock_.now_ns()));
+  for (const char* words : {"kasten", "2"}) {
+    begin(0, {});
+    EXPECT_FALSE(answer(2));
+    EXPECT_TRUE(person_->spoken(words, clock_.now_ns()));
+    EXPECT_EQ(answer()->stimulus, 1) << words;
+  }
+  begin(1, {});
+  EXPECT_FALSE(answer(2));
+  EXPECT_TRUE(person_->spoken("12,5", clock_.now_ns()));
+  EXPECT_EQ(answer()->number, 12.5);
+  begin(1, {1, 2, false, true, nullptr});
+  EXPECT_FALSE(answer(2));
+  EXPECT_TRUE(person_->spoken("", clock_.now_ns()));
+  EXPECT_TRUE(answer()->goes_on);
+}
+
+TEST_F(KeyboardTasks, TextsAreTypedInAnyLettersAndRequiredWhereTheyAre) {
+  person();
+  protocols::PageItem item;
+  item.question = "?";
+  screen_.script.push_back({});
+  screen_.script.push_back({"\u00dc"});
+  screen_.script.push_back({"b"});
+  EXPECT_EQ(ask(item, " x,\n"), "\u00dcb x,");
+  EXPECT_EQ(ask(item, "\n  \na\n"), "  a");
+  item.required = false;
+  EXPECT_EQ(ask(item, "\n"), "");
+  item.kind = protocols::PageItem::Kind::number;
+  item.least = 18;
+  EXPECT_EQ(ask(item, "17\n"
+                      "5\n"),
+            "175");
+}
+
+TEST_F(KeyboardTasks, PagesGoBackAndForth) {
+  person();
+  screen_.script = {{}, {"space"}, {}, {"left"}, {}, {"left"}, {"right"}, {}, {"space"}, {}, {"right"},
+                    {"enter"}};
+  person_->read_screens({{"one"}, {"two"}, {""}, {"three"}});
+  std::string seen;
+  for (const Page& page : screen_.pages) {
+    if (!page.reply.empty()) continue;
+    if (seen.empty() || seen.substr(seen.size() - page.text.size()) != page.text)
+      seen += (seen.empty() ? "" : " ") + page.text;
+    EXPECT_EQ(page.parts, 3);
+  }
+  EXPECT_EQ(seen, "one two one two three");
+  EXPECT_TRUE(screen_.replies.contains("OTHER KEY")) << "nothing stands before the first screen";
+}
+
+TEST_F(KeyboardTasks, ConsentIsGivenBelowItsLastScreenOnly) {
+  person();
+  protocols::PageSpec page;
+  page.kind = protocols::PageSpec::Kind::consent;
+  page.text = "first\fsecond";
+  screen_.script = {{}, {"1"}, {"space"}, {}, {"space"}, {"2"}};
+  EXPECT_EQ(person_->ask(page, {}), "disagree");
+  for (const Page& shown : screen_.pages) EXPECT_EQ(shown.keys.empty(), shown.text == "first");
+}
+
+TEST_F(KeyboardTasks, LongScalesHaveAKeyForEachStep) {
+  person();
+  protocols::PageItem item;
+  item.kind = protocols::PageItem::Kind::choice;
+  for (int i = 0; i < 20; ++i) item.choices.push_back("c" + std::to_string(i));
+  item.shown = item.choices;
+  EXPECT_EQ(ask(item, "0"), "c9");
+  EXPECT_EQ(ask(item, "j"), "c19");
+  std::set<std::string> keys;
+  for (const auto& [key, label] : screen_.pages.back().keys) keys.insert(key);
+  EXPECT_EQ(keys.size(), 20U);
+}
+
+TEST_F(KeyboardTasks, CuesAreHeardWhenTheyAreSeen) {
+  person();
+  begin(0, {});
+  Sample ready = felt();
+  ready.phase = Phase::homing;
+  ready.waiting = Waiting::for_rest;
+  for (int i = 0; i < 5; ++i) {
+    person_->step(ready);
+    ready.time_ns += 200'000'000;
+  }
+  person_->feedback(true);
+  person_->feedback(false);
+  EXPECT_EQ(nobody_.sounds,
+            (std::vector<SoundCue>{SoundCue::ready, SoundCue::right, SoundCue::wrong}));
+}
+
+}  // namespace
+}  // namespace palpate::runner

@@ -1,0 +1,314 @@
+"""palpate run with protocols of version 2 on a terminal: every task, pages, kills and resumption.
+
+Usage: task_run_test.py PALPATE
+"""
+
+import contextlib
+import csv
+import hashlib
+import json
+import os
+import pathlib
+import pty
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from terminal import Terminal, end_if_it_hangs
+
+PALPATE = sys.argv.pop(1)
+
+LEVEL = {"level": {"path": "/stiffness_n_per_m"}}
+SURE = {"confidence": {"question": "HOW SURE", "scale": [{"label": "guessed"}, {"label": "sure", "number": 5}]}}
+BLOCKS = {
+    "ident": {"task": "identify", "stimuli": ["ball", "box"], "repetitions": 1, "feedback": True,
+              "question": "WHICH", "instructions": "ABOUT SHAPES\fMORE ABOUT SHAPES"},
+    "comp": {"task": "compare", "stimuli": ["ball"], "standard": "ball", **LEVEL, **SURE,
+             "procedure": {"kind": "constant", "levels": [40, 80], "repetitions": 1},
+             "question": "WHICH WAS STIFFER", "inter_interval_s": 0.2},
+    "three": {"task": "compare", "stimuli": ["ball"], "standard": "ball", "intervals": 3, **LEVEL,
+              "procedure": {"kind": "constant", "levels": [40], "repetitions": 1},
+              "question": "WHICH WAS ODD", "interval_limit_s": 0.3, "inter_interval_s": 0.2},
+    "detect": {"task": "detect", "stimuli": ["ball"], "repetitions": 2, "catch_trials": 0.5, "question": "ANYTHING"},
+    "number": {"task": "rate", "stimuli": ["ball"], "repetitions": 1, "min": -10, "max": 100, "question": "HOW HARD"},
+    "scale": {"task": "rate", "stimuli": ["ball"], "repetitions": 1, "question": "HOW SOFT",
+              "scale": [{"label": "hard", "number": -1}, {"label": "soft", "number": 1}]},
+    "adjust": {"task": "adjust", "stimuli": ["ball"], "standard": "ball", **LEVEL, "min": 20, "max": 100,
+               "turn": 10, "starts": [30, 90], "repetitions": 2, "question": "MAKE THEM EQUAL"},
+    "stairs": {"task": "compare", "stimuli": ["ball"], "standard": "ball", **LEVEL, "question": "STIFFER",
+               "procedure": {"kind": "staircase", "start": 90, "min": 50, "max": 100, "steps": [20, 10],
+                             "stop": {"trials": 5}}},
+}
+PROTOCOL = {
+    "version": 2, "name": "live", "renderers": ["point"], "seed": 5, "orientation": "fixed",
+    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1}, "material": {"stiffness_n_per_m": 60},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1, "stiffness_n_per_m": 60},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+    "texts": {"instructions": "WELCOME", "end": "GOOD BYE"},
+}
+PAGES = [
+    {"name": "consent", "kind": "consent", "consent_version": "3b", "text": "YOU MAY STOP\fDO YOU TAKE PART"},
+    {"name": "you", "kind": "questionnaire", "items": [
+        {"name": "hand", "kind": "choice", "question": "WHICH HAND", "choices": ["left", "right"]},
+        {"name": "age", "kind": "number", "question": "HOW OLD", "min": 18, "max": 120},
+        {"name": "job", "kind": "text", "question": "WHAT WORK"},
+        {"name": "tired", "kind": "scale", "question": "HOW TIRED", "labels": ["not", "very"]},
+        {"name": "more", "kind": "text", "question": "ANYTHING ELSE", "required": False}]},
+    {"name": "how", "kind": "instructions", "text": "FIRST SCREEN\fSECOND SCREEN"},
+]
+GO_ON = "[space bar: go on]"
+
+
+class Task(unittest.TestCase):
+    def setUp(self):
+        end_if_it_hangs(self, 240)
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        self.db = self.dir / "live.db"
+
+    def protocol(self, *blocks, **changes):
+        path = self.dir / "protocol.json"
+        whole = PROTOCOL | {"blocks": [{"name": name, **BLOCKS[name]} for name in blocks]} | changes
+        path.write_text(json.dumps(whole))
+        return path
+
+    def start(self, *blocks, options=(), db=None, **changes):
+        db = db or self.db
+        new = [] if db.exists() else ["--new-participant"]
+        terminal = Terminal([PALPATE, "run", self.protocol(*blocks, **changes), "--db", db, "--participant", "P01",
+                             "--device", "simulated", "--no-window", *new, *options])
+        self.addCleanup(terminal.__exit__)
+        return terminal
+
+    def play(self, terminal, *steps):
+        """Each (what comes, what is typed then). Whatever a busy machine cuts off is shown again."""
+        for word, keys in steps:
+            came = terminal.wait_for(word, "[fault, ")
+            if came == "[fault, ":
+                self.skipTest("the machine was too busy for the servo")
+            terminal.type(keys)
+
+    def end(self, terminal, status=0):
+        self.assertEqual(terminal.finish(), status, terminal.text)
+
+    def sql(self, query, db=None):
+        with contextlib.closing(sqlite3.connect(db or self.db)) as opened:
+            self.assertEqual(opened.execute("PRAGMA integrity_check").fetchone()[0], "ok")
+            return opened.execute(query).fetchall()
+
+    def export(self, db=None):
+        out = self.dir / "trials.csv"
+        subprocess.run([PALPATE, "export", "--db", db or self.db, "--format", "csv", "--out", out, "--force"],
+                       check=True, capture_output=True)
+        with open(out, newline="", encoding="utf-8") as table:
+            return list(csv.DictReader(table))
+
+
+class EveryTask(Task):
+    def test_identify_with_feedback_and_instructions_that_go_back_and_forth(self):
+        terminal = self.start("ident")
+        self.play(terminal, ("WELCOME", " "), ("ABOUT SHAPES", " "), ("MORE ABOUT SHAPES", "\x1b[D"),
+                  ("ABOUT SHAPES", " "), ("MORE ABOUT SHAPES", " "),
+                  ("1 ball   2 box", "x"), ("This key does nothing now.", "1"), ("1 ball   2 box", "1"),
+                  ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([terminal.text.count(mark) for mark in "\u2713\u2717"], [1, 1])
+        rows = self.export()
+        self.assertEqual([row["response"] for row in rows], ["ball", "ball"])
+        self.assertEqual(sorted(row["correct"] for row in rows), ["0", "1"])
+
+    def test_compare_with_confidence(self):
+        terminal = self.start("comp")
+        first = ("1 / 2\nSpace bar", "1")  # no answer yet
+        self.play(terminal, ("WELCOME", " "), first, ("does nothing", " "), ("2 / 2\nWHICH WAS STIFFER", "1"),
+                  ("HOW SURE", ""), ("1 guessed   2 sure", "3"), ("does nothing", "2"),
+                  ("1 / 2\nSpace bar", " "), ("2 / 2\nWHICH WAS STIFFER", "2"), ("1 guessed   2 sure", "1"),
+                  ("GOOD BYE", " "))
+        self.end(terminal)
+        rows = self.export()
+        self.assertEqual([(row["response"], row["confidence"]) for row in rows], [("1", "5"), ("2", "1")])
+        for row in rows:
+            chosen_comparison = row["comparison_interval"] == row["response"]
+            self.assertEqual(row["success"], str(int(chosen_comparison)))
+            stiffer = float(row["level"]) > 60
+            self.assertEqual(row["correct"], str(int(chosen_comparison == stiffer)))
+            onsets, ends = ([float(at) for at in row[column].split()] if " " in row[column] else
+                            [float(at) for at in row[column].replace(";", ",").split(",")]
+                            for column in ("interval_onsets", "interval_ends"))
+            self.assertGreaterEqual(onsets[1] - ends[0], 0.2, "at rest between the intervals")
+
+    def test_three_intervals_that_end_by_themselves_and_an_answer_without_forces(self):
+        terminal = self.start("three")
+        self.play(terminal, ("WELCOME", " "), ("1 / 3", ""), ("2 / 3", ""), ("3 / 3", ""), ("\nWHICH WAS ODD", "3"),
+                  ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual(self.export()[0]["response"], "3")
+
+    def test_detect_with_catch_trials(self):
+        terminal = self.start("detect")
+        self.play(terminal, ("WELCOME", " "), *[("ANYTHING", "1")] * 4, ("GOOD BYE", " "))
+        self.end(terminal)
+        rows = self.export()
+        self.assertEqual(sorted((row["catch_trial"], row["correct"]) for row in rows),
+                         [("0", "1"), ("0", "1"), ("1", "0"), ("1", "0")])
+
+    def test_numbers_are_typed_and_refused_kindly(self):
+        terminal = self.start("number", "scale")
+        self.play(terminal, ("WELCOME", " "), ("Type a number", "\n"),
+                  ("Please type an answer first. (-10 \u2013 100)", "12,55"), ("> 12.55", "\x7f"), ("> 12.5\n", "9"),
+                  ("> 12.59", "9"), ("> 12.599", "\x7f\x7f"), ("> 12.5\n", "x"), ("does nothing", "\x7f" * 9), ("> ", "101\n"),
+                  ("Please type another number: (-10 \u2013 100)", "\x7f" * 3), ("> ", "-7,5\n"),
+                  ("1 hard   2 soft", "2"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([(row["block_name"], row["number"], row["response"]) for row in self.export()],
+                         [("number", "-7.5", "-7.5"), ("scale", "1", "1")])
+
+    def test_adjust_from_below_and_above(self):
+        terminal = self.start("adjust")
+        self.play(terminal, ("WELCOME", " "), ("1 / 2\nMAKE THEM EQUAL", "2"))
+        # Keys in a burst: each is a turn.
+        terminal.type("22")
+        self.play(terminal, ("", "3"), ("2 / 2\nMAKE THEM EQUAL", "2"), ("does nothing", "3"),
+                  ("1 / 2\nMAKE THEM EQUAL", "4"), ("1 / 2\nMAKE THEM EQUAL", "1"), ("", "4"), ("GOOD BYE", " "))
+        self.end(terminal)
+        rows = self.export()
+        self.assertEqual([(row["level"], row["number"]) for row in rows], [("30", "60"), ("90", "80")])
+        self.assertEqual(rows[0]["response"], "60")
+
+
+class Pages(Task):
+    def answers(self):
+        return self.sql("SELECT page, item, version, answer FROM page_answers ORDER BY id")
+
+    def begin(self, *blocks, **changes):
+        terminal = self.start(*blocks, pages=PAGES + changes.pop("pages", []), **changes)
+        self.play(terminal, ("YOU MAY STOP", " "), ("DO YOU TAKE PART", ""))
+        return terminal
+
+    def test_questionnaires_before_between_and_after(self):
+        more = [{"name": "mid", "kind": "questionnaire", "when": "between", "block": "scale",
+                 "items": [{"name": "n", "kind": "number", "question": "HOW MANY"}]},
+                {"name": "last", "kind": "questionnaire", "when": "after",
+                 "items": [{"name": "words", "kind": "text", "question": "LAST WORDS"}]}]
+        terminal = self.begin("number", "scale", pages=more)
+        self.play(terminal, ("1 I agree   2 I do not agree", "x"), ("does nothing", "1"),
+                  ("1 left   2 right", "2"), ("HOW OLD", "7\n"),
+                  ("another number: (18 \u2013 120)", "\x7f42\n"), ("WHAT WORK", "  \n"),
+                  ("answer first", "\x7f\x7fJ\u00fc x\x7f?"), ("> J\u00fc ?", "\n"), ("1 not   2 very", "1"), ("ANYTHING ELSE", "\n"),
+                  ("FIRST SCREEN", " "), ("SECOND SCREEN", "\x1b[D"), ("FIRST SCREEN", " "), ("SECOND SCREEN", " "),
+                  ("WELCOME", " "), ("HOW HARD", "5\n"), ("HOW MANY", "-3\n"), ("1 hard   2 soft", "1"),
+                  ("LAST WORDS", "bye\n"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertNotIn("no consent is recorded", terminal.text)
+        self.assertEqual(self.answers(), [
+            ("consent", "consent", "3b", "agree"), ("you", "hand", "", "right"), ("you", "age", "", "42"),
+            ("you", "job", "", "J\u00fc ?"), ("you", "tired", "", "not"), ("you", "more", "", ""),
+            ("mid", "n", "", "-3"), ("last", "words", "", "bye")])
+        (digest,), = self.sql("SELECT text_sha256 FROM page_answers WHERE page = 'consent'")
+        self.assertEqual(digest, hashlib.sha256(PAGES[0]["text"].encode()).hexdigest())
+
+    def test_without_consent_nothing_is_shown_and_nothing_kept(self):
+        terminal = self.begin("number")
+        self.play(terminal, ("1 I agree   2 I do not agree", "2"))
+        self.end(terminal)
+        self.assertIn("consent was not given", terminal.text)
+        self.assertNotIn("WELCOME", terminal.text)
+        self.assertNotIn("[trial", terminal.text)
+        self.assertEqual(self.sql("SELECT count(*) FROM attempts"), [(0,)])
+        self.assertEqual(self.sql("SELECT count(*) FROM participants"), [(0,)])
+        # Asked again, with another mind.
+        again = self.begin("number")
+        self.play(again, ("1 I agree   2 I do not agree", "1"), ("WHICH HAND", ""))
+        again.kill()
+        self.assertEqual(self.answers(), [("consent", "consent", "3b", "agree")])
+
+    def test_killed_in_the_last_questionnaire_it_is_asked_again_and_only_that(self):
+        last = {"name": "last", "kind": "questionnaire", "when": "after",
+                "items": [{"name": "words", "kind": "text", "question": "LAST WORDS"}]}
+        terminal = self.start("number", pages=[last])
+        self.play(terminal, ("WELCOME", " "), ("HOW HARD", "5\n"), ("LAST WORDS", "b"), ("> b", ""))
+        terminal.kill()
+        again = self.start("number", pages=[last])
+        self.play(again, ("LAST WORDS", "bye\n"), ("GOOD BYE", " "))
+        self.end(again)
+        self.assertNotIn("WELCOME", again.text)
+        self.assertEqual(self.answers(), [("last", "words", "", "bye")])
+        self.assertEqual(len(self.export()), 1)
+        self.assertEqual([end for (end,) in self.sql("SELECT end_reason FROM runs ORDER BY id")],
+                         ["interrupted", "done"])
+
+
+class ZeroForce(Task):
+    def stop_and_go_on(self, terminal, key="\x1b"):
+        terminal.type(key)
+        terminal.wait_for("EMERGENCY by")
+        terminal.wait_for("[fault")
+        terminal.type(":clear\n:go\n")
+        terminal.wait_for("going on")
+
+    def test_the_emergency_key_works_in_every_state_of_a_trial_and_while_typing(self):
+        terminal = self.start("number", "comp", pages=PAGES[1:2])
+        self.play(terminal, ("1 left   2 right", ""))
+        self.stop_and_go_on(terminal)
+        self.play(terminal, ("", "1"), ("HOW OLD", "4"))
+        self.stop_and_go_on(terminal, "\x1b[24~")  # F12, in the middle of a number
+        self.play(terminal, ("", "2\n"), ("WHAT WORK", "w"))
+        self.stop_and_go_on(terminal)
+        self.play(terminal, ("", "\n"), ("1 not   2 very", "1"), ("ANYTHING ELSE", "\n"), ("WELCOME", " "),
+                  ("HOW HARD", "12"))
+        self.stop_and_go_on(terminal)  # in a trial: it is shown again
+        self.play(terminal, ("HOW HARD", "7\n"), ("1 / 2", ""))
+        self.stop_and_go_on(terminal)
+        self.play(terminal, ("1 / 2", " "), ("2 / 2", "1"), ("1 guessed   2 sure", ""))
+        self.stop_and_go_on(terminal)  # while confidence is asked
+        self.play(terminal, ("1 / 2", " "), ("2 / 2", "1"), ("1 guessed   2 sure", "2"),
+                  ("1 / 2", " "), ("2 / 2", "1"), ("1 guessed   2 sure", "2"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([(row["block_name"], row["number"], row["attempt"]) for row in self.export()],
+                         [("number", "7", "2"), ("comp", "", "3"), ("comp", "", "1")])
+        self.assertEqual(self.sql("SELECT answer FROM page_answers WHERE item = 'age'"), [("42",)])
+        self.assertEqual(self.sql("SELECT DISTINCT cut_off_reason FROM attempts WHERE state = 'cut_off'"),
+                         [("zero force was asked for",)])
+
+
+class Killed(Task):
+    def trials(self, db):
+        columns = ("trial", "block_name", "track", "level", "comparison_interval", "response", "success", "correct")
+        return [tuple(row[column] for column in columns) for row in self.export(db)]
+
+    def go(self, db, kill_after=None):
+        """Answers "1" until the end, or is killed in the trial after so many."""
+        terminal = self.start("stairs", "detect", db=db)
+        done = len(self.sql("SELECT id FROM attempts WHERE state = 'completed'", db)) if db.exists() else 0
+        while True:
+            came = terminal.wait_for("1 / 2\n", "2 / 2\nSTIFFER", "ANYTHING", GO_ON, "[fault, ", " on record; ")
+            if came == " on record; ":
+                break
+            if came in ("1 / 2\n", "ANYTHING") and done == kill_after:
+                terminal.kill()
+                return
+            terminal.type({"1 / 2\n": " ", GO_ON: " ", "[fault, ": ":clear\n:go\n"}.get(came, "1"))
+            done += came in ("2 / 2\nSTIFFER", "ANYTHING")
+        self.end(terminal)
+
+    def test_at_every_trial_the_rest_is_the_same(self):
+        whole = self.dir / "whole.db"
+        self.go(whole)
+        expected = self.trials(whole)
+        self.assertEqual(len(expected), 9)
+        self.assertGreater(len({row[3] for row in expected[:5]}), 2, "levels follow the answers")
+        broken = self.dir / "broken.db"
+        for count in range(9):
+            self.go(broken, kill_after=count)
+        self.go(broken)
+        self.assertEqual(self.trials(broken), expected)
+        ends = [end for (end,) in self.sql("SELECT end_reason FROM runs ORDER BY id", broken)]
+        self.assertEqual(ends, ["interrupted"] * 9 + ["done"])
+
+
+if __name__ == "__main__":
+    unittest.main()
