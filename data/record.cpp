@@ -26,6 +26,15 @@ std::int64_t first_onset_ns(const TrialRecord& record) {
   return record.onset_ns;
 }
 
+bool has_right_answer(const TrialRecord& record) {
+  if (!record.task) return true;
+  const TaskRecord& task = *record.task;
+  if (task.task == "rate" || task.task == "adjust") return false;
+  const bool which = record.response == "1" || record.response == "2";
+  return !(task.task == "compare" && which && task.intervals.size() == 2 && task.level &&
+           task.level == task.standard_level);
+}
+
 bool is_participant_code(std::string_view code) {
   if (code.empty() || code.size() > 32) return false;
   for (const char c : code) {

@@ -105,6 +105,10 @@ struct TrialRecord {
 /// trial's onset.
 std::int64_t first_onset_ns(const TrialRecord& record);
 
+/// Whether an answer to the trial can be right or wrong: not a number or a level that was set, and
+/// not the choice between two intervals of the same level.
+bool has_right_answer(const TrialRecord& record);
+
 /// A file that a protocol names, such as a mesh.
 struct ProtocolFile {
   std::string name;   ///< as the protocol names it

@@ -25,8 +25,7 @@ struct TaskValues {
 
 /// Missing where no answer is right or wrong.
 inline std::optional<bool> correct_of(const TrialRecord& record) {
-  if (record.task && (record.task->task == "rate" || record.task->task == "adjust"))
-    return std::nullopt;
+  if (!has_right_answer(record)) return std::nullopt;
   return record.correct;
 }
 

@@ -300,6 +300,11 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
     order.integer("min_distance", block.min_distance, kManyTimes);
   });
   reader.number("time_out_s", block.time_out, kPresentation);
+  if (block.interval_limit && !(block.time_out > *block.interval_limit)) {
+    reader.faults().add(reader.pointer("time_out_s"),
+                        "expected more than interval_limit_s: the time for the answer begins with "
+                        "the last interval");
+  }
   reader.boolean("feedback", block.feedback);
   if (block.feedback && (block.task == TaskKind::rate || block.task == TaskKind::adjust)) {
     reader.faults().add(reader.pointer("feedback"),
@@ -374,7 +379,9 @@ void check_sessions(const Protocol& protocol, FaultList& faults) {
   int session = 1;
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const int next = protocol.blocks[i].session;
-    if (next != session && next != session + 1) {
+    if (i == 0 && next != 1) {
+      faults.add(block_pointer(i) + "/session", "expected session 1 of the first block");
+    } else if (next != session && next != session + 1) {
       faults.add(block_pointer(i) + "/session", "expected session " + std::to_string(session) +
                                                     " or " + std::to_string(session + 1) +
                                                     ", as the block before it stands in session " +

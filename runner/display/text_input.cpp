@@ -147,7 +147,7 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
     if (rest.substr(2, end - 2) == "24" && end < rest.size() && rest[end] == '~')
       out.emplace_back(emergency("F12"));
     constexpr std::array kArrows = {"up", "down", "right", "left"};
-    if (end == 2 && rest.size() > 2 && rest[2] >= 'A' && rest[2] <= 'D')
+    if (end == 2 && line_.empty() && rest[2] >= 'A' && rest[2] <= 'D')
       out.emplace_back(KeyPress{kArrows[static_cast<std::size_t>(rest[2] - 'A')], time_ns});
     return std::min(end + 1, rest.size());
   }

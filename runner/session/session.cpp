@@ -114,7 +114,7 @@ void Session::tell_feedback() {
           : record_.practice || station_.protocol.response.feedback;
   station_.plan.answered(
       outcome_of(record_));  // first: whoever leaves during the feedback has answered
-  if (feedback) participant_.feedback(record_.correct);
+  if (feedback && data::has_right_answer(record_)) participant_.feedback(record_.correct);
 }
 
 data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {

@@ -15,11 +15,6 @@ constexpr double kSecond_ns = 1e9;
 constexpr std::int64_t kFrame_ns = 33'000'000;  // of the console
 constexpr std::size_t kMostMessages = 200;
 
-/// Neither a number nor an adjusted level is right or wrong.
-bool has_right_answer(const data::TrialRecord& record) {
-  return !record.task || (record.task->task != "rate" && record.task->task != "adjust");
-}
-
 /// For the console; null: as it was shown last.
 const char* in_words(Session::State state) {
   switch (state) {
@@ -104,7 +99,7 @@ void SessionMonitor::held() {
 }
 
 void SessionMonitor::count(const data::TrialRecord& record) {
-  if (record.practice || !has_right_answer(record)) return;
+  if (record.practice || !data::has_right_answer(record)) return;
   for (ShapeScore& score : state_.scores) {
     if (score.shape != record.shape) continue;
     ++score.shown;
@@ -193,7 +188,7 @@ void SessionMonitor::cut_off(const std::string& reason) {
 
 void SessionMonitor::recorded(const data::TrialRecord& record) {
   state_.answer = record.timed_out ? "none in time" : record.response;
-  if (!record.timed_out && has_right_answer(record))
+  if (!record.timed_out && data::has_right_answer(record))
     state_.answer += record.correct ? ", right" : ", wrong";
   if (record.task && record.task->confidence)
     state_.answer += "; sure: " + protocols::level_text(*record.task->confidence);

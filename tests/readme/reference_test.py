@@ -81,6 +81,13 @@ class Dictionary(unittest.TestCase):
         self.assertEqual(set(documented), set(units) - set(self.documented("trials")))
         self.assertEqual(documented, {column: units[column] for column in documented})
 
+    def test_columns_of_pages(self):
+        output_of("simulate", ROOT / "protocols/roughness-magnitude.json", "--db", "pages.db", "--participants", 1,
+                  folder=self.folder)
+        output_of("export", "--db", "pages.db", "--format", "csv", "--out", "rough.csv", "--pages", folder=self.folder)
+        header = (self.folder / "pages.csv").read_text().split("\n", 1)[0].split(",")
+        self.assertEqual(set(header), set(self.documented("pages")))
+
     def test_columns_of_samples_with_their_units(self):
         output_of("export", "--db", "one.db", "--format", "bids", "--out", "bids", folder=self.folder)
         about = json.loads(next(self.folder.glob("bids/sub-*/ses-1/beh/*_physio.json")).read_text())

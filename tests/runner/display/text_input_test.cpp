@@ -36,7 +36,8 @@ std::string command(Kind kind, const std::string& text = "") {
 
 TEST(TextInput, SingleKeysAnswer) {
   EXPECT_EQ(heard("1a \r\n\xC3\xA4"), "key:1 key:a key:space key:enter key:enter key:\xC3\xA4 ");
-  EXPECT_EQ(heard(std::string_view("\x01\x7f\t\0", 4)), "");
+  EXPECT_EQ(heard(std::string_view("\x01\t\0", 3)), "");
+  EXPECT_EQ(heard("1\x7f\b"), "key:1 key:backspace key:backspace ");
 }
 
 TEST(TextInput, KeypadAnswersAsDigits) {
@@ -47,7 +48,8 @@ TEST(TextInput, EscapeAndF12AreEmergencyKeysAlsoInACommand) {
   EXPECT_EQ(heard("\x1b"), command(Kind::emergency_zero, "the key Escape"));
   EXPECT_EQ(heard("\x1b[24~"), command(Kind::emergency_zero, "the key F12"));
   EXPECT_EQ(heard(":no\x1b"), command(Kind::emergency_zero, "the key Escape"));
-  EXPECT_EQ(heard("\x1b[A\x1b[5~"), "") << "cursor keys are none";
+  EXPECT_EQ(heard("\x1b[A\x1b[D\x1b[5~"), "key:up key:left ") << "cursor keys are none";
+  EXPECT_EQ(heard(":no\x1b[A"), "");
 }
 
 TEST(TextInput, AltWithAKeyIsAnEmergencyAndNoAnswer) {
@@ -67,6 +69,8 @@ TEST(TextInput, LinesAreCommands) {
   EXPECT_EQ(
       heard(":note  1: \xC3\xA4 \n:quit withdrawn\n:quit\n"),
       command(Kind::note, "1: \xC3\xA4") + command(Kind::quit, "withdrawn") + command(Kind::quit));
+  EXPECT_EQ(heard(":answer 12,5\n:answer\n"),
+            command(Kind::answer, "12,5") + command(Kind::answer));
   EXPECT_EQ(heard(":quitx\n:\n:note\n"), "unknown::quitx unknown:: unknown::note ");
 }
 
