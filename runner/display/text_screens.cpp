@@ -21,6 +21,8 @@ std::string text_of(const Page& page) {
     text += "\n[" + std::to_string(page.part) + " / " + std::to_string(page.parts) + "]";
   if (page.picture) text += "\n[a picture, which the window shows]";
   if (page.kind == kText && page.keys.empty()) text += "\n[space bar: go on]";
+  if (page.kind == Page::Kind::message && page.parts == 0 && page.typing == Page::Typing::none)
+    return text;  // nothing to answer now
   if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
   if (page.typing != Page::Typing::none) text += "\n> " + stimuli::printable(page.typed);
   for (const auto& [key, answer] : page.keys) {

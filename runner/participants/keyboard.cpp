@@ -194,10 +194,13 @@ std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
 }
 
 void KeyboardRespondent::listen(const Sample& sample) {
-  for (const KeyPress& press : take_keys()) {
+  const std::vector<KeyPress> presses = take_keys();
+  for (std::size_t i = 0; i < presses.size(); ++i) {
+    const KeyPress& press = presses[i];
     if (task() != nullptr) {
-      listen_to_task(press);
-      continue;
+      if (listen_to_task(press)) continue;
+      spoken_.assign(presses.begin() + static_cast<std::ptrdiff_t>(i), presses.end());
+      break;
     }
     if (pending_) continue;
     const std::optional<int> stimulus = meaning(press.key);

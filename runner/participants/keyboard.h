@@ -76,7 +76,7 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
   std::vector<KeyPress> take_keys();  ///< pressed, or spoken and typed by the experimenter
-  void listen_to_task(const KeyPress& press);
+  bool listen_to_task(const KeyPress& press);  ///< false: to be heard after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key is not for typing
   std::optional<double> typed_number(std::optional<double> least, std::optional<double> most) const;

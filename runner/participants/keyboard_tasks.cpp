@@ -105,18 +105,24 @@ std::string KeyboardRespondent::interval_text() const {
   return text;
 }
 
-void KeyboardRespondent::listen_to_task(const KeyPress& press) {
+bool KeyboardRespondent::listen_to_task(const KeyPress& press) {
   const bool in_time = view_.continues || (onset_ns_ > 0 && press.time_ns >= onset_ns_);
-  if (!in_time) return reply();
-  if (pending_ && !is_turn(*task(), *pending_)) return;
+  if (!in_time) {
+    reply();
+    return true;
+  }
+  const bool turning = pending_ && is_turn(*task(), *pending_);
+  if (pending_ && !turning) return true;
   const std::optional<Answer> meant = meaning_in_interval(press.key);
-  if (!meant) return;
+  if (!meant) return true;
   if (!pending_) {
     pending_ = meant;
     pending_->time_ns = press.time_ns;
-  } else if (meant->stimulus == pending_->stimulus) {
-    ++pending_->times;  // turned again before the last turn was felt
+    return true;
   }
+  if (meant->stimulus != pending_->stimulus) return false;
+  ++pending_->times;  // turned again before the last turn was felt
+  return true;
 }
 
 /// A character, where one is being typed; numbers have digits, a point or comma and a minus.

@@ -83,6 +83,7 @@ class PreflightDialogue {
         take_note(command);
         break;
       case Kind::pause:
+      case Kind::answer:
       case Kind::stop_after_trial:
       case Kind::stop_after_block:
         say("there is no trial yet");

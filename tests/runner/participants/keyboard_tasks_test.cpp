@@ -157,6 +157,12 @@ TEST_F(KeyboardTasks, TurnsAreCountedAlsoWhileTheNextIntervalIsMade) {
   ASSERT_TRUE(second);
   EXPECT_EQ(second->stimulus, 0);
   EXPECT_EQ(second->times, 2);
+  // Another key in the same breath is heard after the turn.
+  begin(2, {1, 2, true, true, nullptr, true});
+  screen_.script = {{"2", "4", "1"}};
+  EXPECT_EQ(answer()->stimulus, 1);
+  begin(2, {1, 2, true, true, nullptr, true});
+  EXPECT_EQ(answer()->stimulus, 3);
   begin(2, {2, 2, true, true, nullptr});
   screen_.script = {{}, {}, {"2"}};
   EXPECT_FALSE(answer()) << "the standard cannot be turned";

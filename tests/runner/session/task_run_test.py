@@ -78,7 +78,8 @@ class Task(unittest.TestCase):
 
     def start(self, *blocks, options=(), db=None, **changes):
         db = db or self.db
-        new = [] if db.exists() else ["--new-participant"]
+        known = db.exists() and self.sql("SELECT count(*) FROM participants", db) != [(0,)]
+        new = [] if known else ["--new-participant"]
         terminal = Terminal([PALPATE, "run", self.protocol(*blocks, **changes), "--db", db, "--participant", "P01",
                              "--device", "simulated", "--no-window", *new, *options])
         self.addCleanup(terminal.__exit__)
@@ -165,7 +166,7 @@ class EveryTask(Task):
                   ("1 hard   2 soft", "2"), ("GOOD BYE", " "))
         self.end(terminal)
         self.assertEqual([(row["block_name"], row["number"], row["response"]) for row in self.export()],
-                         [("number", "-7.5", "-7.5"), ("scale", "1", "1")])
+                         [("number", "-7.5", "'-7.5"), ("scale", "1", "1")])  # guarded as a text
 
     def test_adjust_from_below_and_above(self):
         terminal = self.start("adjust")
@@ -177,7 +178,6 @@ class EveryTask(Task):
         self.end(terminal)
         rows = self.export()
         self.assertEqual([(row["level"], row["number"]) for row in rows], [("30", "60"), ("90", "80")])
-        self.assertEqual(rows[0]["response"], "60")
 
 
 class Pages(Task):
@@ -246,8 +246,10 @@ class ZeroForce(Task):
     def stop_and_go_on(self, terminal, key="\x1b"):
         terminal.type(key)
         terminal.wait_for("EMERGENCY by")
-        terminal.wait_for("[fault")
-        terminal.type(":clear\n:go\n")
+        terminal.type(":clear\n")
+        while terminal.wait_for("fault cleared;", "no fault to clear") != "fault cleared;":
+            terminal.type(":clear\n")  # the trial is being cut off
+        terminal.type(":go\n")
         terminal.wait_for("going on")
 
     def test_the_emergency_key_works_in_every_state_of_a_trial_and_while_typing(self):
