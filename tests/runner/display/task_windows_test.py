@@ -178,30 +178,24 @@ class TaskWindows(unittest.TestCase):
         wait_for("a trial", lambda: self.rows("SELECT 1 FROM attempts"))
         time.sleep(1)
         self.page("rate")
+        before = self.screen.settled_picture(self.participant)
         self.type("-7,25")
-        self.page("rate_typed")
+        self.page("rate_typed", before)
         # Typed into the console's note instead, it is no answer; the emergency works in the middle of it.
         self.screen.key("F12")
         wait_for("the cut-off", lambda: self.rows("SELECT 1 FROM attempts WHERE state = 'cut_off'"))
         self.screen.keep(self.console, "rate_emergency")
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - 60, 90)  # clear the fault
-        self.click_go_on()
+        self.screen.click(self.console, width - 100, 460)  # go on
         wait_for("the trial again", lambda: len(self.rows("SELECT 1 FROM attempts")) == 2)
         self.screen.focus(self.participant)
         time.sleep(1)
-        self.type("-7,25\n")
+        self.type("-7,25")
+        self.screen.key("Return")
         wait_for("the answer", self.tasks)
         self.assertEqual(self.tasks()[0]["number"], -7.25)
         self.end()
-
-    def click_go_on(self):
-        """Below the status, whose rows depend on the task: looked for where it lights up."""
-        width, height = self.screen.size(self.console)
-        for y in range(360, min(height, 640), 20):
-            self.screen.click(self.console, width - 100, y)
-            if len(self.rows("SELECT 1 FROM attempts")) == 2:
-                return
 
     def test_two_intervals_confidence_and_the_wheel(self):
         self.start(COMPARE, ADJUST)
@@ -245,11 +239,13 @@ class TaskWindows(unittest.TestCase):
         time.sleep(0.5)
         second = self.screen.settled_picture(self.participant)
         self.screen.click(self.console, width - 200, height - 62)
-        self.type("1\n")
+        self.type("1")
+        self.screen.key("Return")
         wait_for("the question", lambda: self.screen.picture(self.participant) != second)
         self.assertEqual(self.tasks(), [])
         time.sleep(0.5)
-        self.type("certain\n")
+        self.type("certain")
+        self.screen.key("Return")
         wait_for("the answer", self.tasks)
         self.screen.keep(self.console, "spoken_answered")
         self.assertEqual(self.tasks()[0]["confidence"], 2)
