@@ -105,7 +105,7 @@ PUBLIC = {
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open parameters registration weighing",
-    "runner/display": "display explore_window text_display timeline touch_source window",
+    "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
