@@ -80,7 +80,8 @@ std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool si
          (relative ? kRelativeSentence : "") + kGuardSentence +
          "\n"
          "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
-         "trials were\nshown again. They are in no other table. sourcedata/pages.csv, where it is there, "
+         "trials were\nshown again. They are in no other table. sourcedata/pages.csv, where it is "
+         "there, "
          "has the\nparticipants' answers to pages: personal data.\n";
 }
 

@@ -43,7 +43,9 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
   if (!settings.pages) return;
   describe_table("pages", page_columns(), facts, settings, out);
   for (const auto& [place, question] : facts.questions) {
-    row << "pages" << "item" << "" << place << question;
+    row << "pages"
+        << "item"
+        << "" << place << question;
     out.write(row.end());
   }
 }

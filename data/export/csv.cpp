@@ -54,8 +54,7 @@ CsvPaths checked_paths(Store& store, const std::string& path, const ExportSettin
   }
   const fs::path pages = trials.parent_path() / "pages.csv";
   if (settings.pages && trials.filename() == pages.filename()) {
-    throw StoreRefused(path +
-                       ": that name is reserved for the answers to pages; choose another");
+    throw StoreRefused(path + ": that name is reserved for the answers to pages; choose another");
   }
   CsvPaths paths{.trials = trials, .attempts = {}, .pages = {}, .codebook = settings.codebook};
   if (settings.pages) paths.pages = pages;

@@ -28,7 +28,7 @@ struct ProtocolFacts {
   std::string title = {};    ///< "" for none
   double servo_rate = 1000;  ///< Hz
   std::vector<StimulusFacts> stimuli = {};
-  std::vector<BlockFacts> blocks = {};  ///< empty: version 1
+  std::vector<BlockFacts> blocks = {};                              ///< empty: version 1
   std::vector<std::pair<std::string, std::string>> questions = {};  ///< "PAGE, ITEM" -> its text
 };
 

@@ -40,9 +40,7 @@ bool is_joystick_input(std::string_view name) {
 /// A printable character, or a byte as "0x00" to "0xff".
 bool is_box_byte(std::string_view name) {
   if (name.size() == 1) return name[0] > ' ' && name[0] < '\x7f';
-  const auto hexadecimal = [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f');
-  };
+  const auto hexadecimal = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
   return name.size() == 4 && name.starts_with("0x") && hexadecimal(name[2]) && hexadecimal(name[3]);
 }
 
@@ -60,9 +58,10 @@ void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, s
     if (!is_input(input)) reader.faults().add(here, expected);
     const std::string name = meaning.is_string() ? meaning.get<std::string>() : "";
     if (name.empty() || name.size() > kMostMappedKey) {
-      reader.faults().add(here, "expected the name of the key that it stands for, such as '1', "
-                                "'space' or 'escape' (emergency)" +
-                                    found_text(meaning));
+      reader.faults().add(here,
+                          "expected the name of the key that it stands for, such as '1', "
+                          "'space' or 'escape' (emergency)" +
+                              found_text(meaning));
       continue;
     }
     out[input] = name;

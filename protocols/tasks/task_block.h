@@ -113,11 +113,11 @@ struct PageSpec {
   enum class When { before, between, after };
   Kind kind = Kind::instructions;
   When when = When::before;
-  std::string name;             ///< unique within the protocol
-  std::string before_block;     ///< between: shown before this block
-  std::string text;             ///< "\f" between screens of instructions
-  std::string version;          ///< consent
-  std::vector<PageItem> items;  ///< questionnaire
+  std::string name;                     ///< unique within the protocol
+  std::string before_block;             ///< between: shown before this block
+  std::string text;                     ///< "\f" between screens of instructions
+  std::string version;                  ///< consent
+  std::vector<PageItem> items;          ///< questionnaire
   std::vector<PagePicture> pictures{};  ///< of each screen of the text; at most so many
 };
 

@@ -389,8 +389,8 @@ void TaskPlan::add_round() {
   const std::uint64_t round = rounds_++;
   std::vector<Trial> more;
   if (has_order_of_version_1(block())) {
-    more = trials_of_version_1(*protocol_, participant_number_, order_[at_],
-                               static_cast<int>(round));
+    more =
+        trials_of_version_1(*protocol_, participant_number_, order_[at_], static_cast<int>(round));
     if (!block().practice)
       draw_orientations_of_version_1(*protocol_, participant_number_, order_[at_], more);
   } else {

@@ -95,9 +95,9 @@ class TextPlaces {
 };
 
 bool is_one_line(const std::string& text) {
-  return text.size() <= kLongestLabel &&
-         std::all_of(text.begin(), text.end(),
-                     [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
+  return text.size() <= kLongestLabel && std::all_of(text.begin(), text.end(), [](unsigned char c) {
+           return c >= 0x20 && c != 0x7f;
+         });
 }
 
 /// The part of a key before its last dot: answers side by side have it in common.
@@ -109,8 +109,8 @@ void check_translation(const TextPlace& place, const json& value, FaultList& fau
     faults.add(pointer, "expected the translation of '" + place.text->substr(0, 60) + "'" +
                             found_text(value));
   } else if (place.label && !is_one_line(value.get_ref<const std::string&>())) {
-    faults.add(pointer, "expected a text of 1 to 80 bytes without control characters" +
-                            found_text(value));
+    faults.add(pointer,
+               "expected a text of 1 to 80 bytes without control characters" + found_text(value));
   }
 }
 

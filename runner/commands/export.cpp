@@ -220,8 +220,8 @@ void print(const Request& request, const data::ExportResult& done) {
               << " attempts that were cut off\n";
   }
   if (request.pages) {
-    std::cerr << stimuli::printable(done.pages_path.empty() ? request.out : done.pages_path)
-              << ": " << done.answers << " answers to pages: personal data\n";
+    std::cerr << stimuli::printable(done.pages_path.empty() ? request.out : done.pages_path) << ": "
+              << done.answers << " answers to pages: personal data\n";
   }
   if (!request.codebook.empty())
     std::cerr << stimuli::printable(request.codebook) << ": what the columns mean\n";

@@ -24,12 +24,12 @@ struct ConsoleCommand {
     stop_after_block,
     emergency_zero,  ///< zero force at once and until clear_fault
     clear_fault,
-    note,  ///< free text with a time stamp
-    quit,  ///< ends at once: the current trial is cut off
+    note,    ///< free text with a time stamp
+    quit,    ///< ends at once: the current trial is cut off
     answer,  ///< the participant's, typed for them; text "": on to the next
   };
   Kind kind = Kind::note;
-  std::string text;          ///< of note, quit and answer; of emergency_zero: the source, "the key F12"
+  std::string text;  ///< of note, quit and answer; of emergency_zero: the source, "the key F12"
   std::int64_t time_ns = 0;  ///< session clock, on arrival
 };
 
@@ -122,10 +122,10 @@ struct ConsoleState {
   std::uint64_t ticks = 0, missed_ticks = 0;  ///< of this session
   std::int64_t longest_period_ns = 0;
   // Version 2 of protocols:
-  std::string task;                  ///< "compare", ...; empty: version 1
-  int interval = 0, intervals = 0;   ///< of the trial
-  std::string level;                 ///< that is felt now, as text; empty: none
-  bool takes_answers = false;        ///< the experimenter types the participant's answers
+  std::string task;                 ///< "compare", ...; empty: version 1
+  int interval = 0, intervals = 0;  ///< of the trial
+  std::string level;                ///< that is felt now, as text; empty: none
+  bool takes_answers = false;       ///< the experimenter types the participant's answers
 };
 
 class ExperimenterConsole {

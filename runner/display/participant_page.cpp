@@ -122,7 +122,7 @@ class PageLayout {
     draw_text(canvas_, all[static_cast<std::size_t>(at)], kTextSize * unit_, kSmallestSize * unit_,
               width_, text_width(width_, unit_), top_, room_, kText, false);
     if (count == 1 && page_.parts < 2) return;
-      const auto of = [](int one, int total) {
+    const auto of = [](int one, int total) {
       return std::to_string(one) + " / " + std::to_string(total);
     };
     std::string place = page_.parts > 1 ? of(page_.part, page_.parts) : of(at + 1, count);

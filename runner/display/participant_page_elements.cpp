@@ -124,8 +124,8 @@ void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double
   const double field = std::max(words.size().width + unit, std::min(10 * unit, width));
   draw_keycap(canvas, std::round(middle - field / 2), std::round(top), std::round(field),
               std::round(2.9 * unit));
-  words.draw(canvas, middle - words.size().width / 2,
-             top + (2.9 * unit - words.size().height) / 2, kText);
+  words.draw(canvas, middle - words.size().width / 2, top + (2.9 * unit - words.size().height) / 2,
+             kText);
 }
 
 void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {

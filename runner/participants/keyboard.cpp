@@ -40,9 +40,7 @@ void KeyboardRespondent::show(Page page) {
   screen_.show(page_);
 }
 
-void KeyboardRespondent::reply() {
-  reply_with(protocol_.texts.other_key);
-}
+void KeyboardRespondent::reply() { reply_with(protocol_.texts.other_key); }
 
 void KeyboardRespondent::reply_with(const std::string& text) {
   reply_until_ns_ = clock_.now_ns() + kReply_ns;

@@ -24,8 +24,8 @@ class Attendant {
 };
 
 enum class AnswerBy {
-  keys,     ///< the protocol's
-  buttons,  ///< of the device: button n stands for the n-th key of the protocol
+  keys,          ///< the protocol's
+  buttons,       ///< of the device: button n stands for the n-th key of the protocol
   experimenter,  ///< types what the participant says; the participant's keys go on only
 };
 
@@ -75,7 +75,7 @@ class KeyboardRespondent final : public Respondent {
   /// \return  what it means, if it ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
-  std::vector<KeyPress> take_keys();  ///< pressed, or spoken and typed by the experimenter
+  std::vector<KeyPress> take_keys();           ///< pressed, or spoken and typed by the experimenter
   bool listen_to_task(const KeyPress& press);  ///< false: to be heard after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key is not for typing

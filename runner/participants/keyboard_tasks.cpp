@@ -279,9 +279,9 @@ int KeyboardRespondent::page_through(const std::vector<ReadScreen>& screens, con
     for (const std::size_t shown = at; at == shown;) {
       const KeyPress press = wait_for_key(since_ns);
       time_ns = press.time_ns;
-      const auto key =
-          std::find_if(keys.begin(), keys.end(),
-                       [&press](const auto& entry) { return entry.first == press.key; });
+      const auto key = std::find_if(keys.begin(), keys.end(), [&press](const auto& entry) {
+        return entry.first == press.key;
+      });
       const bool forward = press.key == "space" || press.key == "enter" || press.key == "right";
       const bool back = press.key == "left" || press.key == "backspace";
       if (last && key != keys.end()) return static_cast<int>(key - keys.begin());
@@ -311,8 +311,8 @@ std::optional<Answer> KeyboardRespondent::confidence(const protocols::Confidence
   labels.reserve(asked.scale.size());
   for (const protocols::ScaleStep& step : asked.scale) labels.push_back(step.label);
   Answer answer;
-  answer.stimulus = page_through({{asked.question, nullptr}}, numbered(labels),
-                                 Page::Kind::message, answer.time_ns);
+  answer.stimulus = page_through({{asked.question, nullptr}}, numbered(labels), Page::Kind::message,
+                                 answer.time_ns);
   return answer;
 }
 

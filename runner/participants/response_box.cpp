@@ -126,9 +126,8 @@ std::vector<KeyPress> ScreenWithBox::keys() {
   std::vector<KeyPress> keys = screen_.keys();
   const std::vector<KeyPress> more = box_.take();
   keys.insert(keys.end(), more.begin(), more.end());
-  std::stable_sort(keys.begin(), keys.end(), [](const KeyPress& a, const KeyPress& b) {
-    return a.time_ns < b.time_ns;
-  });
+  std::stable_sort(keys.begin(), keys.end(),
+                   [](const KeyPress& a, const KeyPress& b) { return a.time_ns < b.time_ns; });
   return keys;
 }
 

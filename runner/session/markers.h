@@ -20,7 +20,7 @@ struct Marker {
     first_contact = 2,
     response = 3,
     time_out = 4,
-    cut_off = 5,  ///< the trial will be shown again
+    cut_off = 5,   ///< the trial will be shown again
     interval = 6,  ///< forces go on again, in a further interval of the trial
   };
   Kind kind = Kind::trial_start;

@@ -25,7 +25,8 @@ data::ProtocolInfo info_of(const protocols::Protocol& protocol) {
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     add_files(stimulus.object, info.files);
   for (const protocols::PageSpec& page : protocol.pages) {
-    for (const protocols::PagePicture& picture : page.pictures) add_file(picture.file, picture.bytes, info.files);
+    for (const protocols::PagePicture& picture : page.pictures)
+      add_file(picture.file, picture.bytes, info.files);
   }
   return info;
 }

@@ -125,8 +125,7 @@ void SessionMonitor::interval(const protocols::Trial& trial, const IntervalView&
       level = protocols::own_level(station_.protocol, block, shown->stimulus);
     if (level) state_.level = protocols::level_text(*level);
   }
-  state_.objects =
-      std::make_shared<const std::vector<stimuli::ObjectSpec>>(std::move(objects));
+  state_.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(std::move(objects));
   show();
 }
 

@@ -10,10 +10,10 @@
 #include "runner/commands/run/settings.h"
 #include "runner/devices/registry.h"
 #include "runner/display/window.h"
+#include "runner/participants/response_box.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/session/markers.h"
-#include "runner/participants/response_box.h"
 #include "runner/sound/masking_noise.h"
 
 namespace palpate::runner {

@@ -197,11 +197,11 @@ void translate_texts(const RunSettings& settings, Admission& admission) {
     admission.warnings.emplace_back("a gamepad or pedal is looked at in a window only");
   if (settings.language.empty()) return;
   protocols::translate(protocol, settings.protocol, settings.language);
-  admission.notes.push_back(
-      nlohmann::ordered_json{{"language", settings.language},
-                             {"texts_sha256", protocols::sha256_hex(protocol.translation)},
-                             {"texts", protocol.translation}}
-          .dump());
+  admission.notes.push_back(nlohmann::ordered_json{
+      {"language", settings.language},
+      {"texts_sha256", protocols::sha256_hex(protocol.translation)},
+      {"texts",
+       protocol.translation}}.dump());
 }
 
 }  // namespace

@@ -76,10 +76,10 @@ TEST(Texts, NameEveryKeyThatIsMissingUnknownOrWrong) {
   texts["blocks.nowhere.question"] = "?";
   std::vector<std::string> places = faults_of(texts.dump());
   std::sort(places.begin(), places.end());
-  EXPECT_EQ(places, (std::vector<std::string>{
-                        "/blocks.constant.keys.2", "/blocks.constant.question",
-                        "/blocks.nowhere.question", "/blocks.which.keys.die", "/pages.consent.text",
-                        "/texts.go"}));
+  EXPECT_EQ(places,
+            (std::vector<std::string>{"/blocks.constant.keys.2", "/blocks.constant.question",
+                                      "/blocks.nowhere.question", "/blocks.which.keys.die",
+                                      "/pages.consent.text", "/texts.go"}));
   EXPECT_EQ(faults_of("[]").size(), 1U);
   EXPECT_EQ(faults_of("{").size(), 1U);
 }

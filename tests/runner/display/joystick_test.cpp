@@ -49,29 +49,28 @@ TEST(Joystick, AButtonIsAKeyOnceForEachPress) {
 }
 
 TEST(Joystick, WhatIsHeldWhenItIsConnectedIsNoPress) {
-  EXPECT_EQ(keys_of({{"button 1", "1"}},
-                    {buttons(true, false), buttons(true, false), buttons(false, false),
-                     buttons(true, false)}),
+  EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(true, false), buttons(true, false),
+                                          buttons(false, false), buttons(true, false)}),
             Strings{"1"});
   // Unplugged while it was held, and plugged in again.
-  EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(false, false), buttons(true, false),
-                                          std::nullopt, buttons(true, false)}),
+  EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(false, false), buttons(true, false), std::nullopt,
+                                          buttons(true, false)}),
             Strings{"1"});
 }
 
 TEST(Joystick, APedalIsPressedBeyondItsMiddleAndDoesNotChatter) {
   const std::map<std::string, std::string> mapping = {{"axis 1 +", "1"}, {"axis 1 -", "2"}};
-  EXPECT_EQ(keys_of(mapping, {axis(-1), axis(0), axis(0.7), axis(0.55), axis(0.65), axis(0.3),
-                              axis(0.7)}),
+  EXPECT_EQ(keys_of(mapping,
+                    {axis(-1), axis(0), axis(0.7), axis(0.55), axis(0.65), axis(0.3), axis(0.7)}),
             (Strings{"1", "1"}));
   EXPECT_EQ(keys_of(mapping, {axis(0), axis(-0.7), axis(0)}), Strings{"2"});
 }
 
 TEST(Joystick, AHatHasFourSides) {
-  EXPECT_EQ(keys_of({{"hat 1 up", "u"}, {"hat 1 right", "r"}, {"hat 1 down", "d"},
-                     {"hat 1 left", "l"}},
-                    {hat(0), hat(1), hat(3), hat(2), hat(0), hat(4), hat(8)}),
-            (Strings{"u", "r", "d", "l"}));
+  EXPECT_EQ(
+      keys_of({{"hat 1 up", "u"}, {"hat 1 right", "r"}, {"hat 1 down", "d"}, {"hat 1 left", "l"}},
+              {hat(0), hat(1), hat(3), hat(2), hat(0), hat(4), hat(8)}),
+      (Strings{"u", "r", "d", "l"}));
 }
 
 TEST(Joystick, InputsThatItDoesNotHaveAreNeverPressed) {

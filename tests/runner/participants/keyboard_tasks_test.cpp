@@ -106,8 +106,12 @@ class KeyboardTasks : public testing::Test {
 };
 
 TEST_F(KeyboardTasks, NumbersAreTypedWithPointCommaMinusAndBackspace) {
-  for (const auto& [typed, number] : std::vector<std::pair<std::string, double>>{
-           {"12.5\n", 12.5}, {"7,25\n", 7.25}, {".5\n", 0.5}, {"0\n", 0}, {"-0\n", 0}, {"5.\n", 5}}) {
+  for (const auto& [typed, number] : std::vector<std::pair<std::string, double>>{{"12.5\n", 12.5},
+                                                                                 {"7,25\n", 7.25},
+                                                                                 {".5\n", 0.5},
+                                                                                 {"0\n", 0},
+                                                                                 {"-0\n", 0},
+                                                                                 {"5.\n", 5}}) {
     person();
     begin(1, {});
     screen_.script = {{}, {}};
@@ -214,15 +218,16 @@ TEST_F(KeyboardTasks, TextsAreTypedInAnyLettersAndRequiredWhereTheyAre) {
   EXPECT_EQ(ask(item, "\n"), "");
   item.kind = protocols::PageItem::Kind::number;
   item.least = 18;
-  EXPECT_EQ(ask(item, "17\n"
-                      "5\n"),
+  EXPECT_EQ(ask(item,
+                "17\n"
+                "5\n"),
             "175");
 }
 
 TEST_F(KeyboardTasks, PagesGoBackAndForth) {
   person();
-  screen_.script = {{}, {"space"}, {}, {"left"}, {}, {"left"}, {"right"}, {}, {"space"}, {}, {"right"},
-                    {"enter"}};
+  screen_.script = {{},        {"space"}, {},        {"left"}, {},        {"left"},
+                    {"right"}, {},        {"space"}, {},       {"right"}, {"enter"}};
   person_->read_screens({{"one"}, {"two"}, {""}, {"three"}});
   std::string seen;
   for (const Page& page : screen_.pages) {

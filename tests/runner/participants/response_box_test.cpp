@@ -79,8 +79,9 @@ TEST_F(Box, CharactersStandForThemselvesWithoutAMapping) {
 }
 
 TEST_F(Box, BytesAreTheKeysOfTheMappingAndNoOthersCount) {
-  EXPECT_EQ(keys_after(std::string("1A\x05\0", 4), {{"A", "1"}, {"0x05", "space"}, {"0x00", "2"}}, 3),
-            "1 space 2 ");
+  EXPECT_EQ(
+      keys_after(std::string("1A\x05\0", 4), {{"A", "1"}, {"0x05", "space"}, {"0x00", "2"}}, 3),
+      "1 space 2 ");
 }
 
 TEST_F(Box, EscapeIsTheEmergencyAtOnce) {
