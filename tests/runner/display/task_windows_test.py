@@ -29,7 +29,7 @@ LEVEL = {"stimuli": ["ball"], "level": {"path": "/stiffness_n_per_m"}}
 COMPARE = {"name": "which", "task": "compare", **LEVEL, "standard": "ball", "question": "Which one was stiffer?",
            "procedure": {"kind": "constant", "levels": [90], "repetitions": 1}, "inter_interval_s": 0.2,
            "confidence": {"question": "How sure are you?", "scale": [{"label": "guessed"}, {"label": "certain"}]}}
-NUMBER = {"name": "how", "task": "rate", "stimuli": ["ball"], "repetitions": 1, "question": "How hard?", "max": 50}
+NUMBER = {"name": "how", "task": "rate", "stimuli": ["ball"], "repetitions": 1, "question": "How hard?", "max": 50, "time_out_s": 600}
 ADJUST = {"name": "equal", "task": "adjust", **LEVEL, "standard": "ball", "min": 20, "max": 100, "turn": 5,
           "starts": [30], "question": "Make them equal"}
 
