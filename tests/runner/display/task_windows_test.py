@@ -107,7 +107,7 @@ class TaskWindows(unittest.TestCase):
         return before
 
     def type(self, words):
-        self.screen.do("type", "--delay", 60, words)
+        self.screen.do("type", "--delay", 60, "--", words)
 
     def press_until(self, condition, *keys):
         """A key before time zero counts for nothing: it is pressed again."""
