@@ -34,6 +34,12 @@ struct MaskingNoise {
   double level_db = -24;  ///< root mean square, dB re full scale (an amplitude of 1)
 };
 
+/// Short tones in the participant's headphones.
+struct Sounds {
+  bool ready = false, go = false, feedback = false;
+  double level_db = -24;  ///< root mean square, dB re full scale
+};
+
 struct StimulusSpec {
   std::string name;            ///< unique within the protocol
   stimuli::ObjectSpec object;  ///< material already resolved against the protocol's default
@@ -112,12 +118,7 @@ struct Protocol {
     std::string answer_first = "Please type an answer first.";
   } texts;
   std::optional<MaskingNoise> masking_noise;
-  /// Version 2: tones in the participant's headphones.
-  struct Sounds {
-    bool ready = false, go = false, feedback = false;
-    double level_db = -24;  ///< root mean square, dB re full scale
-  };
-  std::optional<Sounds> sounds;
+  std::optional<Sounds> sounds;  ///< version 2
   /// Version 2: what stands for a key of the keyboard. "escape" is the emergency.
   struct Responses {
     std::map<std::string, std::string> joystick;  ///< "button 1", "axis 1 +", "hat 1 up" -> key

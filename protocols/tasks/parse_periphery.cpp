@@ -72,7 +72,7 @@ void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, s
 
 void read_periphery(ObjectReader& reader, Protocol& protocol) {
   reader.section("sounds", [&](ObjectReader& section) {
-    Protocol::Sounds& sounds = protocol.sounds.emplace();
+    Sounds& sounds = protocol.sounds.emplace();
     section.boolean("ready", sounds.ready);
     section.boolean("go", sounds.go);
     section.boolean("feedback", sounds.feedback);

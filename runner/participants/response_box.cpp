@@ -65,7 +65,8 @@ std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::s
 ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
                          Clock& clock, std::function<void()> emergency)
     : keys_(bytes_of(keys)), clock_(clock), emergency_(std::move(emergency)) {
-  const auto [path, speed] = port_of(name);
+  const std::pair<std::string, speed_t> port = port_of(name);
+  const std::string& path = port.first;
   port_ = ::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   const auto refuse = [&](const std::string& why) {
     if (port_ >= 0) ::close(port_);
@@ -76,8 +77,8 @@ ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, st
   termios raw = before_;
   cfmakeraw(&raw);
   raw.c_cflag |= static_cast<tcflag_t>(CLOCAL | CREAD);
-  cfsetispeed(&raw, speed);
-  cfsetospeed(&raw, speed);
+  cfsetispeed(&raw, port.second);
+  cfsetospeed(&raw, port.second);
   if (tcsetattr(port_, TCSANOW, &raw) != 0) refuse(std::strerror(errno));
   tcflush(port_, TCIFLUSH);  // pressed before anybody listened
   wake_ = eventfd(0, EFD_CLOEXEC);
