@@ -79,6 +79,17 @@ class Objective {
     return found;
   }
 
+  /// With one of threshold and slope held: the best place of a grid, if that is far from `place`.
+  std::optional<std::vector<double>> other_start(const std::vector<double>& place) const {
+    const std::vector<Start> starts = starts_of_grid(kOneStart);
+    if (starts.empty()) return std::nullopt;
+    const double cell =
+        threshold_ ? (data_.most_log_slope() - data_.least_log_slope()) / (kOneStart.slopes - 1)
+                   : (data_.high - data_.low) / (kOneStart.thresholds - 1);
+    const bool far = std::abs(starts.front().place[0] - place[0]) > 2 * cell;
+    return far ? std::optional(starts.front().place) : std::nullopt;
+  }
+
  private:
   struct Start {
     double value = 0;
@@ -191,8 +202,10 @@ class Profile {
   double operator()(double held) {
     (objective_.*hold_)(held);
     SimplexMinimum best = objective_.best_from(place_, 0.02, 1e-8);
-    SimplexMinimum other = objective_.best(kOneStart, 1e-8);
-    if (other.value < best.value) best = std::move(other);
+    if (const auto start = objective_.other_start(best.place)) {
+      SimplexMinimum other = objective_.best_from(*start, 0.1, 1e-8);
+      if (other.value < best.value) best = std::move(other);
+    }
     place_ = std::move(best.place);
     return allowed_ - best.value;
   }
