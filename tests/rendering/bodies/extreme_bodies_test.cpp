@@ -93,7 +93,7 @@ TEST(ExtremeBodies, TheyNeverHaveMoreEnergyThanTheHandGave) {
       }
     }
   }
-  EXPECT_GT(touched, 24);
+  EXPECT_GE(touched, 18) << "all at 10 m/s";
 }
 
 /// 1 g between 10 kg and a wall, under 50 kN/m, pressed and let go again and again.
