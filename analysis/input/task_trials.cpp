@@ -136,7 +136,7 @@ TaskTrial read_trial(TaskRow& row) {
   trial.confidence = row.number("confidence");
   trial.catch_trial = row.yes("catch_trial");
   trial.success = row.yes("success");
-  trial.correct = row.yes("correct");
+  if (!row.value("correct").empty()) trial.correct = row.yes("correct");
   trial.timed_out = row.yes("timed_out");
   trial.answered = !trial.timed_out && (!trial.response.empty() || trial.number);
   trial.session = row.whole("session");
@@ -234,7 +234,7 @@ std::optional<TrialTable> identification_of(const TaskTable& table) {
     raw.session = trial.session;
     raw.block = trial.block;
     raw.trial = trial.trial;
-    raw.correct = trial.correct;
+    raw.correct = trial.correct.value_or(false);
     raw.timed_out = trial.timed_out;
     raw.simulated = trial.simulated;
     raw.response_time = trial.response_time.value_or(kNoTime);

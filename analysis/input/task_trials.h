@@ -16,7 +16,8 @@ struct TaskTrial {
   std::string participant, task, block_name, renderer, shape, response;
   std::string track;
   std::optional<double> level, standard_level, number, confidence;
-  bool catch_trial = false, success = false, correct = false, answered = false;
+  bool catch_trial = false, success = false, answered = false;
+  std::optional<bool> correct;  ///< none: no answer is right or wrong
   int session = 1, block = 1, trial = 1;
   bool timed_out = false, simulated = false;
   int intervals = 0;                    ///< compare: how many; 0: unknown

@@ -39,7 +39,7 @@ TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord&
   trial.renderer = record.renderer;
   trial.shape = record.shape;
   trial.response = record.response;
-  trial.correct = record.correct;
+  if (data::has_right_answer(record)) trial.correct = record.correct;
   if (record.task) {
     trial.task = record.task->task;
     trial.block_name = record.task->block_name;

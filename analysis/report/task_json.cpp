@@ -125,6 +125,7 @@ TaskJson cell_json(const TaskCell& cell) {
                {"renderer", cell.renderer},
                {"n_trials", cell.trials},
                {"n_answered", cell.answered},
+               {"n_judged", cell.judged},
                {"n_correct", cell.correct},
                {"standard_level", maybe(cell.standard_level)},
                {"forced_choice", cell.forced_choice},

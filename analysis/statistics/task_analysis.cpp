@@ -254,7 +254,8 @@ void add_information(TaskCell& cell, const Trials& trials) {
 Type2Roc confidence_of(const Trials& trials) {
   std::vector<ConfidenceTrial> sure;
   for (const TaskTrial* trial : trials) {
-    if (trial->answered && trial->confidence) sure.push_back({trial->correct, *trial->confidence});
+    if (trial->answered && trial->confidence && trial->correct)
+      sure.push_back({*trial->correct, *trial->confidence});
   }
   Type2Roc roc = type2_roc(sure);
   if (sure.empty()) roc.undefined = "nobody was asked";
@@ -267,7 +268,8 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std:
   cell.trials = trials.size();
   for (const TaskTrial* trial : trials) {
     cell.answered += trial->answered ? 1 : 0;
-    cell.correct += trial->correct ? 1 : 0;
+    cell.judged += trial->correct ? 1 : 0;
+    cell.correct += trial->correct.value_or(false) ? 1 : 0;
   }
   for (const auto& [participant, own] : by_participant(trials))
     cell.participants.push_back(participant);

@@ -55,7 +55,8 @@ struct ParticipantFunction {
 /// All trials of one task with a stimulus and a renderer in a block.
 struct TaskCell {
   std::string task, block_name, shape, renderer;
-  std::size_t trials = 0, answered = 0, correct = 0;
+  std::size_t trials = 0, answered = 0;
+  std::size_t judged = 0, correct = 0;  ///< trials whose answer can be right or wrong; right ones
   std::optional<double> standard_level;
   /// compare: 1 / `intervals` of the answers succeed without a difference: all levels lie on one
   /// side of the standard.

@@ -79,6 +79,8 @@ class Dictionary(unittest.TestCase):
             units = {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
         documented = self.documented("trials of tasks")
         self.assertEqual(set(documented), set(units) - set(self.documented("trials")))
+        for varied in ("level", "standard_level"):  # the unit of what this protocol varies
+            self.assertEqual((documented.pop(varied), units[varied]), ("", "N/m"))
         self.assertEqual(documented, {column: units[column] for column in documented})
 
     def test_columns_of_pages(self):
