@@ -199,7 +199,7 @@ void ConsoleView::draw_answer(std::vector<ConsoleCommand>& commands) {
 }
 
 void ConsoleView::draw_notes(std::vector<ConsoleCommand>& commands) {
-  const float field = (state_.takes_answers ? 2 : 1) * ImGui::GetFrameHeightWithSpacing();
+  const float field = (state_.takes_answers ? 2.0F : 1.0F) * ImGui::GetFrameHeightWithSpacing();
   const float room = std::max(ImGui::GetContentRegionAvail().y - field, ImGui::GetFontSize());
   ImGui::PushStyleColor(ImGuiCol_ChildBg, ImGui::GetStyleColorVec4(ImGuiCol_FrameBg));
   ImGui::BeginChild(

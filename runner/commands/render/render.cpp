@@ -5,6 +5,7 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/scene_notes.h"
 #include "stimuli/parts/overlaps.h"
 #include "stimuli/printable.h"
 
@@ -37,6 +38,8 @@ void explain_scene(Outputs& outputs, const rendering::Scene& scene,
     if (!spec.objects[i].soft)
       add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), explanation.notes);
   }
+  for (std::string& note : objects_passed_through(spec))
+    explanation.notes.push_back(std::move(note));
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
@@ -106,6 +109,8 @@ int render_command(const std::vector<std::string>& args) {
   outputs.put("out", table.text());
   outputs.put("bodies", bodies.text());
   outputs.write();
+  for (const std::string& note : objects_passed_through(spec))
+    std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));
   return 0;
 }

@@ -50,6 +50,22 @@ class Soft(unittest.TestCase):
         # More than twice as soft or as stiff as the standard: nobody takes one for the other.
         self.assertEqual([point["successes"] for point in curve], [0, 0, 1, 1])
 
+    def test_what_falls_through_soft_objects_is_told(self):
+        path = self.file("path.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,1,0,0,1,0,0.1\n0.01,1,0,0,1,0,0.1\n")
+        soft = block(20000, resolution=3)
+        ball = {"shape": "sphere", "radius_m": 0.01, "position_m": [0, 0, 0.05], "body": {"mass_kg": 0.1}}
+        loose = block(20000, resolution=3, fixed="none")
+        for objects, said in (([soft, ball], "/objects/1: moves through soft objects"),
+                              ([loose, {"shape": "sphere", "radius_m": 0.01, "position_m": [0, 0, -1]}], "/objects/0: is soft, not fixed"),
+                              ([soft, {"shape": "sphere", "radius_m": 0.01, "position_m": [0, 0, -1]}], "")):
+            scene = self.file("scene.json", {"objects": objects, "gravity_m_per_s2": [0, 0, -9.81]})
+            done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path,
+                                "--out", self.dir / "out.csv", "--force")
+            self.assertEqual(done.stderr.count("/objects/"), 1 if said else 0)
+            self.assertIn(said, done.stderr)
+            explained = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain").stdout
+            self.assertIn(said, explained)
+
     def test_what_was_felt_on_a_soft_block_is_replayed_to_the_bit(self):
         protocol = self.file("felt.json", {
             "version": 1, "name": "felt", "renderers": ["ray"], "orientation": "fixed", "samples": True, "seed": 7,
