@@ -212,11 +212,10 @@ int stability_command(const std::vector<std::string>& args) {
       "       palpate stability --soft";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
-      "hand, two devices and renderer against a wall, an edge, a sphere and two objects, and\n"
-      "compares the stability boundary with the passivity condition of theory. Status 1 where\n"
-      "theory is violated. With --soft: does a tool come to rest on a soft body that is stepped "
-      "at\n"
-      "its own rate? Status 1 where it does not and scenes may have it.";
+      "hand, two devices and renderer against a wall, an edge, a sphere, two objects and a body\n"
+      "on a wall, and compares the stability boundary with the passivity condition of theory.\n"
+      "Status 1 where theory is violated. With --soft: does a tool come to rest on a soft body\n"
+      "that is stepped at its own rate? Status 1 where it does not and scenes may have it.";
   line.example =
       "  palpate stability\n"
       "  palpate stability --soft\n"

@@ -33,7 +33,19 @@ class Stability(unittest.TestCase):
         rates = {curve["loop"]["rate_hz"] for curve in result["curves"]}
         self.assertEqual(rates, {500, 1000, 2000, 5000, 10000})
         self.assertEqual({(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("scenes")},
-                         {(s, r) for s in ("wall", "edge", "sphere", "two objects") for r in ("point", "ray")})
+                         {(s, r) for s in ("wall", "edge", "sphere", "two objects", "body on a wall") for r in ("point", "ray")})
+        # What can move and is held against a wall has the wall's boundary, with and without passivity controller: one
+        # that gave way, or bounced, would not.
+        for renderer in ("point", "ray"):
+            wall, body = ([point["measured_ns_per_m"] for point in curve["points"]]
+                          for name in ("wall", "body on a wall") for curve in result["curves"]
+                          if (curve["panel"], curve["loop"]["scene"]) == (f"scenes, {renderer}", name))
+            wall_gain, body_gain = ([gain[f"stiffest_{which}_n_per_m"] for which in ("without", "with")]
+                                    for name in ("wall", "body on a wall")
+                                    for gain in result["passivity_controller"][:10]  # of the scenes
+                                    if (gain["loop"]["renderer"], gain["loop"]["scene"]) == (renderer, name))
+            for found, expected in zip(body + body_gain, wall + wall_gain, strict=True):
+                self.assertAlmostEqual(found / expected, 1, delta=0.01)
         # Theory, worked out again, for the stiffness that is felt: of surface and layer together; through a reach of
         # 5, one end moves the virtual tip by its lever and the other by one less the other way.
         felt = {"a layer as stiff as the surface": 2, "reach 5 about the tail": 5**2 + 4**2,
@@ -58,12 +70,32 @@ class Stability(unittest.TestCase):
         self.assertEqual(len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon"))), points + len(result["curves"]))
         xml.etree.ElementTree.fromstring(re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S))
 
+    def test_a_tool_rests_on_soft_bodies_wherever_scenes_may_have_them(self):
+        said = self.stability("--soft").stdout
+        header, *lines = re.search(r"^ +Pa .*?(?=\n\n)", said, re.S | re.M).group().split("\n")
+        self.assertEqual(re.findall(r"([\d.]+) Hz", header), ["62.5", "125", "250", "500", "1000"])
+        swings = {float(line.split()[0]): line.split()[1:] for line in lines}
+        self.assertEqual(list(swings), [1e3, 1e4, 1e5, 1e6, 1e7])
+        # What is too soft for so slow a body is refused; all else comes to rest, within 1 % of the force.
+        for modulus, row in swings.items():
+            self.assertEqual(len(row), 5)
+            self.assertEqual([cell == "-" for cell in row], [modulus < 1e5, False, False, False, False], modulus)
+            for cell in row[modulus < 1e5:]:
+                self.assertLessEqual(float(cell), 1)
+        settled, accepted = map(int, re.search(r"(\d+) of (\d+) cases", said).groups())
+        self.assertEqual(settled, accepted)
+        # Three springs and three tools for each; of the softest, one kind of tool may be refused.
+        self.assertGreaterEqual(accepted, 23 * 3 * 3 - 2 * 3)
+        self.assertLessEqual(accepted, 23 * 3 * 3)
+
     def test_refuses_what_it_should(self):
         kept = self.dir / "kept.json"
         kept.write_text("mine")
-        for args in (["--json", kept], ["--jobs", "0"], ["extra"]):
+        for args in (["--json", kept], ["--jobs", "0"], ["extra"], ["--soft", "--full"], ["--soft", "--json", self.dir / "new.json"],
+                     ["--soft", "--jobs", "257"]):
             self.assertTrue(self.stability(*args, status=2).stderr)
         self.assertEqual(kept.read_text(), "mine")
+        self.assertFalse((self.dir / "new.json").exists())
 
 
 if __name__ == "__main__":
