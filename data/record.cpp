@@ -26,6 +26,11 @@ std::int64_t first_onset_ns(const TrialRecord& record) {
   return record.onset_ns;
 }
 
+std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord& sample) {
+  if (sample.bodies == 0) return std::nullopt;
+  return record.bodies.at(static_cast<std::size_t>(&sample - record.samples.data()));
+}
+
 bool has_right_answer(const TrialRecord& record) {
   if (!record.task) return true;
   const TaskRecord& task = *record.task;

@@ -33,9 +33,8 @@ struct SampleRecord {
   std::uint8_t contacts = 0;
   std::uint8_t contact_type = 0;
   std::uint8_t buttons = 0;
+  std::uint8_t bodies = 0;   ///< 1: the stimulus moves; where it is after the tick: body_of()
   std::uint32_t faults = 0;  ///< fault bits of the tick
-  std::uint8_t bodies = 0;   ///< 1: the stimulus moves, after the tick as `body` says
-  BodyRecord body;
 };
 
 /// One presentation within a trial of version 2 of protocols.
@@ -99,7 +98,13 @@ struct TrialRecord {
   std::optional<double> contact_share, edge_dwell;
   std::vector<SampleRecord> samples;              ///< empty unless recorded and requested
   std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
+  /// Of the samples, one each; empty where nothing moves in any of them.
+  std::vector<BodyRecord> bodies = {};
 };
+
+/// Where the stimulus was after the tick; none: it did not move, or there was none.
+/// \param sample  of the record's own
+std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord& sample);
 
 /// First tick with forces on in the first interval that was felt, session clock; version 1: the
 /// trial's onset.

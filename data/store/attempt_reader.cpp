@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "data/files/utc.h"
@@ -203,7 +204,9 @@ void AttemptReader::read_samples(std::int64_t attempt, const std::optional<Check
         path_ + ": holds samples in a packing that this palpate does not know; use a newer one");
   }
   try {
-    trial_.record.samples = unpack_samples(bytes, size, count, packing);
+    RecordedSamples recorded = unpack_samples(bytes, size, count, packing);
+    trial_.record.samples = std::move(recorded.samples);
+    trial_.record.bodies = std::move(recorded.bodies);
   } catch (const StoreError& error) {
     throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
   }

@@ -82,8 +82,8 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   bind << record.ticks << record.missed_ticks << record.longest_period_ns << record.faults
        << record.started_inside << record.max_force << record.contact_share << record.edge_dwell;
   const auto count = static_cast<std::int64_t>(record.samples.size());
-  const std::string packed = count > 0 ? pack_samples(record.samples) : "";
-  const int packing = packing_for(record.samples);
+  const std::string packed = count > 0 ? pack_samples(record.samples, record.bodies) : "";
+  const int packing = packing_for(record.bodies);
   bind << (count > 0
                ? std::optional(checksum_of_samples(packing, count, packed.data(), packed.size()))
                : std::nullopt)

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <span>
+#include <stdexcept>
 #include <type_traits>
 
 #include "data/errors.h"
@@ -29,10 +30,11 @@ constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes that are decompre
 // bytes of a measured signal are noise.
 constexpr int kLevel = 3;
 
-// Visits the columns in their order, for encoder and decoder: calls column(get, form), where
-// get(sample) is a reference to the field and `form` a value of its stored type.
-template <class Visitor>
-void visit_columns(int packing, Visitor&& column) {
+// Visits the columns in their order, for encoder and decoder: calls column(rows, get, form), where
+// get(row) is a reference to the field and `form` a value of its stored type.
+template <class Samples, class Bodies, class Visitor>
+void visit_columns(int packing, Samples& samples, Bodies& bodies, Visitor&& visit) {
+  const auto column = [&](auto get, auto form) { visit(samples, get, form); };
   constexpr std::uint8_t kByte{};
   constexpr std::uint32_t kWord{};
   constexpr std::int64_t kTime{};
@@ -85,17 +87,17 @@ void visit_columns(int packing, Visitor&& column) {
   column(
       [](auto& s) -> auto& { return s.bodies; }, kByte);
   for (int i = 0; i < 3; ++i)
-    column(
-        [i](auto& s) -> auto& { return s.body.centre[i]; }, kReal);
+    visit(
+        bodies, [i](auto& b) -> auto& { return b.centre[i]; }, kReal);
   for (int i = 0; i < 4; ++i)
-    column(
-        [i](auto& s) -> auto& { return s.body.orientation_wxyz[i]; }, kReal);
+    visit(
+        bodies, [i](auto& b) -> auto& { return b.orientation_wxyz[i]; }, kReal);
   for (int i = 0; i < 3; ++i)
-    column(
-        [i](auto& s) -> auto& { return s.body.velocity[i]; }, kReal);
+    visit(
+        bodies, [i](auto& b) -> auto& { return b.velocity[i]; }, kReal);
   for (int i = 0; i < 3; ++i)
-    column(
-        [i](auto& s) -> auto& { return s.body.spin[i]; }, kReal);
+    visit(
+        bodies, [i](auto& b) -> auto& { return b.spin[i]; }, kReal);
 }
 
 constexpr std::size_t kCrcSize = 4;
@@ -180,23 +182,24 @@ std::string compressed(const std::vector<unsigned char>& planes, int level) {
 
 }  // namespace
 
-int packing_for(const std::vector<SampleRecord>& samples) {
-  const bool moves =
-      std::any_of(samples.begin(), samples.end(), [](const auto& s) { return s.bodies > 0; });
-  return moves ? kSamplesPacking : kPlainSamplesPacking;
+int packing_for(const std::vector<BodyRecord>& bodies) {
+  return bodies.empty() ? kPlainSamplesPacking : kSamplesPacking;
 }
 
-std::string pack_samples(const std::vector<SampleRecord>& samples) {
+std::string pack_samples(const std::vector<SampleRecord>& samples,
+                         const std::vector<BodyRecord>& bodies) {
   const std::size_t count = samples.size();
-  const int packing = packing_for(samples);
+  if (!bodies.empty() && bodies.size() != count)
+    throw std::invalid_argument("one body for each sample is expected, or none at all");
+  const int packing = packing_for(bodies);
   std::vector<unsigned char> planes(count * bytes_a_sample(packing));
   std::size_t offset = 0;
-  visit_columns(packing, [&](auto get, auto form) {
+  visit_columns(packing, samples, bodies, [&](const auto& of, auto get, auto form) {
     using Field = decltype(form);
     using Pattern = Bits<Field>;
     Pattern before = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto pattern = std::bit_cast<Pattern>(static_cast<Field>(get(samples[i])));
+      const auto pattern = std::bit_cast<Pattern>(static_cast<Field>(get(of[i])));
       const auto stored = sizeof(Field) == 1 ? pattern : static_cast<Pattern>(pattern - before);
       before = pattern;
       for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
@@ -214,8 +217,8 @@ std::string pack_samples(const std::vector<SampleRecord>& samples) {
   return packed;
 }
 
-std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std::int64_t count,
-                                         int packing) {
+RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t count,
+                               int packing) {
   if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
   const auto rows = static_cast<std::size_t>(count);
   const std::size_t expected = rows * bytes_a_sample(packing);
@@ -223,9 +226,11 @@ std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std
   if (!bytes_suffice(rows, size)) refuse();
   if (packing > 2) size -= kCrcSize;
   Planes planes(data, size);
-  std::vector<SampleRecord> samples(rows);
+  RecordedSamples out;
+  out.samples.resize(rows);
+  if (packing > kPlainSamplesPacking) out.bodies.resize(rows);
   std::vector<std::uint64_t> column(rows);
-  visit_columns(packing, [&](auto get, auto form) {
+  visit_columns(packing, out.samples, out.bodies, [&](auto& of, auto get, auto form) {
     using Field = decltype(form);
     using Pattern = Bits<Field>;
     for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
@@ -241,7 +246,7 @@ std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std
       const auto pattern =
           static_cast<Pattern>(sizeof(Field) == 1 ? column[i] : column[i] + before);
       before = pattern;
-      get(samples[i]) = std::bit_cast<Field>(pattern);
+      get(of[i]) = std::bit_cast<Field>(pattern);
     }
   });
   planes.expect_end();
@@ -251,7 +256,7 @@ std::vector<SampleRecord> unpack_samples(const void* data, std::size_t size, std
       crc = crc << 8 | static_cast<const unsigned char*>(data)[size + i];
     if (crc != planes.crc()) refuse();
   }
-  return samples;
+  return out;
 }
 
 }  // namespace palpate::data

@@ -39,6 +39,7 @@ std::unique_ptr<MotionState> MovingBodies::initial_state() const {
   auto state = std::make_unique<BodiesState>();
   state->fixed = fixed_.initial_state();
   std::size_t contacts = 0;
+  state->shapes.reserve(shapes_.size());  // growing would copy them, and copies lose their room
   for (const Scene& shape : shapes_) {
     state->shapes.push_back(shape.initial_state());
     contacts += std::max<std::size_t>(1, state->shapes.back().unions.contacts.capacity());

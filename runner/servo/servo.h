@@ -2,7 +2,9 @@
 // The servo loop's tick: device.read -> renderer -> force limits -> device.write. The same code for
 // a simulated participant (as fast as the processor goes) and a live one (paced by the clock).
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -22,14 +24,19 @@ namespace palpate::runner {
 
 /// The scene of one trial with its renderer and the renderer's state.
 struct TrialScene {
-  TrialScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where)
+  /// \param ticks  that may wait for the session, also where something moves
+  TrialScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
+             std::size_t ticks = 1)
       : scene(what), renderer(&how), state(scene.initial_state()), home(where) {
     rendering::pace_by_tick(state);
     // A soft body's shadow would be a body of its own, with steps of its own.
     if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
-    constexpr std::size_t kTicks = 2048;  // that wait for the session at most
+    constexpr std::size_t kMostPoses = 1 << 18;  // 50 MB; of many bodies fewer ticks can wait
+    constexpr std::size_t kLeastTicks = 2048;
     const std::size_t bodies = state.motion.bodies().size();
-    if (bodies > 0) poses = std::make_unique<Ring<rendering::BodyPose>>(kTicks * bodies);
+    if (bodies == 0) return;
+    const std::size_t kept = std::max(kLeastTicks, kMostPoses / bodies);
+    poses = std::make_unique<Ring<rendering::BodyPose>>(std::min(ticks, kept) * bodies);
   }
 
   const rendering::Scene scene;

@@ -108,7 +108,7 @@ void ServoThread::publish_places(const Sample& sample) noexcept {
 
 void ServoThread::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                           const HomeZone& home) {
-  auto shown = std::make_unique<ShownScene>(scene, renderer, home, realtime_);
+  auto shown = std::make_unique<ShownScene>(scene, renderer, home, realtime_, ring_.capacity());
   if (scene_set_) stop();
   if (!scene_set_) scenes_.clear();
   while (ring_.pop(popped_)) {

@@ -92,8 +92,8 @@ class ServoThread final : public TickSource {
   /// A scene with the threads that step what is soft in it, which the servo's state refers to.
   struct ShownScene {
     ShownScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
-               const RealtimeSettings& realtime)
-        : trial(what, how, where), soft(trial.scene, realtime) {
+               const RealtimeSettings& realtime, std::size_t ticks)
+        : trial(what, how, where, ticks), soft(trial.scene, realtime) {
       if (!soft.empty()) soft.attach(trial.state);
     }
     TrialScene trial;

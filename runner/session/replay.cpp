@@ -126,15 +126,15 @@ void replay(const protocols::Protocol& protocol, const data::TrialRecord& record
   }
 }
 
-bool equals_record(const data::SampleRecord& recorded, const ReplayedSample& again) {
+bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,
+                   const ReplayedSample& again) {
   const rendering::Rendering& r = again.rendering;
-  if (recorded.bodies > 0 && !(again.body && same_body(recorded.body, body_record(*again.body))))
-    return false;
-  return equal(recorded.force, r.force) && equal(recorded.torque, r.torque) &&
-         recorded.depth == r.deepest.depth && recorded.contacts == recorded_contacts(r.contacts) &&
-         recorded.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
-         (recorded.faults & rendering::kAllRenderFaults) ==
-             (r.faults & rendering::kAllRenderFaults);
+  const std::optional<data::BodyRecord> body = data::body_of(recorded, tick);
+  if (body && !(again.body && same_body(*body, body_record(*again.body)))) return false;
+  return equal(tick.force, r.force) && equal(tick.torque, r.torque) &&
+         tick.depth == r.deepest.depth && tick.contacts == recorded_contacts(r.contacts) &&
+         tick.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
+         (tick.faults & rendering::kAllRenderFaults) == (r.faults & rendering::kAllRenderFaults);
 }
 
 }  // namespace palpate::runner

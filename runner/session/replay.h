@@ -37,6 +37,8 @@ void replay(const protocols::Protocol& protocol, const data::TrialRecord& record
 /// Whether a tick's rendering is what is on record, bit by bit (a zero's sign aside, which the
 /// store does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault
 /// bits; of a stimulus that moves, where it is and how fast it goes.
-bool equals_record(const data::SampleRecord& recorded, const ReplayedSample& again);
+/// \param tick  of the record's samples
+bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,
+                   const ReplayedSample& again);
 
 }  // namespace palpate::runner

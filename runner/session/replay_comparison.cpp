@@ -82,7 +82,7 @@ ForceSummary render_again(const protocols::Protocol& protocol, const data::Trial
            if (was.period_ns <= 0) out.periods_known = false;
            ReplayedInterval& now = out.intervals.back();
            ++now.ticks;
-           if (equals_record(was, is)) {
+           if (equals_record(record, was, is)) {
              ++out.equal_ticks;
              ++now.equal_ticks;
            } else if (!out.first_difference) {

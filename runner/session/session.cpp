@@ -276,11 +276,12 @@ void Session::record_sample(const Sample& sample) {
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
   kept.faults = sample.faults;
-  if (const auto bodies = station_.servo.bodies(); !bodies.empty()) {
-    kept.bodies = 1;  // a stimulus is one object
-    kept.body = body_record(bodies.front());
-  }
+  const auto bodies = station_.servo.bodies();  // one at most: a stimulus is one object
+  kept.bodies = bodies.empty() ? 0 : 1;
   record_.samples.push_back(kept);
+  if (bodies.empty() && record_.bodies.empty()) return;
+  record_.bodies.resize(record_.samples.size());  // with those of intervals without one
+  if (!bodies.empty()) record_.bodies.back() = body_record(bodies.front());
 }
 
 }  // namespace palpate::runner

@@ -13,12 +13,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const int packing = 1 + data[0] % data::kSamplesPacking;
   const std::int64_t count = data[1] + 256 * data[2] + 65536 * data[3];
   try {
-    const auto samples = data::unpack_samples(data + 4, size - 4, count, packing);
-    if (static_cast<std::int64_t>(samples.size()) != count) std::abort();
-    const std::string again = data::pack_samples(samples);
+    const auto first = data::unpack_samples(data + 4, size - 4, count, packing);
+    if (static_cast<std::int64_t>(first.samples.size()) != count) std::abort();
+    const std::string again = data::pack_samples(first.samples, first.bodies);
     const auto back =
-        data::unpack_samples(again.data(), again.size(), count, data::packing_for(samples));
-    if (data::pack_samples(back) != again) std::abort();
+        data::unpack_samples(again.data(), again.size(), count, data::packing_for(first.bodies));
+    if (data::pack_samples(back.samples, back.bodies) != again) std::abort();
   } catch (const data::StoreError&) {
   }
   return 0;

@@ -62,6 +62,15 @@ SoftObjectState initial_state(const SoftObject& object) {
   return state;
 }
 
+void keep_room(const SoftObjectState& original, SoftObjectState& copy) {
+  copy.contact.contacts.reserve(original.contact.contacts.capacity());
+  copy.contact.found.reserve(original.contact.found.capacity());
+  copy.contact.forces.reserve(original.contact.forces.capacity());
+  copy.contact.local.reserve(original.contact.local.capacity());
+  copy.impelled.reserve(original.impelled.capacity());
+  copy.mean.reserve(original.mean.capacity());
+}
+
 bool step_is_due(const SoftObject& object, const SoftObjectState& state, double dt) noexcept {
   return state.waiting &&
          state.since_step + dt >= object.delay * object.body->settings().step - kEarly;

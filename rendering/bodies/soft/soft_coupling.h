@@ -88,6 +88,8 @@ bool step_and_look(const SoftObject& object, SoftState& body, std::span<const No
                    SoftView& view) noexcept;
 
 SoftObjectState initial_state(const SoftObject& object);
+/// Gives a copy the room that its original has, so that ticks of it do not allocate.
+void keep_room(const SoftObjectState& original, SoftObjectState& copy);
 
 /// Goes on for dt with the tool where it is at the end of it. No allocation, nothing thrown.
 /// \param dt    s, at most the body's step. \param step  m, by which the tool moved, at most

@@ -26,7 +26,10 @@ class SoftMotionState final : public MotionState {
 
   std::unique_ptr<MotionState> clone() const override {
     auto copy = std::make_unique<SoftMotionState>(*this);
-    for (SoftObjectState& state : copy->soft) state.stepper = nullptr;
+    for (std::size_t i = 0; i < soft.size(); ++i) {
+      copy->soft[i].stepper = nullptr;
+      keep_room(soft[i], copy->soft[i]);
+    }
     return copy;
   }
   std::span<const BodyPose> bodies() const override { return others.motion.bodies(); }
@@ -92,6 +95,7 @@ class SoftMotion final : public SceneMotion {
   std::unique_ptr<MotionState> initial_state() const override {
     auto state = std::make_unique<SoftMotionState>();
     state->others = others_.initial_state();
+    state->soft.reserve(soft_.size());  // growing would copy them, and copies lose their room
     for (const auto& object : soft_) state->soft.push_back(rendering::initial_state(*object));
     return state;
   }

@@ -1,9 +1,9 @@
 #include "runner/commands/replay/report.h"
 
-#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "stimuli/printable.h"
 
@@ -73,15 +73,15 @@ void put(std::string& row, const RenderedForce& shown) {
 }
 
 /// Empty cells in an interval in which nothing moves.
-void put(std::string& row, int bodies, const data::BodyRecord& body) {
-  if (bodies == 0) {
+void put(std::string& row, const std::optional<data::BodyRecord>& body) {
+  if (!body) {
     row += std::string(13, ',');
     return;
   }
-  put_vector(row, body.centre);
-  for (const double q : body.orientation_wxyz) put(row, q);
-  put_vector(row, body.velocity);
-  put_vector(row, body.spin);
+  put_vector(row, body->centre);
+  for (const double q : body->orientation_wxyz) put(row, q);
+  put_vector(row, body->velocity);
+  put_vector(row, body->spin);
 }
 
 /// A line for each interval of a trial of version 2.
@@ -180,9 +180,9 @@ std::string to_json_text(const std::string& name, const RecordedTrial& trial,
 }
 
 std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
-  const bool with_intervals = trial.stored.record.task.has_value();
-  const bool with_body = std::any_of(found.ticks.begin(), found.ticks.end(),
-                                     [](const auto& tick) { return tick.recorded->bodies > 0; });
+  const data::TrialRecord& record = trial.stored.record;
+  const bool with_intervals = record.task.has_value();
+  const bool with_body = !record.bodies.empty();
   std::string text = csv_header(found.other.has_value(), with_intervals, with_body);
   for (const ReplayedTick& tick : found.ticks) {
     const data::SampleRecord& was = *tick.recorded;
@@ -193,7 +193,7 @@ std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
     put(text, was.depth);
     put(text, tick.again);
     if (found.other) put(text, tick.other);
-    if (with_body) put(text, was.bodies, was.body);
+    if (with_body) put(text, data::body_of(record, was));
     text += "\n";
   }
   return text;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <stdexcept>
 
 #include "data/store/store.h"
 #include "tests/shared/peak_memory.h"
@@ -34,7 +35,8 @@ std::vector<std::uint64_t> bits_of(const SampleRecord& sample) {
 void expect_same_bits(const std::vector<SampleRecord>& samples) {
   const std::string packed = pack_samples(samples);
   const auto back =
-      unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(samples.size()));
+      unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(samples.size()))
+          .samples;
   ASSERT_EQ(back.size(), samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ASSERT_EQ(bits_of(back[i]), bits_of(samples[i])) << "sample " << i;
@@ -65,34 +67,40 @@ std::vector<SampleRecord> a_stroke(int ticks) {
 TEST(SamplesCodec, WhereABodyWasComesBackAndOthersArePackedAsEver) {
   std::mt19937_64 random(4);
   std::vector<SampleRecord> samples = a_stroke(50);
-  EXPECT_EQ(packing_for(samples), kPlainSamplesPacking);
+  std::vector<BodyRecord> bodies;
+  EXPECT_EQ(packing_for(bodies), kPlainSamplesPacking);
   const std::string plain = pack_samples(samples);
+  bodies.resize(samples.size());
   for (std::size_t i = 10; i < samples.size(); ++i) {  // at first nothing was shown
-    SampleRecord& s = samples[i];
-    s.bodies = 1;
-    for (auto* vector : {&s.body.centre, &s.body.velocity, &s.body.spin}) {
+    samples[i].bodies = 1;
+    for (auto* vector : {&bodies[i].centre, &bodies[i].velocity, &bodies[i].spin}) {
       for (double& x : *vector) x = std::bit_cast<double>(random());
     }
-    for (double& x : s.body.orientation_wxyz) x = std::bit_cast<double>(random());
+    for (double& x : bodies[i].orientation_wxyz) x = std::bit_cast<double>(random());
   }
-  EXPECT_EQ(packing_for(samples), kSamplesPacking);
-  const std::string packed = pack_samples(samples);
-  const auto back = unpack_samples(packed.data(), packed.size(), 50, kSamplesPacking);
+  EXPECT_EQ(packing_for(bodies), kSamplesPacking);
+  const std::string packed = pack_samples(samples, bodies);
+  const RecordedSamples back = unpack_samples(packed.data(), packed.size(), 50, kSamplesPacking);
   const auto bits = [](const auto& values) {
     std::vector<std::uint64_t> out;
+    out.reserve(values.size());
     for (const double x : values) out.push_back(std::bit_cast<std::uint64_t>(x));
     return out;
   };
+  ASSERT_EQ(back.bodies.size(), bodies.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    EXPECT_EQ(bits_of(back[i]), bits_of(samples[i])) << i;
-    EXPECT_EQ(back[i].bodies, samples[i].bodies) << i;
-    EXPECT_EQ(bits(back[i].body.centre), bits(samples[i].body.centre)) << i;
-    EXPECT_EQ(bits(back[i].body.orientation_wxyz), bits(samples[i].body.orientation_wxyz)) << i;
-    EXPECT_EQ(bits(back[i].body.velocity), bits(samples[i].body.velocity)) << i;
-    EXPECT_EQ(bits(back[i].body.spin), bits(samples[i].body.spin)) << i;
+    EXPECT_EQ(bits_of(back.samples[i]), bits_of(samples[i])) << i;
+    EXPECT_EQ(back.samples[i].bodies, samples[i].bodies) << i;
+    EXPECT_EQ(bits(back.bodies[i].centre), bits(bodies[i].centre)) << i;
+    EXPECT_EQ(bits(back.bodies[i].orientation_wxyz), bits(bodies[i].orientation_wxyz)) << i;
+    EXPECT_EQ(bits(back.bodies[i].velocity), bits(bodies[i].velocity)) << i;
+    EXPECT_EQ(bits(back.bodies[i].spin), bits(bodies[i].spin)) << i;
   }
+  EXPECT_TRUE(unpack_samples(plain.data(), plain.size(), 50).bodies.empty());
   EXPECT_THROW(unpack_samples(plain.data(), plain.size(), 50, kSamplesPacking), StoreError);
   EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 50, kPlainSamplesPacking), StoreError);
+  bodies.pop_back();
+  EXPECT_THROW(pack_samples(samples, bodies), std::invalid_argument);
 }
 
 TEST(SamplesCodec, EveryBitPatternComesBack) {
@@ -139,7 +147,7 @@ TEST(SamplesCodec, TheFirstPackingIsReadWithoutPeriods) {
       0x34, 0xa0, 0x99, 0x60, 0xcf, 0xf0, 0x92, 0x61, 0x26, 0x1c, 0xce, 0x22, 0xd9, 0x7c, 0x7b,
       0x86, 0x00, 0x86, 0x24, 0x06, 0x5f, 0x86, 0x4b, 0x0c, 0x1f, 0x19, 0x56, 0x32, 0xfc, 0x61,
       0x60, 0x04, 0x42, 0x06, 0x06, 0x01, 0x00, 0xf9, 0x68, 0x15, 0xf9};
-  const auto back = unpack_samples(packed, sizeof packed, 2, 1);
+  const auto back = unpack_samples(packed, sizeof packed, 2, 1).samples;
   ASSERT_EQ(back.size(), 2u);
   EXPECT_EQ(back[0].tick, 0u);
   EXPECT_EQ(back[1].tick, 1u);
@@ -162,7 +170,7 @@ TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
       0x0d, 0x68, 0x22, 0xf6, 0x0c, 0x2f, 0x19, 0x66, 0xc2, 0xe1, 0x2c, 0x0c, 0xf5, 0x84, 0x04,
       0xec, 0x19, 0x02, 0x18, 0x92, 0x18, 0x7c, 0x19, 0x2e, 0x31, 0x7c, 0x64, 0x58, 0xc9, 0xf0,
       0x07, 0xe8, 0x43, 0x46, 0x06, 0x16, 0x06, 0x01, 0x00, 0x08, 0x90, 0x26, 0xd7};
-  const auto back = unpack_samples(packed, sizeof packed, 2, 2);
+  const auto back = unpack_samples(packed, sizeof packed, 2, 2).samples;
   ASSERT_EQ(back.size(), 2u);
   EXPECT_EQ(back[1].tick, 1u);
   EXPECT_EQ(back[1].period_ns, 1'000'500);
@@ -210,7 +218,7 @@ TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
     return peak_memory([&] {
       try {
         const auto samples =
-            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count));
+            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count)).samples;
         if (!good || samples.size() != count) _exit(2);
       } catch (const StoreError&) {
         if (good) _exit(2);
@@ -237,7 +245,7 @@ TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
 TEST(SamplesCodec, ALongStandstillIsStoredSoThatItIsReadAgain) {
   constexpr std::size_t kTicks = 450'000;
   const std::string packed = pack_samples(std::vector<SampleRecord>(kTicks));
-  const auto back = unpack_samples(packed.data(), packed.size(), kTicks);
+  const auto back = unpack_samples(packed.data(), packed.size(), kTicks).samples;
   ASSERT_EQ(back.size(), kTicks);
   EXPECT_EQ(bits_of(back.back()), bits_of(SampleRecord{}));
 }
@@ -246,7 +254,7 @@ TEST(SamplesCodec, DamageIsRefused) {
   const auto samples = a_stroke(100);
   const std::string packed = pack_samples(samples);
   const auto unpack = [](const std::string& bytes, std::int64_t count) {
-    return unpack_samples(bytes.data(), bytes.size(), count);
+    return unpack_samples(bytes.data(), bytes.size(), count).samples;
   };
   EXPECT_THROW(unpack(packed.substr(0, packed.size() - 1), 100), StoreError);
   EXPECT_THROW(unpack(packed + "x", 100), StoreError);

@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <utility>
 #include <vector>
 
 #include "rendering/bodies/soft/soft_build.h"
 #include "rendering/renderer.h"
+#include "runner/bench/allocation_count.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {
@@ -188,6 +190,25 @@ TEST(SoftScene, WhatCannotBeSteppedInTimeIsRefused) {
   held.soft->fixed = stimuli::Soft::Fixed::points;
   for (const Vec3& p : stimuli::mesh_of_primitive(held, 2).nodes) held.soft->points.push_back(p);
   EXPECT_THROW(build_soft_object(held, Pose{}, {}), stimuli::MeshError);
+}
+
+TEST(SoftScene, TicksWithSeveralDoNotAllocateNorDoThoseOfACopy) {
+  Pose beside;
+  beside.position.x = 0.06;
+  const Scene scene = soft_scene(Scene({}, true), {},
+                                 {build_soft_object(soft_cube(20000), Pose{}, {}),
+                                  build_soft_object(soft_cube(9000), beside, {.object = 1})},
+                                 true, {});
+  RenderState state = scene.initial_state();
+  RenderState copy = state;
+  for (RenderState* const touched : {&state, &copy}) {
+    for (const double x : {0.002, 0.062}) {
+      const std::uint64_t before = runner::allocations();
+      const Rendering r = press(ray_renderer(), scene, *touched, x, 0.004);
+      EXPECT_EQ(runner::allocations(), before) << x;
+      EXPECT_GT(r.force.z, 0.1) << x;
+    }
+  }
 }
 
 }  // namespace

@@ -131,8 +131,7 @@ TEST_F(TaskSession, RecordsEveryIntervalOfAComparison) {
       catches += task.catch_trial ? 1 : 0;
       EXPECT_EQ(task.intervals[0].stimulus.empty(), task.catch_trial);
       EXPECT_EQ(trial.correct, (trial.response == "yes") != task.catch_trial);
-      if (task.catch_trial) EXPECT_EQ(trial.max_force, 0);
-      if (!task.catch_trial) EXPECT_GT(trial.max_force, 0) << "trial " << trial.trial;
+      EXPECT_EQ(trial.max_force > 0, !task.catch_trial) << "trial " << trial.trial;
     }
   }
   EXPECT_EQ(compared, 11);
