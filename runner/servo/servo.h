@@ -31,11 +31,11 @@ struct TrialScene {
     rendering::pace_by_tick(state);
     // A soft body's shadow would be a body of its own, with steps of its own.
     if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
-    constexpr std::size_t kMostPoses = 1 << 18;  // 50 MB; of many bodies fewer ticks can wait
+    constexpr std::size_t kMostBodyPoses = 1 << 18;  // 50 MB; of many bodies fewer ticks can wait
     constexpr std::size_t kLeastTicks = 2048;
     const std::size_t bodies = state.motion.bodies().size();
     if (bodies == 0) return;
-    const std::size_t kept = std::max(kLeastTicks, kMostPoses / bodies);
+    const std::size_t kept = std::max(kLeastTicks, kMostBodyPoses / bodies);
     poses = std::make_unique<Ring<rendering::BodyPose>>(std::min(ticks, kept) * bodies);
   }
 

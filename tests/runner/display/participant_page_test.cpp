@@ -199,11 +199,10 @@ TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
     page.text = text;
     const Image image = draw_page(page, 1280, 800);
     keep(image, "hostile" + std::to_string(text.size()));
-    // A text of several screens is answered on the last one. Beside the bar that goes on to the next
-    // stands the number of the one on show.
+    // A text of several screens is answered on the last one. Beside the bar that goes on to the
+    // next stands the number of the one on show.
     const bool several = screen_count(page, 1280, 800) > 1;
-    EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? bar : keys)
-        << text.substr(0, 20);
+    EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? bar : keys) << text.substr(0, 20);
     EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);
   }
   for (int i = 0; i < 40; ++i) page.keys.emplace_back("k", "a shape with quite a long name indeed");
