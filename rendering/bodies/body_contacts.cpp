@@ -109,7 +109,7 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
     GapMemory& memory = state_.gaps[pair.first + k];
     const Gap gap = gap_between(at_a, at_b, reach, memory);
     if (gap.distance > reach) continue;
-    state_.near_parts.push_back({index, pair.first + k, gap.distance});
+    state_.near_parts.push_back({index, pair.first + k, gap.distance, gap.distance <= kTouching});
     if (!places) return;
     find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
     for (const ManifoldPoint& point : state_.manifold.points()) {
@@ -149,8 +149,8 @@ void BodyContacts::set_velocities(double step) {
   }
 }
 
-void BodyContacts::find_islands(std::span<const PressingSpring> springs) {
-  (void)springs;  // a spring holds one body
+/// Bodies that contacts connect. A spring holds one body and connects none.
+void BodyContacts::find_islands() {
   for (std::uint32_t i = 0; i < state_.island.size(); ++i) state_.island[i] = i;
   for (bool more = true; more;) {
     more = false;

@@ -12,6 +12,12 @@ class BodyContacts {
  public:
   /// m; parts that are so near touch. Above rounding, below what is seen or felt.
   static constexpr double kTouching = 1e-8;
+  /// m; parts that are found to meet are as near as this or nearer, so that they still touch when
+  /// they are looked at again, rounded otherwise.
+  static constexpr double kMet = 0.75 * kTouching;
+  /// Of a step; what meets so soon after the parts touched, as the far end of an edge that lies
+  /// almost flat, bounces with them.
+  static constexpr double kAtOnce = 4e-3;
 
   BodyContacts(const BodyWorld& world, BodyWorldState& state) : world_(world), state_(state) {}
 
@@ -57,7 +63,7 @@ class BodyContacts {
   double meeting_between(const BodyWorldState::NearParts& parts, TimeAndGap low, TimeAndGap high,
                          GapMemory& memory) const;
   void set_velocities(double step);
-  void find_islands(std::span<const PressingSpring> springs);
+  void find_islands();
   double resting_speed(double step) const;
   double separation_speed(const BodyContact& contact) const;
   void add_row(std::uint32_t a, std::uint32_t b, const Vec3& place, const Vec3& direction,

@@ -184,15 +184,16 @@ bool BodyContacts::bounce(double step) {
     std::fill(state_.push.begin(), state_.push.end(), Vec3(0));
     std::fill(state_.twist.begin(), state_.twist.end(), Vec3(0));
     std::fill(state_.pushed.begin(), state_.pushed.end(), 0);
-    find_islands({});
+    find_islands();
     bool any = false;
     for (std::uint32_t island = 0; island < state_.island.size(); ++island) {
       if (state_.island[island] != island) continue;
       begin_rows();
       for (const BodyContact& contact : state_.contacts) {
-        if (state_.island[contact.a] != island || contact.gap > kTouching) continue;
+        if (state_.island[contact.a] != island || !state_.near_parts[contact.parts].touches)
+          continue;
         const double speed = separation_speed(contact);
-        if (speed > -resting) continue;
+        if (speed > -resting || contact.gap > kTouching - kAtOnce * step * speed) continue;
         const BodyPair& pair = world_.pairs[contact.pair];
         const int leader = static_cast<int>(state_.problem.size());
         add_row(contact.a, contact.b, contact.place, contact.normal, -pair.restitution * speed,
@@ -218,7 +219,7 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
   std::fill(state_.pushed.begin(), state_.pushed.end(), 0);
   if (state_.contacts.empty() && springs.empty()) return;
   set_velocities(step);
-  find_islands(springs);
+  find_islands();
   for (std::uint32_t island = 0; island < state_.island.size(); ++island) {
     if (state_.island[island] != island || (!chosen.empty() && !chosen[island])) continue;
     bool closing = false;

@@ -9,15 +9,15 @@
 namespace palpate::rendering {
 namespace {
 
-// m; at the time that is found they are as near as this, or nearer.
-constexpr double kMet = 0.5 * BodyContacts::kTouching;
+// m; the gap that is looked for. One up to kMet will do.
+constexpr double kSought = 0.5 * BodyContacts::kTouching;
 
 }  // namespace
 
 double BodyContacts::time_to_next(double most) {
   const double resting = resting_speed(most);
   double next = most;
-  for (auto& parts : state_.near_parts) parts.apart = parts.gap > kTouching;
+  for (auto& parts : state_.near_parts) parts.apart = !parts.touches;
   // What touches and parts again, as after a bounce, may meet elsewhere.
   for (const BodyContact& contact : state_.contacts) {
     auto& parts = state_.near_parts[contact.parts];
@@ -25,8 +25,7 @@ double BodyContacts::time_to_next(double most) {
   }
   for (auto& parts : state_.near_parts) {
     if (!parts.apart) continue;
-    next = std::min(next,
-                    parts.gap > kTouching ? meeting_time(parts, next) : meeting_again(parts, next));
+    next = std::min(next, parts.touches ? meeting_again(parts, next) : meeting_time(parts, next));
   }
   return next;
 }
@@ -64,17 +63,17 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
   for (int round = 0; round < kMostAdvances; ++round) {
     const Gap gap = gap_after(near, time, memory, closing);
     distance = gap.distance;
-    if (distance <= kTouching) return time;
+    if (distance <= kMet) return time;
     const double fall =
         pair.obstacle ? std::max(0.0, glm::dot(world_.gravity, gap.normal)) * (most - time) : 0;
     const double speed = glm::dot(gap.normal, closing) + turning + fall;
-    if (!(speed * (most - time) > distance - kMet)) return most;
-    time += (distance - kMet) / speed;
+    if (!(speed * (most - time) > distance - kSought)) return most;
+    time += (distance - kSought) / speed;
   }
   const TimeAndGap low{time, gap_after(near, time, memory, closing).distance};
   const TimeAndGap high{most, gap_after(near, most, memory, closing).distance};
-  if (low.gap <= kTouching) return time;
-  if (high.gap > kMet) return most;
+  if (low.gap <= kMet) return time;
+  if (high.gap > kSought) return most;
   return meeting_between(near, low, high, memory);
 }
 
@@ -99,12 +98,12 @@ double BodyContacts::meeting_between(const BodyWorldState::NearParts& near, Time
                                      TimeAndGap high, GapMemory& memory) const {
   constexpr int kMostRounds = 24;
   Vec3 closing(0);
-  low.gap -= kMet;
-  high.gap -= kMet;
+  low.gap -= kSought;
+  high.gap -= kSought;
   for (int round = 0; round < kMostRounds; ++round) {
     const double middle = (low.time * high.gap - high.time * low.gap) / (high.gap - low.gap);
-    const double value = gap_after(near, middle, memory, closing).distance - kMet;
-    if (std::abs(value) <= kMet) return middle;
+    const double value = gap_after(near, middle, memory, closing).distance - kSought;
+    if (std::abs(value) <= kMet - kSought) return middle;
     if (value > 0) {
       low = {middle, value};
       high.gap *= 0.5;

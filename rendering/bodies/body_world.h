@@ -120,7 +120,8 @@ struct BodyWorldState {
   struct NearParts {
     std::uint32_t pair = 0, parts = 0;
     double gap = 0;
-    bool apart = false;  ///< moving freely, they do not meet before the next event
+    bool touches = false;  ///< gap at most BodyContacts::kTouching
+    bool apart = false;    ///< moving freely, they do not meet before the next event
   };
   std::vector<NearParts> near_parts;
   std::vector<BodyContact> contacts;

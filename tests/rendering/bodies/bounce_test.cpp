@@ -105,8 +105,8 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
 }
 
 /// Boxes that turn meet a wall with one corner after another; each time the energy stays.
-TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
-  stimuli::Random random(5);
+void expect_energy_stays(std::uint64_t seed) {
+  stimuli::Random random(seed);
   for (int trial = 0; trial < 40; ++trial) {
     BodyScene s;
     s.stands(box_mesh({0.1, 2, 2}), {{0.2, 0, 0}, kAsItIs});
@@ -131,9 +131,15 @@ TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
     const double before = energy_of(scene, state);
     const Vec3 came = state.motion.bodies()[0].velocity;
     run(scene, state, 0.5);
-    EXPECT_NEAR(energy_of(scene, state) / before, 1, 1e-8) << trial;
-    EXPECT_GT(glm::distance(state.motion.bodies()[0].velocity, came), 0.1) << trial;
+    EXPECT_NEAR(energy_of(scene, state) / before, 1, 1e-8) << seed << " " << trial;
+    EXPECT_GT(glm::distance(state.motion.bodies()[0].velocity, came), 0.1) << seed << " " << trial;
   }
+}
+
+/// With 126 to 147 a meeting was once found a rounding too far away to bounce, or two corners met
+/// within a microsecond and one of them was only held.
+TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
+  for (const std::uint64_t seed : {5, 126, 142, 146, 147}) expect_energy_stays(seed);
 }
 
 /// Friction turns sliding round where a body strikes with its mass behind the place: Newton's law
