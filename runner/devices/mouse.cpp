@@ -22,8 +22,8 @@ Vec3 towards(const Vec3& from, const Vec3& to, double fraction, double longest) 
 
 }  // namespace
 
-void StylusTarget::move(double across, double up, double towards) {
-  tip += Vec3(across, up, towards);
+void StylusTarget::move(const Vec3& by) {
+  tip += by;
   for (int i = 0; i < 3; ++i) tip[i] = std::clamp(tip[i], -kReach, kReach);
 }
 
@@ -33,7 +33,7 @@ void StylusTarget::turn(double right, double up) {
 }
 
 Vec3 StylusTarget::axis() const {
-  return {std::cos(pitch) * std::sin(yaw), std::sin(pitch), std::cos(pitch) * std::cos(yaw)};
+  return {std::cos(pitch) * std::sin(yaw), -std::cos(pitch) * std::cos(yaw), std::sin(pitch)};
 }
 
 MouseStylus::MouseStylus(double length, double rate)
@@ -54,7 +54,7 @@ MouseStylus::MouseStylus(double length, double rate)
 
 StylusTarget MouseStylus::initial_target() const {
   StylusTarget target;
-  target.tip = {0.06, 0.08, 0.04};
+  target.tip = {0.06, -0.04, 0.08};
   target.length = length_;
   target.yaw = 0.6;
   target.pitch = 0.7;

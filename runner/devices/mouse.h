@@ -8,15 +8,15 @@
 namespace palpate::runner {
 
 /// Target pose of the stylus, set by pointer, wheel and modifiers. Belongs to the window's thread.
-/// Device frame, which is the view's at first: x to the right, y up, z towards the viewer.
+/// Device frame, which is the world's: x to the right, y away from the viewer, z up.
 struct StylusTarget {
   Vec3 tip;           ///< m
   double length = 0;  ///< m
-  double yaw = 0;     ///< rad, about y, of the axis from tip to tail
+  double yaw = 0;     ///< rad, about z, of the axis from tip to tail; 0: in the plane of y and z
   double pitch = 0;   ///< rad, up
 
-  /// \param across, up, towards  m
-  void move(double across, double up, double towards);
+  /// \param by  m
+  void move(const Vec3& by);
   /// \param right, up  rad, of the tail about the tip
   void turn(double right, double up);
   Vec3 axis() const;  ///< unit, tip to tail

@@ -59,7 +59,7 @@ class ExploreView {
   rendering::BodyPull pull_;        ///< by the pointer; object -1: none
   glm::vec3 pulled_from_{0, 0, 0};  ///< m; where the pointer took hold: the pull stays as far away
   bool labels_ = false, dark_ = true;
-  int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z
+  int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z of the world
   float cut_at_ = 0;        ///< of the size of the scene
   int touched_object_ = 0;  ///< whose material the sliders show; the last: all
   bool dragging_time_ = false;

@@ -52,7 +52,7 @@ void PointerControl::step(const PointerMotion& pointer, const Camera& camera,
   const auto follow = [&] {
     const Vec3 to = wanted(pointer.at - pointer_offset_, camera, object);
     const Vec3 by = (to - virtual_tip()) / workspace_.shift_gain();
-    target_.move(by.x, by.y, by.z);
+    target_.move(by);
   };
   const double notches =
       pointer.wheel - (pointer.depth ? kDepthPerPixel / kNotch * pointer.moved.y : 0);

@@ -33,9 +33,9 @@ void add_options(CommandLine& line) {
       ("every", po::value<std::string>()->value_name("TIME")->default_value("16ms"),
        "between pictures")  //
       ("view", po::value<std::string>()->value_name("YAW,PITCH[,ZOOM]")->default_value("30,22"),
-       "where the camera of the pictures stands, degrees: 0,0 looks along -z with y up; what is "
-       "touched is in the picture")                                     //
-      ("labels", po::bool_switch(), "number and shape at each object")  //
+       "where the camera of the pictures stands, degrees: 0,0 looks along +y with x to the right "
+       "and z up, 90,0 stands on +x; what is touched is in the picture")  //
+      ("labels", po::bool_switch(), "number and shape at each object")    //
       ("pictures", po::value<std::string>()->value_name("DIR"),
        "where the window keeps pictures: scene-1.png and so on")  //
       ("calibration", po::value<std::string>()->value_name("FILE"),

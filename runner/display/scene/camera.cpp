@@ -64,12 +64,12 @@ void Camera::fit(std::span<const glm::vec3> points) {
 }
 
 glm::vec3 Camera::towards_viewer() const {
-  return {std::cos(pitch_) * std::sin(yaw_), std::sin(pitch_), std::cos(pitch_) * std::cos(yaw_)};
+  return {std::cos(pitch_) * std::sin(yaw_), -std::cos(pitch_) * std::cos(yaw_), std::sin(pitch_)};
 }
 
 glm::vec3 Camera::eye() const { return centre_ + distance_ * towards_viewer(); }
 
-glm::mat4 Camera::view() const { return glm::lookAt(eye(), centre_, glm::vec3(0, 1, 0)); }
+glm::mat4 Camera::view() const { return glm::lookAt(eye(), centre_, glm::vec3(0, 0, 1)); }
 
 float Camera::near() const { return kNear * distance_; }
 

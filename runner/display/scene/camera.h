@@ -7,15 +7,16 @@
 
 namespace palpate::runner {
 
-/// The camera of a picture of a scene; y is up. Points in the virtual frame, m; pixels from the
-/// picture's upper left corner.
+/// The camera of a picture of a scene: z is up, and at first y leads away from it (the frame of
+/// rendering/README.md). Points in the virtual frame, m; pixels from the picture's upper left
+/// corner.
 class Camera {
  public:
   void resize(float width, float height);
   /// \param right, up  rad
   void orbit(float right, float up);
-  /// Where the camera stands, about the centre. \param yaw  rad, about +y, 0: on +z. \param pitch
-  /// rad, up
+  /// Where the camera stands, about the centre. \param yaw  rad, about +z, 0: on -y, looking
+  /// along +y with +x to the right. \param pitch  rad, up
   void look_from(float yaw, float pitch);
   /// \param closer  above 1: larger in the picture
   void zoom(float closer);

@@ -1,5 +1,5 @@
 #pragma once
-// What a picture of a scene shows, as plain values. Virtual frame, y up, m; colours sRGB, 0 to 1.
+// What a picture of a scene shows, as plain values. Virtual frame, z up, m; colours sRGB, 0 to 1.
 
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
@@ -78,7 +78,7 @@ struct ScenePicture {
   /// What casts and gets shadows is within this distance of this place; the ground fades beyond.
   glm::vec3 middle{0};
   float size = 0.1F;
-  float ground = 0;  ///< height of the ground, y
+  float ground = 0;  ///< height of the ground, z
   float grid = 0;    ///< between the lines on the ground; 0: none
   /// What is on the side of positive dot(plane, (x, y, z, 1)) alone is drawn of objects.
   std::optional<glm::vec4> cut;

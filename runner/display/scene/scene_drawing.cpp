@@ -35,6 +35,7 @@ constexpr double kTurnOfOneNewtonMetre = 3;  // radius, of the size
 constexpr double kLeastForce = 0.005;        // N; less is not drawn
 constexpr double kLeastTorque = 1e-4;        // N m; likewise
 constexpr double kRedOfSize = 0.2;           // of the radius: so far has given way what is red
+constexpr float kFarthestFloor = 1;          // below the lowest, of the size
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
 bool finite(const Vec3& v) {
@@ -156,7 +157,9 @@ SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rend
   float radius = 0;
   for (const glm::vec3& point : points) radius = std::max(radius, glm::distance(point, middle_));
   size_ = std::max<double>(radius, 1e-4);
-  ground_ = low.y;
+  // What hovers or flies is above the world's floor, where that is near.
+  const bool above_floor = low.z > 0 && low.z < kFarthestFloor * radius;
+  ground_ = above_floor ? 0 : low.z;
 }
 
 void SceneDrawing::add_compiled(const rendering::Scene& scene) {
@@ -256,7 +259,7 @@ void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSett
                                ScenePicture& out) const {
   const auto add_label = [&](std::size_t i, const glm::mat4& place) {
     if (!settings.labels) return;
-    const glm::vec3 above(0, objects_[i].top + 0.06F * static_cast<float>(size_), 0);
+    const glm::vec3 above(0, 0, objects_[i].top + 0.06F * static_cast<float>(size_));
     out.labels.push_back({glm::vec3(place[3]) + above, objects_[i].label});
   };
   for (std::size_t i = 0; i < objects_.size(); ++i) {

@@ -25,22 +25,22 @@ constexpr int kSkyMap = 96;  // coarse: its texels melt into each other
 constexpr glm::vec4 kNoCut{0, 0, 0, 1};
 
 DrawnMesh unit_square() {
-  const glm::vec3 up(0, 1, 0), a(-1, 0, -1), b(-1, 0, 1), c(1, 0, 1), d(1, 0, -1);
+  const glm::vec3 up(0, 0, 1), a(-1, 1, 0), b(-1, -1, 0), c(1, -1, 0), d(1, 1, 0);
   return {{a, up}, {b, up}, {c, up}, {a, up}, {c, up}, {d, up}};
 }
 
 /// Above the viewer's left shoulder, wherever the camera stands.
 glm::vec3 lamp_of(const Camera& camera) {
   const glm::vec3 to_viewer = camera.towards_viewer();
-  const glm::vec3 level = glm::normalize(glm::vec3(to_viewer.x, 0, to_viewer.z));
-  const glm::vec3 right(level.z, 0, -level.x);
-  return glm::normalize(0.45F * level - 0.62F * right + glm::vec3(0, 1, 0));
+  const glm::vec3 level = glm::normalize(glm::vec3(to_viewer.x, to_viewer.y, 0));
+  const glm::vec3 right(-level.y, level.x, 0);
+  return glm::normalize(0.45F * level - 0.62F * right + glm::vec3(0, 0, 1));
 }
 
 /// To the unit cube that a map of shadows has: x and y across, z along the light.
 glm::mat4 light_view(const ScenePicture& picture, const glm::vec3& towards_light) {
   const float reach = kShadowReach * picture.size;
-  const glm::vec3 up = std::abs(towards_light.y) > 0.99F ? glm::vec3(0, 0, -1) : glm::vec3(0, 1, 0);
+  const glm::vec3 up = std::abs(towards_light.z) > 0.99F ? glm::vec3(0, 1, 0) : glm::vec3(0, 0, 1);
   return glm::ortho(-reach, reach, -reach, reach, 0.0F, 4 * reach) *
          glm::lookAt(picture.middle + 2 * reach * towards_light, picture.middle, up);
 }
@@ -201,12 +201,12 @@ void SceneRenderer::draw_background(const Theme& theme) const {
 }
 
 void SceneRenderer::draw_ground(const ScenePicture& picture, const Camera& camera) const {
-  if (camera.eye().y <= picture.ground) return;  // would hide everything
+  if (camera.eye().z <= picture.ground) return;  // would hide everything
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);  // what has sunk into it is seen
   solid_.set("is_ground", 1);
-  const glm::vec3 at(picture.middle.x, picture.ground, picture.middle.z);
+  const glm::vec3 at(picture.middle.x, picture.middle.y, picture.ground);
   solid_.set("place",
              glm::scale(glm::translate(glm::mat4(1), at), glm::vec3(kGroundEdge * picture.size)));
   square_.draw();
@@ -314,7 +314,7 @@ unsigned SceneRenderer::draw(const ScenePicture& picture, const Camera& camera, 
   const int across = std::max(width, 1), high = std::max(height, 1);
   lamp_ = lamp_of(camera);
   lamp_view_ = light_view(picture, lamp_);
-  sky_view_ = light_view(picture, {0, 1, 0});
+  sky_view_ = light_view(picture, {0, 0, 1});
   for (const DrawnObject& object : picture.objects) uploaded(object.mesh);
   const std::vector<Item> items = tool_items(picture);
   glDisable(GL_SCISSOR_TEST);

@@ -73,7 +73,7 @@ class SceneRenderer {
     bool used = false;
   };
   std::map<const DrawnMesh*, Uploaded> meshes_;
-  glm::vec3 lamp_{0, 1, 0};
+  glm::vec3 lamp_{0, 0, 1};
   glm::mat4 lamp_view_{1}, sky_view_{1};
 };
 

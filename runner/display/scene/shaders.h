@@ -62,10 +62,10 @@ void main() {
   float sun = facing > 0.0 ? light(lamp_map, lamp_matrix, at + grain * n, softness, 0.002, taps) : 0.0;
   float sky = light(sky_map, sky_matrix, at + 4.0 * grain * n, sky_softness, 0.012, 2 * taps);
   if (is_ground) {
-    float far = length(at.xz - middle.xz);
+    float far = length(at.xy - middle.xy);
     float dark = 1.0 - (0.62 + 0.38 * sun) * (0.66 + 0.34 * sky);
-    float lines = grid > 0.0 ? 0.07 * max(line(at.x / grid), line(at.z / grid)) +
-        0.09 * max(line(at.x / (5.0 * grid)), line(at.z / (5.0 * grid))) : 0.0;
+    float lines = grid > 0.0 ? 0.07 * max(line(at.x / grid), line(at.y / grid)) +
+        0.09 * max(line(at.x / (5.0 * grid)), line(at.y / (5.0 * grid))) : 0.0;
     vec3 seen = ground_colour * (1.0 - dark);
     seen = mix(seen, vec3(dot(ground_colour, vec3(0.33)) > 0.4 ? 0.25 : 0.75), lines);
     result = vec4(seen, 1.0 - smoothstep(ground_from, ground_to, far));
@@ -75,11 +75,11 @@ void main() {
   vec3 base = mix(mix(linear(colour), linear(vec3(0.95, 0.80, 0.35)), min(2.0 * tinted, 1.0)),
                   linear(vec3(0.80, 0.22, 0.20)), clamp(2.0 * tinted - 1.0, 0.0, 1.0));
   vec3 above = vec3(0.50, 0.53, 0.58), below = vec3(0.24, 0.22, 0.21);
-  vec3 hemisphere = mix(below, above, 0.5 + 0.5 * n.y) * mix(0.72, 1.0, sky);
+  vec3 hemisphere = mix(below, above, 0.5 + 0.5 * n.z) * mix(0.72, 1.0, sky);
   float lit = max(facing, 0.0) * sun;
   float fill = 0.16 * max(dot(n, to_eye), 0.0);
   float shine = 0.10 * sun * pow(max(dot(n, normalize(lamp + to_eye)), 0.0), 40.0);
-  float rim = 0.10 * pow(1.0 - max(dot(n, to_eye), 0.0), 3.0) * (0.5 + 0.5 * n.y);
+  float rim = 0.10 * pow(1.0 - max(dot(n, to_eye), 0.0), 3.0) * (0.5 + 0.5 * n.z);
   vec3 sum = base * (hemisphere + fill + vec3(0.74, 0.71, 0.66) * lit) + vec3(shine + rim);
   float veil = opacity < 1.0 ? clamp(opacity + 0.45 * pow(1.0 - abs(dot(n, to_eye)), 2.5), 0.0, 1.0) : 1.0;
   result = vec4(pow(clamp(sum, 0.0, 1.0), vec3(1.0 / 2.2)), veil);

@@ -63,13 +63,21 @@ def red(path):
     return sum(r > g + 70 and r > b + 70 for r, g, b in pixels(path))
 
 
+def middle_row(path):
+    """Mean row of the pixels of the first object, which is blue; the rows count from the top."""
+    _, _, rows = decode_png(path.read_bytes())
+    found = [y for y, row in enumerate(rows) for i in range(0, len(row), 3) if row[i + 2] > row[i] + 40]
+    assert len(found) > 20, "no ball"
+    return sum(found) / len(found)
+
+
 class Explore(unittest.TestCase):
     def setUp(self):
         self.keep = tempfile.TemporaryDirectory()
         self.folder = pathlib.Path(self.keep.name)
         self.scene = self.write("scene.json", json.dumps(SCENE))
         # From above down to 5 mm below the surface, in 0.1 s.
-        rows = [f"{0.005 * k},0,{0.05 - 0.0015 * k},0,0,{0.17 - 0.0015 * k},0" for k in range(21)]
+        rows = [f"{0.005 * k},0,0,{0.05 - 0.0015 * k},0,0,{0.17 - 0.0015 * k}" for k in range(21)]
         self.path = self.write("path.csv", "\n".join([HEADER, *rows]) + "\n")
 
     def tearDown(self):
@@ -106,6 +114,23 @@ class Explore(unittest.TestCase):
         first, *_, last = self.draw("frames", "--every", "50ms")
         self.assertEqual(red(first), 0, "0.05 s earlier the tip is 25 mm above the cube")
         self.assertGreater(red(last), 20)
+
+    def falling(self, gravity):
+        """Frames of a ball above a plate, with the stylus far away."""
+        scene = self.write("fall.json", json.dumps({"gravity_m_per_s2": gravity, "objects": [
+            {"shape": "sphere", "radius_m": 0.02, "position_m": [0, 0, 0.06], "body": {"mass_kg": 0.1, "restitution": 0}},
+            {"shape": "box", "size_m": [0.2, 0.2, 0.02], "position_m": [0, 0, -0.01]}]}))
+        self.path = self.write("far.csv", "\n".join([HEADER, *(f"{0.005 * k},0.5,0.5,0.5,0.5,0.5,0.6" for k in range(101))]) + "\n")
+        return [middle_row(frame) for frame in self.draw(f"fall{gravity[2]}", "--every", "50ms", scene=scene)]
+
+    def test_what_gravity_draws_down_goes_down_in_the_picture(self):
+        rows = self.falling([0, 0, -9.81])
+        # 0.04 m of free fall take 0.09 s; then it lies on the plate.
+        self.assertGreater(rows[1], rows[0] + 1)
+        self.assertGreater(rows[2], rows[1] + 2)
+        self.assertLess(max(rows[4:]) - min(rows[4:]), 1)
+        floating = self.falling([0, 0, 0])
+        self.assertLess(max(floating) - min(floating), 0.5)
 
     def test_the_same_path_gives_the_same_files(self):
         first, second = self.draw("one", "--every", "50ms"), self.draw("two", "--every", "50ms")

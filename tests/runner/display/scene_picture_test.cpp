@@ -72,16 +72,16 @@ class ScenePictureTest : public ::testing::Test {
   }
   static SceneMoment touching(const Vec3& ideal, const Vec3& by) {
     SceneMoment moment;
-    moment.sample.probe = {ideal + by, ideal + by + Vec3(0, 0.12, 0)};
-    moment.sample.rendering.ideal = {ideal, ideal + Vec3(0, 0.12, 0)};
+    moment.sample.probe = {ideal + by, ideal + by + Vec3(0, 0, 0.12)};
+    moment.sample.rendering.ideal = {ideal, ideal + Vec3(0, 0, 0.12)};
     moment.sample.rendering.contacts = 1;
-    moment.sample.device1 = Vec3(0, 2, 0);
-    moment.contacts.push_back({ideal, {0, 2, 0}});
+    moment.sample.device1 = Vec3(0, 0, 2);
+    moment.contacts.push_back({ideal, {0, 0, 2}});
     return moment;
   }
   static SceneMoment away() {
     SceneMoment moment;
-    moment.sample.probe = {{0.3, 0.3, 0}, {0.3, 0.4, 0}};
+    moment.sample.probe = {{0.3, 0, 0.3}, {0.3, 0, 0.4}};
     return moment;
   }
 
@@ -97,7 +97,7 @@ TEST_F(ScenePictureTest, AnObjectIsSeenWhereItIsProjected) {
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_TRUE(bluish(seen({0.05, 0, 0})));
   EXPECT_FALSE(bluish(seen({-0.05, 0, 0}))) << "the second has another colour";
-  EXPECT_GT(difference(seen({-0.05, 0, 0}), seen({0, 0.03, 0})), 60) << "nothing between them";
+  EXPECT_GT(difference(seen({-0.05, 0, 0}), seen({0, 0, 0.03})), 60) << "nothing between them";
   camera_.orbit(static_cast<float>(M_PI), 0);
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_TRUE(bluish(seen({0.05, 0, 0})));
@@ -122,30 +122,30 @@ TEST_F(ScenePictureTest, TheVirtualToolIsSeenInsideOfTheObject) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(count(orange), 0);
-  const SceneMoment moment = touching({0, 0.03, 0}, {0, -0.03, 0});
+  const SceneMoment moment = touching({0, 0, 0.03}, {0, 0, -0.03});
   ScenePicture picture = drawing.picture(moment, light_theme(), {});
   picture.arrows.clear();
   picture.turns.clear();
   camera_.zoom(3);
   draw(picture);
-  EXPECT_TRUE(orange(seen({0, 0.01, 0})));
+  EXPECT_TRUE(orange(seen({0, 0, 0.01})));
 }
 
 TEST_F(ScenePictureTest, EverySegmentOfTheToolIsDrawn) {
   rendering::Tool tool;
   tool.segments = {
       {{0, 0, 0}, {0, 0, 0.1}}, {{0, 0, 0.1}, {0.03, 0, 0.08}}, {{0, 0, 0}, {-0.03, 0, 0.02}}};
-  const SceneDrawing drawing({ball({0, -0.1, 0}, 0.07)}, tool);
+  const SceneDrawing drawing({ball({0, 0, -0.1}, 0.07)}, tool);
   SceneMoment moment;
-  moment.sample.probe = {{0, 0, 0}, {0, 0.05, 0}};
+  moment.sample.probe = {{0, 0, 0}, {0, 0, 0.05}};
   moment.sample.rendering.ideal_side = {1, 0, 0};
   draw(drawing.picture(moment, light_theme(), {}));
   const auto dark = [](const Rgb& c) { return c.r + c.g + c.b < 330; };
   // +z of the stylus is up, +x to the right.
-  EXPECT_TRUE(dark(seen({0, 0.07, 0})));
-  EXPECT_TRUE(dark(seen({0.015, 0.09, 0})));
-  EXPECT_TRUE(dark(seen({-0.015, 0.01, 0})));
-  EXPECT_FALSE(dark(seen({0.015, 0.01, 0})));
+  EXPECT_TRUE(dark(seen({0, 0, 0.07})));
+  EXPECT_TRUE(dark(seen({0.015, 0, 0.09})));
+  EXPECT_TRUE(dark(seen({-0.015, 0, 0.01})));
+  EXPECT_FALSE(dark(seen({0.015, 0, 0.01})));
 }
 
 TEST_F(ScenePictureTest, WhatLiesInsideOfATranslucentObjectIsSeen) {
@@ -181,7 +181,7 @@ TEST_F(ScenePictureTest, ThingsCastShadows) {
   ScenePicture picture = drawing.picture(away(), light_theme(), {});
   picture.grid = 0;
   draw(picture);
-  const glm::vec3 under(0.02, -0.03, -0.02), far(-0.08, -0.03, 0.05);
+  const glm::vec3 under(0.02, 0.02, -0.03), far(-0.08, -0.05, -0.03);
   EXPECT_LT(seen(under).g + 25, seen(far).g);
   picture.objects.clear();
   draw(picture);
@@ -190,7 +190,7 @@ TEST_F(ScenePictureTest, ThingsCastShadows) {
 
 TEST_F(ScenePictureTest, TheSameSceneGivesTheSamePixels) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
-  const SceneMoment moment = touching({0, 0.03, 0}, {0, -0.01, 0});
+  const SceneMoment moment = touching({0, 0, 0.03}, {0, 0, -0.01});
   const std::string first = draw(drawing.picture(moment, light_theme(), {.labels = true}));
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_NE(first, painter_->pixels());
@@ -205,9 +205,9 @@ TEST_F(ScenePictureTest, LabelsAreWritten) {
 
 TEST_F(ScenePictureTest, NumbersThatAreNoneDrawNothing) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
-  SceneMoment moment = touching({0, 0.03, 0}, {0, -0.01, 0});
-  moment.sample.probe.tip.x = moment.contacts[0].place.y = std::nan("");
-  moment.sample.device1.z = INFINITY;
+  SceneMoment moment = touching({0, 0, 0.03}, {0, 0, -0.01});
+  moment.sample.probe.tip.x = moment.contacts[0].place.z = std::nan("");
+  moment.sample.device1.y = INFINITY;
   draw(drawing.picture(moment, light_theme(), {}));
   EXPECT_TRUE(bluish(seen({0, 0, 0})));
   EXPECT_EQ(count(reddish), 0);
@@ -218,7 +218,7 @@ TEST_F(ScenePictureTest, FilesHaveTheirMarks) {
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(painter_->png().substr(1, 3), "PNG");
   painter_->add_to_animation(0);
-  draw(drawing.picture(touching({0, 0.03, 0}, {0, 0, 0}), light_theme(), {}));
+  draw(drawing.picture(touching({0, 0, 0.03}, {0, 0, 0}), light_theme(), {}));
   painter_->add_to_animation(0.1);
   const std::string webp = painter_->animation(0.2);
   EXPECT_EQ(webp.substr(0, 4), "RIFF");
