@@ -91,17 +91,19 @@ DESIGNS = {
 
 
 class ExtremeDesigns(unittest.TestCase):
-    def check_statuses(self, value, place=""):
-        """undefined and singular have a reason; null occurs only with one of them."""
-        if isinstance(value, list):
+    def check_statuses(self, value, place="", told=False):
+        """undefined and singular have a reason; null occurs only with one of them (`told`)."""
+        if value is None:
+            self.assertTrue(told, f"{place} is null, and nothing says why")
+        elif isinstance(value, list):
             for i, each in enumerate(value):
-                self.check_statuses(each, f"{place}/{i}")
-        if not isinstance(value, dict):
-            return
-        if value.get("status") in ("undefined", "singular"):
-            self.assertTrue(value.get("reason"), place)
-        for key, each in value.items():
-            self.check_statuses(each, f"{place}/{key}")
+                self.check_statuses(each, f"{place}/{i}", told)
+        elif isinstance(value, dict):
+            if value.get("status") in ("undefined", "singular"):
+                self.assertTrue(value.get("reason"), place)
+                told = True
+            for key, each in value.items():
+                self.check_statuses(each, f"{place}/{key}", told)
 
     def test_every_design(self):
         for name, (rows, mixed, anova, effects) in DESIGNS.items():
@@ -115,7 +117,7 @@ class ExtremeDesigns(unittest.TestCase):
                 self.assertIsNone(NO_NUMBER.search(done.stdout), name)
                 self.assertIsNone(NO_NUMBER.search(text), name)
                 found = json.loads(text)
-                self.check_statuses(found)
+                self.check_statuses({name: found[name] for name in found if name not in ("protocol", "observer_sha256")})
                 if mixed:
                     self.assertEqual(found["mixed_model"]["status"], mixed)
                 if anova:

@@ -19,10 +19,11 @@ changed. Not in comments, preprocessor lines, raw strings, assertions, `using`, 
 declarations. Places are drawn line by line, so a line with many tokens counts once; lines on which only
 text could change (messages, labels) count a quarter.
 
-The standard library's assertions are on, as in CI's sanitizer build: reading past an end is noticed.
+Built as the release is, so that ccache knows the objects, but for the file with the mutant: there the standard
+library's assertions are on, as in CI's sanitizer build, so that reading past an end is noticed.
 What counts as killed: a test that passes without the mutant fails, twice, or does not end within ten
 times its usual time and half a minute. Tests of the clock (label "clock") are left out, as are those
-that fail or take longer than --longest seconds without a mutant. With --with-commands what survives the
+that fail or use the processor longer than --longest seconds without a mutant. With --with-commands what survives the
 unit tests also meets the room's command tests and the golden traces.
 
 Examples:
@@ -217,13 +218,14 @@ def locate(tree, mutant):
 
 
 @contextlib.contextmanager
-def applied(tree, mutant):
+def applied(tree, mutant, before=""):
+    """The mutant stands in the copy, with `before` put before its file."""
     path, row = locate(tree, mutant)
     original = path.read_bytes()
     lines = original.decode().split("\n")
     lines[row] = mutant["after"]
     try:
-        path.write_text("\n".join(lines))
+        path.write_text(before + "\n".join(lines))
         yield
     finally:
         path.write_bytes(original)
@@ -248,7 +250,8 @@ def key(mutant):
 
 # ---- The copy, its build and its tests ---------------------------------------------------------
 
-# Libraries compiled file by file: a mutant then costs one object, not twelve sources.
+# The room's libraries compiled file by file, without --together: a mutant then costs one object, not twelve
+# sources. Other rooms' objects are ccache's.
 APART = """function(palpate_apart folder)
   get_property(targets DIRECTORY ${folder} PROPERTY BUILDSYSTEM_TARGETS)
   foreach(target IN LISTS targets)
@@ -262,7 +265,7 @@ APART = """function(palpate_apart folder)
     palpate_apart(${inner})
   endforeach()
 endfunction()
-cmake_language(DEFER CALL palpate_apart ${CMAKE_SOURCE_DIR})
+cmake_language(DEFER CALL palpate_apart ${CMAKE_SOURCE_DIR}/ROOM)
 """
 SANDBOX = ["unshare", "--user", "--map-root-user", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc",
            "sh", "-c", 'mount --bind "$0" "$0" && mount -t tmpfs tmpfs /tmp && mount -o remount,bind,ro / &&'
@@ -274,13 +277,13 @@ class Failed(Exception):
 
 
 class Copy:
-    def __init__(self, folder, jobs):
+    def __init__(self, folder, jobs, together):
         folder.mkdir(parents=True, exist_ok=True)
-        self.folder, self.jobs = folder, jobs
+        self.folder, self.jobs, self.together = folder, jobs, together
         # Laid out like a working tree, so that ccache knows the objects of others with the same sources.
-        self.source = folder / "tree"
+        self.source = (folder / "tree").resolve()  # may be a link
         self.build = self.source / ".build/release"
-        self.environment = dict(os.environ, GTEST_BRIEF="1")
+        self.environment = {"CCACHE_BASEDIR": str(self.source), "CCACHE_NOHASHDIR": "1", **os.environ, "GTEST_BRIEF": "1"}
         self.sandbox = SANDBOX + [str(folder)]
         if self.run(["true"], 20)[0] != 0:
             print("No sandbox here (unshare and mount are refused): mutants run unconfined.", file=sys.stderr)
@@ -302,9 +305,9 @@ class Copy:
             if path.is_file() and name not in wanted and not name.startswith(".build/"):
                 path.unlink()
 
-    def configure(self):
-        (self.folder / "apart.cmake").write_text(APART)
-        command = ["cmake", "--preset", "release", "-DPALPATE_TESTS=ON", "-DCMAKE_CXX_FLAGS=-D_GLIBCXX_ASSERTIONS",
+    def configure(self, room):
+        (self.folder / "apart.cmake").write_text("" if self.together else APART.replace("ROOM", room))
+        command = ["cmake", "--preset", "release", "-DPALPATE_TESTS=ON",
                    f"-DCMAKE_PROJECT_palpate_INCLUDE={self.folder / 'apart.cmake'}"]
         if shutil.which("ccache"):
             command.append("-DCMAKE_CXX_COMPILER_LAUNCHER=ccache")
@@ -344,6 +347,12 @@ class Copy:
             process.wait()
 
 
+def processor_seconds():
+    """Used so far by what was run and has ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def digest(path):
     return hashlib.sha1(path.read_bytes()).hexdigest()
 
@@ -362,19 +371,21 @@ class Program:
         """Leaves out what fails or is slow without a mutant."""
         report = self.copy.folder / "report.json"
         report.unlink(missing_ok=True)
-        begin = time.monotonic()
+        begin, used = time.monotonic(), processor_seconds()
         self.copy.run([self.path, f"--gtest_output=json:{report}"], 1200, self.path.parent)
         if not report.exists():
             raise Failed(f"{self.name} does not end well without a mutant: run it by hand")
+        # A busy machine makes every test slower by the same factor.
+        busy = min(1.0, (processor_seconds() - used) / max(1e-3, time.monotonic() - begin))
         for suite in json.loads(report.read_text())["testsuites"]:
             for test in suite["testsuite"]:
                 seconds = float(test["time"].rstrip("s"))
-                if test.get("failures") or seconds > longest:
+                if test.get("failures") or seconds * busy > longest:
                     self.out.append(f"{suite['name']}.{test['name']}")
                 else:
                     self.seconds += seconds
         left_out = f"; left out: {', '.join(self.out)}" if self.out else ""
-        print(f"  {self.name}: {time.monotonic() - begin:.0f} s, {self.seconds:.0f} s used{left_out}")
+        print(f"  {self.name}: {time.monotonic() - begin:.0f} s, {self.seconds:.0f} s used{left_out}", flush=True)
 
     def killer(self):
         """The test that notices, or None."""
@@ -402,12 +413,12 @@ class CommandTest:
         return self.copy.run(command, limit)[0] == 0
 
     def measure(self, longest):
-        begin = time.monotonic()
+        begin, used = time.monotonic(), processor_seconds()
         good = self.passes(600)
-        self.seconds = time.monotonic() - begin
-        used = good and self.seconds <= longest
-        print(f"  {self.name}: {self.seconds:.0f} s{'' if used else ', left out'}{'' if good else ' (fails)'}")
-        return used
+        self.seconds, used = time.monotonic() - begin, processor_seconds() - used
+        kept = good and used <= longest
+        print(f"  {self.name}: {self.seconds:.0f} s{'' if kept else ', left out'}{'' if good else ' (fails)'}", flush=True)
+        return kept
 
     def killer(self):
         limit = 30 + 10 * self.seconds
@@ -420,9 +431,9 @@ class Run:
     def __init__(self, folder, options):
         self.folder, self.options = folder, options
         self.room = folder.split("/")[0]
-        self.copy = Copy(options.tree, options.jobs)
+        self.copy = Copy(options.tree, options.jobs, options.together)
         self.copy.update()
-        self.copy.configure()
+        self.copy.configure(self.room)
         self.results = options.tree / "results" / f"{folder.replace('/', '-')}-{options.seed}.jsonl"
         self.results.parent.mkdir(parents=True, exist_ok=True)
 
@@ -453,8 +464,16 @@ class Run:
         if not good:
             raise Failed("Without a mutant the copy cannot be built:\n" + output[-3000:])
         self.programs = [Program(self.copy, name, self.copy.build / folder / name) for name, folder in programs]
+        known = self.results.parent / "measured.json"  # of programs that have not changed since
+        measured = json.loads(known.read_text()) if known.exists() else {}
         for program in self.programs:
-            program.measure(self.options.longest)
+            name = f"{program.name} {program.hash} {self.options.longest}"
+            if name in measured:
+                program.out, program.seconds = measured[name]
+            else:
+                program.measure(self.options.longest)
+                measured[name] = program.out, program.seconds
+                known.write_text(json.dumps(measured))
         self.programs.sort(key=lambda p: p.seconds)
         self.commands = []
         if self.options.with_commands:
@@ -476,18 +495,22 @@ class Run:
 
     def attempt(self, mutant):
         """(result, by which test or why)"""
-        with applied(self.copy.source, mutant):
+        asserting = "#define _GLIBCXX_ASSERTIONS\n" if mutant["file"].endswith(".cpp") else ""
+        with applied(self.copy.source, mutant, asserting):
             count = self.copy.dependants(self.targets)
             if count > self.options.most_objects:
                 return "skipped", f"{count} objects depend on it"
-            begin = time.time()
             if not self.copy.make(self.targets)[0]:
                 return "not compiled", ""
+            if killer := self.killer():
+                return "killed", killer
+        with applied(self.copy.source, mutant):
+            begin = time.time()
+            self.copy.make(self.targets)
             fresh = [p for p in self.copy.build.rglob("*.o") if p.stat().st_mtime >= begin - 1]
-            if all(digest(p) == self.objects.get(p) for p in fresh):
-                return ("equivalent", "the same machine code") if fresh else ("survived", "not in a test program")
-            killer = self.killer()
-            return ("killed", killer) if killer else ("survived", "")
+            if fresh and all(digest(p) == self.objects.get(p) for p in fresh):
+                return "equivalent", "the same machine code"
+        return "survived", "" if fresh else "not in a test program"
 
     def read(self):
         return [json.loads(line) for line in self.results.read_text().splitlines()] if self.results.exists() else []
@@ -576,6 +599,8 @@ def main():
                         help="leave out slower tests (3); ten times as much for a command's")
     parser.add_argument("--most-objects", type=int, default=60, metavar="N",
                         help="skip a mutant, e.g. of a header, that more objects depend on (60)")
+    parser.add_argument("--together", action="store_true",
+                        help="compile the room's sources as the release does: sooner ready, slower by the mutant")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="compilers at once (all processors)")
     parser.add_argument("--tree", type=pathlib.Path, default=REPOSITORY / ".build/mutation",
                         help="folder of the copy and the results (.build/mutation); one run at a time in each")

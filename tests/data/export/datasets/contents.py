@@ -40,7 +40,9 @@ class Contents(Study):
                 self.assertEqual(beh["duration"], row["response_time"])
 
     def test_bids_onsets_are_seconds_from_the_first_trial(self):
-        for path in (self.dir / "plain-bids").glob("sub-*/ses-1/beh/*_beh.tsv"):
+        paths = list((self.dir / "plain-bids").glob("sub-*/ses-1/beh/*_beh.tsv"))
+        self.assertEqual(len(paths), 3)
+        for path in paths:
             header, rows = bids_checks.read_tsv(path)
             trials = [dict(zip(header, row)) for row in rows]
             def seconds(text):
