@@ -89,9 +89,9 @@ TEST(ReportPage, SaysWhereTheDataAreFrom) {
                                 {"protocol seed", "7"},
                                 {"bootstrap seed", std::to_string(analysis.settings.seed)}}));
   EXPECT_NE(page.find("Seeds of the simulated participants"), std::string::npos);
-  EXPECT_NE(page.find("A: 11, B: 12</p>"), std::string::npos);
+  EXPECT_NE(page.find("A: 11 and B: 12</p>"), std::string::npos);
   EXPECT_NE(page.find("Protocol “shapes” as it was used"), std::string::npos);
-  EXPECT_NE(page.find(">{\n \"seed\": 7 &lt;b&gt;\n}\n</pre>"), std::string::npos)
+  EXPECT_NE(page.find(">{\n &quot;seed&quot;: 7 &lt;b&gt;\n}\n</pre>"), std::string::npos)
       << "line by line, without carriage returns and tabulators";
   EXPECT_NE(page.find("Shapes by touch"), std::string::npos) << "the first title there is";
 }
