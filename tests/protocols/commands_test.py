@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import pathlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -88,6 +89,54 @@ class Validate(unittest.TestCase):
         self.assertEqual(run("validate", "nowhere.json").returncode, 2)
         self.assertEqual(run("validate").returncode, 2)
         self.assertEqual(run("validate", "--help").returncode, 0)
+
+
+class Recover(unittest.TestCase):
+    def recovered(self, name, *more, seed=1):
+        done = run("schedule", str(SOURCE / "protocols" / name), "--recover", "200", "--seed", str(seed), *more)
+        self.assertEqual((done.returncode, done.stderr), (0, b""))
+        return done.stdout.decode()
+
+    def test_staircases_and_quest_plus_are_tried_with_known_thresholds(self):
+        found = json.loads(self.recovered("stiffness-2afc.json", "--format", "json"))
+        self.assertTrue(found["simulated"])
+        self.assertEqual([(one["block"], one["procedure"]) for one in found["procedures"]], [("staircases", 1), ("staircases", 2)])
+        for one, down in zip(found["procedures"], (2, 3)):
+            # A cumulative normal with its middle in the middle of 300 to 600: the level of 0.5^(1 / down) successes.
+            share = (0.5 ** (1 / down) - one["guess"]) / (1 - one["guess"] - one["lapse"])
+            truth = 450 + statistics.NormalDist().inv_cdf(share) / one["slope"]
+            self.assertAlmostEqual(one["true_threshold"], truth, places=6)
+            self.assertEqual(one["guess"], 0.5)
+            self.assertAlmostEqual(one["bias_se"] * 200 ** 0.5 / one["spread"], 1, delta=0.01)
+            self.assertLess(one["without_estimate"], 10)  # who has fewer than four reversals in 40 trials
+            self.assertLess(abs(one["bias"]), one["spread"])
+            self.assertLessEqual(one["mean_trials"], 40)
+        quest, = json.loads(self.recovered("size-questplus.json", "--format", "json"))["procedures"]
+        self.assertIn(quest["true_threshold"], json.loads(
+            (SOURCE / "protocols" / "size-questplus.json").read_text())["blocks"][1]["procedure"]["threshold"])
+        self.assertEqual(quest["mean_trials"], 32)
+        self.assertLess(abs(quest["bias"]), 4 * quest["bias_se"])  # the truth is on its grid
+
+    def test_formats_agree_a_seed_repeats_and_another_does_not(self):
+        found = json.loads(self.recovered("stiffness-2afc.json", "--format", "json"))
+        rows = list(csv.DictReader(io.StringIO(self.recovered("stiffness-2afc.json", "--format", "csv"), newline="")))
+        table = self.recovered("stiffness-2afc.json")
+        self.assertIn("SIMULATED", table)
+        for one, row in zip(found["procedures"], rows, strict=True):
+            self.assertEqual({key: float(row[key]) for key in ("bias", "spread", "true_threshold", "mean_trials")},
+                             {key: one[key] for key in ("bias", "spread", "true_threshold", "mean_trials")})
+            self.assertIn(f"bias {one['bias']:.4g} ", table)
+        self.assertEqual(self.recovered("stiffness-2afc.json"), table)
+        self.assertNotEqual(self.recovered("stiffness-2afc.json", seed=2), table)
+
+    def test_what_cannot_be_recovered_is_refused(self):
+        stairs = str(SOURCE / "protocols" / "stiffness-2afc.json")
+        for protocol, count, said in ((HO2000, "200", "version 2"), (str(SOURCE / "protocols" / "roughness-magnitude.json"), "200",
+                                      "staircase, QUEST+ or limits"), (stairs, "1", "2 to 100000"), (stairs, "100001", "2 to 100000"),
+                                      (stairs, "many", "--recover")):
+            done = run("schedule", protocol, "--recover", count)
+            self.assertEqual((done.returncode, done.stdout), (2, b""), said)
+            self.assertIn(said, done.stderr.decode())
 
 
 class Schedule(unittest.TestCase):

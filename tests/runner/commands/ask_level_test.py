@@ -1,18 +1,17 @@
 """Levels proposed by a program at a socket: one that answers, one that dies, hangs, sends rubbish, sends a megabyte.
 Usage: ask_level_test.py PALPATE propose_levels.py"""
 
-import csv
 import json
-import pathlib
 import socket
 import sqlite3
 import subprocess
 import sys
-import tempfile
 import threading
 import unittest
 
-PALPATE, EXAMPLE = sys.argv.pop(1), sys.argv.pop(1)
+from command_case import PALPATE, CommandCase
+
+EXAMPLE = sys.argv.pop(1)
 TRIALS = 12
 PROTOCOL = {
     "version": 2, "name": "asked", "renderers": ["point"], "orientation": "fixed", "home": {"rest_s": 0.1}, "seed": 4,
@@ -70,18 +69,10 @@ def level(message, value):
     return (json.dumps({"type": "level", "trial": message["trial"], "level": value}) + "\n").encode()
 
 
-class AskLevel(unittest.TestCase):
+class AskLevel(CommandCase):
     def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-        self.protocol = self.dir / "asked.json"
-        self.protocol.write_text(json.dumps(PROTOCOL))
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
+        super().setUp()
+        self.protocol = self.file("asked.json", PROTOCOL)
 
     def program(self, reply):
         program = Program(self.dir / "socket", reply)
@@ -98,10 +89,7 @@ class AskLevel(unittest.TestCase):
         return program, db
 
     def levels(self, db):
-        out = db.with_suffix(".csv")
-        self.palpate("export", "--db", db, "--format", "csv", "--out", out, "--force")
-        with open(out) as file:
-            return [float(row["level"]) for row in csv.DictReader(file) if row["block_name"] == "stairs"]
+        return [float(row["level"]) for row in self.exported(db)[1] if row["block_name"] == "stairs"]
 
     def events(self, db):
         with sqlite3.connect(db) as base:

@@ -2,36 +2,16 @@
 
 import csv
 import json
-import pathlib
-import subprocess
-import sys
-import tempfile
 import unittest
 
-sys.dont_write_bytecode = True
-PALPATE = sys.argv[1]
+from command_case import CommandCase
 
 
 def block(young, **soft):
     return {"shape": "box", "size_m": [0.06, 0.06, 0.04], "soft": {"young_pa": young, **soft}}
 
 
-class Soft(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=600)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
-    def file(self, name, content):
-        path = self.dir / name
-        path.write_text(content if isinstance(content, str) else json.dumps(content))
-        return path
-
+class Soft(CommandCase):
     def test_which_of_four_soft_blocks_is_stiffer(self):
         levels = [5000, 9000, 45000, 80000]
         protocol = self.file("blocks.json", {
@@ -97,4 +77,4 @@ class Soft(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])
+    unittest.main()

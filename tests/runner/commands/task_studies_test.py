@@ -2,41 +2,26 @@
 Usage: task_studies_test.py PALPATE PROTOCOLS"""
 
 import csv
+import hashlib
 import io
 import json
 import pathlib
-import subprocess
 import sys
-import tempfile
 import unittest
 
-PALPATE, PROTOCOLS = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
+from command_case import CommandCase
+
+PROTOCOLS = pathlib.Path(sys.argv.pop(1))
 SHIPPED = ("stiffness-2afc", "size-questplus", "roughness-magnitude")
 SHAPES = [{"name": "sphere", "shape": "sphere", "radius_m": 0.03}, {"name": "cube", "shape": "cube", "edge_m": 0.05}]
 KEYS = {"1": "sphere", "2": "cube"}
 
 
-class TaskStudies(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=600)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
+class TaskStudies(CommandCase):
     def simulated(self, protocol, name, *more, participants=2, seed=1):
         db = self.dir / f"{name}.db"
         self.palpate("simulate", protocol, "--db", db, "--participants", participants, "--seed", seed, *more)
         return db
-
-    def rows(self, db):
-        out = self.dir / f"{db.stem}.csv"
-        self.palpate("export", "--db", db, "--format", "csv", "--out", out, "--force")
-        text = out.read_text()
-        return text, list(csv.DictReader(io.StringIO(text)))
 
     def numbers(self, *source):
         out = self.dir / "numbers.json"
@@ -55,7 +40,7 @@ class TaskStudies(unittest.TestCase):
                 self.assertTrue(said.startswith("SIMULATED PARTICIPANTS"))
                 self.assertIn("SIMULATED PARTICIPANTS", page.read_text())
                 found = json.loads(out.read_text())
-                text, rows = self.rows(db)
+                text, rows = self.exported(db)
                 self.assertEqual(found["n_trials"] + found["n_practice"], len(rows))
                 # The export is analysed to the same cells as the database.
                 self.assertEqual(self.numbers("--csv", self.dir / f"{name}.csv")["cells"], found["cells"])
@@ -66,11 +51,48 @@ class TaskStudies(unittest.TestCase):
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--force")
                 # A second time nothing changes; resumed in parts it is the same; another seed is not.
                 self.palpate("simulate", protocol, "--db", db, "--participants", 2)
-                self.assertEqual(self.rows(db)[0], text)
+                self.assertEqual(self.exported(db)[0], text)
                 parts = self.simulated(protocol, f"{name}-parts", participants=1)
                 self.palpate("simulate", protocol, "--db", parts, "--participants", 2)
-                self.assertEqual(self.rows(parts)[0], text)
-                self.assertNotEqual(self.rows(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
+                self.assertEqual(self.exported(parts)[0], text)
+                self.assertNotEqual(self.exported(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
+
+    def test_answers_to_pages_are_exported_where_they_are_asked_for(self):
+        db = self.simulated(PROTOCOLS / "roughness-magnitude.json", "pages", participants=3)
+        expected = [(f"S00{n}", page, item) for n in (1, 2, 3)
+                    for page, item in (("consent", "consent"), ("about-you", "hand"), ("about-you", "age"))]
+        consent = json.loads((PROTOCOLS / "roughness-magnitude.json").read_text())["pages"][0]
+        for kind, place in (("bids", "sourcedata/pages.csv"),
+                            ("psych-ds", "data/study-roughnessmagnitude_description-pages_data.csv")):
+            with self.subTest(kind):
+                without = self.dir / f"{kind}-without"
+                self.palpate("export", "--db", db, "--format", kind, "--out", without)
+                self.assertEqual([path.name for path in without.rglob("*pages*")], [])
+                folder = self.dir / kind
+                said = self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--pages")
+                self.assertIn("9 answers to pages: personal data", said.stdout + said.stderr)
+                with open(folder / place, newline="") as file:
+                    rows = list(csv.DictReader(file))
+                self.assertEqual([(row["participant_id"], row["page"], row["item"]) for row in rows], expected)
+                for row in rows:
+                    self.assertEqual(row["simulated"], "1")
+                    self.assertRegex(row["answered_utc"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
+                    if row["page"] == "consent":
+                        self.assertEqual((row["answer"], row["consent_version"]), ("agree", "1"))
+                        self.assertEqual(row["text_sha256"], hashlib.sha256(consent["text"].encode()).hexdigest())
+                    if row["item"] == "hand":
+                        self.assertIn(row["answer"], ("left", "right", "both"))
+                    if row["item"] == "age" and row["answer"]:
+                        self.assertTrue(18 <= float(row["answer"]) <= 120)
+                if kind == "bids":  # every column is described beside it
+                    described = json.loads((folder / place).with_suffix(".json").read_text())
+                    self.assertEqual(set(rows[0]) - set(described), set())
+                else:
+                    description = json.loads((folder / "dataset_description.json").read_text())
+                    measured = {one["name"] for one in description["variableMeasured"]}
+                    headers = {column for path in folder.rglob("*_data.csv")
+                               for column in path.read_text().splitlines()[0].split(",")}
+                    self.assertEqual(measured, headers)
 
     def test_what_the_simulated_participants_can_do_is_found_again(self):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "a", participants=4)
@@ -110,7 +132,7 @@ class TaskStudies(unittest.TestCase):
         for seed in (1, 4):
             with self.subTest(seed=seed):
                 databases = [self.simulated(path, f"{path.stem}{seed}", participants=4, seed=seed) for path in (one, two)]
-                (_, expected), (_, found) = (self.rows(db) for db in databases)
+                (_, expected), (_, found) = (self.exported(db) for db in databases)
                 own = {"protocol_name", "protocol_sha256"}
                 self.assertEqual(len(found), 4 * 20)
                 for a, b in zip(expected, found):
@@ -128,11 +150,11 @@ class TaskStudies(unittest.TestCase):
 
     def test_shards_merge_to_the_whole_study(self):
         _, two = self.identification()
-        whole = self.rows(self.simulated(two, "whole", participants=3))[0]
+        whole = self.exported(self.simulated(two, "whole", participants=3))[0]
         parts = [self.simulated(two, f"part{i}", "--shard", f"{i}/3", participants=3) for i in (1, 2, 3)]
         merged = self.dir / "merged.db"
         self.palpate("merge", "--out", merged, *parts)
-        self.assertEqual(self.rows(merged)[0], whole)
+        self.assertEqual(self.exported(merged)[0], whole)
 
     def test_every_interval_is_replayed_to_the_bit(self):
         protocol = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())

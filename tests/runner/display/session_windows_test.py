@@ -8,16 +8,13 @@ import json
 import os
 import pathlib
 import signal
-import sqlite3
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
-from virtual_screen import PATIENCE, VirtualScreen, skip_without_screen, wait_for
-
-PALPATE = sys.argv.pop() if len(sys.argv) > 1 else None
+from virtual_screen import PATIENCE, wait_for
+from window_case import PALPATE, WindowCase
 
 SHAPES = ["sphere", "cone", "cylinder", "cube"]
 TRIALS = 4
@@ -37,25 +34,14 @@ PROTOCOL = {
 }
 
 
-class SessionTest(unittest.TestCase):
+class SessionTest(WindowCase):
     def setUp(self):
-        skip_without_screen()
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.database = self.folder / "study.db"
-        self.program = None
-        self.screen = None
+        super().setUp()
         self.write_protocol()
         self.addCleanup(self.stop)
-        self.new_screen()
 
     def write_protocol(self, **changes):
         (self.folder / "protocol.json").write_text(json.dumps({**PROTOCOL, **changes}))
-
-    def new_screen(self):
-        self.screen = VirtualScreen()
-        self.addCleanup(self.screen.close)
 
     def stop(self):
         if self.program and self.program.poll() is None:
@@ -107,20 +93,6 @@ class SessionTest(unittest.TestCase):
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - 60, 90)  # clear the fault
         self.screen.click(self.console, width - 100, 420)  # go on
-
-    def messages(self):
-        return (self.folder / "messages.txt").read_text()
-
-    def rows(self, query):
-        if not self.database.exists():
-            return []
-        connection = sqlite3.connect(f"file:{self.database}?mode=ro", uri=True, timeout=20)
-        try:
-            return connection.execute(query).fetchall()
-        except sqlite3.OperationalError:  # being made
-            return []
-        finally:
-            connection.close()
 
     def attempts(self):
         return self.rows("SELECT trial, attempt, shape, state FROM attempts ORDER BY id")

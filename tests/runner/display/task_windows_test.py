@@ -3,21 +3,15 @@
 Usage: task_windows_test.py PALPATE     (PALPATE_PICTURES names a folder for pictures to look at)
 """
 
-import contextlib
 import json
-import pathlib
-import sqlite3
 import struct
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 import zlib
 
-from virtual_screen import PATIENCE, VirtualScreen, skip_without_screen, wait_for
-
-PALPATE = sys.argv.pop() if len(sys.argv) > 1 else None
+from virtual_screen import PATIENCE, wait_for
+from window_case import PALPATE, WindowCase
 
 PROTOCOL = {
     "version": 2, "name": "tasks", "renderers": ["point"], "seed": 5, "orientation": "fixed",
@@ -44,16 +38,7 @@ def png(width, height, colour):
             chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
-class TaskWindows(unittest.TestCase):
-    def setUp(self):
-        skip_without_screen()
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.database = self.folder / "study.db"
-        self.screen = VirtualScreen()
-        self.addCleanup(self.screen.close)
-
+class TaskWindows(WindowCase):
     def start(self, *blocks, options=(), **changes):
         (self.folder / "protocol.json").write_text(json.dumps(PROTOCOL | {"blocks": blocks} | changes))
         self.said = open(self.folder / "messages.txt", "w+")
@@ -75,18 +60,6 @@ class TaskWindows(unittest.TestCase):
         if self.program.poll() is None:
             self.program.kill()
         self.program.wait()
-
-    def messages(self):
-        return (self.folder / "messages.txt").read_text()
-
-    def rows(self, query):
-        if not self.database.exists():
-            return []
-        with contextlib.closing(sqlite3.connect(f"file:{self.database}?mode=ro", uri=True, timeout=20)) as opened:
-            try:
-                return opened.execute(query).fetchall()
-            except sqlite3.OperationalError:  # being made
-                return []
 
     def tasks(self):
         return [json.loads(task) for (task,) in
