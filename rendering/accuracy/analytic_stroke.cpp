@@ -11,12 +11,12 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kTick = 1e-3;      // s
-constexpr double kStroked = 0.03;   // m from the middle: where the speed is meant
-constexpr double kTurnSd = 0.02;    // rad a tick
-constexpr double kOutside = 0.3;    // m; farther out than any touch
-constexpr double kApproach = 3e-3;  // m
-constexpr double kPlaced = 1e-9;    // m; how exactly the depth is kept
+constexpr double kStrokeTick = 1e-3;  // s
+constexpr double kStroked = 0.03;     // m from the middle: where the speed is meant
+constexpr double kTurnSd = 0.02;      // rad a tick
+constexpr double kOutside = 0.3;      // m; farther out than any touch
+constexpr double kApproach = 3e-3;    // m
+constexpr double kPlaced = 1e-9;      // m; how exactly the depth is kept
 
 class StrokingHand {
  public:
@@ -31,10 +31,10 @@ class StrokingHand {
   void move() {
     const double turn = kTurnSd * random_.normal();
     heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(out_, heading_);
-    out_ = glm::normalize(out_ + settings_.speed * kTick / kStroked * heading_);
+    out_ = glm::normalize(out_ + settings_.speed * kStrokeTick / kStroked * heading_);
     heading_ = glm::normalize(heading_ - glm::dot(heading_, out_) * out_);
     level_ = glm::normalize(level_ - glm::dot(level_, out_) * out_);
-    time_ += kTick;
+    time_ += kStrokeTick;
   }
 
   /// The stylus with the stroked point at this distance from the middle.
@@ -94,7 +94,7 @@ AnalyticStroke analytic_stroke(const stimuli::ObjectSpec& primitive,
   AnalyticStroke stroke;
   StrokingHand hand(primitive, settings);
   const double distance = hand.distance_for(hand.wanted_depth());
-  const double step = settings.speed * kTick;
+  const double step = settings.speed * kStrokeTick;
   for (double back = settings.deep + kApproach; back > step / 2; back -= step) {
     stroke.poses.push_back(hand.at(distance + back));
   }

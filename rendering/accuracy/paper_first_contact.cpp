@@ -5,18 +5,18 @@
 #include <optional>
 
 #include "rendering/first_contact.h"
+#include "rendering/verification/random_draws.h"
 #include "rendering/verification/reference.h"
-#include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
 
-constexpr double kTick = 1e-3;     // s
-constexpr double kLength = 0.12;   // m
-constexpr int kFine = 100;         // brute-force steps a tick
-constexpr int kAfterwards = 20;    // ticks in which it may still be found
-constexpr double kDeepest = 1e-9;  // of the size: less is touching
+constexpr double kPaperTick = 1e-3;    // s
+constexpr double kPaperStylus = 0.12;  // m
+constexpr int kFine = 100;             // brute-force steps a tick
+constexpr int kAfterwards = 20;        // ticks in which it may still be found
+constexpr double kDeepest = 1e-9;      // of the size: less is touching
 
 /// Where two segments are nearest, as fractions along them.
 struct Nearest {
@@ -39,10 +39,6 @@ LineProbe between(const LineProbe& a, const LineProbe& b, double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
 }
 
-Vec3 random_direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
-}
-
 /// A stylus in straight motion, turning steadily.
 struct Motion {
   Vec3 start, velocity;  ///< of the point at `fraction` of the stylus; m, m/s
@@ -50,10 +46,10 @@ struct Motion {
   double turning = 0, fraction = 0;
 
   LineProbe at(int tick) const {
-    const double time = tick * kTick, angle = turning * time;
+    const double time = tick * kPaperTick, angle = turning * time;
     const Vec3 u = std::cos(angle) * direction + std::sin(angle) * glm::cross(axis, direction);
     const Vec3 at = start + time * velocity;
-    return {at - fraction * kLength * u, at + (1 - fraction) * kLength * u};
+    return {at - fraction * kPaperStylus * u, at + (1 - fraction) * kPaperStylus * u};
   }
 };
 
@@ -126,7 +122,7 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
   loss.turning = turning;
   stimuli::Random random(seed);
   const ContactTrees trees(mesh, true);
-  const double step = speed * kTick, tolerance = 1e-12 * mesh.size();
+  const double step = speed * kPaperTick, tolerance = 1e-12 * mesh.size();
   constexpr int kBefore = 5;  // ticks in free space, about
   while (loss.entries < entries) {
     Motion motion;
@@ -143,7 +139,7 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
     const Vec3 aim = mesh.centre() + 0.8 * mesh.radius() * random.unit() * random_direction(random);
     motion.start = aim;
     if (!inside(mesh, motion.at(0))) continue;
-    double near = 0, far = 2 * mesh.size() + kLength;
+    double near = 0, far = 2 * mesh.size() + kPaperStylus;
     motion.start = aim - far * heading;
     if (reference_gap(mesh, motion.at(0)) == 0) continue;  // the stylus lies along the motion
     while (far - near > step / 8) {

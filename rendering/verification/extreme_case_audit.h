@@ -18,6 +18,11 @@ namespace palpate::rendering::extremes {
 
 using MeshPointer = std::shared_ptr<const stimuli::ConvexMesh>;
 
+inline MeshPointer solid(const stimuli::PolygonSoup& soup) {
+  return std::make_shared<const stimuli::ConvexMesh>(soup);
+}
+
+inline constexpr double kStylus = 0.12;  // m
 inline constexpr double kRounding =
     1e-9;  // of the object's size: smaller errors of lengths are none
 inline constexpr const char* kLengthError = "worst error of a length, sizes of the object";

@@ -13,7 +13,6 @@
 namespace palpate::rendering::extremes {
 namespace {
 
-constexpr double kStylus = 0.12;                   // m
 constexpr double kBlend = std::numbers::pi / 180;  // rad; equation (2)
 constexpr double kExtrapolated = 1e-6;  // of the stored energy: error of the extrapolation
 constexpr double kDepth = 1e-3;         // m, about which a cycle goes

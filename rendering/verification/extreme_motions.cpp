@@ -6,27 +6,13 @@
 #include <numbers>
 
 #include "rendering/verification/extreme_case_audit.h"
+#include "rendering/verification/random_draws.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
-#include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering::extremes {
 namespace {
-
-constexpr double kStylus = 0.12;  // m
-
-MeshPointer solid(const stimuli::PolygonSoup& soup) {
-  return std::make_shared<const stimuli::ConvexMesh>(soup);
-}
-
-double between(stimuli::Random& random, double low, double high) {
-  return low + (high - low) * random.unit();
-}
-
-Vec3 random_direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
-}
 
 /// 0, or so small that rounding may take it for 0, or a little more.
 constexpr double kTiny[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3};

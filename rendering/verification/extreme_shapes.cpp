@@ -13,11 +13,6 @@ namespace palpate::rendering::extremes {
 namespace {
 
 constexpr std::size_t kTicks = 300;  // a path
-constexpr double kStylus = 0.12;     // m
-
-MeshPointer solid(const stimuli::PolygonSoup& soup) {
-  return std::make_shared<const stimuli::ConvexMesh>(soup);
-}
 
 Pose some_pose(const Vec3& position) {
   stimuli::Random random(3);

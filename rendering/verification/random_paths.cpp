@@ -6,23 +6,15 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "rendering/verification/random_draws.h"
 #include "rendering/verification/reference.h"
-#include "stimuli/orientation.h"
 
 namespace palpate::rendering {
 namespace {
 
-double between(stimuli::Random& random, double low, double high) {
-  return low + (high - low) * random.unit();
-}
-
 /// 10 to a random power.
 double magnitude(stimuli::Random& random, double low_power, double high_power) {
   return std::pow(10, between(random, low_power, high_power));
-}
-
-Vec3 random_direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
 Vec3 unit_or_x(const Vec3& v) {

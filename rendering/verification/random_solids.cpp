@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "rendering/verification/random_draws.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
@@ -87,14 +88,6 @@ struct Block {
     return out;
   }
 };
-
-Vec3 random_direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
-}
-
-double between(stimuli::Random& random, double low, double high) {
-  return low + (high - low) * random.unit();
-}
 
 Block random_block(stimuli::Random& random, int cuts) {
   Block block{stimuli::cube(1), {}};

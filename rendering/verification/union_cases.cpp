@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "rendering/verification/random_draws.h"
 #include "rendering/verification/random_solids.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
@@ -17,18 +18,10 @@ namespace {
 // Compilers choose the order of a call's arguments: every draw is a statement of its own, or a walk
 // would not be the same everywhere.
 
-double between(stimuli::Random& random, double low, double high) {
-  return low + (high - low) * random.unit();
-}
-
 Vec3 vector_between(stimuli::Random& random, double low, double high) {
   Vec3 drawn;
   for (int k = 2; k >= 0; --k) drawn[k] = between(random, low, high);
   return drawn;
-}
-
-Vec3 random_direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
 constexpr double kClear = 2e-3;  // m, off the object at the start of a path

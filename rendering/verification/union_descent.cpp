@@ -8,7 +8,7 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Sine of half the opening of the narrowest groove that a tool can be in.
 constexpr double kNarrowest = 1e-5;
@@ -36,7 +36,7 @@ bool leaves_room(const std::vector<HalfSpace>& planes) {
 
 /// Where the way enters a sum from outside; 1 where it does not.
 double entry(const OracleSum& sum, const Vec3& tip, const Vec3& goal) {
-  double enters = 0, leaves = kInfinity;
+  double enters = 0, leaves = kUnbounded;
   for (const OraclePlane& plane : sum.planes) {
     const double before = plane.height(tip), after = plane.height(goal);
     if (before > 0 && after >= before) return 1;
@@ -57,14 +57,14 @@ bool Descent::goal(const Vec3& tip, Choice& best) {
     std::vector<std::size_t> facets = touched_facets(sum, tip, touching_);
     if (!facets.empty()) touched_.push_back({&sum, std::move(facets)});
   }
-  best_distance_ = kInfinity;
+  best_distance_ = kUnbounded;
   std::vector<HalfSpace> planes;
   in_crack_ = false;
   choose(0, planes, best);
-  if (best_distance_ < kInfinity) return true;
+  if (best_distance_ < kUnbounded) return true;
   in_crack_ = true;  // a tool that fits exactly into a gap can move in it
   choose(0, planes, best);
-  return best_distance_ < kInfinity;
+  return best_distance_ < kUnbounded;
 }
 
 /// Tries every choice of one facet of each touched sum from `next` on.

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSpring = 800;                       // N/m
 constexpr double kInside = 1e-12, kMinimal = 1e-9;    // sizes
-constexpr double kTouching = 1e-11;                   // sizes
+constexpr double kTouchingSizes = 1e-11;              // sizes
 constexpr double kFlat = 2 * std::numbers::pi / 180;  // rad
 const double kSinBlend = std::sin(kFlat / 2);         // of equation (2)
 constexpr double kTurned = 1e-9;                      // rad; less is rounding
@@ -86,7 +86,7 @@ class Walk {
     counts_.several += r.contacts > 1;
     counts_.lagged += held && lagged;
     const double size = oracle_.size();
-    const OracleAudit audit = oracle_.audit(ideal_, pose.tip, kTouching * size);
+    const OracleAudit audit = oracle_.audit(ideal_, pose.tip, kTouchingSizes * size);
     counts_.worst_penetration = std::max(counts_.worst_penetration, audit.penetration / size);
     wrong(audit.penetration > kInside * size, counts_.inside, "inside by", audit.penetration);
     const bool lowest = capped || check_minimal(audit, pose);

@@ -14,13 +14,13 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kRadius = 0.03, kRing = 0.05;  // m, of a ball, and of their centres
-constexpr double kLength = 0.12;                // m, of the stylus
-constexpr double kArm = 0.06;                   // m, of the cross
-constexpr double kStep = 1e-4;                  // m a tick
-constexpr int kWarm = 1000;                     // ticks
-constexpr double kTarget = 2000;                // ns, of p99
-constexpr double kFar = 0.3;                    // m, between balls out of reach
+constexpr double kPartRadius = 0.03, kRing = 0.05;  // m, of a ball, and of their centres
+constexpr double kToolLength = 0.12;                // m, of the stylus
+constexpr double kArm = 0.06;                       // m, of the cross
+constexpr double kStep = 1e-4;                      // m a tick
+constexpr int kWarmTicks = 1000;                    // ticks
+constexpr double kTarget = 2000;                    // ns, of p99
+constexpr double kFar = 0.3;                        // m, between balls out of reach
 
 using Mesh = std::shared_ptr<const stimuli::ConvexMesh>;
 
@@ -50,7 +50,7 @@ rendering::Scene ring(const UnionBench& bench, const Mesh& mesh) {
   }
   rendering::Tool tool;
   if (bench.segments == 3) {
-    tool.segments = {{Vec3(0), Vec3(0, 0, kLength)},
+    tool.segments = {{Vec3(0), Vec3(0, 0, kToolLength)},
                      {Vec3(-kArm, 0, 0), Vec3(kArm, 0, 0)},
                      {Vec3(0, -kArm, 0), Vec3(0, kArm, 0)}};
   }
@@ -73,12 +73,12 @@ class RingHand {
                     std::cos(tilt));
     state.measured_side = {std::cos(turn), std::sin(turn), 0};
     const Vec3 tip(round_ * std::cos(round), round_ * std::sin(round), height_);
-    return {tip, tip + kLength * axis};
+    return {tip, tip + kToolLength * axis};
   }
 
  private:
   double round_;
-  double height_ = kRadius + 0.02;
+  double height_ = kPartRadius + 0.02;
   double tick_ = 0;
 };
 
@@ -88,7 +88,7 @@ TickCost time_ring(TickTimer& timer, const rendering::Scene& scene, double round
   rendering::RenderState state = scene.initial_state();
   RingHand hand(round);
   double depth = 0;
-  for (int i = 0; i < kWarm; ++i) {
+  for (int i = 0; i < kWarmTicks; ++i) {
     const rendering::LineProbe probe = hand.next(depth, state);
     depth = renderer.tick(scene, state, probe, TickTimer::kTick).deepest.depth;
   }
@@ -116,7 +116,7 @@ void measure_union_costs(TickTimer& timer, std::size_t ticks,
                              : bench.triangles == 20480 ? 5
                                                         : 7;
     const auto mesh =
-        std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, subdivisions));
+        std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kPartRadius, subdivisions));
     // The cross lies over the ring's hollow; the stylus alone is led over the tops of the balls.
     const double round = bench.segments == 3 ? 0.015 : kRing;
     TickCost cost = time_ring(timer, ring(bench, mesh), round, ticks);

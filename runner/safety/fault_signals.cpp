@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kAsked[] = {SIGINT, SIGTERM, SIGHUP};
 constexpr int kDying[] = {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL};
-constexpr int kPatience = 20;  // ms, for the servo to send zero
+constexpr int kZeroPatience_ms = 20;  // ms, for the servo to send zero
 
 // A handler gets nothing but the signal's number.
 std::atomic<FaultSignals*> installed{nullptr};
@@ -60,8 +60,8 @@ void FaultSignals::dying(int signal) {
     ServoThread* const servo = self->servo_.load();
     // Where the servo's own thread is dying, the guard has been told.
     const timespec millisecond{0, 1'000'000};
-    for (int i = 0;
-         i < kPatience && servo != nullptr && !servo->in_this_thread() && !servo->forces_are_off();
+    for (int i = 0; i < kZeroPatience_ms && servo != nullptr && !servo->in_this_thread() &&
+                    !servo->forces_are_off();
          ++i) {
       nanosleep(&millisecond, nullptr);
     }

@@ -18,9 +18,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr std::int64_t kSpin_ns = 20'000;  // before sleeping for the reading
-constexpr int kUnanswered = 25;            // reads in a row: forces go off
-constexpr auto kNap = std::chrono::milliseconds(2);
+constexpr std::int64_t kReadingSpin_ns = 20'000;  // before sleeping for the reading
+constexpr int kUnanswered = 25;                   // reads in a row: forces go off
+constexpr auto kAnswerNap = std::chrono::milliseconds(2);
 constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
 
 GuardChannel* make_channel() {
@@ -60,7 +60,7 @@ GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& 
       throw std::runtime_error("the device was not ready after " +
                                std::to_string(std::llround(settings.patience)) + " s");
     }
-    std::this_thread::sleep_for(kNap);
+    std::this_thread::sleep_for(kAnswerNap);
   }
   if (channel_->state.load() == GuardState::failed) {
     end();
@@ -89,7 +89,7 @@ void GuardedDevice::end() noexcept {
   const auto give_up = std::chrono::steady_clock::now() + kFarewell;
   while (!ended()) {
     if (std::chrono::steady_clock::now() >= give_up) kill(guard_, SIGKILL);
-    std::this_thread::sleep_for(kNap);
+    std::this_thread::sleep_for(kAnswerNap);
   }
 }
 
@@ -104,7 +104,7 @@ DeviceReading GuardedDevice::read() noexcept {
   for (std::int64_t waited = 0; waited < patience; waited = clock.now_ns() - began) {
     const std::uint32_t answered = channel_->answered.load(std::memory_order_acquire);
     if (answered == asked) break;
-    if (waited > kSpin_ns) futex_wait(channel_->answered, answered, patience - waited);
+    if (waited > kReadingSpin_ns) futex_wait(channel_->answered, answered, patience - waited);
   }
   GuardedReading reading;
   if (channel_->answered.load(std::memory_order_acquire) == asked &&

@@ -4,13 +4,13 @@
 
 #include "runner/session/session.h"
 #include "runner/session/session_end.h"
+#include "runner/session/station.h"
 
 namespace palpate::runner {
 namespace {
 
-constexpr std::int64_t kNap_ns = 5'000'000;
-constexpr double kPatience = 0.5;  // s, for a reading; a servo has several in that time
-constexpr double kPlugging = 2;    // s; a bus tells of what was plugged in with some delay
+constexpr double kReadingPatience = 0.5;  // s, for a reading; a servo has several in that time
+constexpr double kPlugging = 2;           // s; a bus tells of what was plugged in with some delay
 
 bool is_well(const Sample& sample) { return (sample.faults & servo_fault::kDeviceLost) == 0; }
 
@@ -51,7 +51,7 @@ bool LiveForces::await(Wished wished, double seconds, const std::function<bool()
     const Sample& sample = newest();
     if (sample.time_ns > began_ns && wished(sample)) return true;
     if (clock_.now_ns() >= end_ns) return false;
-    clock_.wait_until(clock_.now_ns() + kNap_ns);
+    clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
   }
   return false;
 }
@@ -61,11 +61,11 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
   while (true) {
     guard_->ask_to_reopen();
     while (guard_->reopening() && newest().trouble != DeviceTrouble::guard_lost && !stop())
-      clock_.wait_until(clock_.now_ns() + kNap_ns);
+      clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
     if (guard_->reopening()) return advice(sample_.trouble);
     std::string trouble = guard_->reopen_trouble();
     if (trouble.empty() || clock_.now_ns() >= end_ns || stop()) return trouble;
-    clock_.wait_until(clock_.now_ns() + 20 * kNap_ns);
+    clock_.wait_until(clock_.now_ns() + 20 * kSessionNap_ns);
   }
 }
 
@@ -73,13 +73,13 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   const std::int64_t asked_ns = clock_.now_ns();
   // Zero force that is asked for from now on is kept, however long this takes.
   servo_.clear_fault();
-  await(is_settled, kPatience, stop);
+  await(is_settled, kReadingPatience, stop);
   const bool away =
       sample_.trouble == DeviceTrouble::unplugged || sample_.trouble == DeviceTrouble::silent;
   if (guard_ != nullptr && away) {
     std::string trouble = open_again(stop);
     if (!trouble.empty()) return trouble;
-    await(is_well, kPatience, stop);
+    await(is_well, kReadingPatience, stop);
   }
   if (sample_.time_ns <= asked_ns)
     return "the servo gives no more samples: start the program again";
@@ -88,7 +88,7 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   const auto is_on = [](const Sample& sample) {
     return (sample.faults & servo_fault::kTripped) == 0;
   };
-  if (await(is_on, kPatience, stop)) return "";
+  if (await(is_on, kReadingPatience, stop)) return "";
   return trip_reason(sample_.faults, sample_.trouble);
 }
 

@@ -6,8 +6,6 @@
 namespace palpate::runner {
 namespace {
 
-constexpr std::int64_t kNap_ns = 5'000'000;  // between two looks at console, device and participant
-
 EndOfSession end_by_signal(int signal) {
   return {data::RunEnd::aborted, std::string("signal: ") + strsignal(signal), true};
 }
@@ -125,7 +123,7 @@ void LiveSession::wait_while_held() {
     monitor_.held();
     attend();
     stop_if_due();
-    station_.clock.wait_until(station_.clock.now_ns() + kNap_ns);
+    station_.clock.wait_until(station_.clock.now_ns() + kSessionNap_ns);
   }
   monitor_.going_on();
   hold_.forget_reason();

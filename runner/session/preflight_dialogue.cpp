@@ -11,7 +11,6 @@ namespace {
 
 using Kind = ConsoleCommand::Kind;
 
-constexpr std::int64_t kNap_ns = 5'000'000;
 // What is missing changes while the stylus moves: no new instruction before one can be read.
 constexpr std::int64_t kReading_ns = 1'000'000'000;
 
@@ -41,7 +40,7 @@ class PreflightDialogue {
 
   PreflightResult run() {
     while (preflight_.step() != Preflight::Step::done || !state_.fault.empty()) {
-      station_.clock.wait_until(station_.clock.now_ns() + kNap_ns);
+      station_.clock.wait_until(station_.clock.now_ns() + kSessionNap_ns);
       if (station_.servo_thread.latest(state_.sample)) preflight_.add(state_.sample);
       station_.screen.keys();  // none answers yet
       take_commands();

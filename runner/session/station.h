@@ -2,6 +2,7 @@
 // What a session works with, part by part. The `run` command opens a live station and
 // simulate_study() a simulated one; whoever opens it owns its parts until the session is over.
 
+#include <cstdint>
 #include <functional>
 
 #include "data/record.h"
@@ -31,6 +32,9 @@ struct Station {
   TrialLog& log;         ///< takes every trial before the next one begins. Live: the run record
   LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; none: nobody does
 };
+
+/// ns, of the session's thread between two looks at console, device and participant.
+inline constexpr std::int64_t kSessionNap_ns = 5'000'000;
 
 /// Of a live session: a person, a device, two displays. Threads and processes of their own have the
 /// servo, the watchdog, the displays, the markers and the noise; all else is the session thread's.

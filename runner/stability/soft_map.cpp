@@ -14,10 +14,10 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};         // Pa
-constexpr double kRates[] = {62.5, 125, 250, 500, 1000};        // Hz
-constexpr double kSprings[] = {200, 800, 3000};                 // N/m
-constexpr double kHalf = 0.015, kDepth = 0.003, kTick = 0.001;  // m, m, s
+constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};               // Pa
+constexpr double kRates[] = {62.5, 125, 250, 500, 1000};              // Hz
+constexpr double kSprings[] = {200, 800, 3000};                       // N/m
+constexpr double kHalf = 0.015, kPressed = 0.003, kSoftTick = 0.001;  // m, m, s
 constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
 
 rendering::SoftObject slab(const SoftCase& what) {
@@ -63,14 +63,14 @@ SoftSwing press_and_hold(const SoftCase& what) {
   out.accepted = rendering::coupling_is_stable(
       {.young = what.young, .poisson = what.poisson, .damping = what.damping}, what.rate);
   Vec3 at(0.0003, 0.0002, kHalf + what.radius + 0.0005);
-  const double goal = kHalf + what.radius - kDepth;
+  const double goal = kHalf + what.radius - kPressed;
   double low = std::numeric_limits<double>::infinity(), high = -low, sum = 0;
   constexpr double kFall = 2e-5;  // m, in a tick
   const int falling = static_cast<int>((at.z - goal) / kFall) + 1;
   for (int i = 0; i < falling + kHeldTicks; ++i) {
     const double step = std::max(-kFall, goal - at.z);
     at.z += step;
-    const double force = rendering::advance(object, state, at, tool, std::abs(step), kTick).z;
+    const double force = rendering::advance(object, state, at, tool, std::abs(step), kSoftTick).z;
     out.finite = out.finite && std::isfinite(force);
     if (i < falling + kHeldTicks - kWatchedTicks) continue;
     low = std::min(low, force);

@@ -15,7 +15,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-void add_options(CommandLine& line) {
+void add_explore_options(CommandLine& line) {
   line.positional_names = {"SCENE.json"};
   line.options.add_options()  //
       ("device", po::value<std::string>()->value_name("NAME"),
@@ -120,7 +120,7 @@ int explore_command(const std::vector<std::string>& args) {
       "  palpate explore protocols/scenes/fig17a-engine.json \\\n"
       "      --trajectory protocols/scenes/fig17a-engine.csv --frames engine --every 100ms\n"
       "  palpate explore scene.json --trajectory path.csv --animation scene.webp --size 640x360\n";
-  add_options(line);
+  add_explore_options(line);
   const auto values = line.parse(args);
   if (!values) return 0;
   const rendering::Renderer& renderer = renderer_named(text_of(*values, "renderer"));
