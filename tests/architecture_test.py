@@ -82,7 +82,7 @@ PUBLIC = {
                "primitives printable random shapes solids/gmsh_file solids/solid_mesh vec",
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",
-    "rendering/verification": "explain extreme_cases random_solids reference search union_cases union_search",
+    "rendering/verification": "explain extreme_cases random_draws random_solids reference search union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
