@@ -1,12 +1,11 @@
 #include <algorithm>
-#include <map>
-#include <optional>
 #include <set>
 
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/parse_body.h"
 #include "protocols/parse_object.h"
+#include "protocols/parse_response.h"
 #include "protocols/parse_tool.h"
 #include "protocols/schedule.h"
 #include "protocols/sha256.h"
@@ -20,8 +19,6 @@ using nlohmann::json;
 // More than a laboratory needs; a larger value is a mistake.
 constexpr std::size_t kMaxStimuli = 100;
 constexpr std::size_t kMaxOrientations = 10000;
-constexpr std::size_t kMaxKey = 32;    // bytes of a response key's name
-constexpr std::size_t kMaxLabel = 80;  // bytes of a label
 constexpr long long kMaxTrials = 1000000;
 constexpr NumberRange kRepetitions{1, 1e6};
 constexpr NumberRange kCount{1, 1e6};
@@ -110,87 +107,6 @@ void read_orientation(ObjectReader& reader, Protocol& protocol) {
   }
 }
 
-/// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
-/// a fault, otherwise.
-json read_answer(const json& value, const std::string& pointer, std::string& label,
-                 FaultList& faults) {
-  if (!value.is_object()) return value;
-  ObjectReader answer(value, pointer, faults);
-  const json* const stimulus = answer.member("stimulus", Presence::required);
-  const json* const words = answer.member("label");
-  answer.refuse_unknown_keys();
-  if (words != nullptr) {
-    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
-    label = words->is_string() ? words->get<std::string>() : "";
-    if (label.empty() || label.size() > kMaxLabel ||
-        !std::all_of(label.begin(), label.end(), printable)) {
-      faults.add(answer.pointer("label"), "expected a text of 1 to " + std::to_string(kMaxLabel) +
-                                              " bytes without control characters" +
-                                              found_text(*words));
-      label.clear();
-    }
-  }
-  return stimulus != nullptr ? *stimulus : json();
-}
-
-/// Labels must differ: two responses that read the same cannot be told apart.
-void check_labels(const Protocol& protocol, const std::string& pointer, FaultList& faults) {
-  std::map<std::string, std::string> key_of;  // by what is read
-  for (const auto& [key, stimulus] : protocol.response.keys) {
-    const std::string& label = answer_label(protocol, stimulus);
-    const auto [before, is_new] = key_of.emplace(label, key);
-    if (is_new || protocol.response.keys.at(before->second) == stimulus) continue;
-    faults.add(child_pointer(pointer, key), "expected a label of its own; '" + label +
-                                                "' is what the key '" + before->second +
-                                                "' says already");
-  }
-}
-
-void read_keys(ObjectReader& response, Protocol& protocol) {
-  const json* const keys = response.member("keys", Presence::required);
-  if (keys == nullptr) return;
-  FaultList& faults = response.faults();
-  const std::string pointer = response.pointer("keys");
-  if (!keys->is_object()) {
-    faults.add(pointer, "expected an object of a stimulus for each key" + found_text(*keys));
-    return;
-  }
-  std::map<std::string, std::optional<std::string>> key_of;  // by stimulus
-  for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
-  for (const auto& [key, value] : keys->items()) {
-    const std::string here = child_pointer(pointer, key);
-    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
-    if (key.empty() || key.size() > kMaxKey || !std::all_of(key.begin(), key.end(), printable)) {
-      faults.add(here, "expected a key's name of 1 to " + std::to_string(kMaxKey) +
-                           " bytes without control characters");
-    }
-    std::string label;
-    const json name = read_answer(value, here, label, faults);
-    const auto stimulus = name.is_string() ? key_of.find(name.get<std::string>()) : key_of.end();
-    if (stimulus == key_of.end()) {
-      if (!value.is_object()) {
-        faults.add(here, "expected the name of a stimulus, or an object of 'stimulus' and 'label'" +
-                             found_text(value));
-      } else if (value.contains("stimulus")) {
-        faults.add(child_pointer(here, "stimulus"),
-                   "expected the name of a stimulus" + found_text(name));
-      }
-      continue;
-    }
-    if (stimulus->second) {
-      faults.add(here, "expected one key for each stimulus; '" + stimulus->first +
-                           "' has the key '" + *stimulus->second + "' already");
-    }
-    stimulus->second = key;
-    protocol.response.keys[key] = stimulus->first;
-    if (!label.empty()) protocol.response.labels[stimulus->first] = label;
-  }
-  check_labels(protocol, pointer, faults);
-  for (const auto& [name, key] : key_of) {
-    if (!key && !name.empty()) faults.add(pointer, "no key for the stimulus '" + name + "'");
-  }
-}
-
 void read_breaks(ObjectReader& reader, Protocol& protocol) {
   reader.section("breaks", [&](ObjectReader& section) {
     section.integer("every_trials", protocol.breaks.every_trials, kCount);
@@ -240,7 +156,7 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
   reader.section(
       "response",
       [&](ObjectReader& section) {
-        read_keys(section, protocol);
+        read_response_keys(section, protocol);
         section.number("time_out_s", protocol.response.time_out, {0, 3600, "s", true});
         section.boolean("feedback", protocol.response.feedback);
       },

@@ -86,7 +86,7 @@ PUBLIC = {
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
     "protocols": "difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
-    "protocols/procedures": "procedure procedure_spec psychometric recovery",
+    "protocols/procedures": "procedure procedure_spec psychometric recovery track_seed",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",

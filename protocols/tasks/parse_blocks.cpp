@@ -5,17 +5,11 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <iterator>
-#include <map>
 #include <set>
 #include <utility>
 
-#include "protocols/order.h"
-#include "protocols/parse_procedure.h"
-#include "protocols/schedule.h"
-#include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_answers.h"
 #include "protocols/tasks/task_plan.h"
-#include "protocols/tasks/typical_participant.h"
 
 namespace palpate::protocols {
 namespace {
@@ -23,13 +17,11 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMaxBlocks = 100;
-constexpr std::size_t kMaxTracks = 16;
 constexpr NumberRange kAnyNumber{-1e9, 1e9};
 constexpr NumberRange kManyTimes{1, 1e6};
 constexpr NumberRange kWait{0, 60, "s"};
 constexpr NumberRange kPresentation{0, 3600, "s", true};
 constexpr NumberRange kShareOfTrials{0, 0.5};
-constexpr long long kMostTaskTrials = 1000000;
 constexpr int kPracticeLimit = 100;
 
 std::optional<int> index_of(const Protocol& protocol, const std::string& name) {
@@ -119,19 +111,6 @@ void read_level(ObjectReader& reader, TaskBlock& block) {
   });
 }
 
-void read_procedures(ObjectReader& reader, TaskBlock& block) {
-  const json* const value = reader.member("procedure");
-  if (value == nullptr) return;
-  const std::string pointer = reader.pointer("procedure");
-  const auto read_one = [&](const json& one, const std::string& where) {
-    ObjectReader procedure(one, where, reader.faults());
-    if (auto spec = read_procedure(procedure)) block.procedures.push_back(std::move(*spec));
-  };
-  if (!value->is_array()) return read_one(*value, pointer);
-  if (reader.array("procedure", 1, kMaxTracks) == nullptr) return;
-  for (std::size_t i = 0; i < value->size(); ++i) read_one((*value)[i], child_pointer(pointer, i));
-}
-
 /// Level and procedure, or repetitions.
 void read_variation(ObjectReader& reader, TaskBlock& block) {
   read_level(reader, block);
@@ -141,7 +120,7 @@ void read_variation(ObjectReader& reader, TaskBlock& block) {
     if (!varied) reader.member("level", Presence::required);
     return;
   }
-  read_procedures(reader, block);
+  read_procedures(reader, block.procedures);
   const bool procedural = varied || reader.has("procedure");
   if (varied != reader.has("procedure")) {
     reader.faults().add(reader.pointer(varied ? "procedure" : "level"),
@@ -317,58 +296,6 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
 
 std::string block_pointer(std::size_t i) { return "/blocks/" + std::to_string(i); }
 
-void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
-                     FaultList& faults) {
-  std::set<std::string> told;
-  for (const int stimulus : block.stimuli) {
-    for (const double level : levels_of(block)) {
-      try {
-        at_level(protocol, block, stimulus, level);
-      } catch (const InputError& error) {
-        const Fault& fault = error.faults().front();
-        const std::string text =
-            "expected a level that '" + protocol.stimuli[static_cast<std::size_t>(stimulus)].name +
-            "' can have: at " + level_text(level) + ", " + fault.location + ": " + fault.expected;
-        // One level of a kind tells it.
-        if (told.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name + fault.location)
-                .second)
-          faults.add(pointer + "/level/path", text);
-      }
-    }
-  }
-}
-
-/// Which levels have more successes of two intervals follows from what is asked. \return nullopt:
-/// the task does not tell
-std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
-  if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
-    return std::nullopt;
-  if (const int side = side_of_levels(protocol, block); side != 0)
-    return side > 0 ? Easier::higher : Easier::lower;
-  if (!block.standard || !own_level(protocol, block, *block.standard)) return std::nullopt;
-  return block.asks_smaller ? Easier::lower : Easier::higher;
-}
-
-void check_easier(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
-                  FaultList& faults) {
-  const std::optional<Easier> expected =
-      block.level ? expected_easier(protocol, block) : std::nullopt;
-  if (!expected) return;
-  for (std::size_t i = 0; i < block.procedures.size(); ++i) {
-    const std::optional<Easier> easier = easier_of(block.procedures[i]);
-    if (!easier || *easier == *expected) continue;
-    const bool one_side = side_of_levels(protocol, block) != 0;
-    const std::string place =
-        pointer + "/procedure" + (block.procedures.size() > 1 ? "/" + std::to_string(i) : "");
-    faults.add(
-        place + "/easier",
-        std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
-            (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
-                      : "': levels lie on both sides of the standard, and what counts is that "
-                        "the comparison is chosen"));
-  }
-}
-
 void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
   if (!name.empty() && !names.insert(name).second)
     item.faults().add(item.pointer("name"),
@@ -412,35 +339,6 @@ void read_blocks(ObjectReader& reader, Protocol& protocol) {
       reader.faults().add(block_pointer(i) + "/order",
                           "expected no limits on the order: answers choose the levels of an "
                           "adaptive procedure");
-    }
-  }
-}
-
-void check_blocks(const Protocol& protocol, FaultList& faults) {
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    const TaskBlock& block = protocol.blocks[i];
-    check_levels_of(protocol, block, block_pointer(i), faults);
-    if (block.level && block.task != TaskKind::detect && block.standard &&
-        !own_level(protocol, block, *block.standard)) {
-      faults.add(block_pointer(i) + "/standard",
-                 "expected a stimulus that has " + block.level->pointer + " itself");
-    }
-  }
-  faults.throw_if_any();
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
-    check_easier(protocol, protocol.blocks[i], block_pointer(i), faults);
-  long long trials = 0;
-  for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
-  if (trials > kMostTaskTrials) {
-    faults.add("/blocks", "expected at most " + std::to_string(kMostTaskTrials) +
-                              " trials for each participant, found " + std::to_string(trials));
-    return;
-  }
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    try {
-      check_order(protocol, static_cast<int>(i));
-    } catch (const ScheduleError& error) {
-      faults.add(block_pointer(i) + "/order", error.what());
     }
   }
 }

@@ -9,6 +9,8 @@ namespace palpate::protocols {
 
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);
+/// Reads `procedure` of a block: one, or a list of them.
+void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures);
 /// Reads pages, which refer to the blocks. \param files  where their pictures are
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files);
 /// Reads sounds and responses: what is heard and pressed beside screen and keyboard.

@@ -6,86 +6,15 @@
 #include <utility>
 
 #include "protocols/latin_square.h"
-#include "protocols/order.h"
-#include "protocols/tasks/levels.h"
+#include "protocols/tasks/block_tracks.h"
+#include "protocols/tasks/fixed_trials.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 namespace {
 
-// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1
-// to 4.
-constexpr std::uint64_t kTaskStream = 5;
-enum TaskUse : std::uint64_t {
-  kTaskOrder = 1,
-  kTaskPosition = 2,
-  kTaskOrientation = 3,
-  kTaskCatch = 4,
-  kTaskTracks = 5
-};
-
 constexpr std::size_t kCatchWindow = 20;    // trials
 constexpr long long kLeastUnanswered = 10;  // trials
-
-stimuli::Random task_stream(const Protocol& protocol, int participant, std::uint64_t block,
-                            TaskUse use, std::uint64_t number = 0) {
-  return stimuli::Random(
-      protocol.seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
-}
-
-/// What a track varies the level of.
-struct Track {
-  int stimulus = 0;
-  RendererKind renderer = RendererKind::point;
-  const ProcedureSpec* procedure = nullptr;
-};
-
-std::vector<Track> tracks_of(const TaskBlock& block) {
-  std::vector<Track> tracks;
-  for (const int stimulus : block.stimuli) {
-    for (const RendererKind renderer : block.renderers) {
-      if (block.procedures.empty()) tracks.push_back({stimulus, renderer, nullptr});
-      for (const ProcedureSpec& procedure : block.procedures)
-        tracks.push_back({stimulus, renderer, &procedure});
-    }
-  }
-  return tracks;
-}
-
-long long with_catch_trials(const TaskBlock& block, long long trials) {
-  return trials +
-         std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
-}
-
-/// The intervals of a trial whose stimulus, renderer and level are set.
-/// \param position  of the comparison, from 0
-void set_intervals(const TaskBlock& block, int position, Trial& trial) {
-  const Interval asked{trial.stimulus, trial.renderer, trial.level};
-  const Interval standard{block.standard.value_or(-1),
-                          block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
-  switch (block.task) {
-    case TaskKind::identify:
-      trial.intervals = {asked};
-      break;
-    case TaskKind::compare:
-      trial.intervals.assign(static_cast<std::size_t>(block.intervals), standard);
-      if (!trial.catch_trial) trial.intervals[static_cast<std::size_t>(position)] = asked;
-      break;
-    case TaskKind::detect:
-      trial.intervals = {asked};
-      if (trial.catch_trial) trial.intervals[0] = {block.absent.value_or(-1), trial.renderer};
-      break;
-    case TaskKind::rate:
-      trial.intervals = {asked};
-      if (block.standard) trial.intervals.insert(trial.intervals.begin(), standard);
-      break;
-    case TaskKind::adjust:
-      trial.intervals = {asked, standard};  // in turn, as the participant wants it
-      break;
-  }
-  if (trial.catch_trial) trial.level.reset();
-}
 
 Quat drawn_orientation(const Protocol& protocol, stimuli::Random random) {
   switch (protocol.orientation) {
@@ -97,179 +26,6 @@ Quat drawn_orientation(const Protocol& protocol, stimuli::Random random) {
       break;
   }
   return Quat(1, 0, 0, 0);
-}
-
-/// Trials that are alike: a track at a level, or the catch trials.
-struct Category {
-  std::string name;
-  Trial trial;
-  int count = 0;
-};
-
-void add_levels(const TaskBlock& block, const Track& track, Category category,
-                std::vector<Category>& categories) {
-  if (track.procedure == nullptr) {
-    category.count = block.repetitions;
-    categories.push_back(category);
-    return;
-  }
-  const auto& constant = std::get<ConstantStimuli>(*track.procedure);
-  for (const double level : constant.levels) {
-    Category one = category;
-    one.name += " at " + level_text(level);
-    one.trial.level = level;
-    one.count = constant.repetitions;
-    categories.push_back(std::move(one));
-  }
-}
-
-std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& block) {
-  std::vector<Category> categories;
-  int number = 0;
-  long long trials = 0;
-  for (const Track& track : tracks_of(block)) {
-    Category category;
-    category.name = protocol.stimuli[static_cast<std::size_t>(track.stimulus)].name + " (" +
-                    to_string(track.renderer) + ")";
-    category.trial.stimulus = track.stimulus;
-    category.trial.renderer = track.renderer;
-    category.trial.track = ++number;
-    add_levels(block, track, category, categories);
-  }
-  for (const Category& category : categories) trials += category.count;
-  const auto catch_trials = static_cast<int>(with_catch_trials(block, trials) - trials);
-  if (catch_trials == 0) return categories;
-  // Shown as evenly as they go with every track.
-  const int tracks = number;
-  for (int t = 0; t < tracks; ++t) {
-    const Track track = tracks_of(block)[static_cast<std::size_t>(t)];
-    Category category;
-    category.name = "catch trial";
-    category.trial.stimulus = track.stimulus;
-    category.trial.renderer = track.renderer;
-    category.trial.track = t + 1;
-    category.trial.catch_trial = true;
-    category.count = catch_trials / tracks + (t < catch_trials % tracks ? 1 : 0);
-    if (category.count > 0) categories.push_back(std::move(category));
-  }
-  return categories;
-}
-
-std::vector<int> ordered_categories(const std::vector<Category>& categories, const TaskBlock& block,
-                                    stimuli::Random random) {
-  Protocol::Order order;
-  order.max_run = block.max_run;
-  order.min_distance = block.min_distance;
-  std::vector<int> counts;
-  std::vector<std::string> names;
-  counts.reserve(categories.size());
-  names.reserve(categories.size());
-  for (const Category& category : categories) {
-    counts.push_back(category.count);
-    names.push_back(category.name);
-  }
-  return order_block(counts, order, names, random);
-}
-
-/// Where the comparison stands in each of `count` trials: everywhere equally often, by chance.
-std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
-  std::vector<int> all, places;
-  for (int i = 0; i < intervals; ++i) places.push_back(i);
-  while (static_cast<int>(all.size()) < count) {
-    random.shuffle(places);
-    all.insert(all.end(), places.begin(), places.end());
-  }
-  all.resize(static_cast<std::size_t>(count));
-  random.shuffle(all);
-  return all;
-}
-
-/// \param round  of practice with a criterion, from 0
-std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
-                                std::uint64_t round = 0) {
-  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  const auto number = static_cast<std::uint64_t>(index);
-  std::vector<Category> categories = categories_of(protocol, block);
-  stimuli::Random places = task_stream(protocol, participant, number, kTaskPosition, round);
-  std::vector<std::vector<int>> left;
-  left.reserve(categories.size());
-  for (const Category& category : categories)
-    left.push_back(positions(category.count, block.intervals, places));
-  std::vector<std::size_t> shown(categories.size(), static_cast<std::size_t>(participant - 1));
-  std::vector<Trial> trials;
-  for (const int which : ordered_categories(
-           categories, block, task_stream(protocol, participant, number, kTaskOrder, round))) {
-    const auto c = static_cast<std::size_t>(which);
-    Trial trial = categories[c].trial;
-    // Starts in turn; the next participant begins with the next one.
-    if (block.task == TaskKind::adjust)
-      trial.level = block.starts[shown[c]++ % block.starts.size()];
-    set_intervals(block, left[c].back(), trial);
-    left[c].pop_back();
-    trials.push_back(std::move(trial));
-  }
-  return trials;
-}
-
-/// Identification as version 1 has it, whose order it then has: whatever is the same in two
-/// protocols gives the same trials. Limits on the order of several renderers are of other things.
-bool has_order_of_version_1(const TaskBlock& block) {
-  return block.task == TaskKind::identify && block.procedures.empty() &&
-         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
-}
-
-/// What of a protocol of version 1 an order follows from. \param block  none: all stimuli
-Protocol version_1_view(const Protocol& protocol, const TaskBlock* block) {
-  Protocol view;
-  view.seed = protocol.seed;
-  view.renderers = protocol.renderers;
-  view.orientation = protocol.orientation;
-  view.orientations = protocol.orientations;
-  const auto add = [&](const StimulusSpec& stimulus) {
-    view.stimuli.push_back({stimulus.name, {}});
-  };
-  if (block == nullptr) {
-    for (const StimulusSpec& stimulus : protocol.stimuli) add(stimulus);
-    return view;
-  }
-  for (const int stimulus : block->stimuli)
-    add(protocol.stimuli[static_cast<std::size_t>(stimulus)]);
-  view.renderers = block->renderers;
-  view.renderer_order =
-      block->renderers.size() > 1 ? RendererOrder::interleaved : RendererOrder::fixed;
-  view.order.max_run = block->max_run;
-  view.order.min_distance = block->min_distance;
-  view.practice.repetitions = block->repetitions;
-  return view;
-}
-
-/// Practice has its orientations, main trials get theirs from orientations_of_version_1.
-/// \param round  of practice with a criterion, from 0
-std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index,
-                                       int round = 0) {
-  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  const Protocol view = version_1_view(protocol, &block);
-  const auto before = std::count_if(
-      protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
-        return has_order_of_version_1(other) && other.practice == block.practice &&
-               other.renderers == block.renderers;
-      });
-  const int number = static_cast<int>(before);
-  std::vector<Trial> trials =
-      block.practice
-          ? practice_round(view, participant, block.renderers.front(), number + 1 + round)
-          : block_of_trials(view, participant, block.renderers, number, block.repetitions);
-  const std::vector<Track> tracks = tracks_of(block);
-  for (Trial& trial : trials) {
-    trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
-    const auto is_its = [&](const Track& track) {
-      return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
-    };
-    const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
-    trial.track = static_cast<int>(track - tracks.begin()) + 1;
-    set_intervals(block, 0, trial);
-  }
-  return trials;
 }
 
 /// Of the main trials of a block, which are drawn over all blocks of a participant.
@@ -298,7 +54,8 @@ bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t blo
       std::size_t{1}, static_cast<std::size_t>(std::lround(share * static_cast<double>(window))));
   std::vector<int> marks(window, 0);
   std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
-  stimuli::Random random = task_stream(protocol, participant, block, kTaskCatch, shown / window);
+  stimuli::Random random =
+      task_stream(protocol.seed, participant, block, kTaskCatch, shown / window);
   random.shuffle(marks);
   return marks[shown % window] == 1;
 }
@@ -314,7 +71,7 @@ bool is_adaptive(const TaskBlock& block) {
 long long most_trials_of(const TaskBlock& block) {
   if (block.criterion) return block.criterion->most_trials;
   long long trials = 0;
-  for (const Track& track : tracks_of(block)) {
+  for (const BlockTrack& track : tracks_of(block)) {
     trials += track.procedure == nullptr ? block.repetitions
                                          : static_cast<long long>(most_trials(*track.procedure));
   }
@@ -380,9 +137,9 @@ void TaskPlan::begin_block() {
   tracks_.reset();
   if (!is_adaptive(block())) return add_round();
   std::vector<ProcedureSpec> specs;
-  for (const Track& track : tracks_of(block())) specs.push_back(*track.procedure);
-  tracks_.emplace(specs,
-                  task_stream(*protocol_, participant_number_, block_index(), kTaskTracks).next());
+  for (const BlockTrack& track : tracks_of(block())) specs.push_back(*track.procedure);
+  tracks_.emplace(
+      specs, task_stream(protocol_->seed, participant_number_, block_index(), kTaskTracks).next());
 }
 
 void TaskPlan::add_round() {
@@ -418,7 +175,7 @@ bool TaskPlan::criterion_met() const {
 
 Trial TaskPlan::adaptive_trial() const {
   const TrackLevel wanted = *tracks_->next();
-  const Track track = tracks_of(block())[wanted.track];
+  const BlockTrack track = tracks_of(block())[wanted.track];
   Trial trial;
   trial.stimulus = track.stimulus;
   trial.renderer = track.renderer;
@@ -426,7 +183,7 @@ Trial TaskPlan::adaptive_trial() const {
   trial.level = wanted.level;
   trial.catch_trial = is_catch_trial(*protocol_, participant_number_, block_index(), shown_);
   stimuli::Random random =
-      task_stream(*protocol_, participant_number_, block_index(), kTaskPosition, shown_ + 1);
+      task_stream(protocol_->seed, participant_number_, block_index(), kTaskPosition, shown_ + 1);
   set_intervals(block(),
                 static_cast<int>(random.below(static_cast<std::uint64_t>(block().intervals))),
                 trial);
@@ -447,9 +204,9 @@ void TaskPlan::find_next() {
   trial.practice = block().practice;
   trial.task_block = order_[at_];
   if (!has_order_of_version_1(block())) {
-    trial.orientation = drawn_orientation(
-        *protocol_,
-        task_stream(*protocol_, participant_number_, block_index(), kTaskOrientation, shown_ + 1));
+    trial.orientation =
+        drawn_orientation(*protocol_, task_stream(protocol_->seed, participant_number_,
+                                                  block_index(), kTaskOrientation, shown_ + 1));
   }
   next_ = std::move(trial);
 }

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "protocols/procedures/procedure.h"
+#include "tests/shared/peak_memory.h"
 
 namespace palpate::protocols {
 namespace {
@@ -97,6 +98,42 @@ TEST(InterleavedProcedures, NoneIsLongerThanItsSpecSays) {
       EXPECT_GT(procedure.history().size(), 0u);
     }
   }
+}
+
+TEST(InterleavedProcedures, TracksOfTheSameGridShareItsTables) {
+  QuestPlus quest;
+  for (int i = 0; i < 40; ++i) quest.levels.push_back(i + 1);
+  quest.threshold.values = quest.levels;
+  for (int i = 0; i < 20; ++i) quest.slope.values.push_back(0.1 * (i + 1));
+  quest.guess.values = {0, 0.1, 0.2, 0.3, 0.4};
+  quest.lapse.values = {0, 0.02, 0.04, 0.06};
+  const auto memory_of = [&](std::size_t tracks) {
+    return peak_memory([&] {
+      const InterleavedTracks all(std::vector<ProcedureSpec>(tracks, quest), 1);
+      ASSERT_TRUE(all.next());
+    });
+  };
+  const auto one = memory_of(1), twelve = memory_of(12);
+  ASSERT_TRUE(one && twelve);
+  // 5.1 MB of tables; a posterior has 0.13 MB.
+  EXPECT_GT(*one, 40U * 16000 * sizeof(double));
+  EXPECT_LT(*twelve, *one + 12U * 4 * 16000 * sizeof(double));
+}
+
+TEST(InterleavedProcedures, TracksThatShareTablesLearnFromTheirOwnAnswers) {
+  const ProcedureSpec quest = one_of_each()[2];
+  InterleavedTracks two({quest, quest}, 9);
+  Procedure alone[2]{{quest, 1}, {quest, 2}};
+  stimuli::Random random(3);
+  while (const auto next = two.next()) {
+    EXPECT_EQ(alone[next->track].next_level(), next->level);
+    const Response answer{next->level, random.unit() < (next->track == 0 ? 0.9 : 0.3)};
+    alone[next->track].record(answer);
+    two.record(answer);
+  }
+  for (const std::size_t i : {0U, 1U})
+    EXPECT_EQ(two.tracks()[i].estimate().threshold, alone[i].estimate().threshold);
+  EXPECT_NE(alone[0].estimate().threshold, alone[1].estimate().threshold);
 }
 
 }  // namespace
