@@ -69,7 +69,6 @@ void BodyContacts::look_for(double within, double extra, std::span<const char> c
                          within * glm::length(velocity - a.velocity);
     const Vec3 apart = centre - a.centre;
     if (glm::dot(apart, apart) > reach * reach) continue;
-    state_.near.push_back(index);
     find_in_pair(index, within, extra + (pair.obstacle ? fall : 0), places);
   }
 }
@@ -83,44 +82,75 @@ void BodyContacts::place_parts(std::uint32_t body) {
     *centre++ = axes * part.centre + state_.motion[body].centre;
 }
 
+/// m; no point of the pair's bodies has moved more since their distances were looked at.
+double BodyContacts::moved_since(const BodyPair& pair, const PairPlaces& measured) const {
+  const auto moved = [this](std::uint32_t body, const Vec3& centre, const Quat& orientation) {
+    const BodyMotion& motion = state_.motion[body];
+    // Unit quaternions: a chord of a turn by t is 2 sin(t/4), one of a point 2 radius sin(t/2).
+    const Quat turn = motion.orientation - orientation;
+    return glm::distance(motion.centre, centre) +
+           2 * world_.bodies[body].radius * std::sqrt(glm::dot(turn, turn));
+  };
+  return moved(pair.a, measured.centre_a, measured.orientation_a) +
+         (pair.obstacle ? 0 : moved(pair.b, measured.centre_b, measured.orientation_b));
+}
+
 void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra, bool places) {
   const BodyPair& pair = world_.pairs[index];
   const MovingBody& body_a = world_.bodies[pair.a];
-  const Pose pose_a = pose_of(pair.a), pose_b = pose_of_other(pair);
-  place_parts(pair.a);
-  if (!pair.obstacle) place_parts(pair.b);
-  const Vec3* const centres_a = &state_.part_centres[world_.first_part[pair.a]];
-  const Vec3* const centres_b =
-      pair.obstacle ? nullptr : &state_.part_centres[world_.first_part[pair.b]];
   const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
   const double turning =
       glm::length(state_.spin[pair.a]) * body_a.radius +
       (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
   const double reach = 2 * kTouching + extra +
                        within * (glm::length(velocity - state_.motion[pair.a].velocity) + turning);
+  PairPlaces& measured = state_.measured[index];
+  const double moved = moved_since(pair, measured) + 1e-12 * body_a.radius;  // above rounding
+  if (measured.least - moved > reach) return;
+  state_.near.push_back(index);
+  place_parts(pair.a);
+  if (!pair.obstacle) place_parts(pair.b);
+  measured = {state_.motion[pair.a].centre, pair.obstacle ? Vec3(0) : state_.motion[pair.b].centre,
+              state_.motion[pair.a].orientation,
+              pair.obstacle ? Quat(1, 0, 0, 0) : state_.motion[pair.b].orientation, HUGE_VAL};
   for (std::uint32_t k = 0; k < pair.count; ++k) {
-    const PartPair& parts = world_.part_pairs[pair.first + k];
-    const CollidingPart &a = body_a.parts[parts.part_a], &b = part_b(pair, parts.part_b);
-    const Vec3 apart =
-        (pair.obstacle ? b.centre : centres_b[parts.part_b]) - centres_a[parts.part_a];
-    const double near = a.mesh->radius() + b.mesh->radius() + reach;
-    if (glm::dot(apart, apart) > near * near) continue;
-    const ConvexPlace at_a = place_of(a, pose_a), at_b = place_of(b, pose_b);
     GapMemory& memory = state_.gaps[pair.first + k];
-    const Gap gap = gap_between(at_a, at_b, reach, memory);
-    if (gap.distance > reach) continue;
-    state_.near_parts.push_back({index, pair.first + k, gap.distance, gap.distance <= kTouching});
-    if (!places) return;
-    find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
-    for (const ManifoldPoint& point : state_.manifold.points()) {
-      if (state_.contacts.size() == BodyWorldState::kMostContacts) {
-        state_.dropped = true;
-        return;
-      }
-      state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
-                                 point.place, state_.manifold.normal, point.gap,
-                                 static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
+    memory.least -= moved;
+    const bool looked_for =
+        places || state_.near_parts.empty() || state_.near_parts.back().pair != index;
+    if (looked_for && !(memory.least > reach)) measure_parts(index, pair.first + k, reach, places);
+    measured.least = std::min(measured.least, memory.least);
+  }
+}
+
+/// The gap of two parts and, where they are within reach, the places where they touch or may.
+void BodyContacts::measure_parts(std::uint32_t index, std::uint32_t parts_index, double reach,
+                                 bool places) {
+  const BodyPair& pair = world_.pairs[index];
+  const PartPair& parts = world_.part_pairs[parts_index];
+  GapMemory& memory = state_.gaps[parts_index];
+  const CollidingPart &a = world_.bodies[pair.a].parts[parts.part_a],
+                      &b = part_b(pair, parts.part_b);
+  const Vec3& centre_a = state_.part_centres[world_.first_part[pair.a] + parts.part_a];
+  const Vec3& centre_b =
+      pair.obstacle ? b.centre : state_.part_centres[world_.first_part[pair.b] + parts.part_b];
+  memory.least = glm::distance(centre_a, centre_b) - a.mesh->radius() - b.mesh->radius();
+  if (memory.least > reach) return;
+  const ConvexPlace at_a = place_of(a, pose_of(pair.a)), at_b = place_of(b, pose_of_other(pair));
+  const Gap gap = gap_between(at_a, at_b, reach, memory);
+  memory.least = gap.distance;
+  if (gap.distance > reach) return;
+  state_.near_parts.push_back({index, parts_index, gap.distance, gap.distance <= kTouching});
+  if (!places) return;
+  find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
+  for (const ManifoldPoint& point : state_.manifold.points()) {
+    if (state_.contacts.size() == BodyWorldState::kMostContacts) {
+      state_.dropped = true;
+      return;
     }
+    state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
+                               point.place, state_.manifold.normal, point.gap,
+                               static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
   }
 }
 

@@ -24,12 +24,13 @@ class BodyContacts {
   /// Sets state.near, near_parts and contacts: what touches or may meet within a time, s.
   /// \param extra  m; farther away by this as well \param chosen  bodies; empty: all
   void find(double within, double extra = 0, std::span<const char> chosen = {});
-  /// The same without contacts.
+  /// The same without contacts, and with one of the parts of each pair that are near.
   void find_near(double within, double extra);
 
   /// Bodies that touch and approach each other part again, with the restitution of the pair.
+  /// \param left  s, of the step \param step  s, the whole of it, of which kAtOnce is
   /// \return whether some did
-  bool bounce(double step);
+  bool bounce(double left, double step);
 
   /// s, until the next pair meets, at most `most`. Says of state.near_parts which do not meet until
   /// then; those that rest on each other do.
@@ -51,10 +52,12 @@ class BodyContacts {
   const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
   void place_parts(std::uint32_t body);
   void find_in_pair(std::uint32_t index, double within, double extra, bool places);
+  void measure_parts(std::uint32_t index, std::uint32_t parts_index, double reach, bool places);
+  double moved_since(const BodyPair& pair, const PairPlaces& measured) const;
   void look_for(double within, double extra, std::span<const char> chosen, bool places);
   bool wake_near();
-  Gap gap_after(const BodyWorldState::NearParts& near, double time, GapMemory& memory,
-                Vec3& closing) const;
+  Gap gap_after(const BodyWorldState::NearParts& near, double time, double enough,
+                GapMemory& memory, Vec3& closing) const;
   double meeting_time(const BodyWorldState::NearParts& parts, double most);
   double meeting_again(BodyWorldState::NearParts& parts, double most);
   struct TimeAndGap {

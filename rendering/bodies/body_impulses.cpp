@@ -175,9 +175,9 @@ void BodyContacts::add_impulses(std::size_t body) {
 /// Impacts go through a group of touching bodies one after another, as through a row of balls:
 /// those that approach part, then those that approach then (Smith, Kaufman, Vouga, Tamstorf &
 /// Grinspun 2012, Reflections on simultaneous impact).
-bool BodyContacts::bounce(double step) {
+bool BodyContacts::bounce(double left, double step) {
   constexpr int kMostRounds = 24;
-  const double resting = resting_speed(step);
+  const double resting = resting_speed(left);
   bool bounced = false;
   for (int round = 0; round < kMostRounds; ++round) {
     set_velocities(0);

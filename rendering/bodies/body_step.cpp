@@ -10,7 +10,7 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr int kMostEvents = 8;  // in a step; then what meets is held apart without a bounce
+constexpr int kMostEvents = 32;  // in a step; then what meets is held apart without a bounce
 
 Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& velocity,
                     double duration) {
@@ -47,7 +47,7 @@ void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
       }
       return;
     }
-    if (contacts.bounce(left)) contacts.find(left);
+    if (contacts.bounce(left, duration)) contacts.find(left);
     const double next = event < kMostEvents ? contacts.time_to_next(left) : left;
     // Impulses act on the velocities as they will be; what they do not push moves freely.
     contacts.hold_apart(next, {}, {});

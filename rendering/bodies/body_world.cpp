@@ -49,6 +49,7 @@ BodyWorldState initial_state(const BodyWorld& world) {
   const std::size_t count = world.bodies.size();
   for (const MovingBody& body : world.bodies) state.motion.push_back(body.start);
   state.gaps.resize(world.part_pairs.size());
+  state.measured.resize(world.pairs.size());
   state.sleep.resize(count);
   state.island.resize(count);
   state.velocity.resize(count);

@@ -101,10 +101,19 @@ struct SleepState {
   Quat orientation{1, 0, 0, 0};
 };
 
+/// Where two bodies were when the distances of their parts were looked at (GapMemory::least). As
+/// long as they have moved by less, what was far apart is.
+struct PairPlaces {
+  Vec3 centre_a, centre_b;
+  Quat orientation_a{1, 0, 0, 0}, orientation_b{1, 0, 0, 0};
+  double least = -HUGE_VAL;  ///< m; no part of one was nearer to any of the other
+};
+
 /// What the step changes and the room it needs.
 struct BodyWorldState {
   std::vector<BodyMotion> motion;
-  std::vector<GapMemory> gaps;  ///< of each part pair
+  std::vector<GapMemory> gaps;       ///< of each part pair
+  std::vector<PairPlaces> measured;  ///< of each pair
   std::vector<SleepState> sleep;
   std::size_t sleeping = 0;         ///< bodies
   bool dropped = false;             ///< contacts or friction of them, since this was set to false

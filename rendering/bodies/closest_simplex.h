@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "stimuli/vec.h"
 
@@ -13,6 +14,7 @@ struct GapSimplex {
   struct Corner {
     Vec3 point;  ///< on_b - on_a
     Vec3 on_a, on_b;
+    std::uint32_t vertex_a = 0, vertex_b = 0;
   };
   std::array<Corner, 4> corners;
   std::array<double, 4> weights{};

@@ -32,28 +32,83 @@ Slab slab_along(const ConvexPlace& a, const ConvexPlace& b, const Vec3& normal, 
   return slab;
 }
 
-Vec3 made_smaller(const ConvexPlace& part, std::uint32_t vertex, double scale) {
-  return part.world_point(part.inside + scale * (part.mesh->vertices()[vertex] - part.inside));
+/// A corner of the difference of two parts made smaller.
+class Corners {
+ public:
+  Corners(const ConvexPlace& a, const ConvexPlace& b, double scale)
+      : a_(a),
+        b_(b),
+        inside_a_(a.world_point(a.inside)),
+        inside_b_(b.world_point(b.inside)),
+        scale_(scale) {}
+  Vec3 between() const { return inside_b_ - inside_a_; }
+  /// Of the parts as they are.
+  Vec3 whole(std::uint32_t vertex_a, std::uint32_t vertex_b) const {
+    return on_b(vertex_b) - on_a(vertex_a);
+  }
+  GapSimplex::Corner of(std::uint32_t vertex_a, std::uint32_t vertex_b) const {
+    GapSimplex::Corner corner;
+    corner.on_a = inside_a_ + scale_ * (on_a(vertex_a) - inside_a_);
+    corner.on_b = inside_b_ + scale_ * (on_b(vertex_b) - inside_b_);
+    corner.point = corner.on_b - corner.on_a;
+    corner.vertex_a = vertex_a;
+    corner.vertex_b = vertex_b;
+    return corner;
+  }
+
+ private:
+  Vec3 on_a(std::uint32_t vertex) const { return a_.world_point(a_.mesh->vertices()[vertex]); }
+  Vec3 on_b(std::uint32_t vertex) const { return b_.world_point(b_.mesh->vertices()[vertex]); }
+
+  const ConvexPlace &a_, &b_;
+  Vec3 inside_a_, inside_b_;
+  double scale_;
+};
+
+/// The simplex that was nearest last, where it is now. Empty: there is none, or it holds the
+/// origin.
+GapSimplex simplex_of(const GapMemory& memory, const Corners& corners, double least) {
+  GapSimplex simplex;
+  for (; simplex.count < memory.nearest_count; ++simplex.count) {
+    const auto& [vertex_a, vertex_b] = memory.nearest[simplex.count];
+    simplex.corners[simplex.count] = corners.of(vertex_a, vertex_b);
+  }
+  if (simplex.count == 0 || !reduce_to_nearest(simplex)) return {};
+  const Vec3 at = simplex.nearest();
+  return glm::dot(at, at) > least * least ? simplex : GapSimplex{};
+}
+
+void remember(const GapSimplex& simplex, GapMemory& memory) {
+  memory.nearest_count = static_cast<std::uint32_t>(std::min<std::size_t>(simplex.count, 3));
+  for (std::uint32_t i = 0; i < memory.nearest_count; ++i)
+    memory.nearest[i] = {simplex.corners[i].vertex_a, simplex.corners[i].vertex_b};
 }
 
 /// GJK of both parts scaled. Empty: they overlap still.
+/// \param enough  m; a direction along which the whole parts are farther apart ends the search
 std::optional<GapSimplex> nearest_simplex(const ConvexPlace& a, const ConvexPlace& b, double scale,
-                                          double size, GapMemory& memory) {
+                                          double size, double enough, GapMemory& memory) {
   constexpr int kMostRounds = 64;
-  constexpr double kConverged = 1e-12;
-  Vec3 v = b.world_point(b.inside) - a.world_point(a.inside);
-  if (glm::dot(memory.normal, memory.normal) > 0) v = memory.normal * size;
+  constexpr double kConverged = 1e-12, kInside = 1e-12;
+  const Corners corners(a, b, scale);
+  GapSimplex simplex = simplex_of(memory, corners, 1e-6 * size);
+  Vec3 v = simplex.count > 0                            ? simplex.nearest()
+           : glm::dot(memory.normal, memory.normal) > 0 ? memory.normal * size
+                                                        : corners.between();
   if (!(glm::dot(v, v) > 0)) v = Vec3(size, 0, 0);
-  GapSimplex simplex;
   for (int round = 0; round < kMostRounds; ++round) {
     memory.support_a = support_of(a, v, memory.support_a);
     memory.support_b = support_of(b, -v, memory.support_b);
-    GapSimplex::Corner corner;
-    corner.on_a = made_smaller(a, memory.support_a, scale);
-    corner.on_b = made_smaller(b, memory.support_b, scale);
-    corner.point = corner.on_b - corner.on_a;
+    const GapSimplex::Corner corner = corners.of(memory.support_a, memory.support_b);
+    const double v2 = glm::dot(v, v);
+    const double along = glm::dot(v, corners.whole(memory.support_a, memory.support_b));
+    if (along > 0 && along * along > (1 + 1e-9) * enough * enough * v2) {
+      simplex.count = 1;
+      simplex.corners[0] = {v, corner.on_a, corner.on_b};
+      simplex.weights = {1, 0, 0, 0};
+      return simplex;
+    }
     if (simplex.count > 0) {
-      const double v2 = glm::dot(v, v);
       if (v2 - glm::dot(v, corner.point) <= kConverged * v2) break;
       const bool again =
           std::any_of(simplex.corners.begin(),
@@ -66,13 +121,14 @@ std::optional<GapSimplex> nearest_simplex(const ConvexPlace& a, const ConvexPlac
     if (!reduce_to_nearest(simplex)) return std::nullopt;
     const Vec3 nearer = simplex.nearest();
     const double distance2 = glm::dot(nearer, nearer);
-    if (!(distance2 > 1e-24 * size * size)) return std::nullopt;
-    if (before.count > 0 && distance2 >= glm::dot(v, v)) {  // rounding
+    if (!(distance2 > kInside * kInside * size * size)) return std::nullopt;
+    if (before.count > 0 && distance2 >= v2) {  // rounding
       simplex = before;
       break;
     }
     v = nearer;
   }
+  remember(simplex, memory);
   return simplex;
 }
 
@@ -178,10 +234,13 @@ Gap gap_between(const ConvexPlace& a, const ConvexPlace& b, double enough, GapMe
   Vec3 between = b.world_point(b.inside) - a.world_point(a.inside);
   if (!(glm::dot(between, between) > 0)) between = Vec3(0, 0, 1);
   gap.normal = glm::normalize(between);
+  const std::uint32_t support_a = memory.support_a, support_b = memory.support_b;
   for (const double scale : kScales) {
-    const std::optional<GapSimplex> nearest = nearest_simplex(a, b, scale, size, memory);
+    const std::optional<GapSimplex> nearest = nearest_simplex(a, b, scale, size, enough, memory);
     if (!nearest) {
-      memory.normal = Vec3(0);
+      // It ended with directions that have nothing to do with the gap.
+      memory.support_a = support_a;
+      memory.support_b = support_b;
       continue;
     }
     gap.normal = glm::normalize(nearest->nearest());

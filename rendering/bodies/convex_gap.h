@@ -3,6 +3,7 @@
 // allocates.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -29,13 +30,17 @@ struct ConvexPlace {
 struct GapMemory {
   Vec3 normal;  ///< of the last gap, zero at first
   std::uint32_t support_a = 0, support_b = 0;
+  std::array<std::array<std::uint32_t, 2>, 3> nearest{};  ///< vertices of the last simplex
+  std::uint32_t nearest_count = 0;
+  double least = -HUGE_VAL;  ///< m; they were not nearer where PairPlaces says
 };
 
 /// A slab between two parts.
 struct Gap {
   Vec3 normal;          ///< unit, from a to b
   double distance = 0;  ///< between the planes that touch a and b; negative where they overlap
-  Vec3 on_a, on_b;      ///< of the points that are nearest, where the parts are apart
+  Vec3 on_a,
+      on_b;  ///< the points that are nearest, where the parts are apart by less than `enough`
 };
 
 /// The slab of largest distance. Gilbert, Johnson & Keerthi 1988, of both parts made smaller by

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "rendering/bodies/body_contacts.h"
 #include "rendering/motion.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/random.h"
@@ -229,6 +230,50 @@ TEST(BodyContact, MomentumStaysWhateverHappens) {
       EXPECT_LE(e2, highest * (1 + 1e-3)) << trial << " " << i;
     }
   }
+}
+
+/// Distances that were looked at long ago, and where the search for them ended, hide nothing: what
+/// is found near is what a state that remembers nothing finds.
+TEST(BodyContact, WhatIsRememberedOfDistancesHidesNothing) {
+  stimuli::Random random(21);
+  const Mesh ball = mesh_of(stimuli::icosphere(0.015, 2)), bar = box_mesh({0.06, 0.01, 0.01});
+  std::size_t found = 0;
+  for (int trial = 0; trial < 4; ++trial) {
+    BodyScene s;
+    for (int i = 0; i < 6; ++i) {
+      const Vec3 place(0.12 * (i % 3), 0.12 * static_cast<double>(i / 3), 0.01 * i);
+      const Quat q = glm::normalize(
+          Quat(between(random, -1, 1), between(random, -1, 1), between(random, -1, 1), 0.3));
+      stimuli::Body& body = s.moves(
+          {{ball, {{0.03, 0, 0}, {1, 0, 0, 0}}}, {ball, {{-0.03, 0, 0}, {1, 0, 0, 0}}}, {bar, {}}},
+          {place, q}, 0.1);
+      body.restitution = 0.9;
+      body.velocity = (Vec3(0.12, 0.06, 0) - place) / 0.1;
+      body.spin = {between(random, -9, 9), between(random, -9, 9), between(random, -9, 9)};
+    }
+    const Scene scene = s.scene();
+    RenderState state = scene.initial_state();
+    const BodyWorld& world = body_world_of(scene);
+    for (int i = 0; i < 400; ++i) {
+      run(scene, state, 1e-3);
+      BodyWorldState known = body_state_of(state), fresh = initial_state(world);
+      known.make_room();
+      fresh.motion = known.motion;
+      constexpr double kFar = 2e-3;
+      BodyContacts(world, known).find(0, kFar);
+      BodyContacts(world, fresh).find(0, kFar);
+      const auto gap_in = [](const BodyWorldState& of, std::uint32_t parts) {
+        for (const auto& near : of.near_parts) {
+          if (near.parts == parts) return near.gap;
+        }
+        return kFar;
+      };
+      for (std::uint32_t parts = 0; parts < world.part_pairs.size(); ++parts)
+        EXPECT_NEAR(gap_in(known, parts), gap_in(fresh, parts), 1e-7) << trial << " " << i;
+      found += fresh.near_parts.size();
+    }
+  }
+  EXPECT_GT(found, 300U);
 }
 
 TEST(BodyContact, FastOnesDoNotPassThroughThinWalls) {

@@ -137,9 +137,10 @@ void expect_energy_stays(std::uint64_t seed) {
 }
 
 /// With 126 to 147 a meeting was once found a rounding too far away to bounce, or two corners met
-/// within a microsecond and one of them was only held.
+/// within a microsecond and one of them was only held. With 1522 a box that another drives against
+/// the wall bounces nine times in one tick, with 1941 two corners meet 13 ns before its end.
 TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
-  for (const std::uint64_t seed : {5, 126, 142, 146, 147}) expect_energy_stays(seed);
+  for (const std::uint64_t seed : {5, 126, 142, 146, 147, 1522, 1941}) expect_energy_stays(seed);
 }
 
 /// Friction turns sliding round where a body strikes with its mass behind the place: Newton's law
