@@ -1,0 +1,72 @@
+"""The paper's floating dumbbell and flying rocket as stimuli of a simulated study. Usage: moving_stimuli_test.py PALPATE PROTOCOLS"""
+
+import csv
+import json
+import pathlib
+import shutil
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
+
+
+class MovingStimuli(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
+    def palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done
+
+    def stimulus(self, scene, name):
+        """The first object of a scene, heavy and slow enough to be found again."""
+        found = json.loads((PROTOCOLS / "scenes" / f"{scene}.json").read_text())["objects"][0]
+        self.assertIn("body", found)
+        found["body"] |= {"mass_kg": 4, "damping_per_s": 10}
+        found["body"].pop("velocity_m_per_s", None)
+        del found["position_m"]
+        if "file" in found:
+            source = PROTOCOLS / "scenes" / found["file"]
+            shutil.copy(source, self.dir)
+            found["file"] = source.name
+        return {"name": name, **found}
+
+    def test_scenes_that_move_are_simulated_kept_and_replayed(self):
+        path, db, out = (self.dir / f"flying.{end}" for end in ("json", "db", "csv"))
+        path.write_text(json.dumps({
+            "version": 1, "name": "flying", "renderers": ["point", "ray"], "samples": True, "repetitions": 1, "seed": 16,
+            "stimuli": [self.stimulus("fig14-dumbbells", "dumbbell"), self.stimulus("fig16-rocket", "rocket")],
+            "response": {"keys": {"1": "dumbbell", "2": "rocket"}, "time_out_s": 5}}))
+        self.palpate("validate", path)
+        self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3)
+        base = sqlite3.connect(db)
+        self.addCleanup(base.close)
+        trials = base.execute("SELECT trial, renderer, shape FROM attempts WHERE state = 'completed'").fetchall()
+        self.assertEqual({trial[1:] for trial in trials},
+                         {(renderer, shape) for renderer in ("point", "ray") for shape in ("dumbbell", "rocket")})
+        pushed = set()
+        for trial, renderer, shape in trials:
+            done = self.palpate("replay", "--db", db, "--trial", f"S001/1/{trial}", "--out", out, "--force")
+            self.assertIn("equal the record, bit by bit", done.stdout)
+            with out.open() as file:
+                rows = list(csv.DictReader(file))
+            place = [[float(row[f"recorded_body_{axis}"]) for axis in "xyz"] for row in rows]
+            felt = [float(row["recorded_depth"]) > 0 for row in rows]
+            # Nothing but the hand moves it.
+            first = felt.index(True) if any(felt) else len(rows)
+            for at in place[:first]:
+                self.assertEqual(at, place[0])
+            if place[-1] != place[0]:
+                pushed.add(shape)
+        self.assertEqual(pushed, {"dumbbell", "rocket"})
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
