@@ -1,5 +1,6 @@
 // What is up in the world is up in the picture, and the stylus goes where the pointer goes. Looked
-// for in the pixels that were drawn, not in what the camera says of itself.
+// for in the pixels that were drawn, not in what the camera says of itself. The view of a live
+// session has the same camera, ground and light (runner/display/scene_view.h).
 
 #include <gtest/gtest.h>
 
