@@ -1,6 +1,7 @@
 #pragma once
 // Trials of protocols of version 2: what was asked, at which level, and what was answered.
 
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include "analysis/input/trials.h"
 #include "data/record.h"
+#include "protocols/tasks/block_procedures.h"
 
 namespace palpate::analysis {
 
@@ -18,6 +20,7 @@ struct TaskTrial {
   std::optional<double> level, standard_level, number, confidence;
   bool catch_trial = false, success = false, answered = false;
   std::optional<bool> correct;  ///< none: no answer is right or wrong
+  int participant_number = 0;   ///< in whose order it was shown; 0: unknown
   int session = 1, block = 1, trial = 1;
   bool timed_out = false, simulated = false;
   int intervals = 0;                    ///< compare: how many; 0: unknown
@@ -33,6 +36,8 @@ struct TaskTable {
   Provenance provenance;          ///< of all of them
   /// Whose trials they are: name and SHA-256, each once.
   std::vector<std::pair<std::string, std::string>> protocols;
+  /// How levels were chosen, by SHA-256 of the protocol and name of the block: of databases.
+  std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
 };
 
 /// Whether a CSV file has a column "task" (an export of a study of version 2).

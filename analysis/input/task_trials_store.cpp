@@ -77,6 +77,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
     } else {
       table.trials.push_back(task_trial_of(stored.participant.code, stored.record));
       table.trials.back().protocol_sha256 = stored.protocol_sha256;
+      table.trials.back().participant_number = stored.participant.enrolled_number;
       table.trials.back().simulated = stored.participant.simulated;
       note_once(stored.protocol_name, names);
       note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
@@ -84,6 +85,10 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
       note_once(stored.run.observer_sha256, observers);
     }
   });
+  for (const data::ProtocolInfo& one : store.protocols()) {
+    if (is_protocol(protocol, one.name, one.sha256))
+      table.procedures[one.sha256] = protocols::procedures_of_blocks(one.text, path);
+  }
   table.provenance.protocol_name = listed(names);
   table.provenance.observer_sha256 = listed(observers);
   if (table.trials.empty())

@@ -1,8 +1,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <variant>
 
 #include "analysis/report/report_json.h"
 #include "analysis/report/task_report.h"
+#include "protocols/procedures/psychometric_names.h"
 
 namespace palpate::analysis {
 namespace {
@@ -29,7 +31,8 @@ TaskJson fit_json(const ParticipantFunction& one) {
   TaskJson fit;
   put_status(fit, one.fit.undefined);
   if (!one.fit.undefined.empty()) return fit;
-  fit["function"] = "logistic";
+  fit["function"] = to_string(one.model.function.shape);
+  fit["scale"] = to_string(one.model.function.scale);
   fit["threshold"] = one.fit.parameters.threshold;
   fit["threshold_ci95"] = ends_json(one.fit.threshold_ci95);
   fit["slope"] = one.fit.parameters.slope;
@@ -65,6 +68,27 @@ TaskJson posterior_json(const PsychometricPosterior& posterior) {
   return out;
 }
 
+/// What an adaptive procedure makes of its answers itself.
+TaskJson procedure_json(const TrackProcedure& procedure) {
+  const protocols::Estimate& estimate = procedure.estimate;
+  TaskJson out{{"kind", kind_of(procedure.spec)},
+               {"threshold", maybe(estimate.threshold)},
+               {"threshold_scale_sd", maybe(estimate.threshold_scale_sd)},
+               {"slope", maybe(estimate.slope)},
+               {"guess", maybe(estimate.guess)},
+               {"lapse", maybe(estimate.lapse)},
+               {"n_trials", estimate.trials},
+               {"n_reversals", estimate.reversals},
+               {"n_at_limit", estimate.at_limit},
+               {"converges_at", maybe(procedure.target)},
+               {"fit_level_there", maybe(procedure.fitted_level)}};
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure.spec)) {
+    out["function"] = to_string(quest->function.shape);
+    out["scale"] = to_string(quest->function.scale);
+  }
+  return out;
+}
+
 TaskJson function_json(const ParticipantFunction& one) {
   TaskJson out{{"participant_id", one.participant}};
   for (const LevelCount& count : one.counts)
@@ -79,6 +103,7 @@ TaskJson function_json(const ParticipantFunction& one) {
                              {"reversal_trials", TaskJson::array()}});
     for (const std::size_t at : track.reversals)
       out["tracks"].back()["reversal_trials"].push_back(at + 1);
+    if (track.procedure) out["tracks"].back()["procedure"] = procedure_json(*track.procedure);
   }
   TaskJson detection;
   put_status(detection, one.detectability.undefined);

@@ -2,10 +2,12 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <variant>
 
 #include "analysis/report/report_text.h"
 #include "analysis/report/task_report.h"
 #include "analysis/text.h"
+#include "protocols/procedures/psychometric_names.h"
 
 namespace palpate::analysis {
 namespace {
@@ -37,7 +39,35 @@ std::string detection_text(const ParticipantFunction& one) {
          optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
 }
 
-std::string function_text(const ParticipantFunction& one) {
+std::string procedure_text(const Track& track) {
+  const auto& [spec, estimate, target, fitted] = *track.procedure;
+  std::string text = "    track " + stimuli::printable(track.name) + ", ";
+  const auto* quest = std::get_if<protocols::QuestPlus>(&spec);
+  text += quest != nullptr ? "QUEST+" : kind_of(spec);
+  text += ": ";
+  if (!estimate.threshold) {
+    text += "no estimate";
+  } else if (target) {
+    text += short_number(*estimate.threshold) + ", its reversals' mean, where it converges at " +
+            fixed(100 * *target, 1) + " % successes";
+    if (fitted) text += "; the function is there at " + short_number(*fitted);
+  } else if (quest != nullptr) {
+    text += "threshold " + short_number(*estimate.threshold) + ", slope " +
+            short_number(*estimate.slope) + ", means of its posterior (" +
+            to_string(quest->function.shape) + ", " + to_string(quest->function.scale) + ")";
+  } else {
+    text += short_number(*estimate.threshold) + ", mean of where the answer changed";
+  }
+  text += "; " + counted(static_cast<std::size_t>(estimate.trials), "trial", "trials");
+  if (estimate.reversals > 0)
+    text += ", " + counted(static_cast<std::size_t>(estimate.reversals), "reversal", "reversals");
+  if (estimate.at_limit > 0)
+    text += ", " + std::to_string(estimate.at_limit) +
+            (target ? " at an end of its range" : " series without a change");
+  return text + "\n";
+}
+
+std::string function_line(const ParticipantFunction& one) {
   std::string text = "  " + pad_right(stimuli::printable(one.participant), 12);
   const std::string detected = detection_text(one);
   if (!one.fit.undefined.empty())
@@ -58,6 +88,30 @@ std::string function_text(const ParticipantFunction& one) {
   if (one.posterior.undefined.empty())
     text += "; Bayes " + with_interval(one.posterior.mean.threshold, one.posterior.threshold_ci95);
   return text + detected + "\n";
+}
+
+std::string function_text(const ParticipantFunction& one) {
+  std::string text = function_line(one);
+  for (const Track& track : one.tracks) {
+    if (track.procedure) text += procedure_text(track);
+  }
+  return text;
+}
+
+std::string explanation(const FunctionSettings& functions) {
+  const bool logarithmic = functions.scale != protocols::LevelScale::linear;
+  std::string text = std::string("Intervals are of 95 %. Psychometric functions: ") +
+                     to_string(functions.shape) +
+                     (logarithmic ? " over the logarithm (base 10) of levels" : "") +
+                     ", lapses free up to 0.06; compare with levels on\none side of the standard: "
+                     "guesses 1 / intervals, the ";
+  text += functions.shape == protocols::PsychometricShape::weibull
+              ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
+              : "threshold is half-way from there to certainty";
+  return text +
+         ";\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
+         "mean "
+         "of the threshold on a grid.\n";
 }
 
 std::string magnitude_text(const TaskCell& cell) {
@@ -191,13 +245,7 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
   if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
-  text +=
-      "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare "
-      "with "
-      "levels on\none side of the standard: guesses 1 / intervals, the threshold is half-way from "
-      "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. "
-      "Bayes: posterior "
-      "mean of the threshold on a grid.\n";
+  text += explanation(analysis.functions);
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);
   return text;

@@ -11,8 +11,14 @@
 namespace palpate::analysis {
 namespace {
 
+using protocols::LevelScale;
 using Trials = std::vector<const TaskTrial*>;
 using CellKey = std::tuple<std::string, std::string, std::string, std::string>;
+
+struct Context {
+  const FunctionSettings& settings;
+  const TaskTable& table;
+};
 
 /// Groups in the order of their first trial.
 template <class Key, class KeyOf>
@@ -63,62 +69,30 @@ DetectionCounts detections_of(const Trials& trials) {
   return counts;
 }
 
-/// A staircase goes one way after a success, if at all, and the other way after a failure: whatever
-/// does not is none.
-std::vector<std::size_t> reversals_of(const Track& track) {
-  std::vector<std::size_t> turns;
-  int after_success = 0, last = 0;
-  for (std::size_t i = 1; i < track.levels.size(); ++i) {
-    const double change = track.levels[i] - track.levels[i - 1];
-    if (change == 0) continue;
-    const int way = change > 0 ? 1 : -1;
-    const int meaning = track.successes[i - 1] ? way : -way;
-    if (after_success == 0) after_success = meaning;
-    if (meaning != after_success) return {};
-    if (last != 0 && way != last) turns.push_back(i - 1);
-    last = way;
-  }
-  return turns;
-}
-
-std::vector<Track> tracks_of(const Trials& trials) {
-  std::vector<Track> tracks;
-  for (const auto& [name, own] :
-       grouped<std::string>(trials, [](const TaskTrial& trial) { return trial.track; })) {
-    Track track;
-    track.name = name;
-    for (const TaskTrial* trial : own) {
-      if (!trial->level || trial->catch_trial || !trial->answered) continue;
-      track.levels.push_back(*trial->level);
-      track.successes.push_back(trial->success);
-    }
-    if (track.levels.size() < 2) continue;
-    track.reversals = reversals_of(track);
-    tracks.push_back(std::move(track));
-  }
-  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
-    return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);  // as numbers
-  });
-  return tracks;
-}
-
 /// Catch trials tell the guess rate: they stand infinitely far on the hard side.
 std::vector<LevelCount> with_catch_trials(std::vector<LevelCount> counts,
                                           const DetectionCounts& detections,
-                                          protocols::Easier easier) {
+                                          const protocols::PsychometricFunction& function) {
   if (detections.noise_trials == 0) return counts;
   const double infinity = std::numeric_limits<double>::infinity();
-  counts.push_back({easier == protocols::Easier::higher ? -infinity : infinity,
+  const double least = function.scale == LevelScale::linear ? -infinity : 0;
+  counts.push_back({function.easier == protocols::Easier::higher ? least : infinity,
                     detections.noise_trials, detections.false_alarms});
   return counts;
 }
 
-/// Of a forced choice.
-LevelFigures distance_from_standard(const PsychometricFit& fit, std::optional<double> standard) {
+/// Of a forced choice: the level half-way from guessing to certainty, whatever the function. That
+/// of a Weibull function is not its threshold; the slope is held over its interval.
+LevelFigures distance_from_standard(const PsychometricFit& fit, const PsychometricModel& model,
+                                    std::optional<double> standard) {
   LevelFigures figures;
   if (!standard) return figures;
-  const double away = fit.parameters.threshold - *standard;
-  const Interval ends = fit.threshold_ci95;
+  const auto half_way = [&](double threshold) {
+    if (model.function.shape != protocols::PsychometricShape::weibull) return threshold;
+    return psychometric_level(model.function, {threshold, fit.parameters.slope}, 0.5);
+  };
+  const double away = half_way(fit.parameters.threshold) - *standard;
+  const Interval ends{half_way(fit.threshold_ci95.low), half_way(fit.threshold_ci95.high)};
   const Interval distance = away >= 0 ? Interval{ends.low - *standard, ends.high - *standard}
                                       : Interval{*standard - ends.high, *standard - ends.low};
   figures.jnd = std::abs(away);
@@ -133,17 +107,17 @@ LevelFigures distance_from_standard(const PsychometricFit& fit, std::optional<do
 LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& model,
                         const TaskCell& cell) {
   if (cell.task == "detect" || cell.same_different) return {};
-  if (cell.forced_choice) return distance_from_standard(fit, cell.standard_level);
+  if (cell.forced_choice) return distance_from_standard(fit, model, cell.standard_level);
   const Discrimination found = discrimination(fit, model.function, cell.standard_level);
   return {found.pse,      found.jnd,      found.weber_fraction,
           found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
 }
 
 ParticipantFunction function_of(const std::string& participant, const Trials& trials,
-                                const TaskCell& cell, int simulations, std::uint64_t seed) {
+                                const TaskCell& cell, const Context& context) {
   ParticipantFunction result;
   result.participant = participant;
-  result.tracks = tracks_of(trials);
+  result.tracks = tracks_of(trials, context.table);
   const bool catches = cell.task == "detect" || cell.same_different;
   const DetectionCounts detections = detections_of(trials);
   const DetectionTask asked =
@@ -154,29 +128,33 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   result.fit.undefined = cell.no_function;
   result.posterior.undefined = cell.no_function;
   if (!cell.no_function.empty()) return result;
-  result.model.function.easier = easier_of(result.counts);
+  result.model.function = {context.settings.shape, context.settings.scale,
+                           easier_of(result.counts)};
   if (cell.forced_choice) result.model.guess.value = 1.0 / cell.intervals;
   std::vector<LevelCount> counts = result.counts;
   if (catches) {
     result.model.guess = {0, true, 0.5};
-    counts = with_catch_trials(counts, detections, result.model.function.easier);
+    counts = with_catch_trials(counts, detections, result.model.function);
   }
   result.model.lapse = {0, true, 0.06};
   result.fit = fit_psychometric(counts, result.model);
   result.posterior = psychometric_posterior(counts, result.model);
   if (result.fit.undefined.empty()) {
-    result.goodness = goodness_of_fit(counts, result.model, result.fit, simulations, seed);
+    result.goodness = goodness_of_fit(counts, result.model, result.fit,
+                                      context.settings.simulations, context.settings.seed);
     result.figures = figures_of(result.fit, result.model, cell);
+    add_fitted_levels(result.tracks, result.model, result.fit);
     const double threshold = result.fit.parameters.threshold;
     const Interval& ends = result.fit.threshold_ci95;
     result.determined = threshold >= result.counts.front().level &&
                         threshold <= result.counts.back().level && std::isfinite(ends.low) &&
-                        std::isfinite(ends.high);
+                        std::isfinite(ends.high) &&
+                        (ends.low > 0 || result.model.function.scale == LevelScale::linear);
   }
   return result;
 }
 
-void add_functions(TaskCell& cell, const Trials& trials, int simulations, std::uint64_t seed) {
+void add_functions(TaskCell& cell, const Trials& trials, const Context& context) {
   bool above = false, below = false;
   for (const TaskTrial* trial : trials) {
     if (trial->standard_level) cell.standard_level = trial->standard_level;
@@ -191,8 +169,12 @@ void add_functions(TaskCell& cell, const Trials& trials, int simulations, std::u
   if (compares && above && below && (cell.same_different || cell.intervals > 2))
     cell.no_function =
         "levels lie on both sides of the standard: successes are no monotonic function of them";
+  if (cell.no_function.empty() && context.settings.scale != LevelScale::linear &&
+      std::any_of(trials.begin(), trials.end(),
+                  [](const TaskTrial* trial) { return trial->level && *trial->level < 0; }))
+    cell.no_function = "levels below 0 have no place on a logarithmic scale";
   for (const auto& [participant, own] : by_participant(trials))
-    cell.functions.push_back(function_of(participant, own, cell, simulations, seed));
+    cell.functions.push_back(function_of(participant, own, cell, context));
 }
 
 void add_magnitude(TaskCell& cell, const Trials& trials) {
@@ -262,7 +244,7 @@ Type2Roc confidence_of(const Trials& trials) {
   return roc;
 }
 
-TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std::uint64_t seed) {
+TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& context) {
   TaskCell cell;
   std::tie(cell.task, cell.block_name, cell.shape, cell.renderer) = key;
   cell.trials = trials.size();
@@ -273,8 +255,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std:
   }
   for (const auto& [participant, own] : by_participant(trials))
     cell.participants.push_back(participant);
-  if (cell.task == "compare" || cell.task == "detect")
-    add_functions(cell, trials, simulations, seed);
+  if (cell.task == "compare" || cell.task == "detect") add_functions(cell, trials, context);
   if (cell.task == "rate") add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
   if (cell.task == "identify") add_information(cell, trials);
@@ -284,10 +265,12 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, int simulations, std:
 
 }  // namespace
 
-TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
+TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
                            const AnalysisSettings& settings, const std::string& program_version) {
   TaskAnalysis result;
   result.table = std::move(table);
+  result.functions = functions;
+  const Context context{functions, result.table};
   Trials all;
   for (const TaskTrial& trial : result.table.trials) all.push_back(&trial);
   const auto key_of = [](const TaskTrial& trial) {
@@ -296,7 +279,7 @@ TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
                    trial.renderer};
   };
   for (const auto& [key, trials] : grouped<CellKey>(all, key_of))
-    result.cells.push_back(cell_of(key, trials, simulations, seed));
+    result.cells.push_back(cell_of(key, trials, context));
   result.renderers = compare_renderers(result.cells);
   result.conditions = compare_conditions(result.cells);
   if (auto shapes = identification_of(result.table)) {

@@ -8,6 +8,7 @@
 
 #include "analysis/input/task_trials.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/information.h"
 #include "analysis/statistics/mixed_logistic.h"
 #include "analysis/statistics/psychometric_bayes.h"
@@ -15,16 +16,17 @@
 #include "analysis/statistics/scaling.h"
 #include "analysis/statistics/signal_detection.h"
 #include "analysis/statistics/task_comparisons.h"
+#include "analysis/statistics/task_tracks.h"
 
 namespace palpate::analysis {
 
-/// The trials of a track in order, those without an answer left out.
-struct Track {
-  std::string name;
-  std::vector<double> levels;
-  std::vector<bool> successes;
-  /// Of a staircase: where it turned, as indices. Empty where levels do not follow the answers.
-  std::vector<std::size_t> reversals;
+/// Which psychometric functions are fitted, and how their goodness of fit is judged.
+struct FunctionSettings {
+  protocols::PsychometricShape shape = protocols::PsychometricShape::logistic;
+  /// Weibull functions: not linear.
+  protocols::LevelScale scale = protocols::LevelScale::linear;
+  int simulations = 199;  ///< of each goodness of fit; 0: without p
+  std::uint64_t seed = 2026;
 };
 
 /// What is read off a participant's function, whatever its task measures. PSE: of two intervals
@@ -78,6 +80,7 @@ struct TaskCell {
 
 struct TaskAnalysis {
   TaskTable table;
+  FunctionSettings functions;
   std::vector<TaskCell> cells;
   std::vector<TaskComparison> renderers, conditions;
   /// What version 1 reports of identification, over all its blocks; none: no identification.
@@ -85,9 +88,8 @@ struct TaskAnalysis {
   std::optional<MixedLogistic> accuracy;  ///< likewise
 };
 
-/// \param simulations  of each goodness of fit. \param settings, program_version  of the analysis
-/// of identification
-TaskAnalysis analyze_tasks(TaskTable table, int simulations, std::uint64_t seed,
+/// \param settings, program_version  of the analysis of identification
+TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
                            const AnalysisSettings& settings = {},
                            const std::string& program_version = {});
 

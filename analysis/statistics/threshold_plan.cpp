@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/sensitivity.h"
 #include "stimuli/random.h"

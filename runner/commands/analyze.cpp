@@ -1,7 +1,6 @@
 #include "runner/commands/sweep/analyze.h"
 
 #include <cmath>
-#include <cstdint>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -58,8 +57,30 @@ void put(Outputs& outputs, const analysis::Analysis& analysis,
   if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
 }
 
-constexpr int kRefits = 199;  // of each goodness of fit
-constexpr std::uint64_t kRefitSeed = 2026;
+/// \throws UsageError
+analysis::FunctionSettings function_settings(const boost::program_options::variables_map& values,
+                                             const std::string& function,
+                                             const std::string& scale) {
+  using protocols::LevelScale;
+  using protocols::PsychometricShape;
+  analysis::FunctionSettings settings;
+  if (function == "normal") {
+    settings.shape = PsychometricShape::normal;
+  } else if (function == "weibull") {
+    settings.shape = PsychometricShape::weibull;
+    settings.scale = LevelScale::log10;
+  } else if (function != "logistic") {
+    throw UsageError("--function: expected logistic, normal or weibull, found '" +
+                     stimuli::printable(function) + "'");
+  }
+  if (values.count("scale") == 0) return settings;
+  if (scale != "linear" && scale != "log")
+    throw UsageError("--scale: expected linear or log, found '" + stimuli::printable(scale) + "'");
+  if (scale == "linear" && settings.shape == PsychometricShape::weibull)
+    throw UsageError("--scale: expected log with --function weibull, whose slope is an exponent");
+  settings.scale = scale == "log" ? LevelScale::log10 : LevelScale::linear;
+  return settings;
+}
 
 /// Blocks of one name in two protocols are two things. \throws UsageError
 void require_one_protocol(const analysis::TaskTable& table, const std::string& wanted) {
@@ -79,12 +100,12 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
 /// A study of version 2, or its export.
 void analyze_tasks_of(const std::string& database, const std::string& csv,
                       const std::string& protocol, const analysis::AnalysisSettings& settings,
-                      Outputs& outputs) {
+                      const analysis::FunctionSettings& functions, Outputs& outputs) {
   analysis::TaskTable table = csv.empty() ? analysis::read_task_trials_store(database, protocol)
                                           : analysis::read_task_trials_csv(csv, protocol);
   require_one_protocol(table, protocol);
   const analysis::TaskAnalysis found =
-      analysis::analyze_tasks(std::move(table), kRefits, kRefitSeed, settings, PALPATE_VERSION);
+      analysis::analyze_tasks(std::move(table), functions, settings, PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
@@ -116,6 +137,7 @@ int analyze_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--protocol NAME]\n"
+      "       [--function logistic|normal|weibull] [--scale linear|log]\n"
       "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
@@ -133,11 +155,12 @@ int analyze_command(const std::vector<std::string>& args) {
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
       "      (data of others: participant_id, session, block, trial, renderer, shape, response,\n"
       "      correct and response_time suffice)\n"
+      "  palpate analyze --db thresholds.db --function weibull\n"
       "  palpate analyze --sweep people.sweep --report people.html\n"
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
       "      time_ray_cone; + - * /, < <= > >= == !=, && || !, min, max, abs, parentheses)";
-  std::string database, csv, sweep, pattern, protocol, json, report, figures;
+  std::string database, csv, sweep, pattern, protocol, json, report, figures, function, scale;
   analysis::AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -155,21 +178,30 @@ int analyze_command(const std::vector<std::string>& args) {
   add("force", "replace existing files");
   add("too-fast-s", po::value(&settings.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
       "exclude correct answers faster than this from the times");
+  add("function", po::value(&function)->default_value("logistic")->value_name("NAME"),
+      "psychometric function of tasks: logistic, normal or weibull");
+  add("scale", po::value(&scale)->value_name("NAME"),
+      "of the levels of psychometric functions: linear or log; default: linear, of weibull log");
   const auto values = line.parse(args);
   if (!values) return 0;
   check(*values, settings, line.usage);
+  const analysis::FunctionSettings functions = function_settings(*values, function, scale);
   Outputs outputs(*values, {"json", "report"}, {"db", "csv", "sweep"}, "figures");
   if (values->count("sweep")) {
+    if (!(*values)["function"].defaulted() || values->count("scale"))
+      throw UsageError("--function, --scale: a sweep's points have their figures already");
     const std::string text = analyze_sweep_file(sweep, pattern, outputs);
     outputs.write();
     std::cout << text;
     return 0;
   }
   if (is_of_tasks(database, csv) || !protocol.empty()) {
-    analyze_tasks_of(database, csv, protocol, settings, outputs);
+    analyze_tasks_of(database, csv, protocol, settings, functions, outputs);
     return 0;
   }
 
+  if (!(*values)["function"].defaulted() || values->count("scale"))
+    throw UsageError("--function, --scale: there are no tasks with psychometric functions");
   const analysis::Analysis analysis =
       analysis::analyze(read_study_trials(database, csv), settings, PALPATE_VERSION);
   analysis::StudyRecord record;

@@ -5,12 +5,14 @@ import json
 import math
 import pathlib
 import random
+import statistics
 import subprocess
 import sys
 import tempfile
 import unittest
 
 PALPATE = sys.argv.pop(1)
+FIXTURES = pathlib.Path(__file__).with_name("fixtures")
 PEOPLE = 5  # of a forced choice
 COLUMNS = ["participant_id", "session", "block", "trial", "renderer", "shape", "response", "correct",
            "response_time", "practice", "timed_out", "simulated", "task", "block_name", "track", "level",
@@ -146,6 +148,71 @@ class Tasks(unittest.TestCase):
         self.write(rows)
         self.assertEqual(self.analyze("--json", self.path / "found.json", "--force").returncode, 0)
         return json.loads((self.path / "found.json").read_text())
+
+    def test_functions_by_command_are_those_of_r(self):
+        """Maximum likelihood by R's optim on the definition (fixtures/make_psychophysics.R): of a comparison about a standard,
+        and of a forced choice. The JND of a forced choice is measured half-way from guessing to certainty, of a Weibull
+        function by its inverse."""
+        for case in json.loads((FIXTURES / "psychophysics.json").read_text())["by_command"]:
+            function, scale = case["name"].split()
+            standard = 500 if case["guess"] == 0 else 100
+            rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": 1000 * place + i + 1, "renderer": "ray", "shape": "ball",
+                     "response": "2", "correct": 1, "task": "compare", "block_name": "b", "track": 1, "level": level,
+                     "standard_level": standard, "success": int(i < k)}
+                    for place, (level, n, k) in enumerate(zip(case["levels"], case["n"], case["k"])) for i in range(n)]
+            self.write(rows)
+            for chosen in ([["--scale", scale]] if function != "weibull" else [[], ["--scale", "log"]]):
+                with self.subTest(case["name"], guess=case["guess"], chosen=chosen):
+                    done = self.analyze("--function", function, *chosen, "--json", self.path / "one.json", "--force")
+                    self.assertEqual((done.returncode, done.stderr), (0, ""))
+                    self.assertIn(f"Psychometric functions: {function}", done.stdout)
+                    cell, = json.loads((self.path / "one.json").read_text())["cells"]
+                    fit = cell["psychometric_functions"][0]["fit"]
+                    self.assertEqual((fit["function"], fit["scale"], fit["guess"]), (function, scale, case["guess"]))
+                    self.assertAlmostEqual(fit["log_likelihood"], case["log_likelihood"], delta=1e-6)
+                    self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
+                    self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
+                    self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
+                    for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
+                        self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
+                    if case["guess"] == 0.5:
+                        half_way = fit["threshold"] * (math.log(2) ** (1 / fit["slope"]) if function == "weibull" else 1)
+                        self.assertAlmostEqual(fit["jnd"], half_way - standard, delta=1e-6 * standard)
+                    elif scale == "log":
+                        quartile = {"logistic": lambda p: math.log(p / (1 - p)), "normal": statistics.NormalDist().inv_cdf,
+                                    "weibull": lambda p: math.log10(-math.log(1 - p))}[function]
+                        ratio = 10 ** ((quartile(0.75) - quartile(0.25)) / 2 / fit["slope"])
+                        self.assertAlmostEqual(fit["weber_fraction"], ratio - 1, delta=1e-6)
+
+    def test_functions_are_refused_where_they_have_no_meaning(self):
+        self.write(rows_of_a_study(1)[:50])
+        for wrong, said in ((["--function", "gumbel"], "logistic, normal or weibull"), (["--scale", "db"], "linear or log"),
+                            (["--function", "weibull", "--scale", "linear"], "log with --function weibull")):
+            done = self.analyze(*wrong)
+            self.assertEqual(done.returncode, 2, wrong)
+            self.assertIn(said, done.stderr)
+        rows = [row | {"level": row["level"] - 400} for row in rows_of_a_study(1) if row["task"] == "compare"]
+        self.write(rows)
+        done = self.analyze("--scale", "log")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("levels below 0 have no place on a logarithmic scale", done.stdout)
+
+    def test_catch_trials_tell_guesses_on_a_logarithmic_scale_too(self):
+        draw = random.Random(8)
+        for function in ("logistic", "normal", "weibull"):
+            rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": i + 1, "renderer": "ray", "shape": "bump", "correct": "",
+                     "task": "detect", "block_name": "b", "track": 1, "level": level or "", "catch_trial": int(level == 0),
+                     "success": int(draw.random() < 0.2 + 0.78 * (1 - math.exp(-(level / 2) ** 3))), "response": "yes"}
+                    for i, level in enumerate([0, 0, 0.5, 1, 1.5, 2, 2.5, 3, 4] * 60)]
+            self.write(rows)
+            done = self.analyze("--function", function, "--scale", "log", "--json", self.path / "one.json", "--force")
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            one, = json.loads((self.path / "one.json").read_text())["cells"][0]["psychometric_functions"]
+            false_alarms = sum(row["success"] for row in rows if row["catch_trial"]) / 120
+            self.assertAlmostEqual(one["fit"]["guess"], false_alarms, delta=0.09)
+            self.assertAlmostEqual(one["fit"]["threshold"], 2 if function == "weibull" else 1.77, delta=0.35)
+            self.assertTrue(one["fit"]["determined"])
+            self.assertAlmostEqual(one["bayes"]["threshold"], one["fit"]["threshold"], delta=0.15)
 
     def test_three_intervals_are_guessed_by_a_third(self):
         rows = [{**row, "interval_onsets": "0;1;2"} for row in self.forced(random.Random(5), 350, 1 / 3)]

@@ -164,7 +164,9 @@ std::vector<double> identified(const analysis::TaskTable& table, const data::Tas
 /// Of a protocol of version 2, in the order of figure_columns().
 std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
                                                    analysis::TaskTable table) {
-  const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), 0, 1);
+  analysis::FunctionSettings without_p;
+  without_p.simulations = 0;
+  const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), without_p);
   std::vector<std::optional<double>> out;
   for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
     const auto cell =

@@ -5,6 +5,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 import pathlib
 import sys
 import unittest
@@ -42,7 +43,11 @@ class TaskStudies(CommandCase):
                 found = json.loads(out.read_text())
                 text, rows = self.exported(db)
                 self.assertEqual(found["n_trials"] + found["n_practice"], len(rows))
-                # The export is analysed to the same cells as the database.
+                # The export is analysed to the same cells as the database, which alone knows the procedures.
+                for cell in found["cells"]:
+                    for one in cell.get("psychometric_functions", []):
+                        for track in one.get("tracks", []):
+                            track.pop("procedure", None)
                 self.assertEqual(self.numbers("--csv", self.dir / f"{name}.csv")["cells"], found["cells"])
                 for kind in ("bids", "psych-ds"):
                     folder = self.dir / f"{name}-{kind}"
@@ -93,6 +98,56 @@ class TaskStudies(CommandCase):
                     headers = {column for path in folder.rglob("*_data.csv")
                                for column in path.read_text().splitlines()[0].split(",")}
                     self.assertEqual(measured, headers)
+
+    def test_what_an_adaptive_procedure_made_of_its_answers_stands_beside_the_fit(self):
+        db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "stairs", participants=3)
+        said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
+        self.assertIn("its reversals' mean, where it converges at 70.7 % successes", said)
+        self.assertIn("where it converges at 70.7 % successes", (self.dir / "stairs.html").read_text())
+        compared = 0
+        for cell in self.numbers("--db", db)["cells"]:
+            for one in cell["psychometric_functions"]:
+                for track in one["tracks"]:
+                    if cell["block_name"] == "constant":
+                        self.assertNotIn("procedure", track)
+                        continue
+                    found = track["procedure"]
+                    self.assertEqual(found["kind"], "staircase")
+                    down = {"1": 2, "2": 3}[track["track"]]
+                    self.assertAlmostEqual(found["converges_at"], 0.5 ** (1 / down), places=9)
+                    # By the definition: the track's levels where its way turns, two discarded, an even number of them.
+                    turns = [track["levels"][trial - 1] for trial in track["reversal_trials"]]
+                    if found["n_reversals"] > len(turns):  # the last one ends the track: nothing follows
+                        turns.append(track["levels"][-1])
+                    kept = turns[2 + (len(turns) - 2) % 2:]
+                    self.assertEqual(found["n_reversals"], len(turns))
+                    self.assertAlmostEqual(found["threshold"], sum(kept) / len(kept), places=6)
+                    fit = one["fit"]
+                    at = fit["guess"] + (1 - fit["guess"] - fit["lapse"]) / (
+                        1 + math.exp(-fit["slope"] * (found["fit_level_there"] - fit["threshold"])))
+                    self.assertAlmostEqual(at, found["converges_at"], places=9)
+                    compared += 1
+        self.assertEqual(compared, 6)
+
+    def test_what_quest_plus_made_of_its_answers_is_its_posterior(self):
+        db = self.simulated(PROTOCOLS / "size-questplus.json", "quest", participants=2)
+        spec = json.loads((PROTOCOLS / "size-questplus.json").read_text())["blocks"][1]["procedure"]
+        self.assertIn("QUEST+: threshold", self.palpate("analyze", "--db", db, "--function", "weibull").stdout)
+        for cell in self.numbers("--db", db, "--function", "weibull")["cells"]:
+            for one in cell["psychometric_functions"]:
+                track, = one["tracks"]
+                posterior = {(t, s): 1.0 for t in spec["threshold"] for s in spec["slope"]}
+                for level, success in zip(track["levels"], track["successes"]):
+                    for t, s in posterior:
+                        p = 0.5 + 0.48 * (1 - math.exp(-(level / t) ** s))
+                        posterior[t, s] *= p if success else 1 - p
+                whole = sum(posterior.values())
+                log_threshold = sum(w * math.log10(t) for (t, _), w in posterior.items()) / whole
+                found = track["procedure"]
+                self.assertEqual((found["kind"], found["function"], found["scale"]), ("quest_plus", "weibull", "log"))
+                self.assertAlmostEqual(found["threshold"] / 10 ** log_threshold, 1, places=9)
+                self.assertAlmostEqual(found["slope"], sum(w * s for (_, s), w in posterior.items()) / whole, places=6)
+                self.assertEqual(found["n_trials"], 32)
 
     def test_what_the_simulated_participants_can_do_is_found_again(self):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "a", participants=4)

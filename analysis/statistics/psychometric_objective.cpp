@@ -1,0 +1,123 @@
+#include "analysis/statistics/psychometric_objective.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace palpate::analysis {
+namespace {
+
+constexpr double kWorst = std::numeric_limits<double>::infinity();
+constexpr PsychometricSearch kOneStart{21, 19, 1};
+
+double rate_of(const RateModel& rate, double x) {
+  const double s = std::sin(x);
+  return rate.most * s * s;
+}
+
+}  // namespace
+
+PsychometricObjective::Point PsychometricObjective::point(const std::vector<double>& x) const {
+  std::size_t i = 0;
+  Point p{};
+  p.threshold = threshold_ ? *threshold_ : x[i++];
+  p.log_slope = std::clamp(log_slope_ ? *log_slope_ : x[i++], data_.least_log_slope(),
+                           data_.most_log_slope());
+  p.guess = model_.guess.free ? rate_of(model_.guess, x[i++]) : model_.guess.value;
+  p.lapse = model_.lapse.free ? rate_of(model_.lapse, x[i++]) : model_.lapse.value;
+  return p;
+}
+
+double PsychometricObjective::operator()(const std::vector<double>& x) const {
+  const Point p = point(x);
+  return -psychometric_log_likelihood(data_, model_.function, p.threshold, std::exp(p.log_slope),
+                                      p.guess, p.lapse);
+}
+
+SimplexMinimum PsychometricObjective::best_from(const std::vector<double>& start, double step,
+                                                double tolerance) const {
+  std::vector<double> steps;
+  if (!threshold_) steps.push_back(step * (data_.high - data_.low));
+  while (steps.size() < start.size()) steps.push_back(3 * step);
+  return minimize([this](const std::vector<double>& x) { return (*this)(x); }, start, steps,
+                  tolerance);
+}
+
+SimplexMinimum PsychometricObjective::best(const PsychometricSearch& search,
+                                           double tolerance) const {
+  SimplexMinimum found;
+  found.value = kWorst;
+  for (const Start& start : starts_of_grid(search)) {
+    SimplexMinimum one = best_from(start.place, 0.1, tolerance);
+    if (one.value < found.value) found = std::move(one);
+  }
+  return found;
+}
+
+std::optional<std::vector<double>> PsychometricObjective::other_start(
+    const std::vector<double>& place) const {
+  const std::vector<Start> starts = starts_of_grid(kOneStart);
+  if (starts.empty()) return std::nullopt;
+  const double cell =
+      threshold_ ? (data_.most_log_slope() - data_.least_log_slope()) / (kOneStart.slopes - 1)
+                 : (data_.high - data_.low) / (kOneStart.thresholds - 1);
+  const bool far = std::abs(starts.front().place[0] - place[0]) > 2 * cell;
+  return far ? std::optional(starts.front().place) : std::nullopt;
+}
+
+/// Rates of the grid, as best_from takes them: near 0 and near their most.
+std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
+  std::vector<std::vector<double>> all{{}};
+  for (const RateModel* rate : {&model_.guess, &model_.lapse}) {
+    if (!rate->free) continue;
+    std::vector<std::vector<double>> longer;
+    for (const std::vector<double>& one : all) {
+      for (const double x : {0.25, 1.3}) {
+        longer.push_back(one);
+        longer.back().push_back(x);
+      }
+    }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+/// The best ones, each two cells from those that are better.
+std::vector<PsychometricObjective::Start> PsychometricObjective::starts_of_grid(
+    const PsychometricSearch& search) const {
+  constexpr int kApart = 2;
+  const double range = data_.high - data_.low;
+  const double flat = data_.least_log_slope(), steep = data_.most_log_slope();
+  std::vector<Start> all;
+  const std::vector<std::vector<double>> rates = rates_of_grid();
+  for (int t = 0; t < (threshold_ ? 1 : search.thresholds); ++t) {
+    for (int s = 0; s < (log_slope_ ? 1 : search.slopes); ++s) {
+      Start best;
+      best.value = kWorst;
+      for (const std::vector<double>& rate : rates) {
+        std::vector<double> place;
+        if (!threshold_) place.push_back(data_.low + range * t / (search.thresholds - 1));
+        if (!log_slope_) place.push_back(flat + (steep - flat) * s / (search.slopes - 1));
+        place.insert(place.end(), rate.begin(), rate.end());
+        const double value = (*this)(place);
+        if (value < best.value) best = {value, t, s, std::move(place)};
+      }
+      if (best.value < kWorst) all.push_back(std::move(best));
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Start& a, const Start& b) { return a.value < b.value; });
+  std::vector<Start> chosen;
+  for (Start& one : all) {
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const Start& other) {
+      return std::abs(one.threshold - other.threshold) < kApart &&
+             std::abs(one.slope - other.slope) < kApart;
+    });
+    if (!near) chosen.push_back(std::move(one));
+    if (chosen.size() >= search.starts) break;
+  }
+  return chosen;
+}
+
+}  // namespace palpate::analysis
