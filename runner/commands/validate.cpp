@@ -97,6 +97,9 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
     out << "  page        " << page.name << ", " << kPlaces[static_cast<std::size_t>(page.when)]
         << page.before_block << "\n";
   }
+  const std::vector<std::string> typed = keyboard_parts(protocol);
+  if (!typed.empty())
+    out << "  keyboard    needed beside a device's buttons for " << list(typed) << "\n";
   out << "  trials      at most " << trials << " for each participant\n"
       << masking(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cstddef>
 #include <utility>
@@ -217,6 +218,20 @@ void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_n
     if (view_.answers && view_.interval == 2 && is_turn(*task(), answer)) return reply();
     pending_ = answer;
     return;
+  }
+}
+
+void KeyboardRespondent::look_at_buttons(const Sample& newest) {
+  const unsigned pressed = newest.buttons & ~static_cast<unsigned>(buttons_);
+  buttons_ = newest.buttons;
+  if (by_ != AnswerBy::buttons || pressed == 0 || page_.typing != Page::Typing::none) return;
+  const auto button = static_cast<std::size_t>(std::countr_zero(pressed));
+  if (page_.keys.empty()) {
+    spoken_.push_back({"space", newest.time_ns});
+  } else if (button < page_.keys.size()) {
+    spoken_.push_back({page_.keys[button].first, newest.time_ns});
+  } else {
+    reply();
   }
 }
 

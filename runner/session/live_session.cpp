@@ -140,6 +140,7 @@ void LiveSession::attend() {
   }
   check_noise();
   check_device();
+  if (!monitor_.in_trial() || monitor_.asking()) respondent_.look_at_buttons(forces_.newest());
   if (!station_.screen.open())
     throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
   if (std::string trouble = station_.screen.trouble(); trouble != told_trouble_) {

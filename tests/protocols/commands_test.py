@@ -85,6 +85,11 @@ class Validate(unittest.TestCase):
             for output in (said.stdout, refused.stderr, unknown.stderr, run("\x1b[2J").stderr):
                 self.assertNotRegex(output, rb"[\x00-\x09\x0b-\x1f\x7f]|\xc2[\x80-\x9f]|\xe2\x80\xae")
 
+    def test_says_what_needs_a_keyboard_beside_buttons(self):
+        said = run("validate", str(SOURCE / "protocols" / "roughness-magnitude.json")).stdout.decode()
+        self.assertIn("keyboard    needed beside a device's buttons for numbers of 'estimate', 'age' of page 'about-you'\n", said)
+        self.assertNotIn("keyboard", run("validate", str(SOURCE / "protocols" / "stiffness-2afc.json")).stdout.decode())
+
     def test_missing_file_and_wrong_usage(self):
         self.assertEqual(run("validate", "nowhere.json").returncode, 2)
         self.assertEqual(run("validate").returncode, 2)

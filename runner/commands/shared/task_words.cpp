@@ -112,6 +112,26 @@ std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol
   return trials;
 }
 
+std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol) {
+  constexpr std::size_t kButtons = 8;
+  std::vector<std::string> parts;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    if (block.answers.empty()) parts.push_back("numbers of '" + block.name + "'");
+    if (block.answers.size() > kButtons) parts.push_back("answers to '" + block.name + "'");
+    if (block.confidence && block.confidence->scale.size() > kButtons)
+      parts.push_back("confidence of '" + block.name + "'");
+  }
+  for (const protocols::PageSpec& page : protocol.pages) {
+    for (const protocols::PageItem& item : page.items) {
+      const bool typed = item.kind == protocols::PageItem::Kind::text ||
+                         item.kind == protocols::PageItem::Kind::number;
+      if (typed || item.choices.size() > kButtons)
+        parts.push_back("'" + item.name + "' of page '" + page.name + "'");
+    }
+  }
+  return parts;
+}
+
 int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial) {
   if (block.task != protocols::TaskKind::compare) return 0;
   for (std::size_t i = 0; i < trial.intervals.size(); ++i) {

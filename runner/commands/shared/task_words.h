@@ -20,6 +20,10 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
 /// participant whose threshold is in the middle of the levels.
 std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant);
 
+/// What of a protocol of version 2 the eight buttons of a device cannot answer, so that a session
+/// with --buttons needs a keyboard: "numbers of 'estimate'", ...
+std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol);
+
 /// Position of what was compared with the standard, from 1; 0: none.
 int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial);
 

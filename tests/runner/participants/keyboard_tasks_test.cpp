@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <functional>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -277,6 +278,54 @@ TEST_F(KeyboardTasks, CuesAreHeardWhenTheyAreSeen) {
   person_->feedback(false);
   EXPECT_EQ(nobody_.sounds,
             (std::vector<SoundCue>{SoundCue::ready, SoundCue::right, SoundCue::wrong}));
+}
+
+/// Looks at a button that is pressed at some looks, by number from 1.
+void press_at(KeyboardRespondent& person, Nobody& nobody, Clock& clock,
+              const std::map<int, int>& presses) {
+  const int begun = nobody.looks;
+  nobody.each_look = [&person, &nobody, &clock, presses, begun] {
+    Sample sample;
+    sample.time_ns = clock.now_ns();
+    const auto now = presses.find((nobody.looks - begun) / 3);  // each is held for three looks
+    if (now != presses.end()) sample.buttons = static_cast<std::uint8_t>(1U << (now->second - 1));
+    person.look_at_buttons(sample);
+  };
+}
+
+TEST_F(KeyboardTasks, ButtonsAnswerPagesAndConfidence) {
+  KeyboardRespondent& one = person(AnswerBy::buttons);
+  const protocols::ConfidenceSpec sure{"SURE?", {{1, "guessed"}, {2, "sure"}, {3, "certain"}}};
+  press_at(one, nobody_, clock_, {{2, 5}, {4, 3}});  // there is no fifth
+  EXPECT_EQ(one.confidence(sure).value().stimulus, 2);
+  EXPECT_EQ(screen_.replies.count("OTHER KEY"), 1U);
+  // The same press goes no further: it is still held when the next page comes.
+  const protocols::PageItem hand{protocols::PageItem::Kind::choice,
+                                 "hand",
+                                 "HAND?",
+                                 {"l", "r"},
+                                 {},
+                                 {},
+                                 true,
+                                 {"left", "right"}};
+  press_at(one, nobody_, clock_, {{0, 3}, {2, 2}});
+  EXPECT_EQ(one.ask({}, hand), "r");
+  const std::size_t pages = screen_.pages.size();
+  press_at(one, nobody_, clock_, {{2, 4}, {4, 1}});
+  one.read_screens({{"FIRST", nullptr}, {"SECOND", nullptr}});
+  ASSERT_GE(screen_.pages.size(), pages + 2);
+  EXPECT_EQ(screen_.pages.back().text, "SECOND");
+}
+
+TEST_F(KeyboardTasks, ButtonsDoNotTypeAndKeysOfPagesStayAllowed) {
+  KeyboardRespondent& one = person(AnswerBy::buttons);
+  press_at(one, nobody_, clock_, {{1, 1}, {3, 2}});
+  protocols::PageItem age{protocols::PageItem::Kind::number, "age", "AGE?", {}, 18, 120};
+  EXPECT_EQ(ask(age, "42\n"), "42");
+  KeyboardRespondent& by_keys = person(AnswerBy::keys);
+  press_at(by_keys, nobody_, clock_, {{1, 1}});
+  screen_.script = {{}, {}, {}, {}, {}, {}, {}, {}, {"2"}};
+  EXPECT_EQ(by_keys.confidence({"SURE?", {{1, "no"}, {2, "yes"}}}).value().stimulus, 1);
 }
 
 }  // namespace
