@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "protocols/parse.h"
+#include "protocols/tasks/task_plan.h"
 #include "runner/commands/cluster/job.h"
 #include "runner/commands/cluster/plan_scripts.h"
 #include "runner/commands/cluster/slurm.h"
@@ -32,10 +33,10 @@ struct ClusterSettings {
   bool no_submit = false;
 };
 
-/// Sites ask for tasks of ten minutes at least. \param trials  of a shard
-void warn_of_small_shards(const std::string& items, double trials) {
-  constexpr double kSecondsATrial = 10, kSpeed = 3000, kLeast = 600;  // simulated s, in 1 s, s
-  const double seconds = trials * kSecondsATrial / kSpeed;
+/// Sites ask for tasks of ten minutes at least. \param felt  stimuli of a shard
+void warn_of_small_shards(const std::string& items, double felt) {
+  constexpr double kSecondsAStimulus = 10, kSpeed = 3000, kLeast = 600;  // simulated s, in 1 s, s
+  const double seconds = felt * kSecondsAStimulus / kSpeed;
   std::cerr << "a shard: some " << items << ", roughly " << std::lround(std::ceil(seconds / 60))
             << " min\n";
   if (seconds < kLeast)
@@ -74,7 +75,7 @@ int submit_or_say(const ClusterSettings& settings, const fs::path& folder, Clust
 int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Protocol& protocol,
           const std::vector<std::string>& others,
           const std::function<std::string(const std::vector<std::string>&)>& command,
-          double trials_an_item) {
+          double felt_an_item) {
   if (settings.shards < 1 || settings.shards > std::min<std::int64_t>(job.items, 999'999)) {
     throw UsageError("--shards: must be 1 to the number of " +
                      std::string(job.work == "sweep" ? "points" : "participants") +
@@ -86,8 +87,26 @@ int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Prot
   const double items = static_cast<double>(job.items) / static_cast<double>(job.shards);
   warn_of_small_shards(
       std::to_string(std::lround(items)) + (job.work == "sweep" ? " points" : " participants"),
-      items * trials_an_item);
+      items * felt_an_item);
   return submit_or_say(settings, folder, std::move(job));
+}
+
+/// Stimuli that a participant feels: of tasks each interval, adaptive ones at most.
+/// \param repetitions  of version 1
+double stimuli_felt(const protocols::Protocol& protocol, int repetitions) {
+  if (protocol.version == 1)
+    return static_cast<double>(protocol.stimuli.size() * protocol.renderers.size()) * repetitions;
+  double felt = 0;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    const bool with_standard =
+        block.task == protocols::TaskKind::adjust ||
+        (block.task == protocols::TaskKind::rate && block.standard.has_value());
+    const int intervals = block.task == protocols::TaskKind::compare ? block.intervals
+                          : with_standard                            ? 2
+                                                                     : 1;
+    felt += static_cast<double>(protocols::most_trials_of(block)) * intervals;
+  }
+  return felt;
 }
 
 int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
@@ -107,8 +126,7 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
   job.items = planned.plan.points;
   const int repetitions = sweep.repetitions > 0 ? sweep.repetitions : planned.protocol.repetitions;
   return begin(settings, job, planned.protocol, {sweep.space, sweep.patch}, command,
-               static_cast<double>(planned.plan.shapes.size() * planned.plan.renderers.size()) *
-                   sweep.participants * repetitions);
+               sweep.participants * stimuli_felt(planned.protocol, repetitions));
 }
 
 int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
@@ -127,8 +145,7 @@ int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
   job.items = study.participants;
   job.per_item = protocol.sessions.count;
   return begin(settings, job, protocol, {study.patch}, command,
-               static_cast<double>(protocol.stimuli.size() * protocol.renderers.size()) *
-                   protocol.repetitions);
+               stimuli_felt(protocol, protocol.repetitions));
 }
 
 int cluster_submit(const std::string& given) {

@@ -134,6 +134,28 @@ class Cluster(unittest.TestCase):
         self.assertIn("--shards", self.palpate("cluster", "simulate", *self.STUDY, "--shards", 4, "--dir", "e", status=2))
         self.assertIn("--space", self.palpate("cluster", "simulate", *self.STUDY, "--space", "s.json", "--shards", 2, "--dir", "e", status=2))
 
+    def test_tasks_are_estimated_by_what_is_felt_and_swept_as_on_one_machine(self):
+        # 4 + 70 + 80 trials of two intervals, 10 s each, 3000 simulated s in a second.
+        stiffness = PROTOCOLS / "stiffness-2afc.json"
+        said = self.palpate("cluster", "sweep", stiffness, "--space", "s.json", "--points", 100, "--participants", 30,
+                            "--shards", 1, "--dir", "t", "--no-submit")
+        self.assertIn("roughly 52 min", said)
+        self.assertNotIn("warning", said)
+        said = self.palpate("cluster", "simulate", stiffness, "--participants", 3000, "--shards", 3, "--dir", "u", "--no-submit")
+        self.assertIn("roughly 18 min", said)
+        ball = {"shape": "sphere", "radius_m": 0.02, "subdivisions": 1, "stiffness_n_per_m": 300}
+        (self.folder / "few.json").write_text(json.dumps({
+            "version": 2, "name": "few", "renderers": ["point"], "orientation": "fixed", "stimuli": [{"name": "ball", **ball}],
+            "blocks": [{"name": "stairs", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+                        "level": {"path": "/stiffness_n_per_m"},
+                        "procedure": {"kind": "staircase", "start": 500, "min": 300, "max": 600, "steps": [50],
+                                      "stop": {"trials": 12}}}]}))
+        few = ["few.json", "--space", "s.json", "--points", 3, "--participants", 2]
+        self.palpate("cluster", "sweep", *few, "--shards", 2, "--dir", "v")
+        self.palpate("sweep", *few, "--db", "few.sweep")
+        self.assertEqual((self.folder / "v/all.sweep").read_bytes(), (self.folder / "few.sweep").read_bytes())
+        self.assertIn("points: 3 of 3", self.palpate("cluster", "status", "v"))
+
     PLAN_OPTIONS = ["--gain-sd", 0.15, "--residual-sd", 0.5, "--effect", "cone=22,cube=11", "--participants", "4-30",
                     "--studies", 400, "--trials", "5,9,20"]
 
