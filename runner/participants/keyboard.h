@@ -48,8 +48,8 @@ class KeyboardRespondent final : public Respondent {
   /// What the participant has said: a key, its label or a number; "": on to the next.
   /// \return  false: nothing of the kind is asked now
   bool spoken(const std::string& answer, std::int64_t time_ns);
-  /// To be called while no trial is felt, where the device's buttons answer: button n stands for the
-  /// n-th key of a page, any goes on where there are none. \param newest  sample of the servo
+  /// To be called while no trial is felt, where the device's buttons answer: button n stands for
+  /// the n-th key of a page, any goes on where there are none. \param newest  sample of the servo
   void look_at_buttons(const Sample& newest);
   /// Shows a page without answer keys.
   void show_message(const std::string& text);

@@ -278,6 +278,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
   for (const std::uint64_t seed : {1U, 2U}) {
     stimuli::Random random(seed, {0xc1});
     std::vector<double> quick, whole;  // deviances
+    int missed = 0;                    // the whole search ends in a worse valley than the quick one
     for (int i = 0; i < kRefits; ++i) {
       const auto counts = simulate_counts(model, truth, random);
       double saturated = 0;
@@ -288,7 +289,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
       }
       quick.push_back(2 * (saturated + least_loss(counts, model, kQuickSearch)));
       whole.push_back(2 * (saturated + least_loss(counts, model, kWholeSearch)));
-      EXPECT_GE(quick.back(), whole.back() - 1e-6);
+      missed += quick.back() < whole.back() - 1e-6 ? 1 : 0;
     }
     // Shares that are at least as large as any deviance: what p is.
     std::sort(quick.begin(), quick.end());
@@ -301,8 +302,9 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
       };
       most = std::max(most, std::abs(above(quick) - above(whole)));
     }
-    std::printf("seed %llu: p of quick and of whole refits differ by %.4f at most\n",
-                static_cast<unsigned long long>(seed), most);
+    std::printf("seed %llu: p of quick and of whole refits differ by %.4f at most; %d missed\n",
+                static_cast<unsigned long long>(seed), most, missed);
+    EXPECT_LE(missed, kRefits / 1000);
     // The noise of 199 refits is 0.035 at p = 0.5 and 0.015 at p = 0.05.
     EXPECT_LT(most, 0.015);
   }
