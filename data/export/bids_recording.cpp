@@ -18,6 +18,7 @@ std::vector<Column> columns_of(const StudyLabel& study) {
   std::vector<Column> all{kTrialOfSample};
   if (!study.facts.blocks.empty()) all.push_back(interval_column());
   all.insert(all.end(), sample_columns().begin(), sample_columns().end());
+  if (has_bodies(study.facts)) all.insert(all.end(), body_columns().begin(), body_columns().end());
   return all;
 }
 
@@ -101,6 +102,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   free_ = onset + static_cast<std::int64_t>(std::clamp(length, 0.0, 1e9));
   if (record.samples.empty()) return;
   SampleSlots slots(trial, study_.facts.servo_rate);
+  const bool bodies = has_bodies(study_.facts);
   const std::string nothing = empty_row(columns_.size());
   DelimitedRow row(DelimitedFormat::tsv);
   std::int64_t first = 0;
@@ -115,6 +117,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
     row << record.trial;
     if (!study_.facts.blocks.empty()) row << slots.interval();
     put_sample(row, sample);
+    if (bodies) put_body(row, record, sample);
     file_->gzip.write(row.end());
     ++next_row_;
   }

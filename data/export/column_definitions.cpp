@@ -223,6 +223,25 @@ std::vector<Column> make_samples() {
   };
 }
 
+/// By the names of `palpate render --bodies`.
+std::vector<Column> make_bodies() {
+  return {
+      {"body_x", "Centre of mass of the stimulus after the tick, world frame, x", "m"},
+      {"body_y", "Centre of mass of the stimulus after the tick, world frame, y", "m"},
+      {"body_z", "Centre of mass of the stimulus after the tick, world frame, z", "m"},
+      {"body_qw", "Orientation of the stimulus's axes after the tick, unit quaternion, w", "1"},
+      {"body_qx", "Orientation of the stimulus's axes after the tick, unit quaternion, x", "1"},
+      {"body_qy", "Orientation of the stimulus's axes after the tick, unit quaternion, y", "1"},
+      {"body_qz", "Orientation of the stimulus's axes after the tick, unit quaternion, z", "1"},
+      {"body_vx", "Velocity of its centre of mass, world frame, x", "m/s"},
+      {"body_vy", "Velocity of its centre of mass, world frame, y", "m/s"},
+      {"body_vz", "Velocity of its centre of mass, world frame, z", "m/s"},
+      {"body_wx", "Its spin (angular velocity), world frame, x", "rad/s"},
+      {"body_wy", "Its spin (angular velocity), world frame, y", "rad/s"},
+      {"body_wz", "Its spin (angular velocity), world frame, z", "rad/s"},
+  };
+}
+
 /// With shifted dates, and the seconds between them in the column elapsed.
 std::vector<Column> made_relative(std::vector<Column> columns) {
   for (Column& column : columns) {
@@ -265,6 +284,11 @@ const Column& interval_column() {
 
 std::span<const Column> sample_columns() {
   static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+std::span<const Column> body_columns() {
+  static const std::vector<Column> all = make_bodies();
   return all;
 }
 

@@ -28,6 +28,8 @@ struct Column {
 std::span<const Column> trial_columns(Times times, bool tasks = false);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
+/// After them where a stimulus of the protocol moves: where it was after the tick.
+std::span<const Column> body_columns();
 /// Before them where a protocol of version 2 is among the studies.
 const Column& interval_column();
 

@@ -1,6 +1,10 @@
 #include "data/export/column_values.h"
 
+#include <algorithm>
 #include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "data/export/column_definitions.h"
 
 namespace palpate::data {
 namespace {
@@ -62,6 +66,26 @@ void put_sample(DelimitedRow& row, const SampleRecord& sample) {
       << sample.faults << static_cast<double>(sample.period_ns) / 1e9
       << static_cast<double>(sample.lateness_ns) / 1e9
       << static_cast<double>(sample.compute_ns) / 1e9;
+}
+
+bool has_bodies(const ProtocolFacts& facts) {
+  return std::any_of(facts.stimuli.begin(), facts.stimuli.end(), [](const StimulusFacts& stimulus) {
+    return nlohmann::json::parse(stimulus.object).contains("body");
+  });
+}
+
+void put_body(DelimitedRow& row, const TrialRecord& record, const SampleRecord& sample) {
+  const std::optional<BodyRecord> body = body_of(record, sample);
+  if (!body) {
+    for (std::size_t k = 0; k < body_columns().size(); ++k) row << "";
+    return;
+  }
+  constexpr int kDecimals = 9;
+  for (const double x : body->centre) row.rounded(x, kDecimals);
+  for (const double x : body->orientation_wxyz) row.rounded(x, kDecimals);
+  for (const auto& vector : {body->velocity, body->spin}) {
+    for (const double x : vector) row.rounded(x, kDecimals);
+  }
 }
 
 }  // namespace palpate::data

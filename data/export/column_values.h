@@ -63,5 +63,10 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
 /// sample_columns(): positions rounded to 1 nm, forces to 1 uN and torques to 1 uN m, a thousandth
 /// of the resolution of any device; the database has all digits.
 void put_sample(DelimitedRow& row, const SampleRecord& sample);
+/// Whether a stimulus of the protocol moves: samples then have body_columns() as well.
+bool has_bodies(const ProtocolFacts& facts);
+/// body_columns(), rounded to 1e-9 of their unit; missing where nothing moved.
+/// \param sample  of the record's own
+void put_body(DelimitedRow& row, const TrialRecord& record, const SampleRecord& sample);
 
 }  // namespace palpate::data

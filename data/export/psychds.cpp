@@ -87,7 +87,7 @@ class PsychDsWriter : public DatasetWriter {
   void use(std::span<const Column> columns) {
     for (const Column& column : columns) used_.insert(column.name);
   }
-  void write_samples(const StoredTrial& trial, const std::string& stem, double servo_rate);
+  void write_samples(const StoredTrial& trial, const std::string& stem, const ProtocolFacts& facts);
   Json variables() const;
 
   std::set<std::string> used_;  // columns
@@ -111,7 +111,7 @@ void PsychDsWriter::add(const StoredTrial& trial) {
   }
   put_trial(row_, trial, clock_);
   table_->write(row_.end());
-  if (!trial.record.samples.empty()) write_samples(trial, stem, study.facts.servo_rate);
+  if (!trial.record.samples.empty()) write_samples(trial, stem, study.facts);
 }
 
 void PsychDsWriter::end_table() {
@@ -122,8 +122,9 @@ void PsychDsWriter::end_table() {
 }
 
 void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& stem,
-                                  double servo_rate) {
+                                  const ProtocolFacts& facts) {
   const TrialRecord& record = trial.record;
+  const bool bodies = has_bodies(facts);
   if (haptic_ && session_ != record.session) {
     haptic_->close(false);
     haptic_.reset();
@@ -137,18 +138,21 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
          << "trial";
     if (clock_.tasks()) row_ << interval_column().name;
     row_ << kTimeOfTick.name << sample_columns();
+    if (bodies) row_ << body_columns();
     haptic_->write(row_.end());
     if (clock_.tasks()) use({&interval_column(), 1});
     use({&kTimeOfTick, 1});
     use(sample_columns());
+    if (bodies) use(body_columns());
   }
-  SampleSlots slots(trial, servo_rate);
+  SampleSlots slots(trial, facts.servo_rate);
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = slots.next();
     row_ << trial.participant.code << record.session << record.trial;
     if (clock_.tasks()) row_ << slots.interval();
-    row_ << static_cast<double>(slot) / servo_rate;
+    row_ << static_cast<double>(slot) / facts.servo_rate;
     put_sample(row_, sample);
+    if (bodies) put_body(row_, record, sample);
     haptic_->write(row_.end());
   }
   samples_ += static_cast<std::int64_t>(record.samples.size());
@@ -169,6 +173,7 @@ Json PsychDsWriter::variables() const {
   add({&interval_column(), 1});
   add({&kTimeOfTick, 1});
   add(sample_columns());
+  add(body_columns());
   add(page_columns());
   return all;
 }
