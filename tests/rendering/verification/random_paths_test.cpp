@@ -54,7 +54,7 @@ TEST(RandomPaths, KeepLengthTicksAndPlaceAndComeBackToEachSeed) {
         const auto path = path_of(kind, mesh, side, 3), same = path_of(kind, mesh, side, 3),
                    other = path_of(kind, mesh, side, 4);
         ASSERT_EQ(path.size(), kTicks) << to_string(kind);
-        // Outside: not near the middle at least.
+        // Not near the middle at least.
         EXPECT_GT(distance_to_middle(path[0]), 0.1 * mesh.size()) << to_string(kind);
         std::size_t alike = 0;
         for (std::size_t i = 0; i < path.size(); ++i) {
