@@ -3,8 +3,11 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <future>
+#include <glm/geometric.hpp>
 #include <utility>
 
 namespace palpate::runner {
@@ -51,23 +54,61 @@ void ServoThread::run() noexcept {
     const Sample& sample = servo_.tick();
     if (tells_places_) publish_places(sample);  // first: who has the sample finds them
     publish(sample);
+    if (sample.phase == Phase::feeling) felt_at_ = sample.probe;
+    if (steps_left_ > 0) count_step();
+    if (waits_) go_on_when_back(sample.probe);
   }
   servo_.stop();
 }
 
 void ServoThread::take_requests() noexcept {
   if (incoming_.load(std::memory_order_relaxed) != nullptr) {
-    servo_.begin(*incoming_.exchange(nullptr, std::memory_order_acquire));
-    gap_ = lost_samples_ = false;
+    current_ = incoming_.exchange(nullptr, std::memory_order_acquire);
+    servo_.begin(*current_);
+    gap_ = lost_samples_ = waits_ = false;
+    felt_at_.reset();
+    steps_left_ = 0;
   }
   rendering::BodyPull pull;
-  if (pull_.read(pull)) servo_.pull(pull);
+  if (servo_.shown() != nullptr && pull_.read(pull)) servo_.pull(pull);
+  const std::uint64_t resumed = resume_.load(std::memory_order_relaxed);
+  if (resumed != 0 && current_ != nullptr) {
+    resume_.store(0, std::memory_order_relaxed);
+    steps_left_ = static_cast<std::uint32_t>(resumed - 1);
+    waits_ = true;
+  }
   const std::uint32_t asked = stops_asked_.load(std::memory_order_acquire);
   if (asked != stops_done_.load(std::memory_order_relaxed)) {
     quality_ = servo_.stop();
+    waits_ = false;
+    steps_left_ = 0;
+    away_.store(0);
     if (lost_samples_) quality_.faults |= servo_fault::kSamplesLost;
     stops_done_.store(asked, std::memory_order_release);
   }
+}
+
+/// The stylus may have been moved while nothing happened: what is between then and now must not be
+/// passed through in one tick.
+void ServoThread::go_on_when_back(const rendering::LineProbe& probe) noexcept {
+  const double away = felt_at_ ? std::max(glm::distance(probe.tip, felt_at_->tip),
+                                          glm::distance(probe.tail, felt_at_->tail))
+                               : 0;
+  if (!(away <= kBackWithin)) {
+    away_.store(std::isfinite(away) ? away : 1);
+    return;
+  }
+  away_.store(0);
+  waits_ = false;
+  servo_.begin(*current_);
+}
+
+/// The ramp of the forces begins anew with each: what is not shown as it happens is not felt.
+void ServoThread::count_step() noexcept {
+  if (servo_.shown() == nullptr) return;  // it waits
+  const bool last = --steps_left_ == 0;
+  servo_.stop();
+  if (!last) servo_.begin(*current_);
 }
 
 /// To the session; false where there is no room.
@@ -122,16 +163,26 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
 
 const Sample& ServoThread::next() noexcept {
   const auto give_up = steady_clock::now() + kPatience;
-  while (!ring_.pop(popped_)) {
+  while (next_now() == nullptr) {
     if (steady_clock::now() >= give_up) {
       popped_.faults |= servo_fault::kStalled | servo_fault::kTripped;
       return popped_;
     }
     std::this_thread::sleep_for(kNap);
   }
+  return popped_;
+}
+
+const Sample* ServoThread::next_now() noexcept {
+  if (!ring_.pop(popped_)) return nullptr;
   for (std::size_t i = 0; i < popped_.bodies; ++i)
     scenes_.back()->trial.poses->pop(popped_bodies_[i]);
-  return popped_;
+  return &popped_;
+}
+
+void ServoThread::resume(std::uint32_t ticks) noexcept {
+  scene_set_ = true;
+  resume_.store(std::uint64_t{ticks} + 1, std::memory_order_release);
 }
 
 ServoQuality ServoThread::stop() noexcept {

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -46,6 +47,16 @@ class ServoThread final : public TickSource {
   /// last sample with kStalled and kTripped.
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
+  /// After stop(): the scene goes on from where it was stopped, what moves in it as well, as soon
+  /// as the stylus is back where it was then, within kBackWithin; until then there is no force.
+  /// \param ticks  so many, each with next to no force, then it stops again; 0: without end
+  void resume(std::uint32_t ticks = 0) noexcept;
+  static constexpr double kBackWithin = 0.005;  ///< m, of tip and tail
+  /// m, that tip or tail are away from where they were, while resume() waits for them; else 0. From
+  /// any thread.
+  double away() const noexcept { return away_.load(); }
+  /// The next sample; null where there is none yet. By the session's thread.
+  const Sample* next_now() noexcept;
   std::span<const rendering::BodyPose> bodies() const noexcept override {
     return {popped_bodies_.data(), popped_.bodies};
   }
@@ -79,6 +90,8 @@ class ServoThread final : public TickSource {
   static int current_thread() noexcept;
   void run() noexcept;
   void take_requests() noexcept;
+  void go_on_when_back(const rendering::LineProbe& probe) noexcept;
+  void count_step() noexcept;
   void publish(const Sample& sample) noexcept;
   void publish_places(const Sample& sample) noexcept;
   bool hand_over(const Sample& sample) noexcept;
@@ -103,6 +116,8 @@ class ServoThread final : public TickSource {
       scenes_;  ///< the session thread's; freed once the servo has left them
   std::atomic<TrialScene*> incoming_{nullptr};
   std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
+  std::atomic<std::uint64_t> resume_{0};  ///< ticks + 1; 0: not asked
+  std::atomic<double> away_{0};
   ServoQuality quality_;    ///< written before stops_done_ moves
   bool scene_set_ = false;  ///< the session thread's: a scene is shown, or may be
 
@@ -112,6 +127,10 @@ class ServoThread final : public TickSource {
   bool tells_places_;
   TripleBuffer<rendering::BodyPull> pull_;
   // The servo's own:
+  TrialScene* current_ = nullptr;                ///< shown, or stopped and kept for resume()
+  std::optional<rendering::LineProbe> felt_at_;  ///< m, the stylus in its last tick
+  bool waits_ = false;                           ///< to go on
+  std::uint32_t steps_left_ = 0;                 ///< 0: without end
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};

@@ -40,19 +40,39 @@ LiveTouch::~LiveTouch() {
   recorder_.request_stop();
 }
 
-void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
+protocols::SceneSpec LiveTouch::with_objects(
+    const std::vector<stimuli::ObjectSpec>& objects) const {
   protocols::SceneSpec spec = settings_.spec;
   spec.objects = objects;
   if (settings_.limit) settings_.limit(spec.objects);
-  servo_.prepare(build_scene(settings_.scene_path, spec, *settings_.renderer), *settings_.renderer,
-                 kAnywhere);
+  return spec;
+}
+
+void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
+  servo_.prepare(build_scene(settings_.scene_path, with_objects(objects), *settings_.renderer),
+                 *settings_.renderer, kAnywhere);
+}
+
+std::int64_t LiveTouch::period_ns() const {
+  return static_cast<std::int64_t>(1e9 / settings_.servo.rate);
 }
 
 void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> bodies) {
   if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
   last_ns_ = sample.time_ns;
+  heard_ = std::chrono::steady_clock::now();
   SceneMoment moment{.sample = sample, .contacts = {}};
+  if (stepping_) {  // the hand got next to nothing: shown is what it would have got
+    moment.sample.device1 = sample.rendering.device1;
+    moment.sample.device2 = sample.rendering.device2;
+    moment.sample.faults &= ~servo_fault::kForceLimited;
+  }
   if (sample.rendering.contacts > 0) add_contacts(moment);
+  // Pauses are no part of the scene's time.
+  if (gap_) paused_ns_ = sample.time_ns - shown_ns_ - period_ns();
+  gap_ = false;
+  shown_ns_ = sample.time_ns - paused_ns_;
+  moment.sample.time_ns = shown_ns_;
   update_soft(sample.time_ns);
   for (const auto& surface : soft_) {
     if (surface != nullptr) moment.soft.push_back(surface);
@@ -70,7 +90,7 @@ void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> 
 /// Where forces are off or limited, what was rendered is not what the hand got: one place then,
 /// with that.
 void LiveTouch::add_contacts(SceneMoment& moment) {
-  const Sample& sample = moment.sample;
+  const Sample& sample = moment.sample;  // with the servo's time still
   constexpr std::uint32_t kNotAsRendered = servo_fault::kForceLimited | servo_fault::kTripped;
   while (touched_.time_ns < sample.time_ns && servo_.touched(touched_)) {
   }
@@ -99,32 +119,76 @@ void LiveTouch::update_soft(std::int64_t now_ns) {
   }
 }
 
+void LiveTouch::tell_trouble(const std::string& trouble) {
+  const std::lock_guard lock(mutex_);
+  trouble_ = trouble;
+}
+
+void LiveTouch::keep_what_is_there() {
+  while (const Sample* const sample = servo_.next_now()) keep(*sample, servo_.bodies());
+}
+
+void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted) {
+  const bool held = held_.load();
+  if (held && running_) {
+    servo_.stop();
+    keep_what_is_there();
+    running_ = false;
+    steps_.store(0);
+  }
+  if (wanted) {
+    const std::vector<stimuli::ObjectSpec> before = std::exchange(shown_, std::move(*wanted));
+    try {
+      if (held) {
+        static_cast<void>(
+            build_scene(settings_.scene_path, with_objects(shown_), *settings_.renderer));
+        anew_ = true;
+      } else {
+        prepare(shown_);
+        anew_ = stepping_ = false;
+      }
+    } catch (const std::exception& fault) {
+      shown_ = before;
+      tell_trouble(fault.what());
+    }
+  }
+  const int steps = held ? steps_.exchange(0) : 0;
+  if (held && steps <= 0) return;
+  if (running_) return;
+  if (stepping_) {  // those that are under way are all there is to come
+    servo_.stop();
+    keep_what_is_there();
+  }
+  stepping_ = held;
+  gap_ = true;
+  running_ = !held;
+  heard_ = std::chrono::steady_clock::now();
+  if (anew_) {
+    prepare(shown_);  // as was tried before
+    anew_ = false;
+    if (!held) return;
+    servo_.stop();
+  }
+  servo_.resume(static_cast<std::uint32_t>(steps));
+}
+
 void LiveTouch::record(const std::stop_token& stop) {
-  bool running = true;
+  constexpr auto kPatience = std::chrono::seconds(1);
+  heard_ = std::chrono::steady_clock::now();
   while (!stop.stop_requested()) {
     std::optional<std::vector<stimuli::ObjectSpec>> wanted;
     {
       const std::lock_guard lock(mutex_);
       wanted.swap(wanted_);
     }
-    const bool held = held_.load();
-    if (held && running) servo_.stop();
-    const bool again = (!held && !running) || (wanted && !held);
-    running = !held;
-    try {
-      const std::vector<stimuli::ObjectSpec>& objects = wanted ? *wanted : shown_;
-      if (again) prepare(objects);
-      if (wanted) shown_ = std::move(*wanted);
-    } catch (const std::exception& fault) {
-      const std::lock_guard lock(mutex_);
-      trouble_ = fault.what();
+    stop_or_go_on(std::move(wanted));
+    keep_what_is_there();
+    if (servo_.away() > 0) heard_ = std::chrono::steady_clock::now();
+    if (running_ && std::chrono::steady_clock::now() > heard_ + kPatience) {
+      servo_.emergency_zero();  // should it ever come back
+      tell_trouble("the servo gives no more samples: forces are off");
     }
-    if (!running) {
-      std::this_thread::sleep_for(kIdle);
-      continue;
-    }
-    const Sample& sample = servo_.next();
-    keep(sample, servo_.bodies());
+    std::this_thread::sleep_for(kIdle);
   }
 }
 

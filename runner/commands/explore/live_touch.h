@@ -2,6 +2,7 @@
 // A scene that a hand touches through a device.
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -44,6 +45,8 @@ class LiveTouch final : public TouchSource {
   bool live() const override { return true; }
   void take(std::vector<SceneMoment>& out) override;
   void hold(bool held) override { held_.store(held); }
+  void step(int ticks) override { steps_.fetch_add(ticks); }
+  double away() const override { return servo_.away(); }
   void show(const std::vector<stimuli::ObjectSpec>& objects) override;
   void pull(const rendering::BodyPull& by) noexcept override { servo_.pull(by); }
   void emergency_zero() noexcept override;
@@ -56,7 +59,12 @@ class LiveTouch final : public TouchSource {
 
  private:
   void record(const std::stop_token& stop);
+  void stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted);
+  void keep_what_is_there();
+  void tell_trouble(const std::string& trouble);
+  protocols::SceneSpec with_objects(const std::vector<stimuli::ObjectSpec>& objects) const;
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
+  std::int64_t period_ns() const;
   void keep(const Sample& sample, std::span<const rendering::BodyPose> bodies);
   void add_contacts(SceneMoment& moment);
   void update_soft(std::int64_t now_ns);
@@ -67,10 +75,16 @@ class LiveTouch final : public TouchSource {
   std::optional<std::vector<stimuli::ObjectSpec>> wanted_;
   std::string trouble_;
   std::atomic<bool> held_{false};
+  std::atomic<int> steps_{0};  ///< asked for while it is held
   std::atomic<std::uint64_t> recorded_{0};
-  std::vector<stimuli::ObjectSpec> shown_;  ///< the recorder's; so the next
-  std::int64_t last_ns_ = 0;
-  TouchedPlaces touched_;  ///< the next that no sample has had yet
+  std::vector<stimuli::ObjectSpec> shown_;   ///< the recorder's; so the next
+  bool running_ = true, anew_ = false;       ///< anew: the scene begins at its beginning
+  bool stepping_ = false;                    ///< what comes was asked for by step()
+  bool gap_ = false;                         ///< the next sample comes after a pause
+  std::int64_t last_ns_ = 0, shown_ns_ = 0;  ///< of the last sample: the servo's, without pauses
+  std::int64_t paused_ns_ = 0;               ///< of all pauses
+  std::chrono::steady_clock::time_point heard_{};  ///< when the servo gave a sample last
+  TouchedPlaces touched_;                          ///< the next that no sample has had yet
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_;  ///< the newest, by soft object
   std::int64_t soft_ns_ = 0;                                 ///< when they were asked for
   ServoThread servo_;

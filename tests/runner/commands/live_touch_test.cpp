@@ -25,11 +25,13 @@ using std::chrono::steady_clock;
 /// is started, so that the hand sets out once there is something to touch, not with the thread.
 class FastClock final : public Clock {
  public:
+  /// \param ticks  between two naps of 0.1 ms
+  explicit FastClock(std::uint64_t ticks = 64) : between_naps_(ticks) {}
   void start() { started_.store(true); }
   std::int64_t now_ns() noexcept override { return now_; }
   void wait_until(std::int64_t when_ns) noexcept override {
     while (!started_.load()) std::this_thread::sleep_for(std::chrono::microseconds(100));
-    if (++ticks_ % 64 == 0) std::this_thread::sleep_for(std::chrono::microseconds(100));
+    if (++ticks_ % between_naps_ == 0) std::this_thread::sleep_for(std::chrono::microseconds(100));
     now_ = std::max(now_, when_ns);
   }
 
@@ -37,6 +39,7 @@ class FastClock final : public Clock {
   std::atomic<bool> started_{false};
   std::int64_t now_ = 0;
   std::uint64_t ticks_ = 0;
+  const std::uint64_t between_naps_;
 };
 
 /// A hand that comes down onto the cube's upper face and stays 3 mm deep.
@@ -179,6 +182,93 @@ TEST_F(LiveTouchTest, WhileItIsHeldNothingIsFeltAndNothingHappens) {
   }));
   touch.hold(false);
   EXPECT_TRUE(comes_true([&] { return touch.recorded() > before + 100; })) << "it goes on";
+}
+
+/// A cube that drifts with 10 mm/s, far from the hand.
+LiveTouch::Settings with_drifting_cube() {
+  LiveTouch::Settings settings = settings_of();
+  stimuli::ObjectSpec drifting;
+  drifting.shape = stimuli::ShapeKind::cube;
+  drifting.edge = 0.02;
+  drifting.pose.position = {0.2, 0, 0};
+  drifting.body.emplace().mass = 0.3;
+  drifting.body->velocity = {0, 0, 0.01};
+  settings.spec.objects.push_back(drifting);
+  return settings;
+}
+
+/// Each moment is a tick after the one before, in time and in what moves.
+void expect_no_gap(const std::vector<SceneMoment>& moments) {
+  for (std::size_t i = 1; i < moments.size(); ++i) {
+    ASSERT_EQ(moments[i].sample.time_ns - moments[i - 1].sample.time_ns, 1'000'000) << i;
+    ASSERT_NEAR(moments[i].poses.at(1).position.z - moments[i - 1].poses.at(1).position.z, 1e-5,
+                1e-10)
+        << i;
+  }
+}
+
+TEST_F(LiveTouchTest, APauseKeepsWhatMovesAndStepsGoOnFromIt) {
+  FastClock clock(1);  // no minute may go by while the test has no processor
+  LiveTouch touch(device_, clock, with_drifting_cube());
+  clock.start();
+  std::vector<SceneMoment> moments;
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
+  touch.hold(true);
+  std::uint64_t before = 0;
+  ASSERT_TRUE(comes_true([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    return std::exchange(before, touch.recorded()) == touch.recorded();
+  }));
+  touch.take(moments);
+  ASSERT_EQ(moments.size(), before);
+  for (const int steps : {1, 1, 7}) {
+    touch.step(steps);
+    before += static_cast<std::uint64_t>(steps);
+    ASSERT_TRUE(comes_true([&] { return touch.recorded() >= before; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(touch.recorded(), before) << "and no more than " << steps;
+  }
+  touch.take(moments);
+  // What the hand would have got; in truth the ramp of the forces had just begun.
+  EXPECT_NEAR(moments.back().sample.device1.y + moments.back().sample.device2.y, 500 * 0.003, 1e-9);
+  touch.hold(false);
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() > before + 300; }));
+  touch.take(moments);
+  expect_no_gap(moments);
+  const double seconds = 1e-3 * static_cast<double>(moments.size());
+  EXPECT_NEAR(moments.back().poses.at(1).position.z, 0.01 * seconds, 1e-8);
+}
+
+/// The hand went elsewhere meanwhile: no force and no motion until it is back.
+TEST_F(LiveTouchTest, AfterAPauseItGoesOnOnceTheHandIsBack) {
+  std::atomic<double> aside{0};
+  testing::FakeDevice device([&](int tick) {
+    DeviceReading reading = pressing(tick);
+    reading.stylus.tip.x += aside.load();
+    reading.stylus.tail.x += aside.load();
+    return reading;
+  });
+  FastClock clock(1);
+  LiveTouch touch(device, clock, with_drifting_cube());
+  clock.start();
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
+  touch.hold(true);
+  ASSERT_TRUE(comes_true([&] { return touch.servo().forces_are_off(); }));
+  aside = 0.04;
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const std::uint64_t before = touch.recorded();
+  touch.hold(false);
+  ASSERT_TRUE(comes_true([&] { return touch.away() > 0; }));
+  EXPECT_NEAR(touch.away(), 0.04, 1e-9);
+  EXPECT_TRUE(touch.servo().forces_are_off());
+  EXPECT_EQ(touch.recorded(), before);
+  aside = 0.003;
+  ASSERT_TRUE(comes_true([&] { return touch.recorded() > before + 300; }));
+  EXPECT_EQ(touch.away(), 0);
+  EXPECT_EQ(touch.trouble(), "");
+  std::vector<SceneMoment> moments;
+  touch.take(moments);
+  expect_no_gap(moments);
 }
 
 TEST_F(LiveTouchTest, AnotherMaterialIsFeltOnceTheHandHasLeft) {
