@@ -32,6 +32,16 @@ void StylusTarget::turn(double right, double up) {
   pitch = std::clamp(pitch + up, -kSteepest, kSteepest);
 }
 
+void StylusTarget::point(const rendering::LineProbe& stylus) {
+  const Vec3 along = stylus.tail - stylus.tip;
+  const double size = glm::length(along);
+  tip = {};
+  move(stylus.tip);
+  if (!(size > 0)) return;
+  yaw = std::atan2(along.x, -along.y);
+  pitch = std::clamp(std::asin(std::clamp(along.z / size, -1.0, 1.0)), -kSteepest, kSteepest);
+}
+
 Vec3 StylusTarget::axis() const {
   return {std::cos(pitch) * std::sin(yaw), -std::cos(pitch) * std::cos(yaw), std::sin(pitch)};
 }

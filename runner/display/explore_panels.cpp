@@ -8,6 +8,7 @@
 
 #include "runner/display/console_widgets.h"
 #include "runner/display/explore_view.h"
+#include "runner/safety/fault_table.h"
 
 namespace palpate::runner {
 namespace {
@@ -44,10 +45,12 @@ void ExploreView::draw_time(float width) {
   if (button("< tick", 4)) step(-1);
   if (button("tick >", 4)) step(1);
   if (button("Play", 4)) {
+    steps_ = false;
     timeline_.play();
     source_.hold(true);
   }
   if (source_.live() && button("Live", 4)) {
+    steps_ = false;
     timeline_.follow();
     source_.hold(false);
   }
@@ -67,6 +70,7 @@ void ExploreView::draw_plot(float width, float height) {
   const float low = at.y + height - 0.6F * font, high = at.y + 1.8F * font;
   const double first = timeline_.first(), span = std::max(timeline_.last() - first, 1e-3);
   if (ImGui::IsItemActive() && to > from) {
+    steps_ = false;
     timeline_.seek(first +
                    span * static_cast<double>((ImGui::GetIO().MousePos.x - from) / (to - from)));
     source_.hold(true);
@@ -87,11 +91,17 @@ void ExploreView::draw_plot(float width, float height) {
     place(here, least_here);
     place(here, most_here);
   };
+  std::size_t marked = columns;
   for (const SceneMoment& moment : timeline_.moments()) {
     const auto column = std::min(
         columns - 1,
         static_cast<std::size_t>(static_cast<double>(columns) * (time_of(moment) - first) / span));
     const double force = force_of(moment);
+    if ((moment.sample.faults & ~servo_fault::kForceLimited) != 0 && column != marked) {
+      marked = column;
+      const float at_x = from + static_cast<float>(column);
+      list.AddLine({at_x, low}, {at_x, low + 0.4F * font}, IM_COL32(247, 117, 102, 255), 2);
+    }
     if (column != here) {
       flush();
       here = column;
@@ -123,6 +133,9 @@ void ExploreView::draw_values() {
   table_row("Torque", moment == nullptr
                           ? "-"
                           : fixed_point(1000 * glm::length(torque_on_hand(*moment)), 1) + " mN m");
+  table_row("Scale", settings_.drawing.scale_words(settings_.looks));
+  table_row("Faults", sample.faults == 0 ? "none" : fault_words(sample.faults),
+            sample.faults == 0 ? console_colour::kBright : console_colour::kBad);
   table_row("Contacts", std::to_string(r.contacts));
   table_row("Depth", fixed_point(1000 * r.deepest.depth, 3) + " mm");
   table_row("Kind", rendering::to_string(r.deepest.type));
@@ -139,6 +152,16 @@ void ExploreView::draw_looks() {
   ImGui::Checkbox("Dark", &dark_);
   ImGui::SameLine();
   if (ImGui::Button("Fit")) fitted_ = false;
+  // Standard views: what they look at and how large stays as it is.
+  struct View {
+    const char* name;
+    float yaw, pitch;
+  };
+  constexpr float kQuarter = static_cast<float>(M_PI) / 2;
+  for (const View& view : {View{"Front", 0, 0}, {"Right", kQuarter, 0}, {"Above", 0, kQuarter}}) {
+    ImGui::SameLine();
+    if (ImGui::Button(view.name)) camera_.look_from(view.yaw, view.pitch);
+  }
   ImGui::SetNextItemWidth(0.4F * ImGui::GetContentRegionAvail().x);
   ImGui::Combo("cut across", &cut_axis_, "nothing\0x\0y\0z\0");
   if (cut_axis_ > 0) ImGui::SliderFloat("at", &cut_at_, -1, 1, "%.2f of the size");

@@ -10,14 +10,13 @@
 #include "runner/display/console_panels.h"
 #include "runner/display/console_widgets.h"
 #include "runner/display/scene/image_file.h"
+#include "runner/safety/fault_table.h"
 #include "runner/servo/servo_fault.h"
 
 namespace palpate::runner {
 namespace {
 
 constexpr double kWindowThickness = 1.3;  // of the tool
-constexpr float kOrbitPerPixel = 0.008F;  // rad
-constexpr float kZoomPerNotch = 1.12F;
 
 const char* state_in_words(Timeline::State state, bool live) {
   switch (state) {
@@ -51,6 +50,12 @@ void ExploreView::take_moments(double seconds) {
   fresh_.clear();
   source_.take(fresh_);
   for (SceneMoment& moment : fresh_) timeline_.add(std::move(moment));
+  if (steps_ && !fresh_.empty()) timeline_.seek(timeline_.last());
+  // Until it goes on, the stylus waits where it was.
+  const bool held = timeline_.state() != Timeline::State::following;
+  goes_on_ = !held && (goes_on_ || !fresh_.empty());
+  if (control_ && !goes_on_ && !timeline_.empty())
+    control_->rest_at(timeline_.moments().back().sample.probe);
   timeline_.advance(seconds);
 }
 
@@ -64,12 +69,21 @@ void ExploreView::pause_or_go_on() {
   } else {
     timeline_.play();
   }
+  steps_ = false;
   source_.hold(timeline_.state() != Timeline::State::following);
 }
 
+/// Behind the newest moment a live scene makes more of them.
 void ExploreView::step(int moments) {
-  timeline_.step(moments);
   source_.hold(true);
+  const bool at_end = timeline_.now() >= timeline_.last();
+  steps_ = source_.live() && moments > 0 && at_end;
+  if (steps_) {
+    timeline_.pause();
+    source_.step(moments);
+  } else {
+    timeline_.step(moments);
+  }
 }
 
 ScenePicture ExploreView::picture(const SceneMoment* moment) const {
@@ -171,95 +185,14 @@ void ExploreView::draw_scene(const Modifiers& modifiers, float width, float heig
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
                              ImGuiButtonFlags_MouseButtonMiddle);
   steer(modifiers, at.x, at.y);
-  const float font = ImGui::GetFontSize();
-  const char* const hint = control_ && timeline_.state() == Timeline::State::following
-                               ? (shown != nullptr && !shown->poses.empty()
-                                      ? "pointer: the tip    wheel: press    left: turn    Shift "
-                                        "and left: pull an object    "
-                                        "right: look"
-                                      : "pointer: the tip    wheel: press harder    left: turn    "
-                                        "right: look    middle: "
-                                        "move")
-                               : "drag: look    middle or Shift: move    wheel: nearer";
-  ImGui::GetWindowDrawList()->AddText({at.x + 0.8F * font, at.y + height - 1.6F * font},
-                                      IM_COL32(150, 158, 168, 255), hint);
-}
-
-/// Shift and the left button draw an object that moves, at the place under the pointer, in the
-/// plane of the picture. \return whether one is drawn
-bool ExploreView::pull(const Modifiers& modifiers, const glm::vec2& at, bool left) {
-  const SceneMoment* const shown = timeline_.shown();
-  const bool wanted = left && modifiers.shift && shown != nullptr && source_.live() &&
-                      timeline_.state() == Timeline::State::following;
-  if (!wanted || shown->poses.empty()) {
-    if (pull_.object >= 0) source_.pull(pull_ = {});
-    return false;
-  }
-  if (pull_.object < 0) {
-    const glm::vec3 eye = camera_.eye();
-    const auto hit = settings_.drawing.hit(
-        eye, glm::normalize(camera_.unproject(at, camera_.centre()) - eye), shown->poses);
-    if (!hit || !settings_.objects[hit->object].body) return false;
-    const Pose& now = shown->poses[hit->object];
-    const Pose& first = settings_.objects[hit->object].pose;
-    const Vec3 local = glm::conjugate(now.orientation) * (Vec3(hit->place) - now.position);
-    pull_.object = static_cast<int>(hit->object);
-    pull_.on_object = first.orientation * local + first.position;
-    pulled_from_ = hit->place;
-  }
-  pull_.to = Vec3(camera_.unproject(at, pulled_from_));
-  source_.pull(pull_);
-  return true;
-}
-
-void ExploreView::steer(const Modifiers& modifiers, float x, float y) {
-  const ImGuiIO& io = ImGui::GetIO();
-  const bool over = ImGui::IsItemHovered(), active = ImGui::IsItemActive();
-  const bool touches = control_ && timeline_.state() == Timeline::State::following;
-  PointerMotion pointer;
-  pointer.over = over || active;
-  pointer.at = {io.MousePos.x - x, io.MousePos.y - y};
-  pointer.moved = {io.MouseDelta.x, io.MouseDelta.y};
-  pointer.wheel = over ? io.MouseWheel : 0;
-  const bool left = active && ImGui::IsMouseDown(ImGuiMouseButton_Left);
-  const bool middle = active && ImGui::IsMouseDown(ImGuiMouseButton_Middle);
-  pointer.orbit = active && ImGui::IsMouseDown(ImGuiMouseButton_Right);
-  if (middle || (left && !touches && modifiers.shift)) {
-    camera_.pan(pointer.moved);
-    pointer.orbit = touches;  // the stylus stays
-  } else if (pointer.orbit || (left && !touches)) {
-    camera_.orbit(-kOrbitPerPixel * pointer.moved.x, kOrbitPerPixel * pointer.moved.y);
-  }
-  if (pull(modifiers, pointer.at, left)) return;
-  const SceneMoment* const shown = timeline_.shown();
-  const auto line_of_sight = [&](const glm::vec3& from, const glm::vec3& along) {
-    return settings_.drawing.hit(from, along, shown ? shown->poses : std::vector<Pose>());
-  };
-  under_pointer_.clear();
-  if (over) {
-    const glm::vec3 eye = camera_.eye();
-    const auto hit =
-        line_of_sight(eye, glm::normalize(camera_.unproject(pointer.at, camera_.centre()) - eye));
-    if (hit) under_pointer_ = settings_.drawing.label(hit->object);
-  }
-  if (!touches) {
-    if (pointer.wheel != 0) camera_.zoom(std::pow(kZoomPerNotch, pointer.wheel));
-    return;
-  }
-  pointer.turn = modifiers.ctrl || left;
-  pointer.depth = modifiers.shift;
-  control_->step(pointer, camera_,
-                 [&](const glm::vec3& from, const glm::vec3& along) -> std::optional<glm::vec3> {
-                   const auto hit = line_of_sight(from, along);
-                   if (!hit) return std::nullopt;
-                   return hit->place;
-                 });
+  draw_over_scene(at.x, at.y, width, height);
 }
 
 void ExploreView::draw_side() {
   draw_state();
   ImGui::Dummy({0, 4});
   draw_values();
+  draw_faults();
   ImGui::Dummy({0, 4});
   draw_looks();
   ImGui::Dummy({0, 4});
@@ -271,15 +204,55 @@ void ExploreView::draw_side() {
 
 void ExploreView::draw_state() {
   const SceneMoment* const newest = timeline_.empty() ? nullptr : &timeline_.moments().back();
-  const bool off = newest != nullptr &&
-                   (newest->sample.faults & (servo_fault::kTripped | servo_fault::kEmergency)) != 0;
+  const std::uint32_t faults = newest != nullptr ? newest->sample.faults : 0;
   coloured_text(console_colour::kQuiet, settings_.title);
-  if (off) {
-    coloured_text(console_colour::kBad, "Forces are off");
+  if ((faults & (servo_fault::kTripped | servo_fault::kEmergency)) != 0) {
+    wrapped_text(console_colour::kBad, "Forces are off: " + why_off());
     if (wide_button("Allow forces again", ImGui::GetContentRegionAvail().x, Look::due))
       source_.clear_fault();
   } else {
     coloured_text(console_colour::kGood, state_in_words(timeline_.state(), source_.live()));
+  }
+  const bool behind = timeline_.state() != Timeline::State::following && source_.live() &&
+                      timeline_.now() < timeline_.last();
+  if (behind)
+    wrapped_text(console_colour::kQuiet, "Seen is the past. Live goes on from the newest moment, " +
+                                             fixed_point(timeline_.last() - timeline_.first(), 3) +
+                                             " s.");
+}
+
+/// What the ticks had since forces went off.
+std::string ExploreView::why_off() const {
+  std::uint32_t bits = 0;
+  const auto& moments = timeline_.moments();
+  for (auto it = moments.rbegin(); it != moments.rend(); ++it) {
+    if ((it->sample.faults & servo_fault::kTripped) == 0) break;
+    bits |= it->sample.faults & ~servo_fault::kTripped;
+  }
+  std::string words;
+  for (const rendering::FaultBit& fault : kFaultTable) {
+    if ((bits & fault.bit) == 0 || fault.why[0] == 0) continue;
+    words += (words.empty() ? "" : "; ") + std::string(fault.why);
+  }
+  return words.empty() ? fault_row(servo_fault::kTripped).why : words;
+}
+
+/// Every bit of the moments that are kept: one tick is too short to be seen.
+void ExploreView::draw_faults() {
+  const std::vector<Timeline::Fault> faults = timeline_.faults();
+  if (faults.empty()) return;
+  coloured_text(console_colour::kQuiet, "Faults in these ticks; click: the last of them");
+  for (const Timeline::Fault& fault : faults) {
+    const bool ordinary = fault.bit == servo_fault::kForceLimited;
+    ImGui::PushStyleColor(ImGuiCol_Text, ordinary ? console_colour::kBright : console_colour::kBad);
+    const std::string words = fault_words(fault.bit) + ": " + std::to_string(fault.count) +
+                              ", last at " + fixed_point(fault.last - timeline_.first(), 3) + " s";
+    if (ImGui::Selectable(words.c_str())) {
+      steps_ = false;
+      timeline_.seek(fault.last);
+      source_.hold(true);
+    }
+    ImGui::PopStyleColor();
   }
 }
 

@@ -35,12 +35,17 @@ class ExploreView {
  private:
   void take_moments(double seconds);
   void draw_scene(const Modifiers& modifiers, float width, float height);
+  void draw_over_scene(float x, float y, float width, float height) const;
+  void draw_axes(float right, float low) const;
+  std::string hint() const;
   void steer(const Modifiers& modifiers, float x, float y);
   bool pull(const Modifiers& modifiers, const glm::vec2& at, bool left);
   void draw_time(float width);
   void draw_plot(float width, float height);
   void draw_side();
   void draw_state();
+  std::string why_off() const;
+  void draw_faults();
   void draw_values();
   void draw_looks();
   void draw_material();
@@ -56,13 +61,15 @@ class ExploreView {
   std::vector<SceneMoment> fresh_;
   std::unique_ptr<ExploreClip> clip_;  ///< while one is drawn
   std::string under_pointer_, note_;
+  std::string not_pulled_;          ///< why not, while it is tried
   rendering::BodyPull pull_;        ///< by the pointer; object -1: none
   glm::vec3 pulled_from_{0, 0, 0};  ///< m; where the pointer took hold: the pull stays as far away
   bool labels_ = false, dark_ = true;
   int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z of the world
   float cut_at_ = 0;        ///< of the size of the scene
   int touched_object_ = 0;  ///< whose material the sliders show; the last: all
-  bool dragging_time_ = false;
+  bool goes_on_ = true;     ///< moments have come since it was paused last
+  bool steps_ = false;      ///< the newest moment is shown: ticks were asked for while it is paused
   float emergency_bottom_ = 40;
   bool emergency_highlit_ = false, fitted_ = false;
 };

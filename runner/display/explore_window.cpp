@@ -119,6 +119,7 @@ class ExploreWindow {
     if (key == GLFW_KEY_LEFT) self.view_->step(-ticks);
     if (key == GLFW_KEY_RIGHT) self.view_->step(ticks);
     if (key == GLFW_KEY_S && action == GLFW_PRESS) self.keep_ = true;
+    if (key == GLFW_KEY_C && action == GLFW_PRESS) self.view_->keep_clip();
   }
 
   static void on_pointer(GLFWwindow* window, double, double y) {

@@ -38,6 +38,13 @@ Vec3 PointerControl::wanted(const glm::vec2& pixel, const Camera& camera,
       camera.unproject(pixel, static_cast<float>(plane_distance_) * camera.towards_viewer()));
 }
 
+void PointerControl::rest_at(const rendering::LineProbe& stylus) {
+  const rendering::LineProbe there = workspace_.to_device(stylus);
+  target_.point(there);
+  was_over_ = false;
+  device_.set_target(there);
+}
+
 void PointerControl::step(const PointerMotion& pointer, const Camera& camera,
                           const LineOfSight& object) {
   if (!pointer.over) {

@@ -30,6 +30,8 @@ class PointerControl {
  public:
   PointerControl(MouseStylus& device, const WorkspaceMap& workspace);
   void step(const PointerMotion& pointer, const Camera& camera, const LineOfSight& object);
+  /// The stylus stays there, or goes there, until the next step. \param stylus  m, virtual frame
+  void rest_at(const rendering::LineProbe& stylus);
 
  private:
   Vec3 wanted(const glm::vec2& pixel, const Camera& camera, const LineOfSight& object);

@@ -1,6 +1,7 @@
 #include "runner/display/timeline.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -9,16 +10,35 @@ namespace palpate::runner {
 void Timeline::clear() {
   moments_.clear();
   index_ = 0;
+  faults_ = {};
 }
 
 void Timeline::add(SceneMoment moment) {
   if (!moments_.empty() && !(time_of(moment) > last())) clear();
   moments_.push_back(std::move(moment));
+  count(moments_.back(), true);
   while (moments_.size() > kMost || last() - first() > kSpan) {
+    count(moments_.front(), false);
     moments_.pop_front();
     if (index_ > 0) --index_;
   }
   time_ = std::clamp(time_, first(), last());
+}
+
+void Timeline::count(const SceneMoment& moment, bool added) {
+  for (std::uint32_t left = moment.sample.faults; left != 0; left &= left - 1) {
+    Fault& fault = faults_[static_cast<std::size_t>(std::countr_zero(left))];
+    fault.bit = left & (~left + 1);
+    fault.count += added ? 1 : -1;
+    if (added) fault.last = time_of(moment);
+  }
+}
+
+std::vector<Timeline::Fault> Timeline::faults() const {
+  std::vector<Fault> out;
+  for (const Fault& fault : faults_)
+    if (fault.count > 0) out.push_back(fault);
+  return out;
 }
 
 const SceneMoment* Timeline::shown() const {

@@ -1,8 +1,11 @@
 #pragma once
 // The last minute of a scene that is touched: what is shown of it, and how time goes on.
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <vector>
 
 #include "runner/display/scene/scene_drawing.h"
 
@@ -44,17 +47,28 @@ class Timeline {
   /// Pauses at the last moment not after `time`, or the first.
   void seek(double time);
   void set_speed(double speed);
+
+  /// What went wrong in the moments that are kept: how often, and when last (s).
+  struct Fault {
+    std::uint32_t bit = 0;
+    std::size_t count = 0;
+    double last = 0;
+  };
+  /// Of each bit that occurred, lowest first.
+  std::vector<Fault> faults() const;
   /// \param seconds  that have passed outside
   void advance(double seconds);
 
  private:
   std::size_t index_at(double time) const;
+  void count(const SceneMoment& moment, bool added);
 
   std::deque<SceneMoment> moments_;
   State state_ = State::following;
   double time_ = 0;        ///< shown, where it does not follow
   std::size_t index_ = 0;  ///< likewise
   double speed_ = 1;
+  std::array<Fault, 32> faults_{};  ///< of each bit
 };
 
 /// s

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <glm/geometric.hpp>
@@ -16,6 +17,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "runner/safety/fault_table.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner {
@@ -24,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kLongestOfSize = 0.85;  // the longest arrow, of the size of the scene
-constexpr double kWidestOfSize = 0.28;   // the radius of the largest torque's turn, likewise
+constexpr double kWidestTurn = 5;        // rad, of the largest torque
 constexpr double kSlack = 1e-9;          // s
 
 std::string frame_name(std::size_t index) {
@@ -92,8 +94,7 @@ SceneDrawingSettings drawing_settings(const SceneDrawing& drawing, const Touched
   SceneDrawingSettings out{.sides = renderer.side_contact(), .labels = labels};
   if (touched.strongest > 0)
     out.metres_per_newton = kLongestOfSize * drawing.size() / touched.strongest;
-  if (touched.most_torque > 0)
-    out.metres_per_newton_metre = kWidestOfSize * drawing.size() / touched.most_torque;
+  if (touched.most_torque > 0) out.radians_per_newton_metre = kWidestTurn / touched.most_torque;
   return out;
 }
 
@@ -165,7 +166,10 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   if (!settings.folder.empty()) folder.emplace(settings.folder);
   ProgressLine progress("pictures");
   for (std::size_t i = 0; i < touched.moments.size(); ++i) {
-    painter->draw(drawing.picture(touched.moments[i], light_theme(), looks), camera, light_theme());
+    ScenePicture picture = drawing.picture(touched.moments[i], light_theme(), looks);
+    const std::uint32_t faults = touched.moments[i].sample.faults;
+    if (faults != 0) picture.caption.insert(picture.caption.begin(), fault_words(faults));
+    painter->draw(picture, camera, light_theme());
     if (folder) {
       data::AtomicFile file(folder->prepare(frame_name(i)));
       file.write(painter->png());

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <iterator>
 #include <memory>
@@ -24,6 +25,7 @@ SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
   out.sample.time_ns = std::llround(pose.t * 1e9);
   out.sample.probe = virtual_stylus(spec, pose.probe);
   out.sample.rendering = rendering;
+  out.sample.faults = rendering.faults;
   out.sample.device1 = rendering.device1;
   out.sample.device2 = rendering.device2;
   if (spec.reach) out.held = pose.probe;
@@ -45,14 +47,17 @@ void RecordedTouch::touch() {
   const rendering::Scene scene = build_scene(scene_path_, spec_, renderer_);
   const std::size_t stride = (poses_.size() + Timeline::kMost - 2) / (Timeline::kMost - 1);
   std::size_t row = 0;
+  std::uint32_t faults = 0;
   double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft;
   moments_.clear();
   render_along(scene, spec_, renderer_, poses_,
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
                    const rendering::RenderState& state) {
+                 faults |= rendering.faults;  // of rows that are not kept as well
                  if (row++ % stride != 0) return;
                  moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+                 moments_.back().sample.faults = std::exchange(faults, 0);
                  if (pose.t >= soft_time && pose.t < soft_time + kSoftEvery && soft_time >= 0) {
                    moments_.back().soft = soft;
                  } else {

@@ -83,6 +83,10 @@ glm::vec2 Camera::project(const glm::vec3& point) const {
   return {(clip.x / w + 1) / 2 * width_, (1 - clip.y / w) / 2 * height_};
 }
 
+bool Camera::in_front(const glm::vec3& point) const {
+  return -(view() * glm::vec4(point, 1)).z > near();
+}
+
 glm::vec3 Camera::unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const {
   const float depth = std::min(-near(), (view() * glm::vec4(depth_of, 1)).z);
   const float per_pixel = -2 * depth * std::tan(kFieldOfView / 2) / height_;

@@ -30,6 +30,7 @@ class Camera {
   float distance() const { return distance_; }  ///< m, from the centre
   glm::mat4 matrix() const;                     ///< virtual frame to clip space
   glm::vec2 project(const glm::vec3& point) const;
+  bool in_front(const glm::vec3& point) const;  ///< not behind the viewer
   /// The point seen at a pixel, at the same depth as `depth_of`.
   glm::vec3 unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const;
   glm::vec3 towards_viewer() const;  ///< unit, from the centre to the camera

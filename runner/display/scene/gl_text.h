@@ -23,6 +23,8 @@ class GlText {
   /// Before the texts of a picture, into what is bound. \param size  px, of the font
   void begin(const glm::vec2& picture, double size, const Theme& theme);
   void draw(const std::string& text, const glm::vec2& at, TextAnchor anchor);
+  /// px, of the text as it would be drawn.
+  glm::vec2 size_of(const std::string& text) { return known(text).size; }
   void end();
 
  private:

@@ -45,10 +45,11 @@ struct DrawnArrow {
   glm::vec3 colour{0.2F};
 };
 
-/// A turn about an axis, as most of a circle with a head. Right-handed about `axis`.
+/// A turn about an axis, as an arc with a head. Right-handed about `axis`.
 struct DrawnTurn {
   glm::vec3 centre{0}, axis{0, 0, 1};
   float radius = 0.01F, thickness = 0.001F;
+  float sweep = 5;  ///< rad, from the tail to the point of the head
   glm::vec3 colour{0.2F};
 };
 

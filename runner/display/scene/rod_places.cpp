@@ -8,7 +8,6 @@
 namespace palpate::runner {
 namespace {
 
-constexpr float kArc = 5;  // rad
 constexpr int kArcSteps = 42;
 constexpr float kHeadLength = 4.6F, kHeadRadius = 2.1F;  // of the shaft's radius
 
@@ -44,7 +43,7 @@ std::vector<glm::vec3> points_of(const DrawnTurn& turn) {
   const glm::vec3 x = aside_of(turn.axis), y = glm::cross(turn.axis, x);
   std::vector<glm::vec3> out;
   for (int i = 0; i <= kArcSteps; ++i) {
-    const float angle = kArc * static_cast<float>(i) / static_cast<float>(kArcSteps);
+    const float angle = turn.sweep * static_cast<float>(i) / static_cast<float>(kArcSteps);
     out.push_back(turn.centre + turn.radius * (std::cos(angle) * x + std::sin(angle) * y));
   }
   return out;

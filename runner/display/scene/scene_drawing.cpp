@@ -29,13 +29,14 @@ constexpr std::array<glm::vec3, 4> kLayerColours{
 // Of the size of the scene.
 constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.05,
                  kContactRadius = 0.035, kArrowRadius = 0.024, kTurnThickness = 0.013,
-                 kLongestTurn = 0.4, kLeastTurn = 0.05, kLongestArrow = 1.6;
-constexpr double kLengthOfOneNewton = 0.35;  // of the size
-constexpr double kTurnOfOneNewtonMetre = 3;  // radius, of the size
-constexpr double kLeastForce = 0.005;        // N; less is not drawn
-constexpr double kLeastTorque = 1e-4;        // N m; likewise
-constexpr double kRedOfSize = 0.2;           // of the radius: so far has given way what is red
-constexpr float kFarthestFloor = 1;          // below the lowest, of the size
+                 kTurnRadius = 0.28, kLongestArrow = 1.6;
+constexpr double kLengthOfOneNewton = 1.0 / 6;  // of the size: what a device gives at most is 1
+constexpr double kTurnOfOneNewtonMetre = 8;     // rad
+constexpr double kLeastTurn = 0.05, kLongestTurn = 5.5;  // rad
+constexpr double kLeastForce = 0.005;                    // N; less is not drawn
+constexpr double kLeastTorque = 1e-4;                    // N m; likewise
+constexpr double kRedOfSize = 0.2;   // of the radius: so far has given way what is red
+constexpr float kFarthestFloor = 1;  // below the lowest, of the size
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
 bool finite(const Vec3& v) {
@@ -74,6 +75,17 @@ double round_step(double most) {
   for (const double step : {5.0, 2.0})
     if (step * power <= most) return step * power;
   return power;
+}
+
+/// m/N
+double arrow_scale(const SceneDrawingSettings& settings, double size) {
+  return settings.metres_per_newton > 0 ? settings.metres_per_newton : kLengthOfOneNewton * size;
+}
+
+/// rad/(N m)
+double turn_scale(const SceneDrawingSettings& settings) {
+  return settings.radians_per_newton_metre > 0 ? settings.radians_per_newton_metre
+                                               : kTurnOfOneNewtonMetre;
 }
 
 std::string caption_of(const SceneMoment& moment, double grid) {
@@ -143,7 +155,12 @@ SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rend
                   .layers = {},
                   .felt = objects[i].material.stiffness > 0};
     for (const DrawnVertex& corner : *object.mesh)
-      object.top = std::max(object.top, glm::length(corner.position));
+      object.reach = std::max(object.reach, glm::length(corner.position));
+    if (!object.mesh->empty()) object.low = object.high = object.mesh->front().position;
+    for (const DrawnVertex& corner : *object.mesh) {
+      object.low = glm::min(object.low, corner.position);
+      object.high = glm::max(object.high, corner.position);
+    }
     objects_.push_back(std::move(object));
   }
   const std::vector<glm::vec3> points = outline();
@@ -175,7 +192,7 @@ std::shared_ptr<const DrawnMesh> SceneDrawing::drawn_soft(const Object& object,
   std::vector<float> tints;
   tints.reserve(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const double moved = glm::distance(places[i], rest[i]) / (kRedOfSize * object.top);
+    const double moved = glm::distance(places[i], rest[i]) / (kRedOfSize * object.reach);
     tints.push_back(static_cast<float>(std::clamp(moved, 0.0, 1.0)));
   }
   return std::make_shared<const DrawnMesh>(
@@ -259,8 +276,14 @@ void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSett
                                ScenePicture& out) const {
   const auto add_label = [&](std::size_t i, const glm::mat4& place) {
     if (!settings.labels) return;
-    const glm::vec3 above(0, 0, objects_[i].top + 0.06F * static_cast<float>(size_));
-    out.labels.push_back({glm::vec3(place[3]) + above, objects_[i].label});
+    const Object& object = objects_[i];
+    const glm::vec3 middle(place * glm::vec4(0.5F * (object.low + object.high), 1));
+    const glm::vec3 half = 0.5F * (object.high - object.low);
+    const float top =
+        std::min(object.reach, std::abs(place[0].z) * half.x + std::abs(place[1].z) * half.y +
+                                   std::abs(place[2].z) * half.z);
+    const glm::vec3 above(0, 0, top + 0.06F * static_cast<float>(size_));
+    out.labels.push_back({middle + above, object.label});
   };
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Object& object = objects_[i];
@@ -321,8 +344,7 @@ void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
 
 void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
                               const SceneDrawingSettings& settings, ScenePicture& out) const {
-  const double scale =
-      settings.metres_per_newton > 0 ? settings.metres_per_newton : kLengthOfOneNewton * size_;
+  const double scale = arrow_scale(settings, size_);
   for (const ContactPlace& contact : moment.contacts) {
     const double force = glm::length(contact.force);
     if (!finite(contact.place) || !std::isfinite(force)) continue;
@@ -335,14 +357,24 @@ void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
   }
   const Vec3 torque = torque_on_hand(moment);
   const double size = glm::length(torque);
-  const double radius =
-      size * (settings.metres_per_newton_metre > 0 ? settings.metres_per_newton_metre
-                                                   : kTurnOfOneNewtonMetre * size_);
-  if (!finite(torque) || size < kLeastTorque || radius < kLeastTurn * size_) return;
+  const double sweep = size * turn_scale(settings);
+  if (!finite(torque) || size < kLeastTorque || sweep < kLeastTurn) return;
   const rendering::LineProbe& held = moment.held ? *moment.held : moment.sample.probe;
   out.turns.push_back({0.5 * (held.tip + held.tail), torque / size,
-                       static_cast<float>(std::min(radius, kLongestTurn * size_)),
-                       static_cast<float>(kTurnThickness * size_), theme.torque});
+                       static_cast<float>(kTurnRadius * size_),
+                       static_cast<float>(kTurnThickness * size_),
+                       static_cast<float>(std::min(sweep, kLongestTurn)), theme.torque});
+}
+
+std::string SceneDrawing::scale_words(const SceneDrawingSettings& settings) const {
+  char text[96];
+  // Of a round force and torque that are a good part of what is drawn.
+  const double force = round_step(size_ / arrow_scale(settings, size_));
+  const double torque = round_step(kLongestTurn / turn_scale(settings));
+  std::snprintf(text, sizeof text, "%g N: %.0f mm    %g mN m: %.0f degrees", force,
+                1000 * force * arrow_scale(settings, size_), 1000 * torque,
+                torque * turn_scale(settings) * 180 / M_PI);
+  return text;
 }
 
 ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme,
@@ -356,6 +388,7 @@ ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme
   add_tool(moment, theme, settings, out);
   add_forces(moment, theme, settings, out);
   out.caption.push_back(caption_of(moment, static_cast<double>(out.grid)));
+  if (!out.arrows.empty() || !out.turns.empty()) out.caption.push_back(scale_words(settings));
   return out;
 }
 

@@ -56,11 +56,11 @@ std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
                                std::span<const rendering::BodyPose> bodies);
 
 struct SceneDrawingSettings {
-  bool sides = true;                   ///< the side of the stylus touches, not its tip alone
-  bool labels = false;                 ///< of the objects
-  double thickness = 1;                ///< of the tool, times what files have
-  double metres_per_newton = 0;        ///< of the arrows; 0: by the size of the scene
-  double metres_per_newton_metre = 0;  ///< radius of the turn that shows torque; likewise
+  bool sides = true;             ///< the side of the stylus touches, not its tip alone
+  bool labels = false;           ///< of the objects
+  double thickness = 1;          ///< of the tool, times what files have
+  double metres_per_newton = 0;  ///< of the arrows; 0: by the size of the scene, 6 N as long as it
+  double radians_per_newton_metre = 0;  ///< of the turn that shows torque; 0: 1 N m is 8 rad
 };
 
 /// The parts of a scene that do not change from picture to picture.
@@ -92,6 +92,8 @@ class SceneDrawing {
                          const std::vector<Pose>& poses = {}) const;
 
   double size() const { return size_; }  ///< m, radius about the objects
+  /// How long arrows and turns are, in words: "5 N: 80 mm    200 mN m: 92 degrees".
+  std::string scale_words(const SceneDrawingSettings& settings) const;
   const std::string& label(std::size_t object) const { return objects_[object].label; }
   std::size_t objects() const { return objects_.size(); }
 
@@ -102,7 +104,8 @@ class SceneDrawing {
     glm::vec3 colour;
     std::string label;
     std::vector<std::shared_ptr<const DrawnMesh>> layers;
-    float top = 0;  ///< m, of its bounding sphere above its origin
+    glm::vec3 low{0}, high{0};  ///< m, of its box in its own frame
+    float reach = 0;            ///< m, of its farthest point from its origin
     bool felt = true;
     std::shared_ptr<const rendering::SoftObject> soft = nullptr;
   };

@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "runner/display/scene/display_error.h"
+#include "runner/display/scene/label_places.h"
 #include "runner/display/scene/rod_places.h"
 #include "runner/display/scene/shaders.h"
 
@@ -20,7 +21,8 @@ constexpr float kLampSoftness = 0.030F, kSkySoftness = 0.22F, kGrain = 0.012F;
 constexpr float kGroundEdge = 12, kGroundFrom = 1.6F, kGroundTo = 5.5F;
 constexpr float kOverTranslucent = 0.5F;
 constexpr float kShadowReach = 1.7F;
-constexpr int kSkyMap = 96;  // coarse: its texels melt into each other
+constexpr float kTurnHead = 7;  // of the arc's thickness
+constexpr int kSkyMap = 96;     // coarse: its texels melt into each other
 
 constexpr glm::vec4 kNoCut{0, 0, 0, 1};
 
@@ -109,15 +111,20 @@ std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& p
     arrow(drawn.from, drawn.from + drawn.by, drawn.radius, drawn.colour);
   for (const DrawnTurn& turn : picture.turns) {
     const std::vector<glm::vec3> path = points_of(turn);
-    for (std::size_t i = 0; i + 4 < path.size(); ++i) {
+    // The head is as long as of an arrow, or half of a short arc.
+    const float head = std::min(kTurnHead * turn.thickness / turn.radius, 0.5F * turn.sweep);
+    const auto last =
+        static_cast<std::size_t>((1 - head / turn.sweep) * static_cast<float>(path.size() - 1));
+    for (std::size_t i = 0; i < last; ++i) {
       items.push_back(
           {&cylinder_, rod_place(path[i], path[i + 1], turn.thickness), turn.colour, 0.5F});
       ball(path[i + 1], turn.thickness, turn.colour, 0.5F);
     }
-    const glm::vec3 &neck = path[path.size() - 4], &end = path.back();
-    items.push_back({&cone_,
-                     rod_place(neck, end, std::min(2.8F * turn.thickness, 0.4F * turn.radius)),
-                     turn.colour, 0.5F});
+    const glm::vec3 &neck = path[last], &end = path.back();
+    items.push_back(
+        {&cone_,
+         rod_place(neck, end, std::min(2.8F * turn.thickness, 0.5F * glm::distance(neck, end))),
+         turn.colour, 0.5F});
   }
   for (std::size_t i = first_sign; i < items.size(); ++i) items[i].is_sign = true;
   return items;
@@ -300,9 +307,17 @@ void SceneRenderer::draw_texts(const ScenePicture& picture, const Camera& camera
                                const Theme& theme, const glm::vec2& size) {
   const double font = std::max(11.0, std::round(size.y / 36.0));
   text_.begin(size, font, theme);
-  for (const DrawnLabel& label : picture.labels)
-    text_.draw(label.text, camera.project(label.at), TextAnchor::centre);
   const auto step = static_cast<float>(1.5 * font);
+  std::vector<LabelBox> boxes;
+  for (const DrawnLabel& label : picture.labels) {
+    if (!camera.in_front(label.at)) continue;
+    boxes.push_back({camera.project(label.at), text_.size_of(label.text),
+                     glm::distance(label.at, camera.eye()), &label.text});
+  }
+  const float captions = step * static_cast<float>(picture.caption.size());
+  place_labels(boxes, {size.x, size.y - captions});
+  for (const LabelBox& box : boxes)
+    if (box.shown) text_.draw(*box.text, box.centre, TextAnchor::centre);
   float y = size.y - static_cast<float>(0.5 * font);
   for (auto line = picture.caption.rbegin(); line != picture.caption.rend(); ++line, y -= step)
     text_.draw(*line, {0.7 * font, y}, TextAnchor::lower_left);

@@ -120,6 +120,36 @@ class ExploreWindow(unittest.TestCase):
             self.screen.keep(self.window, "explore_mouse")
         self.assertEqual(self.end(), 0)
 
+    def test_a_clip_is_kept_of_what_was_seen(self):
+        scene = PROTOCOLS / "scenes" / "fig13-two-objects.json"
+        self.open(scene, "--trajectory", scene.with_suffix(".csv"), "--pictures", self.folder / "kept")
+        time.sleep(4)  # to the end of the path
+        self.screen.keep(self.window, "explore_clip_before")
+        self.screen.key("c")
+        clip = wait_for("the clip", lambda: list((self.folder / "kept").glob("scene-1.webp")))[0]
+        self.screen.keep(self.window, "explore_clip_after")
+        data = clip.read_bytes()
+        self.assertEqual((data[:4], data[8:12], data[12:16]), (b"RIFF", b"WEBP", b"VP8X"))
+        # 3 s, a picture each 40 ms; those in which nothing moves are one.
+        self.assertGreater(data.count(b"ANMF"), 30)
+        self.assertEqual(self.end(), 0)
+
+    def test_what_cannot_be_pulled_says_so(self):
+        self.open()
+        words = lambda: self.pixels(20, int(0.72 * self.height), int(0.6 * self.width), 30)
+        middle = int(0.35 * self.width), int(0.42 * self.height)
+        self.screen.point(self.window, *middle)
+        time.sleep(1)
+        before = words()
+        self.screen.do("keydown", "shift")
+        self.screen.do("mousedown", 1)
+        wait_for("a reason", lambda: words() != before)
+        self.screen.keep(self.window, "explore_not_pulled")
+        self.screen.do("mouseup", 1)
+        self.screen.do("keyup", "shift")
+        wait_for("the usual words", lambda: words() == before)
+        self.assertEqual(self.end(), 0)
+
     def test_the_servo_does_not_wait_for_a_display_that_stalls(self):
         self.open("--device", "simulated")
         self.screen.stall()

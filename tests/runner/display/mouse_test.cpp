@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 #include <thread>
+#include <utility>
 
 namespace palpate::runner {
 namespace {
@@ -93,6 +94,18 @@ TEST(StylusTarget, StaysInReachAndTurnsFiveDegreesOfFreedom) {
   EXPECT_GT(hand.axis().z, 0.99) << "z is up";
   hand.move({5, -5, 0.1});
   EXPECT_EQ(hand.tip, Vec3(0.25, -0.25, 0.1));
+}
+
+TEST(StylusTarget, PointsAsAnotherStylus) {
+  StylusTarget hand{{}, kLength, 0, 0};
+  for (const auto& [yaw, pitch] : {std::pair{0.3, 0.8}, {-2.9, -1.2}, {1.6, 0.0}, {3.0, 1.4}}) {
+    const StylusTarget other{{0.05, -0.1, 0.02}, kLength, yaw, pitch};
+    hand.point(other.stylus());
+    EXPECT_LT(glm::length(hand.stylus().tip - other.stylus().tip), 1e-12);
+    EXPECT_LT(glm::length(hand.stylus().tail - other.stylus().tail), 1e-12);
+  }
+  hand.point({{1, 0, 0}, {1, 0, 0}});
+  EXPECT_EQ(hand.tip, Vec3(0.25, 0, 0)) << "within reach";
 }
 
 }  // namespace

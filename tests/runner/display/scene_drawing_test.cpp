@@ -144,6 +144,42 @@ TEST(TorqueTest, OfTheDevicesIsThatOfTheContactsButForTorsion) {
   EXPECT_LT(glm::distance(torque_on_hand(moment), whole - glm::dot(whole, axis) * axis), 1e-12);
 }
 
+TEST(TorqueTest, TheTurnSweepsInProportionAndItsScaleIsSaid) {
+  stimuli::ObjectSpec ball;
+  ball.radius = 0.03;
+  const SceneDrawing drawing({ball}, {});
+  SceneMoment moment;
+  moment.sample.probe = {{0, 0, 0}, {0.2, 0, 0}};
+  const auto sweep = [&](double newton, const SceneDrawingSettings& looks) {
+    moment.sample.device1 = {0, 0, -newton};  // 0.1 m from the middle, and so is the other
+    moment.sample.device2 = {0, 0, newton};
+    const ScenePicture picture = drawing.picture(moment, light_theme(), looks);
+    return picture.turns.empty() ? 0 : picture.turns[0].sweep;
+  };
+  const SceneDrawingSettings looks{.radians_per_newton_metre = 10};
+  EXPECT_NEAR(sweep(1, looks), 2, 1e-5);  // 0.2 N m
+  EXPECT_NEAR(sweep(0.5, looks), 1, 1e-5);
+  EXPECT_EQ(sweep(0.0001, looks), 0) << "too small to be seen";
+  EXPECT_LT(sweep(100, looks), 6) << "no more than a turn";
+  // What a device gives at most, 6 N at the ends of a stylus of 0.12 m, is about half of a turn.
+  moment.sample.probe.tail = {0.12, 0, 0};
+  EXPECT_NEAR(sweep(3, {}), 2.9, 0.3);
+  EXPECT_EQ(drawing.scale_words({.metres_per_newton = 0.01, .radians_per_newton_metre = 10}),
+            "2 N: 20 mm    500 mN m: 286 degrees");
+}
+
+TEST(SceneDrawingTest, ALabelStandsJustAboveItsObject) {
+  stimuli::ObjectSpec plate;
+  plate.shape = stimuli::ShapeKind::box;
+  plate.size = {0.3, 0.3, 0.02};
+  plate.pose.position = {0.1, 0, 0.05};
+  const SceneDrawing drawing({plate}, {});
+  const ScenePicture picture = drawing.picture({}, light_theme(), {.labels = true});
+  ASSERT_EQ(picture.labels.size(), 1U);
+  EXPECT_NEAR(picture.labels[0].at.x, 0.1, 1e-6);
+  EXPECT_NEAR(picture.labels[0].at.z, 0.06 + 0.06 * drawing.size(), 1e-6);
+}
+
 TEST(SceneDrawingTest, LayersLieInsideOfATranslucentSkin) {
   stimuli::ObjectSpec spec;
   spec.pose.position = {0.01, 0.02, 0.03};

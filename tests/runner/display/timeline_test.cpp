@@ -67,6 +67,29 @@ TEST(TimelineTest, SeekFindsTheLastMomentThatIsNotLater) {
   EXPECT_DOUBLE_EQ(line.now(), 0.040);
 }
 
+TEST(TimelineTest, FaultsAreCountedWhileTheirMomentsAreKept) {
+  Timeline line;
+  EXPECT_TRUE(line.faults().empty());
+  for (int t = 0; t <= 50'000; t += 10) {
+    SceneMoment moment = moment_at(t);
+    if (t == 1000 || t == 20'000) moment.sample.faults = 4;
+    if (t == 1000) moment.sample.faults |= 0x80000000U;
+    line.add(moment);
+  }
+  std::vector<Timeline::Fault> faults = line.faults();
+  ASSERT_EQ(faults.size(), 2U);
+  EXPECT_EQ(faults[0].bit, 4U);
+  EXPECT_EQ(faults[0].count, 2U);
+  EXPECT_DOUBLE_EQ(faults[0].last, 20);
+  EXPECT_EQ(faults[1].bit, 0x80000000U);
+  line.add(moment_at(70'000));  // the first of them is more than a minute ago
+  faults = line.faults();
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_EQ(faults[0].count, 1U);
+  line.clear();
+  EXPECT_TRUE(line.faults().empty());
+}
+
 TEST(TimelineTest, SlowMotionShowsEveryMomentOfATenthOfTheTime) {
   Timeline line = of(0, 1000);
   line.seek(0.5);
