@@ -121,17 +121,20 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual(self.end(), 0)
 
     def test_a_clip_is_kept_of_what_was_seen(self):
-        scene = PROTOCOLS / "scenes" / "fig13-two-objects.json"
-        self.open(scene, "--trajectory", scene.with_suffix(".csv"), "--pictures", self.folder / "kept")
-        time.sleep(4)  # to the end of the path
-        self.screen.keep(self.window, "explore_clip_before")
+        # 0.4 s; a picture each 40 ms, which a machine without a graphics card draws in seconds when it is busy.
+        path = self.folder / "path.csv"
+        path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{0.01 * k},0,0,{0.05 - 0.0006 * k},0,0.01,{0.17 - 0.0006 * k}\n" for k in range(41)))
+        self.open("--trajectory", path, "--pictures", self.folder / "kept")
+        time.sleep(2)  # to the end of the path
         self.screen.key("c")
         clip = wait_for("the clip", lambda: list((self.folder / "kept").glob("scene-1.webp")))[0]
-        self.screen.keep(self.window, "explore_clip_after")
+        self.screen.keep(self.window, "explore_clip")
         data = clip.read_bytes()
-        self.assertEqual((data[:4], data[8:12], data[12:16]), (b"RIFF", b"WEBP", b"VP8X"))
-        # 3 s, a picture each 40 ms; those in which nothing moves are one.
-        self.assertGreater(data.count(b"ANMF"), 30)
+        self.assertEqual((data[:4], data[8:12]), (b"RIFF", b"WEBP"))
+        # Those in which nothing moves are one.
+        self.assertGreaterEqual(data.count(b"ANMF"), 6)
+        self.assertLessEqual(data.count(b"ANMF"), 11)
         self.assertEqual(self.end(), 0)
 
     def test_what_cannot_be_pulled_says_so(self):
