@@ -128,9 +128,12 @@ class Faces {
       const stimuli::Facet& across = at.part->mesh->facets()[side.across];
       const double height = across.offset - glm::dot(across.normal, a);
       const double slope = -glm::dot(across.normal, along);
-      out.portion.clip(height, slope);
+      const double at_side = -height / slope;
+      out.portion.enter = slope > 0 ? std::max(out.portion.enter, at_side) : out.portion.enter;
+      out.portion.leave = slope < 0 ? std::min(out.portion.leave, at_side) : out.portion.leave;
+      if ((slope == 0) & (height < 0)) out.portion.leave = -1;
       if (!(towards_end ? slope < 0 : slope > 0)) continue;
-      const double way = towards_end ? -height / slope : height / slope;
+      const double way = towards_end ? at_side : -at_side;
       if (way >= nearest) continue;
       nearest = way;
       out.next.facet = side.across;

@@ -52,9 +52,12 @@ class IdealTool {
   bool next_hit(const Vec3& goal, std::uint32_t& near, PairCast& first);
   void move_to_hit(const Vec3& goal, std::uint32_t near, const PairCast& hit);
   bool find_exact_place();
+  bool in_the_way_at_rest(Plane& plane);
+  void take_plane(const Plane& plane);
   void let_go_of_idle_planes();
   bool let_go_of_slid_planes(bool at_rest);
   bool slid_off(const Plane& plane) const;
+  bool slide_on(Plane& plane);
   bool slid_off_at_rest(const Plane& plane) const;
   bool parted_here(const NearPair& near) const;
 

@@ -103,6 +103,9 @@ void IdealTool::remember_planes() {
   for (const NearPair& near : pairs_.all()) {
     PairState& state = pairs_.state_of(near);
     state.carries = near.carries;
+    // What the next tick may step to is on its way here by then.
+    if (!(state.feature == near.came_with) && pairs_.part_of(near).trees->facet_map() != nullptr)
+      prefetch_neighbours(*pairs_.part_of(near).mesh, state.feature);
     if (near.carries) state.plane.valid = false;
     if (near.carries || state.feature.kind == Kind::none) continue;
     if (near.has_plane && !near.was_cast) continue;

@@ -6,12 +6,16 @@
 namespace palpate::rendering {
 namespace {
 
+using Kind = ContactFeature::Kind;
+
 constexpr int kRounds = 96;         // of casts in one tick; then the ideal tool stays where it is
 constexpr double kSlidOff = 4;      // skins; a contact farther off its facet has left it,
 constexpr double kOnFacet = 1e-11;  // or farther than this of the size, where the skin is thin
 constexpr double kAtRest = 2e-12;   // of the size: the same without the skin, all else is rounding
 constexpr double kExact = 1e-5;     // of the skin; what is nearer than this is rounding
-constexpr double kSamePlace = 8;    // skins; within it a contact that comes back never left
+constexpr double kInTheWay =
+    0.25;  // of a part's rounding; what the tool at rest is deeper in holds it
+constexpr double kSamePlace = 8;  // skins; within it a contact that comes back never left
 
 }  // namespace
 
@@ -37,7 +41,9 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
   for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
     NearPair& near = pairs_[i];
     if (near.carries) continue;  // convex, and behind a plane that the way stays beyond
-    if (apart(near, at_, goal)) continue;
+    if (apart(near, at_, goal) ||
+        pairs_.part_by_sphere(near, pairs_.posed(near, at_), pairs_.posed(near, goal)))
+      continue;
     near.was_cast = true;
     const PairCast found =
         cast(pairs_.mesh_of(near), pairs_.state_of(near).feature, pairs_.local(near, at_), near.d,
@@ -67,6 +73,21 @@ bool IdealTool::slid_off_at_rest(const Plane& plane) const {
   return distance_off(*part.mesh, plane.feature, tip, near.true_d) > slack;
 }
 
+/// Goes on to the plane of the next facet of M where the tool, a skin away, is over that facet.
+/// Then the way to wherever that plane holds it is free: it stays beyond the plane.
+bool IdealTool::slide_on(Plane& plane) {
+  const NearPair& near = pairs_[plane.near];
+  const ContactFeature next =
+      feature_beyond(*pairs_.part_of(near).mesh, plane.feature, pairs_.local(near, at_), near.d);
+  if (next.kind == Kind::none) return false;
+  Plane beyond = plane_of(plane.near, next);
+  if (!(glm::dot(beyond.normal, at_) - beyond.depth > 0) || slid_off(beyond)) return false;
+  beyond.stays = true;
+  plane = beyond;
+  pairs_.state_of(near).feature = beyond.feature;
+  return true;
+}
+
 /// Whether the pair let go of the ideal tool where that is now, within rounding.
 bool IdealTool::parted_here(const NearPair& near) const {
   const double same = kSamePlace * group_.skin;
@@ -86,14 +107,15 @@ void IdealTool::let_go_of_idle_planes() {
 /// Lets go of planes whose facet the tool has slid off. True when there are some.
 bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   bool slid = false;
-  planes_.remove_if([&](const Plane& plane) {
+  planes_.remove_if([&](Plane& plane) {
     NearPair& near = pairs_[plane.near];
     if (plane.stays && parted_here(near)) return false;
     if (!(at_rest ? slid_off_at_rest(plane) : slid_off(plane))) return false;
-    near.carries = false;
     near.parted = true;
     near.parted_at = at_;
     slid = true;
+    if (slide_on(plane)) return false;
+    near.carries = false;
     return true;
   });
   return slid;
@@ -103,6 +125,39 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
 bool IdealTool::find_exact_place() {
   return planes_.nearest(Vec3(0), 0, kExact * group_.skin, exact_) ||
          planes_.nearest(Vec3(0), 0, group_.skin / 8, exact_);
+}
+
+/// Whether the tool, without the skin that keeps it off what holds it, is in another part, which it
+/// was less than the skin away from; then the plane that keeps it out.
+bool IdealTool::in_the_way_at_rest(Plane& plane) {
+  for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
+    const NearPair& near = pairs_[i];
+    if (near.carries || apart(near, exact_, exact_)) continue;
+    const ScenePart& part = pairs_.part_of(near);
+    const ContactFeature known = pairs_.state_of(near).feature;
+    const Vec3 rest = part.local_vector(exact_), skin = part.local_vector(exact_ - at_);
+    if (known.kind != Kind::none &&
+        measure(*part.mesh, known, near.true_tip + rest, near.true_d).depth < 0)
+      continue;
+    const PairCast in =
+        cast(pairs_.mesh_of(near), known, near.true_tip + rest - skin, near.true_d, skin);
+    if (!in.hit) continue;
+    plane = plane_of(i, in.feature);
+    if (!(plane.depth - glm::dot(plane.normal, exact_) > kInTheWay * part.tolerance)) continue;
+    if (plane.depth - glm::dot(plane.normal, at_) < group_.skin) return true;
+  }
+  return false;
+}
+
+/// Puts the plane of a pair that has none in use.
+void IdealTool::take_plane(const Plane& plane) {
+  if (planes_.full()) let_go_of_idle_planes();
+  stuck_ = planes_.full();
+  if (stuck_) return;
+  NearPair& near = pairs_[plane.near];
+  near.carries = true;
+  pairs_.state_of(near).feature = plane.feature;
+  planes_.add(plane);
 }
 
 void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCast& hit) {
@@ -117,17 +172,8 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
     let_go_of_idle_planes();
     let_go_of_slid_planes(false);
   }
-  NearPair& near = pairs_[index];
-  plane.stays = parted_here(near);
-  near.carries = true;
-  pairs_.state_of(near).feature = plane.feature;
-  if (planes_.full()) let_go_of_idle_planes();
-  if (planes_.full()) {
-    near.carries = false;
-    stuck_ = true;
-    return;
-  }
-  planes_.add(plane);
+  plane.stays = parted_here(pairs_[index]);
+  take_plane(plane);
 }
 
 /// Moves the ideal tool as near to the virtual one as the parts let it.
@@ -148,7 +194,10 @@ void IdealTool::translate() {
     at_ = goal;
     let_go_of_idle_planes();
     if (!find_exact_place()) break;
-    if (!let_go_of_slid_planes(true)) return;
+    if (let_go_of_slid_planes(true)) continue;
+    Plane in_the_way;
+    if (!in_the_way_at_rest(in_the_way)) return;
+    take_plane(in_the_way);
   }
   stuck_ = true;
 }

@@ -33,7 +33,8 @@ bool IdealTool::put_plane(std::uint32_t index, ContactFeature feature) {
 /// let it.
 /// \param most  of the turn \return what it took of it, 0 to 1
 double IdealTool::turn(const ToolPose& from, double most) {
-  const PlacedTool before = pairs_.placed(from);
+  PlacedTool& before = all_.before;
+  pairs_.place(from, before);
   const PlacedTool& after = pairs_.now();
   const Vec3 shift = turned(memory_.grasp, from) - turned(memory_.grasp, tick_.tool);
   double motion = 0;
@@ -55,10 +56,8 @@ double IdealTool::turn(const ToolPose& from, double most) {
   for (double fraction = most; fraction >= kLeastTurn; fraction *= 0.5) {
     ToolPose to = fraction == 1 ? tick_.tool : between(from, tick_.tool, fraction);
     to.tip = from.tip + turned(memory_.grasp, from) - turned(memory_.grasp, to);
-    if (fraction == 1)
-      pairs_.orient(after);
-    else
-      pairs_.orient(pairs_.placed(to));
+    if (fraction < 1) pairs_.place(to, all_.turned);
+    pairs_.orient(fraction == 1 ? after : all_.turned);
     if (settle(from, before, to, far)) {
       pose_ = to;
       return fraction;
@@ -84,6 +83,9 @@ bool IdealTool::settle(const ToolPose& from, const PlacedTool& placed_from, cons
     const Vec3 tip = pairs_.local(near, at_);
     if (!state.carries) {
       if (near.was_apart && apart(near, at_, at_)) continue;
+      if (pairs_.part_by_sphere(near, NearPairs::posed(near, from.tip, placed_from),
+                                pairs_.posed(near, at_)))
+        continue;
       near.was_cast = true;
       const Entry entry =
           pairs_.sweep(near, pairs_.shrunk(near, from.tip, placed_from.segments[near.segment]),
@@ -112,7 +114,9 @@ bool IdealTool::push_out(const Vec3& from, double most_push) {
                         pairs_.local(near, at_), near.d)
                      .feature;
       } else {
-        if (apart(near, from, at_)) continue;
+        if (apart(near, from, at_) ||
+            pairs_.part_by_sphere(near, pairs_.posed(near, from), pairs_.posed(near, at_)))
+          continue;
         near.was_cast = true;
         const PairCast hit =
             cast(pairs_.mesh_of(near), pairs_.state_of(near).feature, pairs_.local(near, from),

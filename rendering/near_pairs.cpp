@@ -1,6 +1,7 @@
 #include "rendering/near_pairs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -11,10 +12,29 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-/// m, of a segment above the plane of a pair.
-double height_above(const NearPair& near, const Vec3& tip, const PlacedSegment& segment) {
-  return glm::dot(near.normal, tip + segment.from) - near.offset +
-         std::min(0.0, glm::dot(near.normal, segment.along));
+/// m, of a segment, the tool's tip where it is, above a plane.
+double height_above(const Vec3& normal, double offset, const Vec3& tip,
+                    const PlacedSegment& segment) {
+  return glm::dot(normal, tip + segment.from) - offset +
+         std::min(0.0, glm::dot(normal, segment.along));
+}
+
+/// From a point to the nearest of a segment that starts at `to_start` from it.
+Vec3 to_nearest(const Vec3& to_start, const Vec3& along, double per_length2) {
+  return to_start - std::clamp(per_length2 * glm::dot(to_start, along), -1.0, 0.0) * along;
+}
+
+[[gnu::always_inline]] inline void prefetch(const stimuli::ConvexMesh& mesh,
+                                            ContactFeature feature) {
+  if (feature.kind == Kind::edge)
+    __builtin_prefetch(&mesh.edges()[feature.index]);
+  else
+    __builtin_prefetch(&mesh.facets()[feature.index]);
+}
+
+double inverse_length2(const Vec3& along) {
+  const double length2 = glm::dot(along, along);
+  return length2 > 0 ? 1 / length2 : 0;
 }
 
 }  // namespace
@@ -37,54 +57,76 @@ LineProbe NearPairs::shrunk(const NearPair& near, const Vec3& tip,
   return {start, start + part.shrink * part.local_vector(segment.along)};
 }
 
-/// Takes up the plane of an earlier tick.
-void NearPairs::take_up_plane(NearPair& near) {
-  const SeparatingPlane& plane = state_of(near).plane;
-  near.has_plane = plane.valid;
-  if (!plane.valid) return;
-  const ScenePart& part = part_of(near);
-  near.normal = part.world_vector(plane.normal);
-  near.offset =
-      plane.offset + glm::dot(near.normal, part.position) + 2 * (part.margin + part.tolerance);
-}
-
 void NearPairs::collect(const ToolPose& from, const PlacedTool& placed_from, double motion,
                         double reach) {
   all_.near.clear();
-  const PlacedTool& now = now_;
+  const PlacedTool& now = all_.now;
+  std::array<double, Tool::kMostSegments> per_length2;
+  for (std::uint32_t j = 0; j < now.count; ++j)
+    per_length2[j] = inverse_length2(now.segments[j].along);
+  const auto segments = static_cast<std::uint32_t>(tick_.scene.segments());
   visit_near_parts([&](std::uint32_t index) {
     const ScenePart& part = tick_.scene.parts()[index];
     if (part.breaking != ScenePart::kHolds && all_.breaking[part.breaking].strength == 0) return;
+    const Vec3 to_tip = tick_.tool.tip - part.sphere_centre;
+    const double margin = 2 * part.margin + part.tolerance;
+    const double far = part.sphere_radius + std::max(motion, reach) + margin;
+    const std::uint32_t first = group_.first_pair + (index - group_.first_part) * segments;
     for (std::uint32_t j = 0; j < now.count; ++j) {
-      NearPair near;
-      near.part = index;
-      near.segment = j;
-      near.pair = group_.first_pair +
-                  (index - group_.first_part) * static_cast<std::uint32_t>(tick_.scene.segments()) +
-                  j;
-      PairState& state = state_of(near);
+      const PairState& state = all_.pairs[first + j];
+      const PlacedSegment& segment = now.segments[j];
+      Vec3 normal;
+      double offset = 0;
+      bool was_apart = false;
       if (!state.carries) {
-        const Vec3 to_start = part.sphere_centre - (tick_.tool.tip + now.segments[j].from);
-        const Vec3& along = now.segments[j].along;
-        const double length2 = glm::dot(along, along);
-        const double fraction =
-            length2 > 0 ? std::clamp(glm::dot(to_start, along) / length2, 0.0, 1.0) : 0;
-        const Vec3 apart = to_start - fraction * along;
-        const double far =
-            part.sphere_radius + std::max(motion, reach) + 2 * part.margin + part.tolerance;
+        const Vec3 apart = to_nearest(to_tip + segment.from, segment.along, per_length2[j]);
         if (glm::dot(apart, apart) > far * far) continue;
-        take_up_plane(near);
-        near.was_apart =
-            near.has_plane && height_above(near, from.tip, placed_from.segments[j]) > 0;
-        if (near.was_apart && height_above(near, tick_.tool.tip, now.segments[j]) > reach) continue;
+        if (state.plane.valid) {
+          normal = part.world_vector(state.plane.normal);
+          offset = state.plane.offset + glm::dot(normal, part.position) + margin + part.tolerance;
+          was_apart = height_above(normal, offset, from.tip, placed_from.segments[j]) > 0;
+          if (was_apart && height_above(normal, offset, tick_.tool.tip, segment) > reach) continue;
+        }
       }
-      all_.near.push_back(near);
+      NearPair& near = all_.near.emplace_back();
+      near.part = index;
+      near.pair = first + j;
+      near.segment = j;
+      near.normal = normal;
+      near.offset = offset;
+      near.has_plane = !state.carries && state.plane.valid;
+      near.was_apart = was_apart;
+      near.came_with = state.feature;
+      if (part.trees->facet_map() != nullptr) prefetch(*part.mesh, state.feature);
     }
   });
 }
 
+bool NearPairs::part_by_sphere(NearPair& near, const PosedSegment& from, const PosedSegment& to) {
+  const ScenePart& part = part_of(near);
+  const Vec3 apart = to_nearest(to.start - part.sphere_centre, to.along, inverse_length2(to.along));
+  const double margin = 2 * (part.margin + part.tolerance);
+  const double radius = part.sphere_radius + margin;
+  const double distance2 = glm::dot(apart, apart);
+  if (!(distance2 > radius * radius)) return false;
+  const Vec3 normal = apart / std::sqrt(distance2);
+  const double offset = glm::dot(normal, part.sphere_centre) + radius;
+  const auto above = [&](const PosedSegment& segment) {
+    return glm::dot(normal, segment.start) + std::min(0.0, glm::dot(normal, segment.along)) >
+           offset;
+  };
+  if (!above(from) || !above(to)) return false;
+  near.normal = normal;
+  near.offset = offset;
+  near.height = height_above(normal, offset, tick_.tool.tip, oriented_->segments[near.segment]);
+  near.has_plane = true;
+  state_of(near).plane = {part.local_vector(normal),
+                          offset - margin - glm::dot(normal, part.position), true};
+  return true;
+}
+
 void NearPairs::orient(const PlacedTool& oriented) {
-  oriented_ = oriented;
+  oriented_ = &oriented;
   for (NearPair& near : all_.near) {
     const ScenePart& part = part_of(near);
     const PlacedSegment& segment = oriented.segments[near.segment];
@@ -92,7 +134,10 @@ void NearPairs::orient(const PlacedTool& oriented) {
     near.true_d = part.local_vector(segment.along);
     near.tip = part.inside + part.shrink * (near.true_tip - part.inside);
     near.d = part.shrink * near.true_d;
-    if (near.has_plane) near.height = height_above(near, tick_.tool.tip, segment);
+    if (part.trees->facet_map() != nullptr && near.came_with.kind != Kind::none)
+      prefetch_neighbours(*part.mesh, near.came_with);
+    if (near.has_plane)
+      near.height = height_above(near.normal, near.offset, tick_.tool.tip, segment);
   }
 }
 
@@ -125,8 +170,8 @@ Entry NearPairs::sweep(NearPair& near, const LineProbe& before, const LineProbe&
 }
 
 bool NearPairs::virtual_inside() {
-  collect(tick_.tool, now_, 0, 0);
-  orient(now_);
+  collect(tick_.tool, all_.now, 0, 0);
+  orient(all_.now);
   for (NearPair& near : all_.near) {
     const WalkResult at = locate(mesh_of(near), state_of(near).feature, near.true_tip, near.true_d);
     state_of(near).feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;

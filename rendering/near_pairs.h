@@ -29,6 +29,11 @@ inline bool apart(const NearPair& near, const Vec3& from, const Vec3& to) {
          glm::dot(near.normal, to) + near.height > 0;
 }
 
+/// A segment in the world, m.
+struct PosedSegment {
+  Vec3 start, along;
+};
+
 /// The pairs of one group, in one tick. Translations are relative to the virtual tool's tip.
 class NearPairs {
  public:
@@ -36,8 +41,7 @@ class NearPairs {
       : tick_(tick),
         all_(tick.state.unions),
         group_(group),
-        carried_(tick.sides ? tick.scene.tool() : nullptr),
-        now_(placed(tick.tool)) {}
+        carried_(tick.sides ? tick.scene.tool() : nullptr) {}
 
   std::span<NearPair> all() { return all_.near; }
   std::span<const NearPair> all() const { return all_.near; }
@@ -54,12 +58,14 @@ class NearPairs {
 
   /// The segments' tool; null: the stylus itself.
   const Tool* carried() const { return carried_; }
-  PlacedTool placed(const ToolPose& pose) const { return place(carried_, tick_.sides, pose); }
+  void place(const ToolPose& pose, PlacedTool& out) const {
+    rendering::place(carried_, tick_.sides, pose, out);
+  }
   PlacedSegment placed(const ToolPose& pose, std::uint32_t segment) const {
     return place_segment(carried_, tick_.sides, pose, segment);
   }
   /// The virtual tool.
-  const PlacedTool& now() const { return now_; }
+  const PlacedTool& now() const { return all_.now; }
 
   /// Sets the pairs that the tool can touch while it comes from `from` and then stays within
   /// `reach` of the virtual tool.
@@ -67,8 +73,9 @@ class NearPairs {
   void collect(const ToolPose& from, const PlacedTool& placed_from, double motion, double reach);
 
   /// Puts the pairs' segments where the tool of this orientation has them.
+  /// \param oriented  stays in use
   void orient(const PlacedTool& oriented);
-  const PlacedTool& oriented() const { return oriented_; }
+  const PlacedTool& oriented() const { return *oriented_; }
 
   /// Mesh frame, m; the segment's tip where the tool, oriented, is moved by y.
   Vec3 local(const NearPair& near, const Vec3& y) const {
@@ -82,19 +89,31 @@ class NearPairs {
   /// them where it does not.
   Entry sweep(NearPair& near, const LineProbe& before, const LineProbe& after);
 
+  /// Whether a plane that touches the part's bounding sphere parts the two at both poses, and so
+  /// all the way between; then it is remembered. Much less than a cast.
+  bool part_by_sphere(NearPair& near, const PosedSegment& from, const PosedSegment& to);
+  /// Where the tool of a pose has the pair's segment.
+  static PosedSegment posed(const NearPair& near, const Vec3& tip, const PlacedTool& tool) {
+    const PlacedSegment& segment = tool.segments[near.segment];
+    return {tip + segment.from, segment.along};
+  }
+  /// The same of the oriented tool, moved by y.
+  PosedSegment posed(const NearPair& near, const Vec3& y) const {
+    return posed(near, tick_.tool.tip + y, *oriented_);
+  }
+
   /// Whether the virtual tool is inside of a part.
   bool virtual_inside();
 
  private:
   template <class Visit>
   void visit_near_parts(const Visit& visit) const;
-  void take_up_plane(NearPair& near);
 
   UnionTick& tick_;
   UnionMemory& all_;
   const PartGroup& group_;
   const Tool* carried_;
-  PlacedTool now_, oriented_;
+  const PlacedTool* oriented_ = nullptr;
 };
 
 }  // namespace palpate::rendering

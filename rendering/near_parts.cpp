@@ -126,7 +126,7 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
   if (state.clearance > 0 && moved(tool, memory.near_pose) + slack < state.clearance) return;
   state.near_parts_pose = probe;
   memory.near_pose = tool;
-  const PlacedTool placed = place(carried, sides, tool);
+  const PlacedTool& placed = memory.now;
   std::array<Line, Tool::kMostSegments> lines;
   for (std::size_t j = 0; j < placed.count; ++j)
     lines[j] = {tool.tip + placed.segments[j].from, placed.segments[j].along};

@@ -311,7 +311,23 @@ double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, con
   if (is_point(mesh, d))
     return minkowski::distance_off<false>(mesh, measured<false>(mesh, feature, tip, Vec3(0)), tip,
                                           Vec3(0));
-  return minkowski::distance_off<true>(mesh, measured<true>(mesh, feature, tip, d), tip, d);
+  const Measured at = measured<true>(mesh, feature, tip, d);
+  // Between the ends of both: the two meet, but for rounding.
+  if (at.edge && at.within && !at.nearly_parallel) return 0;
+  return minkowski::distance_off<true>(mesh, at, tip, d);
+}
+
+ContactFeature feature_beyond(const stimuli::ConvexMesh& mesh, ContactFeature feature,
+                              const Vec3& tip, const Vec3& d) {
+  Measured next;
+  if (is_point(mesh, d)) {
+    const Measured at = measured<false>(mesh, feature, tip, Vec3(0));
+    const bool past = beyond<false>(mesh, at, tip + at.depth * at.normal, Vec3(0), next);
+    return past ? feature_of(next) : ContactFeature();
+  }
+  const Measured at = measured<true>(mesh, feature, tip, d);
+  const bool past = beyond<true>(mesh, at, tip + at.depth * at.normal, d, next);
+  return past ? feature_of(next) : ContactFeature();
 }
 
 WalkResult measure(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,

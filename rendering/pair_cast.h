@@ -44,6 +44,11 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
 double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,
                     const Vec3& d);
 
+/// The facet of M past the side of the feature that the segment, moved along the feature's normal
+/// onto it, is past. Of kind none where it is past none.
+ContactFeature feature_beyond(const stimuli::ConvexMesh& mesh, ContactFeature feature,
+                              const Vec3& tip, const Vec3& d);
+
 /// The same feature, measured wherever the segment is; one that is no facet of M any more since the
 /// segment has turned gives way to the facet that its normal has become.
 WalkResult measure(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,

@@ -243,6 +243,7 @@ Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe&
     tool.frame =
         tool_frame(tool.d, state.has_last ? &all.last.frame : nullptr, state.measured_side);
   }
+  place(Probe::kSegment ? scene.tool() : nullptr, Probe::kSegment, tool, all.now);
   update_near_parts(scene, state, probe, tool, Probe::kSegment);
   Tick<Probe> plain{scene, state, probe, Probe::kSegment ? glm::length(tool.d) : 0};
   UnionTick tick{scene, state, tool, Probe::kSegment, dt};

@@ -68,9 +68,13 @@ PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, 
 
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose) {
   PlacedTool out;
+  place(tool, sides, pose, out);
+  return out;
+}
+
+void place(const Tool* tool, bool sides, const ToolPose& pose, PlacedTool& out) {
   out.count = tool == nullptr || !sides ? 1 : tool->segments.size();
   for (std::size_t j = 0; j < out.count; ++j) out.segments[j] = place_segment(tool, sides, pose, j);
-  return out;
 }
 
 ToolPose between(const ToolPose& from, const ToolPose& to, double fraction) {

@@ -41,6 +41,9 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured);
 /// \param sides  false: the tip alone touches
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose);
 
+/// The same over what was placed before: writes no more than the segments that there are.
+void place(const Tool* tool, bool sides, const ToolPose& pose, PlacedTool& out);
+
 /// One of them.
 PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, std::size_t index);
 

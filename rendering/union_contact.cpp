@@ -27,7 +27,8 @@ double motion_of(const ToolPose& from, const PlacedTool& placed_from, const Tool
 /// The pose at which a tool that comes from free space meets the first part; the virtual one where
 /// it meets none.
 ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
-  const PlacedTool before = pairs_.placed(from);
+  PlacedTool& before = all_.before;
+  pairs_.place(from, before);
   const PlacedTool& after = pairs_.now();
   pairs_.collect(from, before, motion_of(from, before, tick_.tool, after), 0);
   Entry first;

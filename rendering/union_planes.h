@@ -48,12 +48,16 @@ class Planes {
   bool empty() const { return count_ == 0; }
   void clear() { count_ = 0; }
   void add(const Plane& plane) { planes_[count_++] = plane; }
+  /// In order; `drop` may change what it keeps.
   template <class Drop>
   void remove_if(const Drop& drop) {
-    count_ = static_cast<std::size_t>(
-        std::remove_if(planes_.begin(), planes_.begin() + static_cast<std::ptrdiff_t>(count_),
-                       drop) -
-        planes_.begin());
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (drop(planes_[i])) continue;
+      if (kept != i) planes_[kept] = planes_[i];
+      ++kept;
+    }
+    count_ = kept;
   }
 
   /// Whether the planes, all of which hold the tool, leave it room: not where they are a crack.

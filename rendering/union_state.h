@@ -87,11 +87,12 @@ struct NearPair {
   Vec3 normal;
   double offset = 0, height = 0;
   bool has_plane = false;
-  bool was_apart = false;  ///< by that plane, at the pose that the tool comes from
-  bool was_cast = false;   ///< the plane did not do: it is renewed
-  Vec3 parted_at;          ///< m, where it last let go of the ideal tool in this tick
-  bool parted = false;     ///< it did
-  bool carries = false;    ///< has a plane in use
+  bool was_apart = false;    ///< by that plane, at the pose that the tool comes from
+  bool was_cast = false;     ///< the plane did not do: it is renewed
+  Vec3 parted_at;            ///< m, where it last let go of the ideal tool in this tick
+  bool parted = false;       ///< it did
+  bool carries = false;      ///< has a plane in use
+  ContactFeature came_with;  ///< the pair's feature at the last tick
 };
 
 /// A contact of several, with where it is.
@@ -120,6 +121,8 @@ struct UnionMemory {
   std::vector<NearPair> near;           ///< of the group in hand
   std::vector<PlacedContact> contacts;  ///< of the last tick
   std::vector<RubbedPair> rubbed;       ///< at the last tick
+  PlacedTool now;                       ///< the virtual tool at this tick
+  PlacedTool before, turned;            ///< the ideal tool in hand, before it turns and turned
   ToolPose last;                        ///< the virtual tool at the last tick
   ToolPose near_pose;                   ///< the same when the list of near parts was rebuilt
   bool exceptions = false;              ///< some object is off or behind, or some layer broken

@@ -54,6 +54,14 @@ TEST(UnionSearch, IdealToolsInNarrowWedgesAreExact) {
   expect_nothing_wrong(3, 3507);
 }
 
+TEST(UnionSearch, WhatIsNearerThanTheSkinIsNotEnteredWithoutIt) {
+  // The tool rests a skin off what holds it; another part is in the last bit of the way.
+  expect_nothing_wrong(1401, 83);
+  expect_nothing_wrong(1401, 4623);
+  // A facet that is touched exactly is not in the way.
+  EXPECT_EQ(search_union(ray_renderer(), 1, 60).capped, 0u);
+}
+
 TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
   // The virtual tool has turned into a part; the ideal one, at the same tip, has not.
   expect_nothing_wrong(2, 2979);
