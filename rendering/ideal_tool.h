@@ -49,6 +49,7 @@ class IdealTool {
   // ideal_tool_translate.cpp
   void resume_planes();
   void translate();
+  bool find_goal(Vec3& goal);
   bool next_hit(const Vec3& goal, std::uint32_t& near, PairCast& first);
   void move_to_hit(const Vec3& goal, std::uint32_t near, const PairCast& hit);
   bool find_exact_place();
@@ -58,7 +59,8 @@ class IdealTool {
   bool let_go_of_slid_planes(bool at_rest);
   bool slid_off(const Plane& plane) const;
   bool slide_on(Plane& plane);
-  bool slid_off_at_rest(const Plane& plane) const;
+  bool slid_off_at_rest(const Plane& plane, double slack) const;
+  bool past_a_facet_at_rest() const;
   bool parted_here(const NearPair& near) const;
 
   // ideal_tool_contacts.cpp
@@ -82,6 +84,7 @@ class IdealTool {
   Vec3 exact_;     ///< m, the same without the skin, once it rests
   Planes planes_;
   bool stuck_ = false;
+  bool in_crack_ = false;  ///< opposite planes leave it less than a skin
 };
 
 }  // namespace palpate::rendering

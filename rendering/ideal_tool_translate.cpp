@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <span>
 
 #include "rendering/ideal_tool.h"
 
@@ -8,11 +9,13 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-constexpr int kRounds = 96;         // of casts in one tick; then the ideal tool stays where it is
-constexpr double kSlidOff = 4;      // skins; a contact farther off its facet has left it,
-constexpr double kOnFacet = 1e-11;  // or farther than this of the size, where the skin is thin
-constexpr double kAtRest = 2e-12;   // of the size: the same without the skin, all else is rounding
-constexpr double kExact = 1e-5;     // of the skin; what is nearer than this is rounding
+constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
+constexpr double kSlidOff = 4;       // skins; a contact farther off its facet has left it,
+constexpr double kOnFacet = 1e-11;   // or farther than this of the size, where the skin is thin
+constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
+constexpr double kExact = 1e-5;      // of the skin; what is nearer than this is rounding
+constexpr double kRounding = 0.125;  // of the skin; so much less of it is a skin
+constexpr double kLessSkin = 0.25;   // of the skin, in a gap where two do not fit, and so on
 constexpr double kInTheWay =
     0.25;  // of a part's rounding; what the tool at rest is deeper in holds it
 constexpr double kSamePlace = 8;  // skins; within it a contact that comes back never left
@@ -65,10 +68,11 @@ bool IdealTool::slid_off(const Plane& plane) const {
 }
 
 /// The same where it rests, without the skin.
-bool IdealTool::slid_off_at_rest(const Plane& plane) const {
+/// \param slack  of the size; all else is rounding
+bool IdealTool::slid_off_at_rest(const Plane& plane, double slack) const {
   const NearPair& near = pairs_[plane.near];
   const ScenePart& part = pairs_.part_of(near);
-  const double slack = kAtRest * (part.mesh->size() + glm::length(near.true_d));
+  slack *= part.mesh->size() + glm::length(near.true_d);
   const Vec3 tip = near.true_tip + part.local_vector(exact_);
   return distance_off(*part.mesh, plane.feature, tip, near.true_d) > slack;
 }
@@ -110,7 +114,7 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   planes_.remove_if([&](Plane& plane) {
     NearPair& near = pairs_[plane.near];
     if (plane.stays && parted_here(near)) return false;
-    if (!(at_rest ? slid_off_at_rest(plane) : slid_off(plane))) return false;
+    if (!(at_rest ? slid_off_at_rest(plane, kAtRest) : slid_off(plane))) return false;
     near.parted = true;
     near.parted_at = at_;
     slid = true;
@@ -125,6 +129,17 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
 bool IdealTool::find_exact_place() {
   return planes_.nearest(Vec3(0), 0, kExact * group_.skin, exact_) ||
          planes_.nearest(Vec3(0), 0, group_.skin / 8, exact_);
+}
+
+/// Whether planes hold the tool, a skin away, on facets of which it is past one without the skin:
+/// those of a groove may end between the two, and leave a gap that is too narrow for the skin.
+bool IdealTool::past_a_facet_at_rest() const {
+  const std::span<const Plane> all = planes_.all();
+  const auto past = [&](const Plane& plane) {
+    return plane.stays && plane.multiplier > 0 && slid_off_at_rest(plane, kOnFacet);
+  };
+  const auto off = [&](const Plane& plane) { return plane.multiplier > 0 && slid_off(plane); };
+  return std::any_of(all.begin(), all.end(), past) && std::none_of(all.begin(), all.end(), off);
 }
 
 /// Whether the tool, without the skin that keeps it off what holds it, is in another part, which it
@@ -176,15 +191,24 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   take_plane(plane);
 }
 
+/// The point nearest to the virtual tool a skin off the planes. In a gap narrower than two skins
+/// the tool keeps a share of the skin, or else what it has. False where rounding hides it.
+bool IdealTool::find_goal(Vec3& goal) {
+  const double skin = group_.skin;
+  in_crack_ = false;
+  if (planes_.nearest(Vec3(0), skin, kRounding * skin, goal)) return true;
+  in_crack_ = !planes_.leave_room();
+  for (double less = kLessSkin * skin; less >= kExact * skin; less *= kLessSkin) {
+    if (planes_.nearest(Vec3(0), less, kRounding * less, goal)) return true;
+  }
+  return planes_.nearest_from(at_, skin, kRounding * skin, goal);
+}
+
 /// Moves the ideal tool as near to the virtual one as the parts let it.
 void IdealTool::translate() {
-  const double tolerance = group_.skin / 8;
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
-    if (!planes_.nearest(Vec3(0), group_.skin, tolerance, goal) &&
-        !planes_.nearest_from(at_, group_.skin, tolerance, goal)) {
-      break;
-    }
+    if (!find_goal(goal)) break;
     std::uint32_t near = 0;
     PairCast hit;
     if (next_hit(goal, near, hit)) {
@@ -195,6 +219,7 @@ void IdealTool::translate() {
     let_go_of_idle_planes();
     if (!find_exact_place()) break;
     if (let_go_of_slid_planes(true)) continue;
+    if (past_a_facet_at_rest() && !find_goal(exact_)) break;  // the gap is closed to it
     Plane in_the_way;
     if (!in_the_way_at_rest(in_the_way)) return;
     take_plane(in_the_way);

@@ -84,7 +84,7 @@ void IdealTool::follow() {
     stuck_ = false;
     resume_planes();
     translate();
-  } while (most > 0 && (stuck_ || !planes_.leave_room()));
+  } while (most > 0 && (stuck_ || in_crack_ || !planes_.leave_room()));
   const std::size_t first_contact = all_.contacts.size();
   add_contacts();
   remember(first_contact);

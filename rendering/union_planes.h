@@ -85,13 +85,15 @@ class Planes {
     return solve(spaces, tolerance, origin, point);
   }
 
-  /// The same to the virtual tool, from `at`, which is allowed: no plane asks for more than is
-  /// there.
+  /// The same to the virtual tool, from `at`: no plane asks for more than is there, and none that
+  /// `at` is above is crossed.
   bool nearest_from(const Vec3& at, double skin, double tolerance, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;
-    for (std::size_t i = 0; i < count_; ++i)
-      spaces[i] = {planes_[i].normal,
-                   std::min(planes_[i].depth + skin, glm::dot(planes_[i].normal, at))};
+    for (std::size_t i = 0; i < count_; ++i) {
+      const double height = glm::dot(planes_[i].normal, at) - planes_[i].depth;
+      spaces[i] = {planes_[i].normal, planes_[i].depth + std::min(skin, height)};
+      if (height > 0) tolerance = std::min(tolerance, 0.5 * height);
+    }
     return solve(spaces, tolerance, Vec3(0), point);
   }
 

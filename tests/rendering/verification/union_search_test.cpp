@@ -62,6 +62,23 @@ TEST(UnionSearch, WhatIsNearerThanTheSkinIsNotEnteredWithoutIt) {
   EXPECT_EQ(search_union(ray_renderer(), 1, 60).capped, 0u);
 }
 
+TEST(UnionSearch, AGapNarrowerThanTwoSkinsIsNeitherEnteredNorALimit) {
+  // Turning closes a wedge between two parts down to less than two skins; then it goes along it.
+  // In the other a slit of 0.17 skins has a second facet on one side, 0.05 skins higher.
+  for (const std::uint64_t walk : {7208, 11395}) {
+    const UnionCounts counts = search_union(ray_renderer(), 1407, walk);
+    EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+    EXPECT_EQ(counts.capped, 0u);
+  }
+}
+
+TEST(UnionSearch, AGrooveThatEndsBeforeTheToolAtRestIsClosedWhereItsSkinIs) {
+  // Facets 0.02 degrees from antiparallel end 1e-7 m before the place where they would meet.
+  const UnionCounts counts = search_union(ray_renderer(), 1407, 9371);
+  EXPECT_EQ(counts.wrong(), 0u) << told(counts);
+  EXPECT_EQ(counts.capped, 0u);
+}
+
 TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
   // The virtual tool has turned into a part; the ideal one, at the same tip, has not.
   expect_nothing_wrong(2, 2979);
