@@ -70,10 +70,12 @@ TEST(UnionSearch, AGapNarrowerThanTwoSkinsIsNeitherEnteredNorALimit) {
     EXPECT_EQ(counts.wrong(), 0u) << told(counts);
     EXPECT_EQ(counts.capped, 0u);
   }
+  // From free space it comes onto parts that abut, between which there is no room at all.
+  expect_nothing_wrong(1407, 1026);
 }
 
 TEST(UnionSearch, AGrooveThatEndsBeforeTheToolAtRestIsClosedWhereItsSkinIs) {
-  // Facets 0.02 degrees from antiparallel end 1e-7 m before the place where they would meet.
+  // Facets 0.02 degrees from antiparallel end 1e-7 m before where the tool would rest without skin.
   const UnionCounts counts = search_union(ray_renderer(), 1407, 9371);
   EXPECT_EQ(counts.wrong(), 0u) << told(counts);
   EXPECT_EQ(counts.capped, 0u);
