@@ -197,11 +197,11 @@ bool IdealTool::find_goal(Vec3& goal) {
   const double skin = group_.skin;
   in_crack_ = false;
   if (planes_.nearest(Vec3(0), skin, kRounding * skin, goal)) return true;
-  in_crack_ = !planes_.leave_room();
+  in_crack_ = planes_.are_a_crack();
   for (double less = kLessSkin * skin; less >= kExact * skin; less *= kLessSkin) {
     if (planes_.nearest(Vec3(0), less, kRounding * less, goal)) return true;
   }
-  return planes_.nearest_from(at_, skin, kRounding * skin, goal);
+  return planes_.nearest_from(at_, skin, kRounding * skin, kExact * skin, goal);
 }
 
 /// Moves the ideal tool as near to the virtual one as the parts let it.

@@ -76,6 +76,17 @@ class Planes {
     return out.found && glm::dot(out.point, out.point) * (kNarrowest * kNarrowest) < 1;
   }
 
+  /// Whether two of them face each other as the sides of a crack do.
+  bool are_a_crack() const {
+    for (std::size_t a = 0; a < count_; ++a) {
+      for (std::size_t b = a + 1; b < count_; ++b) {
+        if (1 + glm::dot(planes_[a].normal, planes_[b].normal) <= 2 * kNarrowest * kNarrowest)
+          return true;
+      }
+    }
+    return false;
+  }
+
   /// The point nearest to `origin` at least `skin` above all planes; sets the multipliers.
   bool nearest(const Vec3& origin, double skin, double tolerance, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;
@@ -86,13 +97,13 @@ class Planes {
   }
 
   /// The same to the virtual tool, from `at`: no plane asks for more than is there, and none that
-  /// `at` is above is crossed.
-  bool nearest_from(const Vec3& at, double skin, double tolerance, Vec3& point) {
+  /// `at` is above is crossed, but for `rounding`.
+  bool nearest_from(const Vec3& at, double skin, double tolerance, double rounding, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;
     for (std::size_t i = 0; i < count_; ++i) {
       const double height = glm::dot(planes_[i].normal, at) - planes_[i].depth;
       spaces[i] = {planes_[i].normal, planes_[i].depth + std::min(skin, height)};
-      if (height > 0) tolerance = std::min(tolerance, 0.5 * height);
+      if (height > 0) tolerance = std::clamp(0.5 * height, rounding, tolerance);
     }
     return solve(spaces, tolerance, Vec3(0), point);
   }

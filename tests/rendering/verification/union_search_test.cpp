@@ -72,6 +72,7 @@ TEST(UnionSearch, AGapNarrowerThanTwoSkinsIsNeitherEnteredNorALimit) {
   }
   // From free space it comes onto parts that abut, between which there is no room at all.
   expect_nothing_wrong(1407, 1026);
+  EXPECT_EQ(search_union(ray_renderer(), 1408, 4350).capped, 0u);
 }
 
 TEST(UnionSearch, AGrooveThatEndsBeforeTheToolAtRestIsClosedWhereItsSkinIs) {
