@@ -207,7 +207,8 @@ void MovingBodies::find_probe_contacts(BodiesState& state, const Stroke& stroke)
 }
 
 /// The contact of the last step, where the probe is beyond its plane at the end of this one: within
-/// the step it still presses.
+/// the step it still presses. A probe that is still below the plane and not about to come out has
+/// gone past the border of what it touched: the plane ends there, and so does the contact.
 void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const {
   const BodiesState::Held& held = state.held[body];
   ProbeContact contact = held.contact;
@@ -221,7 +222,13 @@ void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t b
   spring.place = into(frame, on_probe) + shift;
   contact.force = 0;
   contact.offset = contact.tangential = Vec3(0);
+  const std::size_t others = state.contacts.size();
   place_contact(state, stroke, frame, shift, contact);
+  if (state.contacts.size() == others) return;
+  const PressingSpring& placed = state.contacts.back().spring;
+  if (placed.depth <= std::max(0.0, -placed.closing * stroke.duration)) return;
+  state.contacts.pop_back();
+  state.held[body].holds = false;
 }
 
 /// Remembers the spring that a body ends the step with, for go_on.

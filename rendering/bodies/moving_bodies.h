@@ -70,7 +70,7 @@ class BodiesState final : public MotionState {
     ContactType type = ContactType::none;
     bool balanced = false;  ///< the next two are known
     double energy = 0;      ///< J, that the body has to have when it leaves the probe
-    double impulse = 0;     ///< N s, of the contact so far
+    double leeway = 0;      ///< J, that steps may have lost or won of it and is not yet mended
   };
   std::vector<Held> held;
   std::size_t most_contacts = 0;

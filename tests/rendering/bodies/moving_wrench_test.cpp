@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/force.h"
+#include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
@@ -40,7 +41,7 @@ TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStill) {
     const Scene a = moving.scene(true, tool), b = still.scene(true, tool);
     RenderState sa = a.initial_state(), sb = b.initial_state();
     int touched = 0, split = 0;
-    for (int i = 0; i < 450; ++i) {  // one prong of the fork is the deeper one all the time
+    for (int i = 0; i < 1000; ++i) {
       const LineProbe probe = pressed(i), last = pressed(std::max(0, i - 1));
       const Rendering ra = ray_renderer().tick(a, sa, probe, 1e-3);
       const Rendering rb = ray_renderer().tick(b, sb, probe, 1e-3);
@@ -61,6 +62,112 @@ TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStill) {
     }
     EXPECT_GT(touched, 200);
     EXPECT_TRUE(tool.segments.empty() || split > 50) << split;
+  }
+}
+
+Vec3 drawn_vector(stimuli::Random& random) {
+  return {2 * random.unit() - 1, 2 * random.unit() - 1, 2 * random.unit() - 1};
+}
+
+/// A straight stroke at 0.1 m/s, from 2 mm outside of an edge or a corner of the box into
+/// it, out again, and a rest of three ticks at the end of each way.
+struct DrawnStroke {
+  static constexpr int kWay = 100, kRest = 3;
+  LineProbe start;
+  Vec3 each{0, 0, 0};  ///< m; way of a tick
+  Vec3 back{0, 0, 0};  ///< m; that of the way out
+
+  LineProbe at(int tick) const {
+    const int in = std::min(tick, kWay), out = std::clamp(tick - kWay - kRest, 0, kWay);
+    const Vec3 way = static_cast<double>(in) * each + static_cast<double>(out) * back;
+    return {start.tip + way, start.tail + way};
+  }
+};
+
+DrawnStroke drawn_stroke(stimuli::Random& random, const Vec3& half, bool corner) {
+  Vec3 outward = glm::normalize(drawn_vector(random));
+  const int along = static_cast<int>(random.below(3));
+  if (!corner) outward[along] *= 0.1;
+  Vec3 place = half;
+  for (int axis = 0; axis < 3; ++axis) place[axis] *= outward[axis] < 0 ? -1 : 1;
+  if (!corner) place[along] *= 0.6 * random.unit();
+  // Across the way in: so it passes over the edge, and a part of it touches that is not the tip.
+  const Vec3 way = glm::normalize(outward);
+  const Vec3 axis = glm::normalize(glm::cross(way, drawn_vector(random)) + 0.3 * way);
+  const Vec3 sideways = glm::cross(way, drawn_vector(random));
+  DrawnStroke stroke;
+  stroke.start.tip = place + 2e-3 * way - 0.04 * random.unit() * axis;
+  stroke.start.tail = stroke.start.tip + 0.12 * axis;
+  stroke.each = 1e-4 * glm::normalize(-way + 1.2 * sideways);
+  stroke.back = 1e-4 * glm::normalize(way + 0.5 * drawn_vector(random));
+  return stroke;
+}
+
+struct StrokeCounts {
+  int exact = 0, changes = 0, left = 0;  ///< ticks; strokes that end away
+};
+
+/// The force of a tick is the mean over it, with several contacts that of its end. Where what is
+/// touched stays the same, and at rest, that is known from the body that stands still.
+void expect_that_of_one_that_stands_still(const Tool& tool, const Pose& pose,
+                                          const DrawnStroke& stroke, StrokeCounts& counts) {
+  const Mesh mesh = box_mesh({0.06, 0.06, 0.04});
+  BodyScene moving, still;
+  moving.moves(mesh, pose, 2e7);
+  still.stands(mesh, pose);
+  const Scene a = moving.scene(true, tool), b = still.scene(true, tool);
+  RenderState sa = a.initial_state(), sb = b.initial_state();
+  Rendering before;
+  for (int i = 0; i < 2 * (DrawnStroke::kWay + DrawnStroke::kRest); ++i) {
+    const LineProbe in_body = stroke.at(i), last = stroke.at(std::max(0, i - 1));
+    const auto world = [&](const Vec3& v) { return pose.orientation * v + pose.position; };
+    const LineProbe probe{world(in_body.tip), world(in_body.tail)};
+    const Rendering ra = ray_renderer().tick(a, sa, probe, 1e-3);
+    const Rendering rb = ray_renderer().tick(b, sb, probe, 1e-3);
+    if (i == 0 && rb.contacts > 0) return;
+    const double moved = glm::distance(in_body.tip, last.tip);
+    const double step = glm::distance(rb.force, before.force);
+    // 20,000 t yield by some nanometres after all.
+    const BodyPose& now = sa.motion.bodies()[0];
+    const Quat turn = glm::conjugate(pose.orientation) * now.orientation;
+    const double yielded = glm::distance(now.centre, pose.position) +
+                           2 * 0.05 * glm::length(Vec3(turn.x, turn.y, turn.z));
+    const double rounding = 1e-6 + moving.stiffness * yielded;
+    EXPECT_LE(yielded, 5e-8) << i;
+    EXPECT_LE(glm::distance(ra.force, rb.force), step + 2e3 * moved + rounding) << i;
+    const bool same = rb.contacts == before.contacts && rb.segment == before.segment &&
+                      rb.deepest.type == before.deepest.type &&
+                      glm::dot(rb.deepest.normal, before.deepest.normal) > 1 - 1e-12;
+    if (rb.contacts > 0 && before.contacts > 0 && (same || moved == 0)) {
+      const double share = rb.contacts == 1 && moved > 0 ? 0.5 : 1;
+      const Vec3 force = glm::mix(before.force, rb.force, share);
+      EXPECT_LE(glm::distance(ra.force, force), rounding) << i;
+      ++counts.exact;
+    }
+    counts.changes += rb.contacts > 0 && before.contacts > 0 && !same;
+    before = rb;
+  }
+  counts.left += before.contacts == 0 ? 1 : 0;
+}
+
+TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStillOverEdgesAndCorners) {
+  Tool prongs = fork();
+  prongs.segments.pop_back();
+  for (const std::uint64_t seed : {3, 17}) {
+    StrokeCounts counts;
+    for (const Tool& tool : {Tool{}, prongs, fork()}) {
+      stimuli::Random random(seed);
+      for (int trial = 0; trial < 40; ++trial) {
+        const Quat turn = glm::normalize(Quat(random.unit() - 0.5, drawn_vector(random)));
+        const DrawnStroke stroke = drawn_stroke(random, {0.03, 0.03, 0.02}, trial % 2 == 0);
+        expect_that_of_one_that_stands_still(tool, {0.1 * drawn_vector(random), turn}, stroke,
+                                             counts);
+        if (HasFailure()) FAIL() << "seed " << seed << ", trial " << trial;
+      }
+    }
+    EXPECT_GT(counts.exact, 3000) << seed;
+    EXPECT_GT(counts.changes, 10) << seed;
+    EXPECT_GT(counts.left, 30) << seed;
   }
 }
 
