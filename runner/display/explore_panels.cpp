@@ -133,7 +133,9 @@ void ExploreView::draw_values() {
   table_row("Torque", moment == nullptr
                           ? "-"
                           : fixed_point(1000 * glm::length(torque_on_hand(*moment)), 1) + " mN m");
-  table_row("Scale", settings_.drawing.scale_words(settings_.looks));
+  const auto [force_scale, torque_scale] = settings_.drawing.scale_words(settings_.looks);
+  table_row("Arrows", force_scale);
+  table_row("Turns", torque_scale);
   table_row("Faults", sample.faults == 0 ? "none" : fault_words(sample.faults),
             sample.faults == 0 ? console_colour::kBright : console_colour::kBad);
   table_row("Contacts", std::to_string(r.contacts));
@@ -159,9 +161,10 @@ void ExploreView::draw_looks() {
   };
   constexpr float kQuarter = static_cast<float>(M_PI) / 2;
   for (const View& view : {View{"Front", 0, 0}, {"Right", kQuarter, 0}, {"Above", 0, kQuarter}}) {
-    ImGui::SameLine();
     if (ImGui::Button(view.name)) camera_.look_from(view.yaw, view.pitch);
+    ImGui::SameLine();
   }
+  ImGui::NewLine();
   ImGui::SetNextItemWidth(0.4F * ImGui::GetContentRegionAvail().x);
   ImGui::Combo("cut across", &cut_axis_, "nothing\0x\0y\0z\0");
   if (cut_axis_ > 0) ImGui::SliderFloat("at", &cut_at_, -1, 1, "%.2f of the size");

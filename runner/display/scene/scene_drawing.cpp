@@ -366,15 +366,16 @@ void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
                        static_cast<float>(std::min(sweep, kLongestTurn)), theme.torque});
 }
 
-std::string SceneDrawing::scale_words(const SceneDrawingSettings& settings) const {
-  char text[96];
+std::array<std::string, 2> SceneDrawing::scale_words(const SceneDrawingSettings& settings) const {
+  char arrow[48], turn[48];
   // Of a round force and torque that are a good part of what is drawn.
   const double force = round_step(size_ / arrow_scale(settings, size_));
   const double torque = round_step(kLongestTurn / turn_scale(settings));
-  std::snprintf(text, sizeof text, "%g N: %.0f mm    %g mN m: %.0f degrees", force,
-                1000 * force * arrow_scale(settings, size_), 1000 * torque,
+  std::snprintf(arrow, sizeof arrow, "%g N: %.0f mm", force,
+                1000 * force * arrow_scale(settings, size_));
+  std::snprintf(turn, sizeof turn, "%g mN m: %.0f degrees", 1000 * torque,
                 torque * turn_scale(settings) * 180 / M_PI);
-  return text;
+  return {arrow, turn};
 }
 
 ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme,
@@ -388,7 +389,10 @@ ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme
   add_tool(moment, theme, settings, out);
   add_forces(moment, theme, settings, out);
   out.caption.push_back(caption_of(moment, static_cast<double>(out.grid)));
-  if (!out.arrows.empty() || !out.turns.empty()) out.caption.push_back(scale_words(settings));
+  if (!out.arrows.empty() || !out.turns.empty()) {
+    const auto [arrow, turn] = scale_words(settings);
+    out.caption.push_back(arrow + "    " + turn);
+  }
   return out;
 }
 

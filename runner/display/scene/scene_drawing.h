@@ -1,6 +1,7 @@
 #pragma once
 // Pictures of a scene as it is touched: from what a tick was to what is drawn.
 
+#include <array>
 #include <cstddef>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -92,8 +93,8 @@ class SceneDrawing {
                          const std::vector<Pose>& poses = {}) const;
 
   double size() const { return size_; }  ///< m, radius about the objects
-  /// How long arrows and turns are, in words: "5 N: 80 mm    200 mN m: 92 degrees".
-  std::string scale_words(const SceneDrawingSettings& settings) const;
+  /// How long arrows and turns are, in words: "5 N: 80 mm" and "200 mN m: 92 degrees".
+  std::array<std::string, 2> scale_words(const SceneDrawingSettings& settings) const;
   const std::string& label(std::size_t object) const { return objects_[object].label; }
   std::size_t objects() const { return objects_.size(); }
 

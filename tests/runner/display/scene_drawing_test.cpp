@@ -164,8 +164,10 @@ TEST(TorqueTest, TheTurnSweepsInProportionAndItsScaleIsSaid) {
   // What a device gives at most, 6 N at the ends of a stylus of 0.12 m, is about half of a turn.
   moment.sample.probe.tail = {0.12, 0, 0};
   EXPECT_NEAR(sweep(3, {}), 2.9, 0.3);
-  EXPECT_EQ(drawing.scale_words({.metres_per_newton = 0.01, .radians_per_newton_metre = 10}),
-            "2 N: 20 mm    500 mN m: 286 degrees");
+  const auto [arrow, turn] =
+      drawing.scale_words({.metres_per_newton = 0.01, .radians_per_newton_metre = 10});
+  EXPECT_EQ(arrow, "2 N: 20 mm");
+  EXPECT_EQ(turn, "500 mN m: 286 degrees");
 }
 
 TEST(SceneDrawingTest, ALabelStandsJustAboveItsObject) {
