@@ -76,10 +76,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
   const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
   state.world.dropped = false;
-  const int outer_steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
-  const int inner_steps = touches ? this->inner_steps(state, last, probe, time) : 1;
-  const int steps = outer_steps * inner_steps;
-  InnerSteps inner;
+  const int steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
   for (int i = 0; i < steps; ++i) {
     const auto at = [&](int k) {
       if (k == steps) return probe;
@@ -95,8 +92,6 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
       return between(from, to, static_cast<double>(k) / steps).frame;
     };
     step(renderer, state, {at(i), at(i + 1), frame_at(i), frame_at(i + 1), time / steps, touches});
-    if (inner_steps > 1 && i >= steps - inner_steps)
-      inner.add(sum(renderer, state, Rendering{}, at(i + 1)));
   }
   state.fixed.measured_side = tool && touches ? frame[0] : outer.measured_side;
   Rendering fixed = renderer.tick(fixed_, state.fixed, probe, dt);
@@ -104,42 +99,9 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
     state.last = outer.last = probe;
     state.last_frame = frame;
     state.has_last = outer.has_last = true;
-    Rendering out = sum(renderer, state, fixed, probe);
-    if (inner_steps > 1) show_mean(inner, fixed, out);
-    return out;
+    return sum(renderer, state, fixed, probe);
   }
   return fixed;
-}
-
-/// Steps into which each of a tick's is divided, so that what may touch goes no farther in one than
-/// a lever and a normal stay what they are.
-int MovingBodies::inner_steps(const BodiesState& state, const LineProbe& from, const LineProbe& to,
-                              double duration) const {
-  constexpr double kFarthest = 5e-4;  // m
-  constexpr int kMost = 20;
-  double reach = 0;
-  if (fixed_.tool() != nullptr) {
-    for (const ToolSegment& segment : fixed_.tool()->segments)
-      reach = std::max({reach, glm::length(segment.from), glm::length(segment.to)});
-  }
-  const Vec3 d = from.tail - from.tip;
-  const double length2 = glm::dot(d, d);
-  const double longest = std::min(duration, kLongestStep);
-  double farthest = 0;
-  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
-    const BodyMotion& motion = state.world.motion[i];
-    const MovingBody& body = world_.bodies[i];
-    const Vec3 way = duration * motion.velocity;
-    const double turn = glm::length(spin_of(body.inertia, motion)) * body.radius * duration;
-    const double moved = turn + std::max(glm::distance(to.tip - from.tip, way),
-                                         glm::distance(to.tail - from.tail, way));
-    const Vec3 off = motion.centre - from.tip;
-    const double along = length2 > 0 ? std::clamp(glm::dot(off, d) / length2, 0.0, 1.0) : 0;
-    if (glm::distance(off, along * d) <= body.radius + reach + moved)
-      farthest = std::max(farthest, moved);
-  }
-  const double in_step = duration > 0 ? farthest * longest / duration : 0;
-  return static_cast<int>(std::clamp(std::ceil(in_step / kFarthest), 1.0, double{kMost}));
 }
 
 void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {

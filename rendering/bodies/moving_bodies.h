@@ -98,8 +98,6 @@ class MovingBodies final : public SceneMotion {
     double duration = 0;
     bool touches = true;  ///< false: the probe is not where it can be
   };
-  int inner_steps(const BodiesState& state, const LineProbe& from, const LineProbe& to,
-                  double duration) const;
   void step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
   void draw(BodiesState& state, double duration) const;
   void feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
@@ -116,15 +114,6 @@ class MovingBodies final : public SceneMotion {
   void settle(BodiesState& state, const Stroke& stroke) const;
   Rendering sum(const Renderer& renderer, const BodiesState& state, const Rendering& fixed,
                 const LineProbe& probe) const;
-  /// What bodies do to the hand in the inner steps of a tick.
-  struct InnerSteps {
-    int count = 0;
-    Vec3 force, torque, device2;  ///< sums over the steps
-    Rendering shown;              ///< of the last step that touched
-    std::uint32_t faults = 0;
-    void add(const Rendering& step);
-  };
-  void show_mean(const InnerSteps& inner, const Rendering& fixed, Rendering& out) const;
   void add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,
                 const LineProbe& probe, Rendering& out) const;
   Pose pose_of(const BodiesState& state, std::size_t body) const {

@@ -72,39 +72,4 @@ Rendering MovingBodies::sum(const Renderer& renderer, const BodiesState& state,
   return none;
 }
 
-void MovingBodies::InnerSteps::add(const Rendering& step) {
-  ++count;
-  force += step.force;
-  torque += step.torque;
-  device2 += step.device2;
-  faults |= step.faults;
-  if (step.contacts > 0) shown = step;
-}
-
-/// The force of a tick is the mean over it, so that the hand gets the momentum that bodies lose.
-/// \param out  with what the bodies do in the last inner step
-void MovingBodies::show_mean(const InnerSteps& inner, const Rendering& fixed,
-                             Rendering& out) const {
-  const double share = 1.0 / inner.count;
-  const Vec3 force = share * inner.force;
-  out.force = fixed.force + force;
-  out.torque = fixed.torque + share * inner.torque;
-  out.device2 = fixed.device2 + share * inner.device2;
-  out.device1 = out.force - out.device2;
-  out.faults |= inner.faults;
-  const Rendering& shown = inner.shown;
-  if (shown.contacts == 0) return;
-  const double strength = glm::length(shown.force);
-  const double depth =
-      strength > 0 ? shown.deepest.depth * std::min(1.0, glm::length(force) / strength) : 0;
-  out.contacts = fixed.contacts + shown.contacts;
-  if (fixed.object >= 0 && depth <= fixed.deepest.depth) return;
-  out.deepest = shown.deepest;
-  out.deepest.depth = depth;
-  out.ideal = shown.ideal;
-  out.ideal_side = shown.ideal_side;
-  out.object = shown.object;
-  out.segment = shown.segment;
-}
-
 }  // namespace palpate::rendering

@@ -171,7 +171,6 @@ struct TipBounce {
   double mass, stiffness, off;
   Vec3 spin{0, 0, 0};
   Vec3 hand{0, 0, 0};  ///< m/s
-  double speed = 0.3;  ///< m/s, of the body
 };
 
 struct TipResult {
@@ -185,7 +184,7 @@ TipResult bounce_on_tip(const TipBounce& of, double dt) {
   BodyScene s;
   s.stiffness = of.stiffness;
   stimuli::Body& body = s.moves(box_mesh({0.05, 0.1, 0.06}), {{-0.05, 0, 0}, kAsItIs}, of.mass);
-  body.velocity = {of.speed, 0, 0};
+  body.velocity = {0.3, 0, 0};
   body.spin = of.spin;
   const Scene scene = s.scene();
   RenderState state = scene.initial_state();
@@ -203,9 +202,7 @@ TipResult bounce_on_tip(const TipBounce& of, double dt) {
     result.work -= dt * glm::dot(r.force, of.hand);
     result.ticks_in_contact += r.contacts > 0 ? 1 : 0;
     away = r.contacts > 0 || result.ticks_in_contact == 0 ? 0 : away + 1;
-    if (of.speed < 1) {  // a fast one turns over, onto its side
-      EXPECT_GE(r.force.x, -1e-12);
-    }
+    EXPECT_GE(r.force.x, -1e-12);
   }
   const BodyPose& now = state.motion.bodies()[0];
   result.energy_after = energy_of(scene, state);
@@ -224,24 +221,6 @@ TEST(Bounce, OffTheMiddleOnTheTipEnergyStays) {
           EXPECT_GT(r.ticks_in_contact, 0);
           EXPECT_NEAR(r.energy_after / r.energy_before, 1, 1e-9)
               << mass << " " << stiffness << " " << off << " " << spin.y;
-        }
-      }
-    }
-  }
-}
-
-/// A light one goes through a good part of itself and turns far within a millisecond.
-TEST(Bounce, FastOnTheTipItGetsNoEnergy) {
-  for (const double mass : {1e-3, 0.01, 0.1, 1.0}) {
-    for (const double stiffness : {3e3, 1e4, 5e4}) {
-      for (const double speed : {1.0, 3.0, 10.0}) {
-        for (const double off : {0.0, 0.01, 0.02, 0.03, 0.04}) {
-          TipBounce of{mass, stiffness, off};
-          of.speed = speed;
-          const TipResult r = bounce_on_tip(of, 1e-3);
-          EXPECT_GT(r.ticks_in_contact, 0);
-          EXPECT_LE(r.energy_after / r.energy_before, 1.01)
-              << mass << " " << stiffness << " " << speed << " " << off;
         }
       }
     }
