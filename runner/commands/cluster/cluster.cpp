@@ -257,8 +257,8 @@ void describe(CommandLine& line) {
       "many\n"
       "  palpate cluster plan --db pilot.db --test model --trials 10,20,40,76 --dir power\n"
       "  palpate cluster status people\n"
-      "  parallel --sshloginfile hosts people/shard.sh ::: $(seq 64) && people/finish.sh    "
-      "without Slurm";
+      "  parallel --sshloginfile hosts \"$PWD\"/people/shard.sh ::: $(seq 64) && people/finish.sh\n"
+      "      (GNU parallel, without Slurm; DIR begun with --no-submit)";
 }
 
 void add_shards(CommandLine& line, ClusterSettings& settings) {
